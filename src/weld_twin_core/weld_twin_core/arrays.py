@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Read-only float64 copies with shape and finiteness checked at the public boundary."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import DataError
+
+Array = NDArray[np.float64]
+
+
+def readonly(
+    value: ArrayLike, shape: tuple[int | None, ...], name: str, *, finite: bool = True
+) -> Array:
+    """
+    Copy a value into a read-only float64 array and check it.
+
+    Parameters
+    ----------
+    value : array_like
+        What the caller gave.
+    shape : tuple
+        Wanted shape; ``None`` matches any length.
+    name : str
+        How the message names the value.
+    finite : bool
+        Refuse NaN and infinity.
+
+    Raises
+    ------
+    DataError
+        Not numeric, wrong shape, or not finite; the message names the first bad index.
+
+    """
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError(f'{name} must be numbers, got {_short(value)}') from None
+    if array.ndim != len(shape) or any(
+        want is not None and want != got for want, got in zip(shape, array.shape, strict=True)
+    ):
+        wanted = '(' + ', '.join('any' if s is None else str(s) for s in shape) + ')'
+        raise DataError(f'{name} must have shape {wanted}, got {array.shape}')
+    if finite and not np.isfinite(array).all():
+        bad = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        count = int((~np.isfinite(array)).sum())
+        raise DataError(
+            f'{name} has {count} value(s) that are not finite, the first at index {bad}; '
+            'drop or repair those samples'
+        )
+    array.setflags(write=False)
+    return array
+
+
+def increasing(t: ArrayLike, name: str) -> Array:
+    """
+    Return stamps, shape (n,) [s], checked to be strictly increasing.
+
+    Raises
+    ------
+    DataError
+        A stamp repeats or goes back; the message names the sample.
+
+    """
+    stamps = readonly(t, (None,), name)
+    steps = np.diff(stamps)
+    if steps.size and steps.min() <= 0.0:
+        k = int(np.argmax(steps <= 0.0))
+        raise DataError(
+            f'{name} must increase, but sample {k + 1} is {-steps[k]:.6g} s before sample {k}; '
+            'sort the samples or drop the repeated ones'
+        )
+    return stamps
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + '...'

@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Hayati's turn about y, for axes that are nearly parallel (IEEE CDC 1983)."""
+
+from dataclasses import dataclass
+
+from .base import ChannelError, Parameter, Stage, Value, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class AxisParallelism(ChannelError):
+    """The tilt that alpha cannot express where two axes are nearly parallel."""
+
+    joint: str
+    dbeta: Value = 0.0
+
+    name = 'axis_parallelism'
+    of = 'link'
+    stage = Stage.LINK
+    channel = 'beta'
+    parameters = (Parameter('dbeta', 'rad', typical=5e-4),)

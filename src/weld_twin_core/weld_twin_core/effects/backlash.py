@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Backlash: play (dead-zone hysteresis) of full width delta.
+
+The paper writes "theta - delta where the direction changes, theta otherwise" (eq. II.iii.d). Read
+literally, the joint jumps for the one sample at which it reverses and is perfect again at the next:
+the size of the deviation depends on the sample rate, and a slow reversal costs nothing. A gear
+with a gap behaves as the *play operator*: the output stays while the input crosses the gap and
+then trails by half of it until the next reversal. Play is the default; the literal form is the
+variant ``form: reversal``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import scan
+from ..arrays import Array
+from ..chain import Shift
+from ..errors import ModelError
+from ..robot import Robot
+from .base import Effect, MemoryEffect, Parameter, Stage, Value, View, register
+
+FORMS = ('play', 'reversal')
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class Backlash(MemoryEffect):
+    """A gap in the drive of one joint; before the first sample the gap is centred."""
+
+    joint: str
+    width: Value = 0.0
+    form: str = 'play'
+
+    name = 'backlash'
+    of = 'joint'
+    stage = Stage.PLAY
+    parameters = (Parameter('width', 'rad', typical=5e-4, lower=0.0, linear=False),)
+    options = ('form',)
+    needs = frozenset({'order'})
+
+    def check(self, robot: Robot) -> None:
+        """Refuse an unknown form and a negative width."""
+        super().check(robot)
+        if self.form not in FORMS:
+            raise ModelError(f'backlash: form must be one of {FORMS}, got {self.form!r}')
+
+    def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
+        """Return output minus input of the gap, and its output (or last motion) as state."""
+        i = view.robot.index(self.joint)
+        q = view.joint(i)
+        if self.form == 'reversal':
+            flips, state = _reversals(q, state)
+            return {('q', i): -self.number('width') * flips}, state
+        output = scan.play(q, self.number('width'), q[..., 0] if state is None else state)
+        return {('q', i): output - q}, output[..., -1]
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the side of the gap last touched, -1/2 or +1/2; 0 before it is first touched."""
+        i = view.robot.index(self.joint)
+        q = view.joint(i)
+        if self.form == 'reversal':
+            return [{('q', i): -_reversals(q, None)[0]}]
+        contact, touched = self._contact(q)
+        side = np.take_along_axis(np.sign(contact), np.maximum(touched, 0), -1)
+        return [{('q', i): np.where(touched >= 0, 0.5 * side, 0.0)}]
+
+    def push(self, view: View, tangent: Array) -> Array:
+        """Hold the tangent of the last contact while the gap is being crossed."""
+        if self.form == 'reversal':
+            return tangent
+        _, touched = self._contact(view.joint(view.robot.index(self.joint)))
+        at = np.broadcast_to(np.maximum(touched, 0), tangent.shape)
+        return np.take_along_axis(tangent, at, -1)
+
+    def _contact(self, q: Array) -> tuple[Array, Array]:
+        """Return output minus input where a side is touched (else 0), and when it last was."""
+        width = self.number('width')
+        lag = scan.play(q, width, q[..., 0]) - q
+        # Whatever is within rounding of a side rests on it; a closed gap always rests on the
+        # side opposite to the motion.
+        step = np.diff(q, axis=-1, prepend=q[..., :1])
+        side = np.where(width > 0.0, lag, -step)
+        resting = np.abs(side) >= np.where(width > 0.0, 0.5 * width * (1.0 - 1e-9), 1e-300)
+        return np.where(resting, side, 0.0), scan.last_true(resting)
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
+        """Yield play of a small, a usual and a large width: how it engages depends on width."""
+        for width in (5e-5, 5e-4, 2e-3):
+            yield cls(str(joint), width)
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return the displacement per unit of width."""
+        return [{key: value / self.width for key, value in self.displace(view).items()}]
+
+    def from_atoms(self, coefficients: Array) -> Effect:
+        """Return the gap whose width is the coefficient, never negative."""
+        return Backlash(self.joint, max(float(coefficients[0]), 0.0), self.form)
+
+
+def _reversals(q: Array, state: Any) -> tuple[Array, Any]:
+    """Return 1.0 where the direction differs from that of the last motion, and what to carry."""
+    before, moved = state if state is not None else (q[..., 0], np.zeros(q.shape[:-1]))
+    path = np.concatenate([np.asarray(before)[..., None], q], axis=-1)
+    direction = np.sign(np.diff(path, axis=-1))
+    # Prefix the direction carried over, so that index 0 always holds a motion or rest.
+    direction = np.concatenate([np.asarray(moved)[..., None], direction], axis=-1)
+    last = np.maximum(scan.last_true(direction != 0.0), 0)
+    held = np.take_along_axis(direction, last, -1)
+    flips = (held[..., 1:] * held[..., :-1] < 0.0).astype(np.float64)
+    return flips, (q[..., -1], held[..., -1])

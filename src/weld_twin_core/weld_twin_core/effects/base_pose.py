@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Base pose: the robot does not stand where the model says (paper IV.ii, initialization offset)."""
+
+from dataclasses import dataclass
+
+from .base import FrameError, Value, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class BasePose(FrameError):
+    """The base is displaced by xyz in the world and turned by rotvec about its own origin."""
+
+    xyz: Value = (0.0, 0.0, 0.0)
+    rotvec: Value = (0.0, 0.0, 0.0)
+
+    name = 'base_pose'
+    channel = 'base'

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Cartesian compliance: the tool yields to the force on it, dx = K^-1 F (paper, eq. II.v)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import Shift
+from .base import Effect, Parameter, Stage, Value, View, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class CartesianCompliance(Effect):
+    """One compliance along each axis of the tool frame (or of the wrench's own frame)."""
+
+    compliance: Value = (0.0, 0.0, 0.0)
+
+    name = 'cartesian_compliance'
+    of = 'robot'
+    stage = Stage.POSE
+    parameters = (Parameter('compliance', 'm/N', size=3, typical=1e-6),)
+    needs = frozenset({'wrench'})
+
+    def _axis_forces(self, view: View) -> list[Array]:
+        """Return for each axis the force along it as a world vector, shape (..., N, 3)."""
+        if view.wrench is None:
+            return [np.zeros(view.q.shape[:-1] + (3,))] * 3
+        chain = view.frames
+        frame = chain.rotation if view.wrench_frame == 'tool' else chain.base_rotation
+        return [frame[..., :, k] * view.wrench[:, k, None] for k in range(3)]
+
+    def displace(self, view: View) -> Shift:
+        """Return the deflection on the pose."""
+        total = sum(
+            np.asarray(self.number('compliance', k))[..., None] * force
+            for k, force in enumerate(self._axis_forces(view))
+        )
+        return {('pose', j): total[..., j] for j in range(3)}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the force along each axis."""
+        forces = self._axis_forces(view)
+        return [{('pose', j): force[..., j] for j in range(3)} for force in forces]

@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Drift: the frame creeps at a constant rate from the recording's first stamp on."""
+
+from dataclasses import dataclass
+
+from ..chain import Shift
+from .base import Effect, Parameter, Stage, Value, View, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class Drift(Effect):
+    """A creeping fixture, instrument or pedestal."""
+
+    xyz_rate: Value = (0.0, 0.0, 0.0)
+
+    name = 'drift'
+    of = 'robot'
+    stage = Stage.POSE
+    parameters = (Parameter('xyz_rate', 'm/s', size=3, typical=1e-6),)
+    needs = frozenset({'time'})
+
+    def displace(self, view: View) -> Shift:
+        """Return rate times elapsed time on the pose."""
+        return {('pose', k): self.number('xyz_rate', k) * view.elapsed for k in range(3)}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return elapsed time along each axis."""
+        return [{('pose', k): view.elapsed} for k in range(3)]

@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint compliance: theta -> theta + compliance * tau, a linear spring in the drive."""
+
+from dataclasses import dataclass
+
+from ..chain import Shift
+from .base import Effect, Parameter, Stage, Value, View, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class JointCompliance(Effect):
+    """The joint yields to the load torque of links, payload and tool wrench."""
+
+    joint: str
+    compliance: Value = 0.0
+
+    name = 'joint_compliance'
+    of = 'joint'
+    stage = Stage.ELASTIC
+    parameters = (Parameter('compliance', 'rad/(N m)', typical=1e-5),)
+    needs = frozenset({'load'})
+
+    def displace(self, view: View) -> Shift:
+        """Return compliance times load torque; a positive compliance sags."""
+        i = view.robot.index(self.joint)
+        return {('q', i): self.number('compliance') * view.shift[('tau', i)]}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the load torque."""
+        i = view.robot.index(self.joint)
+        return [{('q', i): view.shift[('tau', i)]}]

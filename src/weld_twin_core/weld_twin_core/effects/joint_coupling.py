@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint coupling: theta_i -> theta_i + ratio * theta_source, as in geared wrists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ..chain import Shift
+from ..errors import ModelError
+from ..robot import Robot
+from .base import Effect, Parameter, Stage, Value, View, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class JointCoupling(Effect):
+    """Motion of one joint leaks into another."""
+
+    joint: str
+    source: str = ''
+    ratio: Value = 0.0
+
+    name = 'joint_coupling'
+    of = 'joint'
+    stage = Stage.JOINT
+    parameters = (Parameter('ratio', '-', typical=3e-4),)
+    options = ('source',)
+
+    def check(self, robot: Robot) -> None:
+        """Refuse an unknown source, and a joint coupled with itself."""
+        super().check(robot)
+        robot.index(self.source)
+        if self.source == self.joint:
+            raise ModelError('joint_coupling: source and joint are the same; use gear_ratio')
+
+    def displace(self, view: View) -> Shift:
+        """Return ratio times the source's angle on the joint."""
+        source = view.joint(view.robot.index(self.source))
+        return {('q', view.robot.index(self.joint)): self.number('ratio') * source}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the source's angle."""
+        return [{('q', view.robot.index(self.joint)): view.joint(view.robot.index(self.source))}]
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
+        """Yield one instance per neighbour along the chain, where gears share a housing."""
+        i = view.robot.index(str(joint))
+        for k in (i - 1, i + 1):
+            if 0 <= k < view.robot.n:
+                yield cls(str(joint), view.robot.joint_names[k], 0.0)

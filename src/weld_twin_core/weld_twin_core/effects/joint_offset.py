@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint offset: theta -> theta + offset (paper, eq. II.iii.a)."""
+
+from dataclasses import dataclass
+
+from .base import ChannelError, Parameter, Stage, Value, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class JointOffset(ChannelError):
+    """A constant encoder or mastering error of one joint."""
+
+    joint: str
+    offset: Value = 0.0
+
+    name = 'joint_offset'
+    of = 'joint'
+    stage = Stage.JOINT
+    channel = 'q'
+    parameters = (Parameter('offset', 'rad', typical=5e-4),)

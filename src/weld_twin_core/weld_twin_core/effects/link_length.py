@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Link length: a -> a + da (paper, eq. II.iii.b)."""
+
+from dataclasses import dataclass
+
+from .base import ChannelError, Parameter, Stage, Value, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class LinkLength(ChannelError):
+    """A wrong length of the common normal of one DH row."""
+
+    joint: str
+    da: Value = 0.0
+
+    name = 'link_length'
+    of = 'link'
+    stage = Stage.LINK
+    channel = 'a'
+    parameters = (Parameter('da', 'm', typical=2e-4),)

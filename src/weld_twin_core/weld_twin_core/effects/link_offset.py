@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Link offset: d -> d + dd."""
+
+from dataclasses import dataclass
+
+from .base import ChannelError, Parameter, Stage, Value, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class LinkOffset(ChannelError):
+    """A wrong offset along the axis of one DH row."""
+
+    joint: str
+    dd: Value = 0.0
+
+    name = 'link_offset'
+    of = 'link'
+    stage = Stage.LINK
+    channel = 'd'
+    parameters = (Parameter('dd', 'm', typical=2e-4),)

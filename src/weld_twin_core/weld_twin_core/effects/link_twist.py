@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Link twist: alpha -> alpha + dalpha (paper, eq. II.iii.c)."""
+
+from dataclasses import dataclass
+
+from .base import ChannelError, Parameter, Stage, Value, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class LinkTwist(ChannelError):
+    """A wrong angle between the axes of one DH row."""
+
+    joint: str
+    dalpha: Value = 0.0
+
+    name = 'link_twist'
+    of = 'link'
+    stage = Stage.LINK
+    channel = 'alpha'
+    parameters = (Parameter('dalpha', 'rad', typical=5e-4),)

@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Measurement scale: the instrument reads (1 + scale) times the position in its own frame."""
+
+from dataclasses import dataclass
+
+from ..chain import Shift
+from .base import Effect, Parameter, Stage, Value, View, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class MeasurementScale(Effect):
+    """A wrong unit of length of the measuring system, about the origin of its frame."""
+
+    scale: Value = 0.0
+
+    name = 'measurement_scale'
+    of = 'robot'
+    stage = Stage.POSE
+    parameters = (Parameter('scale', '-', typical=5e-5),)
+
+    def displace(self, view: View) -> Shift:
+        """Return scale times position on the pose."""
+        position = view.frames.position
+        return {('pose', k): self.number('scale') * position[..., k] for k in range(3)}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the position."""
+        position = view.frames.position
+        return [{('pose', k): position[..., k] for k in range(3)}]

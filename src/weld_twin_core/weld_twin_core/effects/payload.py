@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Payload: a mass the model does not know, visible through the joints' compliance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import Shift
+from ..dynamics import payload_torque
+from .base import Effect, Parameter, Stage, Value, View, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class Payload(Effect):
+    """``mass`` is added to the declared payload, its centre at ``com`` of the tool frame."""
+
+    mass: Value = 0.0
+    com: Value = (0.0, 0.0, 0.0)
+
+    name = 'payload'
+    of = 'robot'
+    stage = Stage.LOAD
+    parameters = (
+        Parameter('mass', 'kg', typical=1.0),
+        Parameter('com', 'm', size=3, typical=0.05, linear=False),
+    )
+
+    def displace(self, view: View) -> Shift:
+        """Return the extra torque on the 'tau' channel of every joint."""
+        com = np.asarray(self.com, dtype=np.float64)
+        com = com[..., None, :] if com.ndim > 1 else com
+        return _on_joints(payload_torque(view.robot, view.frames, self.number('mass'), com))
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return d torque by mass, and by each component of the centre."""
+        com = np.asarray(self.com, dtype=np.float64)
+        robot, chain = view.robot, view.frames
+        out: list[Shift | None] = [_on_joints(payload_torque(robot, chain, 1.0, com))]
+        origin = payload_torque(robot, chain, 1.0, np.zeros(3))
+        for k in range(3):
+            lever = payload_torque(robot, chain, 1.0, np.eye(3)[k]) - origin
+            out.append(_on_joints(self.number('mass') * lever))
+        return out
+
+
+def _on_joints(torque: Array) -> Shift:
+    return {('tau', i): torque[i] for i in range(torque.shape[0])}

@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Thermal growth: a, d -> (1 + coefficient dT) a, d, with dT measured or a warm-up curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import Channel, Shift
+from ..errors import DataError, ModelError
+from ..robot import Robot
+from .base import Effect, Parameter, Stage, Value, View, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class ThermalGrowth(Effect):
+    """
+    Links grow with temperature against ``reference`` [degC].
+
+    ``links`` names the joints whose rows grow (all when left out). Without a recorded
+    temperature, ``warmup: [rise, time_constant]`` [K, s] stands in for it.
+    """
+
+    coefficient: Value = 0.0
+    reference: float = 20.0
+    links: Sequence[str] | None = None
+    warmup: Sequence[float] | None = None
+
+    name = 'thermal_growth'
+    of = 'links'
+    stage = Stage.LINK
+    parameters = (Parameter('coefficient', '1/K', typical=1.2e-5),)
+    options = ('reference', 'links', 'warmup')
+    needs = frozenset({'temperature'})
+
+    def check(self, robot: Robot) -> None:
+        """Refuse unknown links and an incomplete warm-up curve."""
+        super().check(robot)
+        for name in self.links or ():
+            robot.index(name)
+        if self.warmup is not None and len(self.warmup) != 2:
+            raise ModelError('thermal_growth: warmup needs [rise in K, time constant in s]')
+
+    def rise(self, view: View) -> Array:
+        """
+        Return the temperature above the reference, shape (N,) [K].
+
+        Raises
+        ------
+        DataError
+            There is neither a recorded temperature nor a warm-up curve.
+
+        """
+        if self.warmup is not None:
+            return self.warmup[0] * -np.expm1(-view.elapsed / self.warmup[1])
+        if view.temperature is None:
+            raise DataError(
+                'thermal_growth needs a temperature: record /temperature, or give warmup'
+            )
+        return view.temperature - self.reference
+
+    def _lengths(self, view: View) -> list[tuple[Channel, float]]:
+        robot = view.robot
+        rows = range(robot.n) if self.links is None else [robot.index(k) for k in self.links]
+        lengths = [((key, i), float(getattr(robot, key)[i])) for i in rows for key in ('a', 'd')]
+        return [(channel, length) for channel, length in lengths if length != 0.0]
+
+    def displace(self, view: View) -> Shift:
+        """Return the growth of every length; travel of a prismatic joint does not grow."""
+        growth = self.number('coefficient') * self.rise(view)
+        return {channel: length * growth for channel, length in self._lengths(view)}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return length times temperature rise."""
+        rise = self.rise(view)
+        return [{channel: length * rise for channel, length in self._lengths(view)}]

@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Time delay: the measurement clock is late against the joint clock."""
+
+from dataclasses import dataclass
+
+from ..chain import Shift
+from .base import Effect, Parameter, Stage, Value, View, register, single
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class TimeDelay(Effect):
+    """A measurement stamped t shows the robot as it was at t - delay."""
+
+    delay: Value = 0.0
+
+    name = 'time_delay'
+    of = 'robot'
+    stage = Stage.CLOCK
+    parameters = (Parameter('delay', 's', typical=5e-3),)
+    needs = frozenset({'velocity', 'time'})
+
+    def displace(self, view: View) -> Shift:
+        """Return the delay on the 'clock' channel; the twin samples that much earlier."""
+        return single(('clock', 0), self.number('delay'), view)
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return minus the joint velocity on every joint."""
+        return [{('q', i): -view.qd[..., i] for i in range(view.robot.n)}]

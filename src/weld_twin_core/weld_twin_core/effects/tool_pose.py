@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tool pose: the tool is not mounted where the model says."""
+
+from dataclasses import dataclass
+
+from .base import FrameError, Value, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class ToolPose(FrameError):
+    """The tool centre point is displaced by xyz of the flange; the tool turns by rotvec of itself."""
+
+    xyz: Value = (0.0, 0.0, 0.0)
+    rotvec: Value = (0.0, 0.0, 0.0)
+
+    name = 'tool_pose'
+    channel = 'tool'

@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Transmission ripple: theta -> theta + sum A sin(n theta + phase), n in cycles per turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import Shift
+from .base import Effect, Parameter, Stage, Value, View, register
+
+MAX_ORDER = 100
+"""Highest order a search considers: one per tooth of a 100:1 strain-wave gear."""
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class TransmissionRipple(Effect):
+    """Periodic error of the gear, one or several orders at once (numbers, or lists)."""
+
+    joint: str
+    amplitude: Value = 0.0
+    order: Value = 1.0
+    phase: Value = 0.0
+
+    name = 'transmission_ripple'
+    of = 'joint'
+    stage = Stage.JOINT
+    parameters = (
+        Parameter('amplitude', 'rad', size=0, typical=2e-4),
+        Parameter('order', '1/rev', size=0, lower=0.0, differentiable=False, linear=False),
+        Parameter('phase', 'rad', size=0, linear=False),
+    )
+
+    def _terms(self, view: View) -> Iterable[tuple[Array, Array, Array]]:
+        theta = view.joint(view.robot.index(self.joint))
+        count = {np.asarray(getattr(self, p.name)).ndim for p in self.parameters}
+        many = max(count) > 0
+        orders = np.atleast_1d(np.asarray(self.order, dtype=np.float64))
+        for k in range(orders.shape[-1] if many else 1):
+            index = k if many else None
+            phase = self.number('phase', index)
+            order = self.number('order', index)
+            yield self.number('amplitude', index), order, order * theta + phase
+
+    def displace(self, view: View) -> Shift:
+        """Return the sum of sines on the joint."""
+        total = sum(a * np.sin(angle) for a, _, angle in self._terms(view))
+        return {('q', view.robot.index(self.joint)): total}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return d/d amplitude of every order, None for the orders, d/d phase of every order."""
+        site = ('q', view.robot.index(self.joint))
+        terms = list(self._terms(view))
+        amplitude: list[Shift | None] = [{site: np.sin(angle)} for _, _, angle in terms]
+        phase: list[Shift | None] = [{site: a * np.cos(angle)} for a, _, angle in terms]
+        return amplitude + [None] * len(terms) + phase
+
+    def slope(self, view: View) -> Shift:
+        """Return sum A n cos(n theta + phase)."""
+        total = sum(a * n * np.cos(angle) for a, n, angle in self._terms(view))
+        return {('q', view.robot.index(self.joint)): total}
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
+        """Yield one instance per integer order that the joint's range of motion can tell."""
+        for order in range(1, MAX_ORDER + 1):
+            yield cls(str(joint), 0.0, float(order), 0.0)
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return sine and cosine of every order, so that amplitude and phase become linear."""
+        site = ('q', view.robot.index(self.joint))
+        theta = view.joint(site[1])
+        orders = np.atleast_1d(np.asarray(self.order, dtype=np.float64))
+        return [{site: f(n * theta)} for n in orders for f in (np.sin, np.cos)]
+
+    def from_atoms(self, coefficients: Array) -> Effect:
+        """Return amplitude and phase of sine and cosine coefficients, pairs in `atoms` order."""
+        sine, cosine = np.asarray(coefficients, dtype=np.float64).reshape(-1, 2).T
+        amplitude, phase = np.hypot(sine, cosine), np.arctan2(cosine, sine)
+        if np.ndim(self.order) == 0:
+            return TransmissionRipple(self.joint, float(amplitude[0]), self.order, float(phase[0]))
+        return TransmissionRipple(self.joint, amplitude, self.order, phase)

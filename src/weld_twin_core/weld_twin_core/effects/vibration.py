@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Vibration: x'' + 2 damping w x' + w^2 x = -gain theta'', theta -> theta + x, w = 2 pi frequency.
+
+A command that is straight between samples accelerates in kicks at the samples only, so the
+response is a free decay between kicks: one complex number z per joint, x = Im z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import scan
+from ..arrays import Array
+from ..chain import Shift
+from .base import Effect, MemoryEffect, Parameter, Stage, Value, View, register
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class Vibration(MemoryEffect):
+    """Lightly damped oscillation of one joint, excited by its acceleration; gain 1 is a free end."""
+
+    joint: str
+    frequency: Value = 10.0
+    damping: Value = 0.05
+    gain: Value = 0.0
+
+    name = 'vibration'
+    of = 'joint'
+    stage = Stage.SERVO
+    parameters = (
+        Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False),
+        Parameter('damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False),
+        Parameter('gain', '-', typical=0.3),
+    )
+    needs = frozenset({'velocity', 'time'})
+
+    def _mode(self) -> tuple[Array, Array]:
+        """Return the complex pole and the damped angular frequency [1/s]."""
+        w = 2.0 * np.pi * self.number('frequency')
+        damped = w * np.sqrt(1.0 - self.number('damping') ** 2)
+        return -self.number('damping') * w + 1j * damped, damped
+
+    def _kicks(self, view: View, q: Array, state: Any) -> tuple[Array, Array, Any]:
+        """Return the steps in time, the jump of velocity before each, and what to carry."""
+        rest = np.zeros(q.shape[:-1], complex)
+        # The velocity before the first step is not known; NaN marks it, and it kicks nothing.
+        start = (view.t[0], q[..., 0], np.full(q.shape[:-1], np.nan), rest)
+        t0, q0, rate0, z0 = start if state is None else state
+        dt = np.diff(view.t, prepend=t0)
+        change = np.diff(q, axis=-1, prepend=np.asarray(q0)[..., None])
+        before = np.asarray(rate0)[..., None]
+        rate = np.where(dt > 0.0, change / np.where(dt > 0.0, dt, 1.0), before)
+        kick = np.nan_to_num(np.diff(rate, axis=-1, prepend=before))
+        return dt, kick, (view.t[-1], q[..., -1], rate[..., -1], z0)
+
+    def _response(self, view: View, state: Any) -> tuple[Array, Array, Array, Array, Any]:
+        """Return the response z at gain 1, its decay, steps and kicks, and what to carry."""
+        q = view.joint(view.robot.index(self.joint))
+        dt, kick, (t, last, rate, z0) = self._kicks(view, q, state)
+        pole, damped = self._mode()
+        decay = np.exp(pole * dt)
+        z = scan.linear(decay, -decay * kick / damped, z0)
+        return z, decay, dt, kick, (t, last, rate, z[..., -1])
+
+    def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
+        """Return the oscillation on the joint's channel."""
+        i = view.robot.index(self.joint)
+        if view.static:
+            return {('q', i): np.zeros_like(view.joint(i))}, None
+        z, _, _, _, state = self._response(view, state)
+        return {('q', i): self.number('gain') * z.imag}, state
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return d/d frequency, damping and gain, by the recursion's own derivative."""
+        i = view.robot.index(self.joint)
+        if view.static:
+            zero: list[Shift | None] = [{('q', i): np.zeros_like(view.joint(i))}] * 3
+            return zero
+        z, decay, dt, kick, _ = self._response(view, None)
+        zeta, gain, turn = self.number('damping'), self.number('gain'), 2.0 * np.pi
+        pole, damped = self._mode()
+        w, root = turn * self.number('frequency'), np.sqrt(1.0 - zeta**2)
+        out: list[Shift | None] = []
+        for d_pole, d_log_damped in (
+            (pole / w * turn, turn / w),
+            (w * (-1.0 - 1j * zeta / root), -zeta / root**2),
+        ):
+            drive = decay * kick / damped * d_log_damped + dt * d_pole * z
+            out.append({('q', i): gain * scan.linear(decay, drive, np.zeros(z.shape[:-1])).imag})
+        return [*out, {('q', i): z.imag}]
+
+    def push(self, view: View, tangent: Array) -> Array:
+        """Add the oscillation that the tangent itself excites."""
+        if view.static:
+            return tangent
+        dt, kick, _ = self._kicks(view, tangent, None)
+        pole, damped = self._mode()
+        decay = np.exp(pole * dt)
+        z = scan.linear(decay, -decay * kick / damped, np.zeros(tangent.shape[:-1]))
+        return tangent + self.number('gain') * z.imag
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
+        """Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them."""
+        if view.static or view.t.size < 3:
+            return
+        highest = 0.4 / float(np.median(np.diff(view.t)))
+        for frequency in np.geomspace(2.0, 40.0, 22):
+            if frequency < highest:
+                yield cls(str(joint), float(frequency), 0.05, 0.0)
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return both quadratures of the response, so that frequency may be a little off."""
+        i = view.robot.index(self.joint)
+        z = self._response(view, None)[0]
+        return [{('q', i): z.imag}, {('q', i): z.real}]
+
+    def from_atoms(self, coefficients: Array) -> Effect:
+        """Return the mode whose gain is the in-phase coefficient."""
+        return Vibration(self.joint, self.frequency, self.damping, float(coefficients[0]))

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What was commanded and what was measured: several streams, each on its own clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from .arrays import Array, increasing, readonly
+from .errors import DataError
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotion:
+    """
+    The joint stream.
+
+    Attributes
+    ----------
+    t : array, shape (N,) [s]
+        Stamps on the joint clock, strictly increasing, counted from the recording's epoch.
+    q : array, shape (N, n) [rad or m]
+    qd : array, shape (N, n) [rad/s or m/s], optional
+        Velocity where the controller gives it.
+    static : bool
+        Each row is a station at rest, visited in order; nothing is known of the motion between.
+
+    """
+
+    t: Array
+    q: Array
+    qd: Array | None = None
+    static: bool = False
+
+    def __post_init__(self) -> None:
+        t = increasing(self.t, 'joint stamps')
+        q = readonly(self.q, (t.size, None), 'joint positions')
+        if t.size == 0:
+            raise DataError('the joint stream is empty')
+        object.__setattr__(self, 't', t)
+        object.__setattr__(self, 'q', q)
+        if self.qd is not None:
+            object.__setattr__(self, 'qd', readonly(self.qd, q.shape, 'joint velocities'))
+
+    def _spline(self) -> CubicHermiteSpline:
+        spline = self.__dict__.get('_cached_spline')
+        if spline is None:
+            spline = CubicHermiteSpline(self.t, self.q, self.velocity, axis=0)
+            object.__setattr__(self, '_cached_spline', spline)
+        return spline
+
+    @property
+    def velocity(self) -> Array:
+        """Return joint velocity, shape (N, n): as measured, else by second-order differences."""
+        if self.static or self.t.size < 2:
+            return np.zeros_like(self.q)
+        if self.qd is not None:
+            return self.qd
+        edge = 2 if self.t.size > 2 else 1
+        return np.gradient(self.q, self.t, axis=0, edge_order=edge)
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """
+        Return joint position and velocity at other times, shape t.shape + (n,).
+
+        Cubic Hermite between samples: a planned motion is smooth, and at 125 Hz a straight line
+        between samples would be wrong by more than a laser tracker's noise. Times outside the
+        stream take its first or last position at rest.
+        """
+        if self.static or self.t.size < 2:
+            index = np.abs(np.asarray(t)[..., None] - self.t).argmin(axis=-1)
+            return self.q[index], np.zeros(np.shape(t) + self.q.shape[1:])
+        inside = np.clip(t, self.t[0], self.t[-1])
+        spline = self._spline()
+        moving = (inside == t)[..., None]
+        return spline(inside), np.where(moving, spline(inside, 1), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """
+    Measured tool poses or points, in the world (measuring) frame.
+
+    Attributes
+    ----------
+    t : array, shape (M,) [s]
+        Stamps on the measurement clock, same epoch as the joint stream.
+    position : array, shape (M, 3) [m]
+    rotation : array, shape (M, 3, 3), optional
+    sigma : array, shape (M,) [m], optional
+        Standard deviation of each position, where the instrument gives it.
+
+    """
+
+    t: Array
+    position: Array
+    rotation: Array | None = None
+    sigma: Array | None = None
+
+    def __post_init__(self) -> None:
+        t = increasing(self.t, 'measurement stamps')
+        object.__setattr__(self, 't', t)
+        position = readonly(self.position, (t.size, 3), 'measured positions')
+        object.__setattr__(self, 'position', position)
+        if self.rotation is not None:
+            rotation = readonly(self.rotation, (t.size, 3, 3), 'measured rotations')
+            object.__setattr__(self, 'rotation', rotation)
+        if self.sigma is not None:
+            object.__setattr__(self, 'sigma', readonly(self.sigma, (t.size,), 'sigma'))
+
+    def take(self, index: Array) -> Measurements:
+        """Return the measurements of an index or mask."""
+        return Measurements(
+            self.t[index],
+            self.position[index],
+            None if self.rotation is None else self.rotation[index],
+            None if self.sigma is None else self.sigma[index],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A sampled side signal: stamps, shape (K,) [s], and values, shape (K,) or (K, 6)."""
+
+    t: Array
+    value: Array
+
+    def __post_init__(self) -> None:
+        t = increasing(self.t, 'signal stamps')
+        value = np.asarray(self.value, dtype=np.float64)
+        shape = (t.size,) + (None,) * (value.ndim - 1)
+        object.__setattr__(self, 't', t)
+        object.__setattr__(self, 'value', readonly(value, shape, 'signal values'))
+
+    def at(self, t: Array) -> Array:
+        """Return the signal at other times by straight lines, held at the ends."""
+        if self.value.ndim == 1:
+            return np.interp(t, self.t, self.value)
+        columns = [np.interp(t, self.t, column) for column in self.value.T]
+        return np.stack(columns, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """
+    One recording of the cell.
+
+    Attributes
+    ----------
+    name : str
+    joints : JointMotion
+    measured : Measurements, optional
+    wrench : Signal, value shape (K, 6) [N, N m], optional
+        Force and torque on the tool, in ``wrench_frame``.
+    wrench_frame : str
+        'tool', or 'base' for a wrench given in the base frame.
+    temperature : Signal, value shape (K,) [degC], optional
+    epoch_ns : int
+        What the stamps count from.
+
+    """
+
+    name: str
+    joints: JointMotion
+    measured: Measurements | None = None
+    wrench: Signal | None = None
+    wrench_frame: str = 'tool'
+    temperature: Signal | None = None
+    epoch_ns: int = 0
+    notes: tuple[str, ...] = field(default=())
+
+    def with_measured(self, measured: Measurements | None) -> Recording:
+        """Return the recording with other measurements beside the same motion."""
+        return replace(self, measured=measured)

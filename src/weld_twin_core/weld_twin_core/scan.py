@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Effects with memory as associative scans over the samples.
+
+A recursion whose step is closed under composition (a clip of a clip is a clip, an affine map of
+an affine map is affine) needs log2(N) array passes instead of a loop over N samples, works on
+irregular stamps and on many parameter draws at once, and run over one sample with the state
+carried is the live form.
+
+References
+----------
+.. [1] G. E. Blelloch, "Prefix sums and their applications", CMU-CS-90-190, 1990.
+.. [2] A. Visintin, "Differential Models of Hysteresis", Springer 1994, ch. III (play).
+
+"""
+
+import numpy as np
+
+from .arrays import Array
+
+
+def play(q: Array, width: Array | float, start: Array) -> Array:
+    """
+    Return the output of the play (dead-zone hysteresis) operator.
+
+    .. math:: w_k = \\min(q_k + \\delta/2, \\max(q_k - \\delta/2, w_{k-1}))
+
+    Parameters
+    ----------
+    q : array, shape (..., N) [rad]
+        Input, in order of time.
+    width : array, broadcasts with q [rad]
+        Full width of the gap, non-negative.
+    start : array, shape (...) [rad]
+        Output before the first sample.
+
+    Returns
+    -------
+    array, shape (..., N) [rad]
+
+    """
+    low, high = np.broadcast_arrays(q - 0.5 * width, q + 0.5 * width)
+    low, high = low.copy(), high.copy()
+    step = 1
+    while step < low.shape[-1]:
+        before_low, before_high = low[..., :-step].copy(), high[..., :-step].copy()
+        now_low, now_high = low[..., step:].copy(), high[..., step:].copy()
+        low[..., step:] = np.clip(before_low, now_low, now_high)
+        high[..., step:] = np.clip(before_high, now_low, now_high)
+        step *= 2
+    return np.clip(np.asarray(start)[..., None], low, high)
+
+
+def last_true(mask: Array) -> Array:
+    """Return for each sample the index of the last true entry up to it, or -1; shape as mask."""
+    index = np.where(mask, np.arange(mask.shape[-1]), -1)
+    return np.maximum.accumulate(index, axis=-1)
+
+
+def linear(gain: Array, drive: Array, start: Array) -> Array:
+    """
+    Return y_k = gain_k y_{k-1} + drive_k; real or complex, |gain| <= 1.
+
+    Parameters
+    ----------
+    gain, drive : array, shape (..., N)
+    start : array, shape (...)
+        y before the first sample.
+
+    """
+    factor, value = np.broadcast_arrays(gain, drive)
+    factor, value = factor.copy(), value.copy()
+    value[..., 0] += factor[..., 0] * start
+    step = 1
+    while step < value.shape[-1]:
+        value[..., step:] += factor[..., step:] * value[..., :-step].copy()
+        factor[..., step:] *= factor[..., :-step].copy()
+        step *= 2
+    return value

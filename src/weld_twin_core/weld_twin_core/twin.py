@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -124,13 +124,13 @@ class Twin:
         """Return the change of pose, shape (6, ...), that a small change of channels makes."""
         total: Array | float = 0.0
         for channel, value in shift.items():
-            for direct, factor in self._direct(channel):
+            for direct, factor in self.direct(channel):
                 total = total + factor * value * column(
                     self.robot, run.chain, direct, run.view.shift
                 )
         return np.asarray(total)
 
-    def _direct(self, channel: Channel) -> list[tuple[Channel, Any]]:
+    def direct(self, channel: Channel) -> list[tuple[Channel, Any]]:
         """Resolve a load torque into the joint motion its springs make of it."""
         if channel[0] != 'tau':
             return [(channel, 1.0)]
@@ -145,9 +145,14 @@ class Twin:
 
     # Evaluation ------------------------------------------------------------------------------
 
-    def view(self, recording: Recording, at: Array | None = None) -> View:
-        """Return what reaches the pointwise stages: motion with memory, clock and signals."""
-        return self._sampled(recording, at, False)[0]
+    def evaluate(self, recording: Recording, at: Array | None = None) -> Evaluation:
+        """Return one pass through the stages, without derivatives."""
+        return self._evaluate(recording, at, False)
+
+    def joint_view(self, recording: Recording) -> View:
+        """Return what effects with memory see: the commanded motion on its own stamps."""
+        motion = recording.joints
+        return _view(self.robot, recording, motion.t, motion.q, motion.velocity)
 
     def _evaluate(self, recording: Recording, at: Array | None, want: bool) -> Evaluation:
         view, tangents = self._sampled(recording, at, want)
@@ -166,7 +171,7 @@ class Twin:
             for effect in self._of(Stage.CLOCK):
                 t = t - effect.displace(_clock_view(self.robot, motion))[('clock', 0)][..., :1]
             q, qd = motion.at(t)
-            picker = _Picker(motion, t)
+            picker = Picker(motion, t)
         if moved is not None:
             q = q + (moved if picker is None else picker.take(moved))
             qd = qd + _rates(motion, moved, picker)
@@ -211,14 +216,16 @@ class Twin:
         for stage in POINTWISE:
             effects = [(k, e) for k, e in enumerate(self.effects) if e.stage == stage]
             if stage == Stage.LOAD and (effects or self._of(Stage.ELASTIC)):
-                view = _with(view, load_torque(view))
+                view = view.displaced(load_torque(view), keep_frames=True)
             for k, effect in effects:
                 if want:
                     own += _indexed(k, effect.gradient(view))
                     for key, value in effect.slope(view).items():
                         slopes[key] = slopes.get(key, 0.0) + value
             for _, effect in effects:
-                view = _with(view, effect.displace(view), frames=stage >= Stage.POSE)
+                view = view.displaced(
+                    effect.displace(view), keep_frames=stage in (Stage.LOAD, Stage.POSE)
+                )
         chain = view.frames
         position, rotation = chain.position, chain.rotation
         error = [view.shift.get(('pose', k)) for k in range(6)]
@@ -299,7 +306,7 @@ class LiveTwin:
                         view, self._states.get(effect.key)
                     )
                     moved = _added(None, shift, self.twin.robot.n)
-                    view = _replaced(view, view.q + moved)
+                    view = replace(view, q=view.q + moved)
         run = self.twin._pointwise(view, [], False)
         joints = np.array([
             float(np.ravel(run.view.q[..., i] + run.view.shift.get(('q', i), 0.0))[0])
@@ -308,7 +315,7 @@ class LiveTwin:
         return joints, Poses(run.poses.position[0], run.poses.rotation[0])
 
 
-class _Picker:
+class Picker:
     """Straight-line interpolation from joint stamps to measurement stamps, draws and all."""
 
     def __init__(self, motion: JointMotion, t: Array) -> None:
@@ -352,27 +359,6 @@ def _clock_view(robot: Robot, motion: JointMotion) -> View:
     return View(robot, motion.t[:1], motion.t[:1], motion.q[:1], motion.q[:1])
 
 
-def _replaced(view: View, q: Array) -> View:
-    return View(
-        view.robot, view.t, view.elapsed, q, view.qd, view.static, view.wrench,
-        view.wrench_frame, view.temperature, view.shift,
-    )  # fmt: skip
-
-
-def _with(view: View, more: Shift, *, frames: bool = False) -> View:
-    """Return the view with more displacement; a pose displacement leaves the frames as they are."""
-    total = dict(view.shift)
-    for key, value in more.items():
-        total[key] = total[key] + value if key in total else value
-    out = View(
-        view.robot, view.t, view.elapsed, view.q, view.qd, view.static, view.wrench,
-        view.wrench_frame, view.temperature, total,
-    )  # fmt: skip
-    if frames and 'frames' in view.__dict__:
-        out.__dict__['frames'] = view.frames
-    return out
-
-
 def _indexed(k: int, gradient: list[Shift | None]) -> list[tuple[int, int, Shift]]:
     return [(k, c, shift) for c, shift in enumerate(gradient) if shift is not None]
 
@@ -397,7 +383,7 @@ def _added(moved: Array | None, shift: Shift, n: int) -> Array:
     return moved
 
 
-def _rates(motion: JointMotion, moved: Array, picker: _Picker | None) -> Array:
+def _rates(motion: JointMotion, moved: Array, picker: Picker | None) -> Array:
     if motion.static or motion.t.size < 2:
         return np.zeros(()) if picker is None else np.zeros(moved.shape[-1])
     rates = np.gradient(moved, motion.t, axis=-2)

@@ -124,6 +124,16 @@ class View:
         """Return the position of one joint, shape (..., N)."""
         return self.q[..., index]
 
+    def displaced(self, more: Shift, *, keep_frames: bool = False) -> View:
+        """Return the view with more displacement; ``keep_frames`` where it moves no frame."""
+        total = dict(self.shift)
+        for key, value in more.items():
+            total[key] = total[key] + value if key in total else value
+        out = replace(self, shift=total)
+        if keep_frames and 'frames' in self.__dict__:
+            out.__dict__['frames'] = self.frames
+        return out
+
 
 @dataclass(frozen=True, eq=False)
 class Effect(ABC):
@@ -168,6 +178,33 @@ class Effect(ABC):
     def from_atoms(self, coefficients: Array) -> Effect:
         """Return the instance that a combination of `atoms` stands for."""
         return self.with_vector(np.asarray(coefficients, dtype=np.float64))
+
+    # Fit coordinates: what a least-squares fit turns. Most effects fit their parameters; an effect
+    # whose parameters bend (amplitude and phase) gives coordinates in which it is straight.
+
+    def coordinates(self) -> Array:
+        """Return the fit coordinates, shape (K,)."""
+        return np.array([
+            value for (p, _), value in zip(self.components(), self.vector(), strict=True)
+            if p.differentiable
+        ])
+
+    def with_coordinates(self, values: Array) -> Effect:
+        """Return the effect at other fit coordinates, kept inside the physical bounds."""
+        vector = self.vector()
+        specs = self.components()
+        free = [k for k, (p, _) in enumerate(specs) if p.differentiable]
+        for k, value in zip(free, values, strict=True):
+            vector[k] = min(max(float(value), specs[k][0].lower), specs[k][0].upper)
+        return self.with_vector(vector)
+
+    def coordinate_shifts(self, view: View) -> list[Shift]:
+        """Return d displacement / d fit coordinates."""
+        return [shift for shift in self.gradient(view) if shift is not None]
+
+    def coordinate_scales(self) -> Array:
+        """Return the typical size of every fit coordinate, shape (K,)."""
+        return np.array([p.typical for p, _ in self.components() if p.differentiable])
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:

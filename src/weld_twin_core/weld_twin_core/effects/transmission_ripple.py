@@ -85,3 +85,21 @@ class TransmissionRipple(Effect):
         if np.ndim(self.order) == 0:
             return TransmissionRipple(self.joint, float(amplitude[0]), self.order, float(phase[0]))
         return TransmissionRipple(self.joint, amplitude, self.order, phase)
+
+    def coordinates(self) -> Array:
+        """Return sine and cosine coefficients, pairs in order; the orders stay."""
+        amplitude = np.atleast_1d(np.asarray(self.amplitude, dtype=np.float64))
+        phase = np.atleast_1d(np.asarray(self.phase, dtype=np.float64))
+        return np.stack([amplitude * np.cos(phase), amplitude * np.sin(phase)], -1).ravel()
+
+    def with_coordinates(self, values: Array) -> Effect:
+        """Return the ripple with other sine and cosine coefficients."""
+        return self.from_atoms(values)
+
+    def coordinate_shifts(self, view: View) -> list[Shift]:
+        """Return sine and cosine of every order."""
+        return self.atoms(view)
+
+    def coordinate_scales(self) -> Array:
+        """Return the typical amplitude for every coefficient."""
+        return np.full(2 * np.size(self.order), self.parameters[0].typical)

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an effect that is not in the twin would do to the poses, to first order.
+
+One pass of the twin is shared by every effect looked at: its views, its interpolation and the
+derivative of the pose by each channel are computed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from .arrays import Array
+from .chain import Channel, Shift, column
+from .effects.base import Effect, Stage, View
+from .recording import Recording
+from .twin import Evaluation, Picker, Twin, load_torque
+
+
+class Features:
+    """
+    First-order features of effects, for one recording and one set of stamps.
+
+    Parameters
+    ----------
+    twin : Twin
+        Where the features are taken: its effects act, the ones asked about come on top.
+    recording : Recording
+    at : array, shape (M,) [s]
+
+    """
+
+    def __init__(self, twin: Twin, recording: Recording, at: Array) -> None:
+        self.twin = twin
+        self.recording = recording
+        self.at = at
+        self._columns: dict[Channel, Array] = {}
+
+    @cached_property
+    def run(self) -> Evaluation:
+        """Return the twin's own pass."""
+        return self.twin.evaluate(self.recording, self.at)
+
+    @cached_property
+    def view(self) -> View:
+        """Return what pointwise effects see, with load torques."""
+        view = self.run.view
+        if any(channel[0] == 'tau' for channel in view.shift):
+            return view
+        return view.displaced(load_torque(view), keep_frames=True)
+
+    @cached_property
+    def joint_view(self) -> View:
+        """Return what effects with memory see: the joint stream on its own stamps."""
+        return self.twin.joint_view(self.recording)
+
+    def column(self, channel: Channel) -> Array:
+        """Return d pose / d channel, shape (6, M)."""
+        if channel not in self._columns:
+            run = self.run
+            self._columns[channel] = column(self.twin.robot, run.chain, channel, run.view.shift)
+        return self._columns[channel]
+
+    def pose_change(self, shift: Shift) -> Array:
+        """Return the change of pose, shape (6, M), that displaced channels make."""
+        total = np.zeros((6, self.at.size))
+        for channel, value in shift.items():
+            for direct, factor in self.twin.direct(channel):
+                total += (factor * value) * self.column(direct)
+        return total
+
+    def shifts(self, effect: Effect, atoms: bool = True) -> list[Shift]:
+        """Return the effect's linear features (or fit-coordinate derivatives) at the stamps."""
+        if effect.stage in (Stage.SERVO, Stage.PLAY):
+            view = self.joint_view
+            found = effect.atoms(view) if atoms else effect.coordinate_shifts(view)
+            pick = Picker(self.recording.joints, self.run.view.t).pick
+            return [{key: pick(value) for key, value in shift.items()} for shift in found]
+        return effect.atoms(self.view) if atoms else effect.coordinate_shifts(self.view)
+
+    def columns(self, effect: Effect, atoms: bool = True) -> Array:
+        """Return the effect's features as pose changes, shape (K, 6, M)."""
+        found = [self.pose_change(shift) for shift in self.shifts(effect, atoms)]
+        return np.stack(found) if found else np.zeros((0, 6, self.at.size))
+
+    def seeds(self, kind: type[Effect], joint: str | None) -> Iterable[Effect]:
+        """Yield the instances a search for this kind of effect starts from."""
+        memory = kind.stage in (Stage.SERVO, Stage.PLAY)
+        return kind.seeds(self.joint_view if memory else self.view, joint)
+
+
+def sites(kind: type[Effect], joints: Sequence[str]) -> Sequence[str | None]:
+    """Return the joints an effect can sit on, or one None for effects of the whole robot."""
+    return joints if kind.of in ('joint', 'link') else (None,)

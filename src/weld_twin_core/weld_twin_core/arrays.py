@@ -69,8 +69,9 @@ def increasing(t: ArrayLike, name: str) -> Array:
     steps = np.diff(stamps)
     if steps.size and steps.min() <= 0.0:
         k = int(np.argmax(steps <= 0.0))
+        relation = f'{-steps[k]:.6g} s before' if steps[k] < 0.0 else 'at the same time as'
         raise DataError(
-            f'{name} must increase, but sample {k + 1} is {-steps[k]:.6g} s before sample {k}; '
+            f'{name} must increase, but sample {k + 1} is {relation} sample {k}; '
             'sort the samples or drop the repeated ones'
         )
     return stamps

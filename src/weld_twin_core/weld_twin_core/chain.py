@@ -7,8 +7,7 @@ A *channel* is one scalar of the chain that an effect may displace: ``('q', i)``
 ``('theta' | 'd' | 'a' | 'alpha' | 'beta', i)``, ``('base' | 'tool' | 'pose', 0..5)`` or
 ``('tau', i)``. A *shift* maps channels to displacements that broadcast with the samples.
 
-Vectors are kept components first, shape (3, ...), so that each operation runs over contiguous
-samples; public results have the samples first.
+Inside, vectors are kept components first (see `vectors`); public results have the samples first.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ import numpy as np
 from .arrays import Array
 from .robot import Robot
 from .rotation import left_jacobian, rotation_matrix, transform
+from .vectors import components, cross, pad
 
 Channel = tuple[str, int]
 Shift = Mapping[Channel, Array]
@@ -43,14 +43,16 @@ class Frames(NamedTuple):
     """
     The chain at given joint positions; every field is in the world frame.
 
-    ``rotation`` is (..., 3, 3) and ``position`` (..., 3) of the tool; ``flange_rotation`` is the
-    rotation before the tool frame; ``base_rotation`` and ``base_point`` those of the base.
+    ``rotation`` is (..., 3, 3) and ``position`` (..., 3) of the tool; ``flange_rotation`` and
+    ``flange_point`` are those of the chain's end before the tool frame; ``base_rotation`` and
+    ``base_point`` those of the base.
     """
 
     rotation: Array
     position: Array
     rows: tuple[RowAxes, ...]
     flange_rotation: Array
+    flange_point: Array
     base_rotation: Array
     base_point: Array
 
@@ -101,9 +103,9 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
 
     """
     base_rotation, base_point = base_frame(robot, shift)
-    axes_count = max([q.ndim - 1, *(np.ndim(value) for value in shift.values())])
+    axes = max([q.ndim - 1, *(np.ndim(value) for value in shift.values())])
     x, y, z, p = (
-        _pad(v, axes_count) for v in (*(base_rotation[..., k] for k in range(3)), base_point)
+        pad(components(v), axes) for v in (*(base_rotation[..., k] for k in range(3)), base_point)
     )
     row = _standard_row if robot.convention == 'standard' else _modified_row
     rows = []
@@ -113,24 +115,16 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
             values[key] = np.asarray(getattr(robot, key)[i] + shift.get((key, i), 0.0))
         moved = 'd' if robot.prismatic[i] else 'theta'
         values[moved] = values[moved] + q[..., i] + shift.get(('q', i), 0.0)
-        x, y, z, p, axes = row(x, y, z, p, values)
-        rows.append(axes)
+        x, y, z, p, row_axes = row(x, y, z, p, values)
+        rows.append(row_axes)
     flange = np.stack([np.moveaxis(v, 0, -1) for v in np.broadcast_arrays(x, y, z)], axis=-1)
     tool_rotation, tool_point = tool_frame(robot, shift)
-    position = np.moveaxis(p, 0, -1) + (flange @ tool_point[..., None])[..., 0]
+    flange_point = np.moveaxis(p, 0, -1)
+    position = flange_point + (flange @ tool_point[..., None])[..., 0]
     return Frames(
-        flange @ tool_rotation, position, tuple(rows), flange, base_rotation, base_point
-    )
-
-
-def _components(vector: Array) -> Array:
-    return np.moveaxis(vector, -1, 0)
-
-
-def _pad(vector: Array, count: int) -> Array:
-    """Put the components of (..., 3) first, before as many sample axes as all inputs have."""
-    first = _components(vector)
-    return first.reshape((3,) + (1,) * (count + 1 - first.ndim) + first.shape[1:])
+        flange @ tool_rotation, position, tuple(rows), flange, flange_point, base_rotation,
+        base_point,
+    )  # fmt: skip
 
 
 def _standard_row(
@@ -195,7 +189,7 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
     row = chain.rows[i]
     if name == 'q':
         name = 'd' if robot.prismatic[i] else 'theta'
-    tip = _components(chain.position)
+    tip = components(chain.position)
     match name:
         case 'theta':
             return _turn_column(row.z, row.z_point, tip)
@@ -206,21 +200,14 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
         case 'd':
             return _slide_column(row.z, tip)
         case 'a':
-            along = row.x if robot.convention == 'standard' else _cross(row.y, row.z)
+            along = row.x if robot.convention == 'standard' else cross(row.y, row.z)
             return _slide_column(along, tip)
     raise KeyError(channel)
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Return the cross product of components-first vectors (numpy's own is several times slower)."""
-    return np.stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
-
-
 def _turn_column(axis: Array, point: Array, tip: Array) -> Array:
-    axis, lever = np.broadcast_arrays(axis, tip - point)
-    return np.concatenate([_cross(axis, lever), axis])
+    moment = cross(axis, tip - point)
+    return np.concatenate([moment, np.broadcast_to(axis, moment.shape)])
 
 
 def _slide_column(axis: Array, tip: Array) -> Array:
@@ -240,16 +227,16 @@ def _frame_column(robot: Robot, chain: Frames, name: str, i: int, shift: Shift) 
     if name == 'base' and i < 3:
         return _unit(i, samples)
     if name == 'tool' and i < 3:
-        return _slide_column(_components(chain.flange_rotation[..., i]), _components(chain.position))
+        return _slide_column(components(chain.flange_rotation[..., i]), components(chain.position))
     error = _six(shift, name)
     axis = left_jacobian(np.zeros(3) if error is None else error[..., 3:])[..., i - 3]
     if name == 'base':
         axis = np.broadcast_to(axis, samples + (3,))
         point = np.broadcast_to(chain.base_point, samples + (3,))
-        return _turn_column(_components(axis), _components(point), _components(chain.position))
+        return _turn_column(components(axis), components(point), components(chain.position))
     turned = (chain.flange_rotation @ (robot.T_flange_tool[:3, :3] @ axis[..., None]))[..., 0]
     out = np.zeros((6,) + samples)
-    out[3:] = _components(turned)
+    out[3:] = components(turned)
     return out
 
 

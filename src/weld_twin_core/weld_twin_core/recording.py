@@ -4,13 +4,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from .arrays import Array, increasing, readonly
 from .errors import DataError
+
+WRENCH_FRAMES = ('tool', 'base')
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,30 +40,28 @@ class JointMotion:
 
     def __post_init__(self) -> None:
         t = increasing(self.t, 'joint stamps')
-        q = readonly(self.q, (t.size, None), 'joint positions')
         if t.size == 0:
             raise DataError('the joint stream is empty')
+        q = readonly(self.q, (t.size, None), 'joint positions')
         object.__setattr__(self, 't', t)
         object.__setattr__(self, 'q', q)
         if self.qd is not None:
             object.__setattr__(self, 'qd', readonly(self.qd, q.shape, 'joint velocities'))
 
+    @cached_property
     def _spline(self) -> CubicHermiteSpline:
-        spline = self.__dict__.get('_cached_spline')
-        if spline is None:
-            spline = CubicHermiteSpline(self.t, self.q, self.velocity, axis=0)
-            object.__setattr__(self, '_cached_spline', spline)
-        return spline
+        return CubicHermiteSpline(self.t, self.q, self.velocity, axis=0)
 
-    @property
+    @cached_property
     def velocity(self) -> Array:
         """Return joint velocity, shape (N, n): as measured, else by second-order differences."""
-        if self.static or self.t.size < 2:
-            return np.zeros_like(self.q)
-        if self.qd is not None:
+        if self.qd is not None and not self.static:
             return self.qd
+        if self.static or self.t.size < 2:
+            return readonly(np.zeros_like(self.q), self.q.shape, 'joint velocities')
         edge = 2 if self.t.size > 2 else 1
-        return np.gradient(self.q, self.t, axis=0, edge_order=edge)
+        rates = np.gradient(self.q, self.t, axis=0, edge_order=edge)
+        return readonly(rates, self.q.shape, 'joint velocities')
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """
@@ -74,9 +75,8 @@ class JointMotion:
             index = np.abs(np.asarray(t)[..., None] - self.t).argmin(axis=-1)
             return self.q[index], np.zeros(np.shape(t) + self.q.shape[1:])
         inside = np.clip(t, self.t[0], self.t[-1])
-        spline = self._spline()
         moving = (inside == t)[..., None]
-        return spline(inside), np.where(moving, spline(inside, 1), 0.0)
+        return self._spline(inside), np.where(moving, self._spline(inside, 1), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,12 @@ class Measurements:
             rotation = readonly(self.rotation, (t.size, 3, 3), 'measured rotations')
             object.__setattr__(self, 'rotation', rotation)
         if self.sigma is not None:
-            object.__setattr__(self, 'sigma', readonly(self.sigma, (t.size,), 'sigma'))
+            sigma = readonly(self.sigma, (t.size,), 'sigma of the measurements')
+            if sigma.size and sigma.min() < 0.0:
+                raise DataError(
+                    f'sigma of the measurements is negative at sample {int(sigma.argmin())}'
+                )
+            object.__setattr__(self, 'sigma', sigma)
 
     def take(self, index: Array) -> Measurements:
         """Return the measurements of an index or mask."""
@@ -130,10 +135,11 @@ class Signal:
 
     def __post_init__(self) -> None:
         t = increasing(self.t, 'signal stamps')
-        value = np.asarray(self.value, dtype=np.float64)
-        shape = (t.size,) + (None,) * (value.ndim - 1)
+        if t.size == 0:
+            raise DataError('a signal is empty; leave it out of the recording')
+        shape = (t.size,) if np.ndim(self.value) == 1 else (t.size, 6)
         object.__setattr__(self, 't', t)
-        object.__setattr__(self, 'value', readonly(value, shape, 'signal values'))
+        object.__setattr__(self, 'value', readonly(self.value, shape, 'signal values'))
 
     def at(self, t: Array) -> Array:
         """Return the signal at other times by straight lines, held at the ends."""
@@ -170,7 +176,21 @@ class Recording:
     wrench_frame: str = 'tool'
     temperature: Signal | None = None
     epoch_ns: int = 0
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.wrench_frame not in WRENCH_FRAMES:
+            raise DataError(
+                f'wrench_frame must be one of {", ".join(WRENCH_FRAMES)}, '
+                f'got {self.wrench_frame!r}'
+            )
+        for name, signal, axes in (('wrench', self.wrench, 2), ('temperature', self.temperature, 1)):
+            if signal is not None and signal.value.ndim != axes:
+                wanted = '(K, 6)' if axes == 2 else '(K,)'
+                raise DataError(
+                    f'{name} of recording {self.name!r} must have shape {wanted}, '
+                    f'got {signal.value.shape}'
+                )
 
     def with_measured(self, measured: Measurements | None) -> Recording:
         """Return the recording with other measurements beside the same motion."""

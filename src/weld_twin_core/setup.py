@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+from setuptools import find_packages, setup
+
+NAME = 'weld_twin_core'
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    packages=find_packages(),
+    package_data={NAME: ['py.typed', '**/*.yaml']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
+        ('share/' + NAME, ['package.xml']),
+    ],
+    install_requires=['setuptools', 'numpy', 'scipy'],
+    extras_require={'test': ['pytest']},
+    zip_safe=False,
+    maintainer='weld_twin contributors',
+    maintainer_email='maintainers@example.org',
+    description="A robot's positional accuracy as arrays: kinematics, effects, twin, diagnosis.",
+    license='Apache-2.0',
+)

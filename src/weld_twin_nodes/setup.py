@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = 'weld_twin_nodes'
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    packages=find_packages(),
+    package_data={NAME: ['py.typed', '**/*.yaml', '**/*.csv', '**/*.html']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
+        ('share/' + NAME, ['package.xml']),
+        ('share/' + NAME + '/launch', glob('launch/*.launch.py')),
+        ('share/' + NAME + '/config', glob('config/*.yaml')),
+    ],
+    install_requires=['setuptools', 'numpy', 'PyYAML', 'rich', 'matplotlib'],
+    extras_require={'test': ['pytest']},
+    zip_safe=False,
+    maintainer='weld_twin contributors',
+    maintainer_email='maintainers@example.org',
+    description='Nodes and command line of the welding robot digital twin.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'weld-twin = weld_twin_nodes.cli:main',
+            'trajectory_generator = weld_twin_nodes.trajectory_generator:main',
+            'error_injector = weld_twin_nodes.error_injector:main',
+            'forward_kinematics_twin = weld_twin_nodes.twin:main',
+            'deviation_analyzer = weld_twin_nodes.deviation_analyzer:main',
+            'recorder = weld_twin_nodes.recorder:main',
+        ]
+    },
+)

@@ -30,17 +30,9 @@ from . import (
     transmission_ripple,
     vibration,
 )
-from .base import (
-    REGISTRY,
-    Effect,
-    MemoryEffect,
-    Parameter,
-    Stage,
-    View,
-    effect_from_mapping,
-    effects_from_list,
-    register,
-)
+from .base import Effect, MemoryEffect
+from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
+from .view import Parameter, Stage, View
 
 __all__ = [
     'REGISTRY',

@@ -4,7 +4,9 @@
 
 from dataclasses import dataclass
 
-from .base import ChannelError, Parameter, Stage, Value, register
+from .constant import ChannelError
+from .registry import register
+from .view import Parameter, Stage, Value
 
 
 @register

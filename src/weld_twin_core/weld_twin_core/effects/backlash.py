@@ -24,7 +24,9 @@ from ..arrays import Array
 from ..chain import Shift
 from ..errors import ModelError
 from ..robot import Robot
-from .base import Effect, MemoryEffect, Parameter, Stage, Value, View, register
+from .base import Effect, MemoryEffect
+from .registry import register
+from .view import Parameter, Stage, Value, View
 
 FORMS = ('play', 'reversal')
 

@@ -10,7 +10,9 @@ import numpy as np
 
 from ..arrays import Array
 from ..chain import Shift
-from .base import Effect, Parameter, Stage, Value, View, register
+from .base import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
 
 
 @register

@@ -5,7 +5,9 @@
 from dataclasses import dataclass
 
 from ..chain import Shift
-from .base import Effect, Parameter, Stage, Value, View, register
+from .base import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
 
 
 @register

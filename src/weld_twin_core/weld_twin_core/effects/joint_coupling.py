@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from ..chain import Shift
 from ..errors import ModelError
 from ..robot import Robot
-from .base import Effect, Parameter, Stage, Value, View, register
+from .base import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
 
 
 @register

@@ -12,7 +12,9 @@ import numpy as np
 from .. import scan
 from ..arrays import Array
 from ..chain import Shift
-from .base import MemoryEffect, Parameter, Stage, Value, View, register
+from .base import MemoryEffect
+from .registry import register
+from .view import Parameter, Stage, Value, View
 
 
 @register

@@ -13,7 +13,9 @@ from ..arrays import Array
 from ..chain import Channel, Shift
 from ..errors import DataError, ModelError
 from ..robot import Robot
-from .base import Effect, Parameter, Stage, Value, View, register
+from .base import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
 
 
 @register

@@ -4,7 +4,9 @@
 
 from dataclasses import dataclass
 
-from .base import FrameError, Value, register
+from .constant import FrameError
+from .registry import register
+from .view import Value
 
 
 @register

@@ -18,7 +18,9 @@ import numpy as np
 from .. import scan
 from ..arrays import Array
 from ..chain import Shift
-from .base import Effect, MemoryEffect, Parameter, Stage, Value, View, register
+from .base import Effect, MemoryEffect
+from .registry import register
+from .view import Parameter, Stage, Value, View
 
 
 @register

@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects whose displacement is a constant: of one channel, or of a frame."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import Channel, Shift
+from .base import Effect
+from .view import Parameter, Stage, View, single
+
+
+class ChannelError(Effect):
+    """A constant error of one channel of one joint or row: its one parameter is the displacement."""
+
+    channel: ClassVar[str]
+
+    def displace(self, view: View) -> Shift:
+        """Return the parameter on the channel."""
+        site = (self.channel, view.robot.index(str(self.site)))
+        return single(site, self.number(self.parameters[0].name), view)
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return one: the displacement is the parameter."""
+        return [single((self.channel, view.robot.index(str(self.site))), np.ones(()), view)]
+
+
+class FrameError(Effect):
+    """A constant error of the base or tool frame: a displacement and a turn."""
+
+    channel: ClassVar[str]
+    of = 'robot'
+    stage = Stage.LINK
+    parameters = (
+        Parameter('xyz', 'm', size=3, typical=5e-4),
+        Parameter('rotvec', 'rad', size=3, typical=1e-3),
+    )
+
+    def displace(self, view: View) -> Shift:
+        """Return xyz and rotvec on the six components of the frame."""
+        out: dict[Channel, Array] = {}
+        for k in range(3):
+            out |= single((self.channel, k), self.number('xyz', k), view)
+            out |= single((self.channel, k + 3), self.number('rotvec', k), view)
+        return out
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return one for each component."""
+        return [single((self.channel, k), np.ones(()), view) for k in range(6)]

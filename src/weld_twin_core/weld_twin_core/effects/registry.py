@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The effects known by name, and effects from the entries of an effects file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..errors import DataError, ModelError
+from ..robot import Robot
+from .base import Effect, MemoryEffect
+from .view import Stage
+
+E = TypeVar('E', bound=Effect)
+REGISTRY: dict[str, type[Effect]] = {}
+
+
+def register(effect: type[E]) -> type[E]:
+    """
+    Make an effect known by its name, from this package or from user code.
+
+    Raises
+    ------
+    ModelError
+        Another effect has that name, or the class does not keep the contract of its stage.
+
+    """
+    known = REGISTRY.get(effect.name)
+    if known is not None and known.__qualname__ != effect.__qualname__:
+        raise ModelError(f'an effect named {effect.name!r} is registered already')
+    declared = {parameter.name for parameter in effect.parameters}
+    missing = sorted(declared - {item.name for item in fields(effect)})
+    if missing:
+        raise ModelError(f'effect {effect.name!r} declares {missing[0]!r} but has no such field')
+    if effect.stage in (Stage.SERVO, Stage.PLAY) and not issubclass(effect, MemoryEffect):
+        raise ModelError(
+            f'effect {effect.name!r} acts in stage {effect.stage.name}, which runs in order of '
+            'time; derive it from MemoryEffect'
+        )
+    if effect.stage == Stage.ELASTIC and 'compliance' not in declared:
+        raise ModelError(
+            f'effect {effect.name!r} is a spring in a joint; name its parameter compliance'
+        )
+    REGISTRY[effect.name] = effect
+    return effect
+
+
+def effect_from_mapping(entry: Mapping[str, Any]) -> Effect:
+    """
+    Build an effect from an entry of an effects file.
+
+    Raises
+    ------
+    ModelError
+        Unknown effect or parameter, or a value that is not a number.
+
+    """
+    if not isinstance(entry, Mapping) or 'effect' not in entry:
+        raise ModelError(f"an effect must be a mapping with the key 'effect', got {entry!r}")
+    kind = REGISTRY.get(str(entry['effect']))
+    if kind is None:
+        raise ModelError(
+            f'unknown effect {entry["effect"]!r}; known effects are ' + ', '.join(sorted(REGISTRY))
+        )
+    allowed = {item.name for item in fields(kind)}
+    values: dict[str, Any] = {}
+    for key, value in entry.items():
+        if key == 'effect':
+            continue
+        if key not in allowed:
+            raise ModelError(
+                f'effect {kind.name!r} has no parameter {key!r}; it takes '
+                + ', '.join(sorted(allowed))
+            )
+        values[key] = value if key in kind.options or key == 'joint' else _numbers(kind, key, value)
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise ModelError(f'effect {kind.name!r}: {error}') from None
+
+
+def effects_from_list(entries: Any, robot: Robot) -> tuple[Effect, ...]:
+    """
+    Build and check the effects of a file against a robot.
+
+    Raises
+    ------
+    ModelError
+        Not a list, or an entry that cannot be used; the message names the entry.
+
+    """
+    if entries is None:
+        return ()
+    if not isinstance(entries, Sequence) or isinstance(entries, str):
+        raise ModelError('an effects file must be a list of effects')
+    out = []
+    for k, entry in enumerate(entries):
+        try:
+            effect = effect_from_mapping(entry)
+            effect.check(robot)
+        except (ModelError, DataError) as error:
+            raise ModelError(f'effect {k}: {error}') from None
+        out.append(effect)
+    return tuple(out)
+
+
+def _numbers(kind: type[Effect], key: str, value: Any) -> Any:
+    size = next((p.size for p in kind.parameters if p.name == key), 0)
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ModelError(f'effect {kind.name!r}: {key} must be a number, got {value!r}') from None
+    if array.ndim > 1 or (size == 1 and array.ndim) or (size > 1 and array.shape != (size,)):
+        wanted = {0: 'a number or a list', 1: 'one number'}.get(size, f'{size} numbers')
+        raise ModelError(f'effect {kind.name!r}: {key} must be {wanted}, got {value!r}')
+    return float(array) if array.ndim == 0 else array

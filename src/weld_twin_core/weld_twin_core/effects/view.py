@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What an effect is made of and what it may look at: stages, parameters, the samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import Channel, Frames, Shift, frames
+from ..robot import Robot
+
+Value = Any
+"""A parameter: a number, a list of numbers, or the same with a leading axis of draws."""
+
+
+class Stage(IntEnum):
+    """
+    When an effect acts. Stages run in this order; effects of one stage see the same input.
+
+    SERVO and PLAY have memory and run one after the other on the joint stream's own stamps.
+    CLOCK picks the instant a measurement belongs to. The others are functions of that instant.
+    """
+
+    SERVO = 0
+    PLAY = 1
+    CLOCK = 2
+    JOINT = 3
+    LOAD = 4
+    ELASTIC = 5
+    LINK = 6
+    POSE = 7
+    NOISE = 8
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """
+    One parameter of an effect.
+
+    Attributes
+    ----------
+    name, unit : str
+    size : int
+        Number of components; 0 means a number or a list of any length.
+    typical : float
+        A magnitude worth worrying about; scales fits and default tolerances.
+    lower, upper : float
+        Physical bounds.
+    differentiable : bool
+        Whether `Effect.gradient` gives its derivative.
+    linear : bool
+        Whether the displacement is proportional to it.
+
+    """
+
+    name: str
+    unit: str
+    size: int = 1
+    typical: float = 1.0
+    lower: float = -np.inf
+    upper: float = np.inf
+    differentiable: bool = True
+    linear: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """
+    What an effect may look at: the samples that reach its stage.
+
+    Attributes
+    ----------
+    robot : Robot
+    t : array, shape (N,), or (D, N) where the delay is drawn [s]
+    elapsed : array, shape as t [s]
+        Time since the recording's first stamp.
+    q, qd : array, shape (..., N, n) [rad, rad/s]
+    static : bool
+        Samples are stations at rest; their order is known, their timing means nothing.
+    wrench : array, shape t.shape + (6,), optional [N, N m]
+    wrench_frame : str
+    temperature : array, shape as t, optional [degC]
+    shift : mapping
+        Channels displaced by the stages before.
+
+    """
+
+    robot: Robot
+    t: Array
+    elapsed: Array
+    q: Array
+    qd: Array
+    static: bool = False
+    wrench: Array | None = None
+    wrench_frame: str = 'tool'
+    temperature: Array | None = None
+    shift: Shift = field(default_factory=dict)
+
+    @cached_property
+    def frames(self) -> Frames:
+        """Return the chain at these samples, with the displacements so far."""
+        return frames(self.robot, self.q, self.shift)
+
+    def joint(self, index: int) -> Array:
+        """Return the position of one joint, shape (..., N)."""
+        return self.q[..., index]
+
+    def displaced(self, more: Shift, *, keep_frames: bool = False) -> View:
+        """Return the view with more displacement; ``keep_frames`` where it moves no frame."""
+        total = dict(self.shift)
+        for key, value in more.items():
+            total[key] = total[key] + value if key in total else value
+        out = replace(self, shift=total)
+        if keep_frames and 'frames' in self.__dict__:
+            out.__dict__['frames'] = self.frames
+        return out
+
+
+def single(channel: Channel, value: Array | float, view: View) -> Shift:
+    """Return a shift of one channel, broadcast over the samples of a view."""
+    wanted = np.broadcast_shapes(np.shape(value), view.t.shape)
+    return {channel: np.broadcast_to(value, wanted)}

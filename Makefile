@@ -1,25 +1,28 @@
 # make demo   set up what is missing, then run the whole job on an embedded example
 # make test   set up what is missing, then lint, type check and test
 SHELL := /bin/bash
-READY := .venv/ready
 RUN := tools/in_env
 
-.PHONY: demo test lint setup clean
+.PHONY: demo test lint setup setup-test clean
 
-demo: $(READY)
+demo: setup
 	@$(RUN) weld-twin demo --out out
 
 test: lint
 	@$(RUN) python -m pytest
 
-lint: $(READY)
+lint: setup-test
 	@$(RUN) ruff check src test
 	@$(RUN) mypy
 
-setup: $(READY)
+setup: .venv/ready
+setup-test: .venv/ready-test
 
-$(READY): pyproject.toml tools/setup
+.venv/ready: pyproject.toml tools/setup
 	@tools/setup
+
+.venv/ready-test: .venv/ready
+	@tools/setup test bench
 
 clean:
 	rm -rf .venv out

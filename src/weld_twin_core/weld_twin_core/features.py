@@ -17,8 +17,9 @@ import numpy as np
 from .arrays import Array
 from .chain import Channel, Shift, column
 from .effects.base import Effect, Stage, View
+from .picker import Picker
 from .recording import Recording
-from .twin import Evaluation, Picker, Twin, load_torque
+from .twin import Evaluation, Twin, load_torque
 
 
 class Features:

@@ -87,9 +87,11 @@ class Backlash(MemoryEffect):
         lag = scan.play(q, width, q[..., 0]) - q
         # Whatever is within rounding of a side rests on it; a closed gap always rests on the
         # side opposite to the motion.
+        rounding = 4.0 * np.spacing(np.abs(q).max(initial=1.0))
         step = np.diff(q, axis=-1, prepend=q[..., :1])
-        side = np.where(width > 0.0, lag, -step)
-        resting = np.abs(side) >= np.where(width > 0.0, 0.5 * width * (1.0 - 1e-9), 1e-300)
+        is_open = width > 4.0 * rounding
+        side = np.where(is_open, lag, -step)
+        resting = np.abs(side) >= np.where(is_open, 0.5 * width - rounding, 1e-300)
         return np.where(resting, side, 0.0), scan.last_true(resting)
 
     @classmethod

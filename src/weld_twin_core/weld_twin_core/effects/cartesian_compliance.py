@@ -18,7 +18,7 @@ from .view import Parameter, Stage, Value, View
 @register
 @dataclass(frozen=True, eq=False)
 class CartesianCompliance(Effect):
-    """One compliance along each axis of the tool frame (or of the wrench's own frame)."""
+    """One compliance along each axis of the tool frame, whatever frame the wrench comes in."""
 
     compliance: Value = (0.0, 0.0, 0.0)
 
@@ -33,8 +33,11 @@ class CartesianCompliance(Effect):
         if view.wrench is None:
             return [np.zeros(view.q.shape[:-1] + (3,))] * 3
         chain = view.frames
-        frame = chain.rotation if view.wrench_frame == 'tool' else chain.base_rotation
-        return [frame[..., :, k] * view.wrench[:, k, None] for k in range(3)]
+        force = view.wrench[..., :3]
+        if view.wrench_frame == 'base':
+            world = (chain.base_rotation @ force[..., None])[..., 0]
+            force = (np.swapaxes(chain.rotation, -1, -2) @ world[..., None])[..., 0]
+        return [chain.rotation[..., :, k] * force[..., k, None] for k in range(3)]
 
     def displace(self, view: View) -> Shift:
         """Return the deflection on the pose."""

@@ -33,6 +33,8 @@ class JointCoupling(Effect):
     def check(self, robot: Robot) -> None:
         """Refuse an unknown source, and a joint coupled with itself."""
         super().check(robot)
+        if not self.source:
+            raise ModelError('joint_coupling needs a source joint')
         robot.index(self.source)
         if self.source == self.joint:
             raise ModelError('joint_coupling: source and joint are the same; use gear_ratio')

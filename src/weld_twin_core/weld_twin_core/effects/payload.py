@@ -34,15 +34,17 @@ class Payload(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return the extra torque on the 'tau' channel of every joint."""
+        torque = payload_torque(view.robot, view.frames, self.number('mass'), self._centre())
+        return _on_joints(torque)
+
+    def _centre(self) -> Array:
         com = np.asarray(self.com, dtype=np.float64)
-        com = com[..., None, :] if com.ndim > 1 else com
-        return _on_joints(payload_torque(view.robot, view.frames, self.number('mass'), com))
+        return com[..., None, :] if com.ndim > 1 else com
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return d torque by mass, and by each component of the centre."""
-        com = np.asarray(self.com, dtype=np.float64)
         robot, chain = view.robot, view.frames
-        out: list[Shift | None] = [_on_joints(payload_torque(robot, chain, 1.0, com))]
+        out: list[Shift | None] = [_on_joints(payload_torque(robot, chain, 1.0, self._centre()))]
         origin = payload_torque(robot, chain, 1.0, np.zeros(3))
         for k in range(3):
             lever = payload_torque(robot, chain, 1.0, np.eye(3)[k]) - origin

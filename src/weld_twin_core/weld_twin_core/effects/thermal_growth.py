@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -41,12 +42,19 @@ class ThermalGrowth(Effect):
     needs = frozenset({'temperature'})
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown links and an incomplete warm-up curve."""
+        """Refuse unknown links, a reference that is no number and an unusable warm-up curve."""
         super().check(robot)
+        if isinstance(self.links, str):
+            raise ModelError(f'thermal_growth: links must be a list, got {self.links!r}')
         for name in self.links or ():
             robot.index(name)
-        if self.warmup is not None and len(self.warmup) != 2:
-            raise ModelError('thermal_growth: warmup needs [rise in K, time constant in s]')
+        if not isinstance(self.reference, Real):
+            raise ModelError(f'thermal_growth: reference must be a number, got {self.reference!r}')
+        if self.warmup is not None and not _is_curve(self.warmup):
+            raise ModelError(
+                'thermal_growth: warmup must be [rise in K, time constant in s above zero], '
+                f'got {self.warmup!r}'
+            )
 
     def rise(self, view: View) -> Array:
         """
@@ -81,3 +89,8 @@ class ThermalGrowth(Effect):
         """Return length times temperature rise."""
         rise = self.rise(view)
         return [{channel: length * rise for channel, length in self._lengths(view)}]
+
+
+def _is_curve(warmup: Sequence[float]) -> bool:
+    numbers = [value for value in warmup if isinstance(value, Real)]
+    return len(warmup) == len(numbers) == 2 and warmup[1] > 0.0

@@ -13,7 +13,7 @@ from .view import Parameter, Stage, Value, View, single
 @register
 @dataclass(frozen=True, eq=False)
 class TimeDelay(Effect):
-    """A measurement stamped t shows the robot as it was at t - delay."""
+    """A measurement stamped t shows the robot as it was at t - delay; stations do not move."""
 
     delay: Value = 0.0
 
@@ -25,7 +25,8 @@ class TimeDelay(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return the delay on the 'clock' channel; the twin samples that much earlier."""
-        return single(('clock', 0), self.number('delay'), view)
+        late = 0.0 * self.number('delay') if view.static else self.number('delay')
+        return single(('clock', 0), late, view)
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return minus the joint velocity on every joint."""

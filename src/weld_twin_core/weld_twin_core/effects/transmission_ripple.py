@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..chain import Shift
+from ..errors import ModelError
 from .base import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
@@ -22,7 +23,12 @@ MAX_ORDER = 100
 @register
 @dataclass(frozen=True, eq=False)
 class TransmissionRipple(Effect):
-    """Periodic error of the gear, one or several orders at once (numbers, or lists)."""
+    """
+    Periodic error of the gear, one or several orders at once.
+
+    Each parameter is a number or a list with one entry per order; a number beside lists holds
+    for every order.
+    """
 
     joint: str
     amplitude: Value = 0.0
@@ -38,13 +44,25 @@ class TransmissionRipple(Effect):
         Parameter('phase', 'rad', size=0, linear=False),
     )
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        shapes = {p.name: np.shape(getattr(self, p.name)) for p in self.parameters}
+        lengths = {shape[-1] for shape in shapes.values() if shape}
+        if len(lengths) > 1:
+            raise ModelError(
+                'transmission_ripple: amplitude, order and phase must be numbers or lists of one '
+                f'length, got lengths {sorted(lengths)}'
+            )
+        for name, shape in shapes.items():
+            if lengths and not shape:
+                every = np.full(lengths.copy().pop(), getattr(self, name), dtype=np.float64)
+                every.setflags(write=False)
+                object.__setattr__(self, name, every)
+
     def _terms(self, view: View) -> Iterable[tuple[Array, Array, Array]]:
         theta = view.joint(view.robot.index(self.joint))
-        count = {np.asarray(getattr(self, p.name)).ndim for p in self.parameters}
-        many = max(count) > 0
-        orders = np.atleast_1d(np.asarray(self.order, dtype=np.float64))
-        for k in range(orders.shape[-1] if many else 1):
-            index = k if many else None
+        count = np.shape(self.order)[-1:]
+        for index in range(*count) if count else (None,):
             phase = self.number('phase', index)
             order = self.number('order', index)
             yield self.number('amplitude', index), order, order * theta + phase

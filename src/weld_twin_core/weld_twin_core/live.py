@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The twin one joint state at a time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .arrays import Array
+from .effects.base import View
+from .errors import DataError
+from .memory import added, in_series
+from .poses import Poses
+
+if TYPE_CHECKING:
+    from .twin import Twin
+
+
+class LiveTwin:
+    """
+    The twin one joint state at a time, with the memory of its effects carried along.
+
+    Changing `twin` while running keeps the memory of every effect that is still there. The
+    poses belong to the joint stamps; a delay of the measurement clock is the caller's to add.
+    """
+
+    def __init__(self, twin: Twin) -> None:
+        self.twin = twin
+        self._states: dict[tuple[Any, ...], Any] = {}
+        self._start: float | None = None
+        self._last = -np.inf
+
+    def reset(self) -> None:
+        """Forget the motion so far, as after a jump back in time."""
+        self._states.clear()
+        self._start = None
+        self._last = -np.inf
+
+    def step(
+        self,
+        t: float,
+        q: Array,
+        qd: Array | None = None,
+        wrench: Array | None = None,
+        temperature: float | None = None,
+        wrench_frame: str = 'tool',
+    ) -> tuple[Array, Poses]:
+        """
+        Return the joint positions, shape (n,), and the pose, shapes (3,) and (3, 3).
+
+        Parameters
+        ----------
+        t : float [s]
+            Stamp; not before the one of the last call.
+        q, qd : array, shape (n,)
+        wrench : array, shape (6,), optional
+        temperature : float, optional [degC]
+
+        Raises
+        ------
+        DataError
+            The stamp goes back, or there is not one position for each joint.
+
+        """
+        view = self._remembered(self._view(t, q, qd, wrench, temperature, wrench_frame))
+        run = self.twin.pointwise(view)
+        joints = view.q[0].copy()
+        for (name, i), value in run.view.shift.items():
+            if name == 'q':
+                joints[i] += np.ravel(value)[0]
+        return joints, Poses(run.poses.position[0], run.poses.rotation[0])
+
+    def _view(
+        self,
+        t: float,
+        q: Array,
+        qd: Array | None,
+        wrench: Array | None,
+        temperature: float | None,
+        wrench_frame: str,
+    ) -> View:
+        robot = self.twin.robot
+        q = np.asarray(q, dtype=np.float64)
+        if q.shape != (robot.n,):
+            raise DataError(f'robot {robot.name!r} needs {robot.n} joint positions, got {q.shape}')
+        if t < self._last:
+            raise DataError(
+                f'the joint state at {t:.6f} s is {self._last - t:.6g} s before the one already '
+                'seen; reset the twin after a jump back in time'
+            )
+        self._last = t
+        if self._start is None:
+            self._start = t
+        stamp = np.array([t])
+        return View(
+            robot, stamp, stamp - self._start, q[None],
+            np.zeros_like(q)[None] if qd is None else np.asarray(qd)[None], False,
+            None if wrench is None else np.asarray(wrench)[None], wrench_frame,
+            None if temperature is None else np.array([temperature]),
+        )  # fmt: skip
+
+    def _remembered(self, view: View) -> View:
+        """Run the effects with memory, each on what the one before left, and keep their states."""
+        seen: Counter[tuple[str, ...]] = Counter()
+        for _, effect in in_series(self.twin.effects):
+            key = (seen[effect.key], *effect.key)
+            seen[effect.key] += 1
+            shift, self._states[key] = effect.run(view, self._states.get(key))
+            view = replace(view, q=added(view.q, shift))
+        return view

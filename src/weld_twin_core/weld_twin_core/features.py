@@ -9,7 +9,7 @@ derivative of the pose by each channel are computed once.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -88,10 +88,21 @@ class Features:
         found = [self.pose_change(shift) for shift in self.shifts(effect, atoms)]
         return np.stack(found) if found else np.zeros((0, 6, self.at.size))
 
-    def seeds(self, kind: type[Effect], joint: str | None) -> Iterable[Effect]:
-        """Yield the instances a search for this kind of effect starts from."""
-        memory = kind.stage in (Stage.SERVO, Stage.PLAY)
-        return kind.seeds(self.joint_view if memory else self.view, joint)
+    def seeds(
+        self, kind: type[Effect], joint: str | None, residual: Array | None = None
+    ) -> tuple[list[Effect], float]:
+        """
+        Return the instances a search for this kind of effect starts from, and among how many.
+
+        ``residual``, shape (c, M), is what the search wants explained.
+        """
+        view = self.joint_view if kind.stage in (Stage.SERVO, Stage.PLAY) else self.view
+        pull = None
+        if joint is not None and residual is not None:
+            index = self.twin.robot.index(joint)
+            pull = (self.column(('q', index))[: residual.shape[0]] * residual).sum(axis=0)
+        seeds = list(kind.seeds(view, joint, pull))
+        return seeds, kind.trials(view, joint) or float(len(seeds))
 
 
 def sites(kind: type[Effect], joints: Sequence[str]) -> Sequence[str | None]:

@@ -95,7 +95,9 @@ class Backlash(MemoryEffect):
         return np.where(resting, side, 0.0), scan.last_true(resting)
 
     @classmethod
-    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
+    def seeds(
+        cls, view: View, joint: str | None, pull: Array | None = None
+    ) -> Iterable[Effect]:
         """Yield play of a small, a usual and a large width: how it engages depends on width."""
         for width in (5e-5, 5e-4, 2e-3):
             yield cls(str(joint), width)

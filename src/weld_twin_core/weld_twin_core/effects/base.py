@@ -75,9 +75,21 @@ class Effect(Parametric, ABC):
         return {}
 
     @classmethod
-    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
-        """Yield the instances a search starts from; each spans one linear subspace."""
+    def seeds(
+        cls, view: View, joint: str | None, pull: Array | None = None
+    ) -> Iterable[Effect]:
+        """
+        Yield the instances a search starts from; each spans one linear subspace.
+
+        ``pull``, shape (N,), is how strongly the residual would move the joint at every sample;
+        an effect too fine to search on a grid may look for itself in it.
+        """
         yield cls._at(joint)
+
+    @classmethod
+    def trials(cls, view: View, joint: str | None) -> float:
+        """Return how many different instances `seeds` chose among; 0 means as many as it yields."""
+        return 0.0
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the linear features of this instance; their combinations start a fit."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from ..arrays import Array
 from ..chain import Shift
 from ..errors import ModelError
 from ..robot import Robot
@@ -49,7 +50,9 @@ class JointCoupling(Effect):
         return [{('q', view.robot.index(self.joint)): view.joint(view.robot.index(self.source))}]
 
     @classmethod
-    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
+    def seeds(
+        cls, view: View, joint: str | None, pull: Array | None = None
+    ) -> Iterable[Effect]:
         """Yield one instance per neighbour along the chain, where gears share a housing."""
         i = view.robot.index(str(joint))
         for k in (i - 1, i + 1):

@@ -15,6 +15,10 @@ from .base import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
+FINEST, COARSEST = 1e-4, 2e-2
+"""Steps that a search considers [rad]."""
+PEAKS = 3
+
 
 @register
 @dataclass(frozen=True, eq=False)
@@ -44,14 +48,41 @@ class Quantization(Effect):
         return [None]
 
     @classmethod
-    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
-        """Yield steps close enough for the next one to be seen, over the joint's travel."""
+    def seeds(
+        cls, view: View, joint: str | None, pull: Array | None = None
+    ) -> Iterable[Effect]:
+        """
+        Yield the steps whose staircase the residual follows best.
+
+        A staircase of step s is a wave of 1/s cycles per radian: the spectrum of the residual's
+        pull over joint position shows every step at once. A grid of steps would need tens of
+        thousands, for a small error of the step runs out of phase over the joint's travel.
+        """
+        if pull is None:
+            return
         q = view.joint(view.robot.index(str(joint)))
-        travel = max(float(np.ptp(q)), 1e-3)
-        step = 5e-3
-        while step > 5e-5:
-            yield cls(str(joint), step)
-            step /= 1.0 + min(0.1, 0.2 * step / travel)
+        travel = float(np.ptp(q))
+        if travel < 4.0 * FINEST:
+            return
+        cell = 0.25 * FINEST
+        bins = np.rint((q - q.min()) / cell).astype(int)
+        size = 1 << (4 * (int(bins.max()) + 1) - 1).bit_length()
+        power = np.abs(np.fft.rfft(np.bincount(bins, pull, minlength=size))) ** 2
+        step = size * cell / np.maximum(np.arange(power.size), 1)
+        power[(step < FINEST) | (step > min(COARSEST, 0.5 * travel))] = 0.0
+        for _ in range(PEAKS):
+            k = int(np.argmax(power))
+            if power[k] <= 0.0:
+                return
+            near = _parabola(power, k)
+            yield cls(str(joint), size * cell / near)
+            power[max(k - 6, 0) : k + 7] = 0.0
+
+    @classmethod
+    def trials(cls, view: View, joint: str | None) -> float:
+        """Return how many steps the spectrum tells apart."""
+        travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
+        return max(1.0, travel / FINEST)
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the rounding error itself; its right coefficient is one."""
@@ -60,3 +91,12 @@ class Quantization(Effect):
     def from_atoms(self, coefficients: Array) -> Effect:
         """Return the same staircase: its height and step are one parameter."""
         return self
+
+
+def _parabola(power: Array, k: int) -> float:
+    """Return the place of a peak between bins, from its neighbours' logarithms."""
+    if not 0 < k < power.size - 1 or min(power[k - 1], power[k + 1]) <= 0.0:
+        return float(k)
+    low, mid, high = np.log(power[k - 1 : k + 2])
+    bend = low - 2.0 * mid + high
+    return float(k) if bend >= 0.0 else k + 0.5 * float(low - high) / float(bend)

@@ -78,7 +78,9 @@ class ServoLag(MemoryEffect):
         return tangent + scan.linear(decay, -weight * change, np.zeros(tangent.shape[:-1]))
 
     @classmethod
-    def seeds(cls, view: View, joint: str | None) -> list[ServoLag]:
+    def seeds(
+        cls, view: View, joint: str | None, pull: Array | None = None
+    ) -> list[ServoLag]:
         """Return a fast and a slow lag; between them the response is nearly proportional."""
         return [] if view.static else [cls(str(joint), tau) for tau in (2e-3, 3e-2)]
 

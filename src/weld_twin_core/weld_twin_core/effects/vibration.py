@@ -109,7 +109,9 @@ class Vibration(MemoryEffect):
         return tangent + self.number('gain') * z.imag
 
     @classmethod
-    def seeds(cls, view: View, joint: str | None) -> Iterable[Effect]:
+    def seeds(
+        cls, view: View, joint: str | None, pull: Array | None = None
+    ) -> Iterable[Effect]:
         """Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them."""
         if view.static or view.t.size < 3:
             return

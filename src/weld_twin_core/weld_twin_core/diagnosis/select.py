@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which units belong in the model: forward by evidence, nonlinear fits between, then backward."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Array
+from ..effects.base import Effect
+from .fit import Fit, design, fit, robust_scale
+from .gram import Gram
+from .library import Library, Unit
+from .problem import Model, Problem, Scale
+from .score import Choice, best_choice, evidence
+
+ENTER = 6.0
+"""Nats a unit must be worth to enter: odds of about 400 to 1, for a hundred or so candidates."""
+SHORTLIST = 4
+"""Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
+SLACK = 0.15
+"""Share of the best gain within which a linear ranking is not trusted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """
+    What selection works on: the problem, its noise, the shared library and its Gram matrix.
+
+    ``shared`` is the library's normal matrix, computed once; residuals change, columns do not.
+    """
+
+    problem: Problem
+    scale: Scale
+    library: Library
+    shared: Array
+
+    @classmethod
+    def of(cls, problem: Problem, scale: Scale, library: Library) -> Workspace:
+        """Multiply the library out once."""
+        return cls(problem, scale, library, library.columns @ library.columns.T)
+
+    def conditioned(self, model: Model, residual: Array) -> Gram:
+        """Return the library's normal equations given a model: its frames and effects fitted."""
+        own, _ = design(self.problem, model, self.scale)
+        cross = own @ self.library.columns.T
+        normal = np.block([[self.shared, cross.T], [cross, own @ own.T]])
+        right = np.concatenate([self.library.columns @ residual, own @ residual])
+        gram = Gram(
+            normal, right, float(residual @ residual), residual.size,
+            np.maximum(np.diag(normal).copy(), 1e-300),
+        )  # fmt: skip
+        count = self.library.columns.shape[0]
+        return gram.without(np.arange(count, count + own.shape[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of a selection: the unit taken in, its evidence, and the fit with it."""
+
+    unit: Unit
+    nats: float
+    fit: Fit
+
+
+def forward(
+    work: Workspace,
+    start: Fit,
+    effective: Callable[[Fit], float],
+    most: int = 40,
+    tick: Callable[[str], None] = lambda text: None,
+) -> list[Step]:
+    """
+    Return the steps of a forward selection.
+
+    Parameters
+    ----------
+    work : Workspace
+    start : Fit
+        The baseline: frames and known effects.
+    effective : callable
+        Number of independent rows of a fit.
+    most : int
+        Stop after this many units.
+    tick : callable
+        Told what was found, for progress.
+
+    """
+    steps: list[Step] = []
+    now = start
+    taken: list[tuple[str, str | None]] = []
+    while len(steps) < most:
+        gram = work.conditioned(now.model, now.residual)
+        count = effective(now)
+        ranked = ranking(gram, work.library.units, count)
+        ranked = [c for c in ranked if c.nats > ENTER and not _repeats(c, taken)]
+        if not ranked:
+            break
+        best = _refined(work, now, gram, ranked, count)
+        if best is None:
+            break
+        steps.append(best)
+        taken.append(best.unit.site)
+        now = best.fit
+        tick(f'{best.unit} (+{best.nats:.0f} nats)')
+    return steps
+
+
+def ranking(gram: Gram, units: Sequence[Unit], effective: float) -> list[Choice]:
+    """Return every unit's best choice, most evidence first."""
+    found = [best_choice(gram, unit, effective) for unit in units]
+    return sorted((c for c in found if c is not None), key=lambda c: -c.nats)
+
+
+def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
+    """A unit may enter once; only a ripple has further orders to add."""
+    return choice.unit.site in taken and choice.unit.family != 'transmission_ripple'
+
+
+def _refined(
+    work: Workspace, now: Fit, gram: Gram, ranked: list[Choice], count: float
+) -> Step | None:
+    """Return the best of the leading choices after a nonlinear fit of each."""
+    close = [c for c in ranked if c.nats > ranked[0].nats - max(8.0, SLACK * ranked[0].nats)]
+    best: Step | None = None
+    for choice in close[:SHORTLIST]:
+        result = fitted_with(work, now.model, choice.effect(gram))
+        gain = now.rss - result.rss
+        freedom = result.coordinates.size - now.coordinates.size
+        tried = float(np.log(choice.unit.trials))
+        nats = evidence(_with_rss(gram, now.rss), gain, freedom, count) - tried
+        if nats > ENTER and (best is None or nats > best.nats):
+            best = Step(choice.unit, nats, result)
+    return best
+
+
+def _with_rss(gram: Gram, rss: float) -> Gram:
+    return replace(gram, rss=rss)
+
+
+def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
+    """Return the fit of a model with one more effect, merged where its kind can merge."""
+    return fit(work.problem, model.with_found(merged(model.found, effect)), work.scale, None, 5)
+
+
+def merged(found: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
+    """Return the effects with one more; orders of one joint's ripple go into one effect."""
+    for k, other in enumerate(found):
+        if other.name == effect.name == 'transmission_ripple' and other.site == effect.site:
+            parts = {
+                p.name: np.append(getattr(other, p.name), getattr(effect, p.name))
+                for p in other.parameters
+            }
+            return (*found[:k], replace(other, **parts), *found[k + 1 :])
+    return (*found, effect)
+
+
+def without(model: Model, k: int) -> Model:
+    """Return the model without found effect k."""
+    return model.with_found(model.found[:k] + model.found[k + 1 :])
+
+
+def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
+    """Return the fit with every effect dropped that is not worth its freedom given the others."""
+    while now.model.found:
+        count = effective(now)
+        losses = []
+        for k in range(len(now.model.found)):
+            less = fit(work.problem, without(now.model, k), work.scale, None, 4)
+            gram = Gram(np.zeros((0, 0)), np.zeros(0), less.rss, now.residual.size, np.zeros(0))
+            freedom = now.coordinates.size - less.coordinates.size
+            losses.append((evidence(gram, less.rss - now.rss, freedom, count), less))
+        worst = min(losses, key=lambda item: item[0])
+        if worst[0] >= ENTER:
+            break
+        now = worst[1]
+    return now
+
+
+def rescaled(problem: Problem, model: Model, least: Scale | None = None) -> Scale:
+    """Return noise and weights from a model's own residual."""
+    return robust_scale(problem, problem.residuals(model), least)

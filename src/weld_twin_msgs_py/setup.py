@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+from setuptools import find_packages, setup
+
+NAME = 'weld_twin_msgs_py'
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    packages=find_packages(),
+    package_data={NAME: ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
+        ('share/' + NAME, ['package.xml']),
+    ],
+    # rosbags has no ROS package; on ROS machines pip adds it beside the rest
+    install_requires=['setuptools', 'numpy', 'PyYAML', 'defusedxml', 'urdf_parser_py', 'rosbags'],
+    extras_require={'test': ['pytest']},
+    zip_safe=False,
+    maintainer='weld_twin contributors',
+    maintainer_email='maintainers@example.org',
+    description='Messages, bags, robot files and tables in and out of arrays.',
+    license='Apache-2.0',
+)

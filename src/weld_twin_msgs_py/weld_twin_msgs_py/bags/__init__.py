@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags (mcap and sqlite3, directories and single files) in and out; nothing else opens one."""
+
+from .from_bag import read_recording
+from .info import BagInfo, TopicInfo, bag_info
+from .reader import BagReader, provenance
+from .to_bag import write_recording
+from .writer import BagWriter
+
+__all__ = [
+    'BagInfo',
+    'BagReader',
+    'BagWriter',
+    'TopicInfo',
+    'bag_info',
+    'provenance',
+    'read_recording',
+    'write_recording',
+]

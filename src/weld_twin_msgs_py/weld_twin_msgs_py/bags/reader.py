@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Streaming access to one bag: a message is decoded, handed over and forgotten.
+
+Only the standard message types this project knows are decoded, with the definitions of Jazzy, so
+a bag that also holds somebody's own types reads as well.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from struct import unpack_from
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from rosbags.rosbag2 import Reader
+
+from weld_twin_core.errors import DataError, TwinError
+
+from ..convert import NANOSECONDS
+from .store import TYPES
+
+SUFFIXES = ('.mcap', '.db3')
+PROVENANCE_PREFIX = 'weld_twin/'
+CDR_HEADER = 4
+"""Bytes before the first field of a serialised message; the second gives the byte order."""
+
+
+class BagMessage(NamedTuple):
+    """One message: its topic, its type, when it was recorded [ns], and itself."""
+
+    topic: str
+    type: str
+    log_ns: int
+    message: Any
+
+
+class BagReader:
+    """
+    An open bag; use as a context manager so that the storage is never left open.
+
+    Attributes
+    ----------
+    path : Path
+    topics : dict
+        Message type and count of each topic.
+    provenance : dict
+        What the writer said about the bag's making; empty for bags made elsewhere.
+
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self.topics: dict[str, tuple[str, int]] = {}
+        self.provenance: dict[str, Any] = {}
+        self._readers: list[Reader] = []
+        self._stack = ExitStack()
+
+    def __enter__(self) -> BagReader:
+        """
+        Open the storage.
+
+        Raises
+        ------
+        DataError
+            Nothing is there, it is no bag, or it is damaged.
+
+        """
+        files = _storage_paths(self.path)
+        try:
+            with clear_errors(self.path):
+                for file in files:
+                    self._readers.append(self._stack.enter_context(Reader(file)))
+                self._list_topics()
+                self.provenance = self._provenance()
+        except BaseException:
+            self._stack.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the storage."""
+        self._stack.close()
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """
+        Yield the messages of some topics, in the order of recording.
+
+        Raises
+        ------
+        DataError
+            The bag turns out to be damaged on the way.
+
+        """
+        with clear_errors(self.path):
+            for reader in self._readers:
+                wanted = [c for c in reader.connections if c.topic in topics]
+                if not wanted:
+                    continue
+                for connection, log_ns, data in reader.messages(wanted):
+                    message = TYPES.deserialize_cdr(data, connection.msgtype)
+                    yield BagMessage(connection.topic, connection.msgtype, log_ns, message)
+
+    def stamps(self) -> Iterator[tuple[str, int, bool]]:
+        """
+        Yield topic, stamp [ns] and whether it is the header's, of every message, undecoded.
+
+        A message without a header, or of an unknown type, gives the time of its recording.
+
+        Raises
+        ------
+        DataError
+            The bag turns out to be damaged on the way.
+
+        """
+        with clear_errors(self.path):
+            for reader in self._readers:
+                stamped = {c.id: _has_header(c.msgtype) for c in reader.connections}
+                for connection, log_ns, data in reader.messages():
+                    if stamped[connection.id]:
+                        order = '<' if data[1] else '>'
+                        sec, nanosec = unpack_from(order + 'iI', data, CDR_HEADER)
+                        yield connection.topic, sec * NANOSECONDS + nanosec, True
+                    else:
+                        yield connection.topic, log_ns, False
+
+    def _list_topics(self) -> None:
+        for reader in self._readers:
+            for connection in reader.connections:
+                count = self.topics.get(connection.topic, ('', 0))[1]
+                self.topics[connection.topic] = (connection.msgtype, count + connection.msgcount)
+
+    def _provenance(self) -> dict[str, Any]:
+        custom: dict[str, str] = {}
+        for reader in self._readers:
+            custom |= reader.storage.metadata.custom or {}
+        beside = self.path.parent / 'metadata.yaml'
+        if self.path.suffix in SUFFIXES and beside.exists():
+            with Reader(self.path.parent) as reader:
+                custom |= reader.storage.metadata.custom or {}
+        start = len(PROVENANCE_PREFIX)
+        return {
+            key[start:]: json.loads(value)
+            for key, value in custom.items()
+            if key.startswith(PROVENANCE_PREFIX)
+        }
+
+
+def _has_header(kind: str) -> bool:
+    """Return whether messages of a type start with a std_msgs/Header."""
+    if kind not in TYPES.fielddefs:
+        return False
+    fields = TYPES.fielddefs[kind][1]
+    return bool(fields) and fields[0][0] == 'header'
+
+
+@contextmanager
+def clear_errors(path: Path) -> Iterator[None]:
+    """Turn whatever a damaged byte makes the storage libraries raise into one sentence."""
+    try:
+        yield
+    except TwinError:
+        raise
+    except PermissionError:
+        raise DataError(f"bag '{path}' cannot be read: permission denied") from None
+    except Exception as error:  # a flipped bit surfaces as anything from KeyError to ZstdError
+        reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
+        raise DataError(
+            f"bag '{path}' is damaged or was cut short ({reason[:200]}); record it again, or "
+            "repair it with 'mcap recover' or 'sqlite3 .recover'"
+        ) from None
+
+
+def _storage_paths(path: Path) -> list[Path]:
+    """Return what to open: the path itself, or the files of a bag that lost its metadata."""
+    if not path.exists():
+        raise DataError(f"there is no bag at '{path}'")
+    if path.suffix == '.bag':
+        raise DataError(f"'{path}' is a ROS 1 bag; convert it with rosbags-convert first")
+    if path.is_file():
+        if path.suffix not in SUFFIXES:
+            raise DataError(
+                f"'{path}' is no bag: expected a rosbag2 directory, a .mcap or a .db3 file"
+            )
+        return [path]
+    if (path / 'metadata.yaml').exists():
+        return [path]
+    files = sorted(file for file in path.iterdir() if file.suffix in SUFFIXES)
+    if not files:
+        raise DataError(
+            f"'{path}' is no bag: it holds neither metadata.yaml nor a .mcap or .db3 file"
+        )
+    return files
+
+
+def provenance(path: Path | str) -> dict[str, Any]:
+    """
+    Return what the writer said about a bag's making; empty for bags made elsewhere.
+
+    Raises
+    ------
+    DataError
+        Nothing is there, it is no bag, or it is damaged.
+
+    """
+    with BagReader(path) as reader:
+        return reader.provenance

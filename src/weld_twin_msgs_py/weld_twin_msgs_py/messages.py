@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Arrays to messages.
+
+One factory serves rclpy and rosbags: both take the fields as keywords, they only differ in where
+the class comes from and in what holds a sequence of numbers.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.rotation import quaternion_from_matrix
+
+from .convert import NANOSECONDS
+
+LEVELS = (b'\x00', b'\x01', b'\x02', b'\x03')
+"""Levels of a DiagnosticStatus: ok, warn, error, stale."""
+
+
+class Messages:
+    """Makes messages of one flavour; use `ros_messages` or `bag_messages`."""
+
+    def __init__(
+        self,
+        lookup: Callable[[str], Any],
+        numbers: Callable[[Array], Any],
+        level: Callable[[int], Any],
+    ) -> None:
+        self._lookup = lookup
+        self._numbers = numbers
+        self._level = level
+
+    def _make(self, kind: str, **fields: Any) -> Any:
+        return self._lookup(kind)(**fields)
+
+    def time(self, ns: int) -> Any:
+        """Return a builtin_interfaces/Time."""
+        sec, nanosec = divmod(int(ns), NANOSECONDS)
+        return self._make('builtin_interfaces/msg/Time', sec=sec, nanosec=nanosec)
+
+    def header(self, ns: int, frame_id: str) -> Any:
+        """Return a std_msgs/Header."""
+        return self._make('std_msgs/msg/Header', stamp=self.time(ns), frame_id=frame_id)
+
+    def joint_state(
+        self, ns: int, names: Sequence[str], q: Array, qd: Array | None = None, frame_id: str = ''
+    ) -> Any:
+        """Return a JointState from positions and velocities, shape (n,) each [rad, rad/s]."""
+        empty = np.zeros(0)
+        return self._make(
+            'sensor_msgs/msg/JointState', header=self.header(ns, frame_id), name=list(names),
+            position=self._numbers(np.asarray(q, dtype=np.float64)),
+            velocity=self._numbers(empty if qd is None else np.asarray(qd, dtype=np.float64)),
+            effort=self._numbers(empty),
+        )  # fmt: skip
+
+    def _xyz(self, kind: str, value: Array) -> Any:
+        x, y, z = (float(v) for v in value)
+        return self._make(f'geometry_msgs/msg/{kind}', x=x, y=y, z=z)
+
+    def pose(self, ns: int, position: Array, rotation: Array, frame_id: str = 'base') -> Any:
+        """Return a PoseStamped from position (3,) [m] and rotation (3, 3)."""
+        x, y, z, w = (float(v) for v in quaternion_from_matrix(rotation))
+        turned = self._make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
+        inner = self._make(
+            'geometry_msgs/msg/Pose', position=self._xyz('Point', position), orientation=turned
+        )
+        return self._make(
+            'geometry_msgs/msg/PoseStamped', header=self.header(ns, frame_id), pose=inner
+        )
+
+    def point(self, ns: int, position: Array, frame_id: str = 'base') -> Any:
+        """Return a PointStamped, (3,) [m]."""
+        return self._make(
+            'geometry_msgs/msg/PointStamped',
+            header=self.header(ns, frame_id), point=self._xyz('Point', position),
+        )  # fmt: skip
+
+    def vector3(self, ns: int, vector: Array, frame_id: str = 'base') -> Any:
+        """Return a Vector3Stamped, (3,)."""
+        return self._make(
+            'geometry_msgs/msg/Vector3Stamped',
+            header=self.header(ns, frame_id), vector=self._xyz('Vector3', vector),
+        )  # fmt: skip
+
+    def wrench(self, ns: int, wrench: Array, frame_id: str = 'tool') -> Any:
+        """Return a WrenchStamped from force and torque, (6,) [N, N m]."""
+        inner = self._make(
+            'geometry_msgs/msg/Wrench',
+            force=self._xyz('Vector3', wrench[:3]), torque=self._xyz('Vector3', wrench[3:]),
+        )  # fmt: skip
+        return self._make(
+            'geometry_msgs/msg/WrenchStamped', header=self.header(ns, frame_id), wrench=inner
+        )
+
+    def temperature(self, ns: int, celsius: float, frame_id: str = '') -> Any:
+        """Return a Temperature [degC]; its variance is left unknown (zero)."""
+        return self._make(
+            'sensor_msgs/msg/Temperature',
+            header=self.header(ns, frame_id), temperature=float(celsius), variance=0.0,
+        )  # fmt: skip
+
+    def diagnostics(
+        self, ns: int, name: str, values: Mapping[str, Any], level: int = 0, message: str = '',
+        hardware_id: str = '',
+    ) -> Any:  # fmt: skip
+        """Return a DiagnosticArray with one status; numbers are written to round trip."""
+        pairs = [
+            self._make('diagnostic_msgs/msg/KeyValue', key=str(k), value=_text(v))
+            for k, v in values.items()
+        ]
+        status = self._make(
+            'diagnostic_msgs/msg/DiagnosticStatus', level=self._level(level), name=name,
+            message=message, hardware_id=hardware_id, values=pairs,
+        )  # fmt: skip
+        return self._make(
+            'diagnostic_msgs/msg/DiagnosticArray', header=self.header(ns, ''), status=[status]
+        )
+
+
+def _text(value: Any) -> str:
+    return repr(float(value)) if isinstance(value, float | np.floating) else str(value)
+
+
+def ros_messages() -> Messages:
+    """Return the factory of rclpy messages; needs a ROS installation."""
+    cache: dict[str, Any] = {}
+
+    def lookup(kind: str) -> Any:
+        if kind not in cache:
+            package, folder, name = kind.split('/')
+            cache[kind] = getattr(import_module(f'{package}.{folder}'), name)
+        return cache[kind]
+
+    # rclpy refuses numpy arrays for sequences and wants a byte as bytes.
+    return Messages(lookup, lambda values: array('d', values), lambda level: LEVELS[level])
+
+
+def bag_messages() -> Messages:
+    """Return the factory of rosbags messages, the ones a `BagWriter` serialises."""
+    from .bags.store import TYPES  # nodes do without rosbags
+
+    return Messages(
+        lambda kind: TYPES.types[kind], lambda values: values, lambda level: level
+    )

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The one table of topics: name, type, quality of service, meaning.
+
+Every publisher offers *reliable*, which every subscriber can take. A stream that may come from
+somebody else's node is requested *best effort*: that matches both joint_state_broadcaster
+(reliable) and sensor drivers (best effort), where a reliable request would silently receive
+nothing from the latter. Queues are deep because samples are paired by stamp, so an old sample is
+worth as much as a new one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+RELIABLE = 'reliable'
+BEST_EFFORT = 'best_effort'
+
+
+@dataclass(frozen=True)
+class Qos:
+    """Quality of service: keep the last ``depth`` samples; volatile, as all streams are."""
+
+    reliability: str
+    depth: int
+
+    def to_rclpy(self) -> Any:
+        """Return the rclpy profile; needs a ROS installation."""
+        from rclpy.qos import (  # only nodes have rclpy
+            DurabilityPolicy,
+            HistoryPolicy,
+            QoSProfile,
+            ReliabilityPolicy,
+        )
+
+        return QoSProfile(  # type: ignore[no-untyped-call]
+            history=HistoryPolicy.KEEP_LAST,
+            depth=self.depth,
+            reliability=ReliabilityPolicy[self.reliability.upper()],
+            durability=DurabilityPolicy.VOLATILE,
+        )
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One row of the table."""
+
+    name: str
+    type: str
+    offered: Qos
+    requested: Qos
+    meaning: str
+
+    def message_class(self) -> Any:
+        """Return the rclpy message class; needs a ROS installation."""
+        from importlib import import_module
+
+        package, kind, name = self.type.split('/')
+        return getattr(import_module(f'{package}.{kind}'), name)
+
+
+def _stream(name: str, kind: str, depth: int, meaning: str) -> Topic:
+    """Return a topic that anybody's node may publish."""
+    return Topic(name, kind, Qos(RELIABLE, depth), Qos(BEST_EFFORT, depth), meaning)
+
+
+def _result(name: str, kind: str, depth: int, meaning: str) -> Topic:
+    """Return a topic that only this project's nodes publish."""
+    return Topic(name, kind, Qos(RELIABLE, depth), Qos(RELIABLE, depth), meaning)
+
+
+JOINT_STATES = _stream(
+    '/joint_states', 'sensor_msgs/msg/JointState', 200,
+    'commanded joint motion: position [rad or m], velocity where known',
+)  # fmt: skip
+ACTUAL_JOINT_STATES = _result(
+    '/actual/joint_states', 'sensor_msgs/msg/JointState', 200,
+    'joint motion with the joint-space effects in it',
+)  # fmt: skip
+MEASURED_POSE = _stream(
+    '/measured/tool_pose', 'geometry_msgs/msg/PoseStamped', 200,
+    'where the tool really is, in the measuring frame [m]',
+)  # fmt: skip
+MEASURED_POINT = _stream(
+    '/measured/tool_point', 'geometry_msgs/msg/PointStamped', 200,
+    'the same from an instrument that gives no orientation [m]',
+)  # fmt: skip
+MEASURED_SIGMA = _stream(
+    '/measured/sigma', 'geometry_msgs/msg/Vector3Stamped', 200,
+    'standard deviation of the measured position of the same stamp, per axis [m]',
+)  # fmt: skip
+TWIN_POSE = _result(
+    '/twin/tool_pose', 'geometry_msgs/msg/PoseStamped', 200,
+    'where the twin says the tool is [m]',
+)  # fmt: skip
+DEVIATION = _result(
+    '/deviation', 'geometry_msgs/msg/Vector3Stamped', 200,
+    'measured minus twin in the base frame, at the stamp of the measurement [m]',
+)  # fmt: skip
+DEVIATION_METRICS = _result(
+    '/deviation/metrics', 'diagnostic_msgs/msg/DiagnosticArray', 10,
+    'D(t), D_norm, D_cum, RMS, max, samples, dropped',
+)  # fmt: skip
+TOOL_WRENCH = _stream(
+    '/tool_wrench', 'geometry_msgs/msg/WrenchStamped', 100,
+    'load on the tool, in the tool frame unless the header names another [N, N m]',
+)  # fmt: skip
+TEMPERATURE = _stream(
+    '/temperature', 'sensor_msgs/msg/Temperature', 10,
+    'temperature of the arm or around it [degC]',
+)  # fmt: skip
+
+TOPICS = (
+    JOINT_STATES, ACTUAL_JOINT_STATES, MEASURED_POSE, MEASURED_POINT, MEASURED_SIGMA, TWIN_POSE,
+    DEVIATION, DEVIATION_METRICS, TOOL_WRENCH, TEMPERATURE,
+)  # fmt: skip
+BY_NAME = {topic.name: topic for topic in TOPICS}
+
+
+@dataclass(frozen=True)
+class TopicNames:
+    """What the inputs are called; a recording made elsewhere has its own names."""
+
+    joints: str = JOINT_STATES.name
+    pose: str = MEASURED_POSE.name
+    point: str = MEASURED_POINT.name
+    sigma: str = MEASURED_SIGMA.name
+    wrench: str = TOOL_WRENCH.name
+    temperature: str = TEMPERATURE.name
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            name = getattr(self, item.name)
+            object.__setattr__(self, item.name, name if name.startswith('/') else f'/{name}')

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""ABB IRB 120-3/0.6."""
+
+from math import pi
+
+DEGREE = pi / 180.0
+
+_ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
+    (0.0, -pi / 2, 0.29, 0.0, -165.0, 165.0, 250.0),
+    (0.27, 0.0, 0.0, -pi / 2, -110.0, 110.0, 250.0),
+    (0.07, -pi / 2, 0.0, 0.0, -110.0, 70.0, 250.0),
+    (0.0, pi / 2, 0.302, 0.0, -160.0, 160.0, 320.0),
+    (0.0, -pi / 2, 0.0, 0.0, -120.0, 120.0, 320.0),
+    (0.0, 0.0, 0.072, pi, -400.0, 400.0, 420.0),
+)
+
+DATA = {
+    'name': 'abb_irb120',
+    'source': 'ABB, "Product specification IRB 120", 3HAC035960: geometry, range, speed; masses '
+    'and centres from the URDF of ROS-Industrial (abb_irb120_support), where they were taken from '
+    'solid models; acceleration is an estimate (full speed in 0.25 s)',
+    'joints': [
+        {
+            'name': f'joint_{k}', 'a': a, 'alpha': alpha, 'd': d, 'theta_offset': theta,
+            'lower': lower * DEGREE, 'upper': upper * DEGREE, 'max_velocity': speed * DEGREE,
+            'max_acceleration': 4.0 * speed * DEGREE,
+        }
+        for k, (a, alpha, d, theta, lower, upper, speed) in enumerate(_ROWS, 1)
+    ],
+    'links': [
+        {'mass': 3.067, 'com': [9.8e-05, 0.05159, -0.00012]},
+        {'mass': 3.909, 'com': [-0.16876, 0.00078, -0.00212]},
+        {'mass': 2.944, 'com': [-0.01209, -0.00106, 0.02281]},
+        {'mass': 1.328, 'com': [0.00041, -0.0773, 0.00015]},
+        {'mass': 0.546, 'com': [6.2e-05, -3.7e-05, -0.00109]},
+        {'mass': 0.137, 'com': [0.0, -0.00017, -0.00706]},
+    ],
+}  # fmt: skip

@@ -1,0 +1,243 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint positions along a whole path on one branch: no jumps, within the limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ..arrays import Array
+from ..chain import frames
+from ..errors import ReachError
+from ..robot import Robot
+from ..rotation import rotation_vector
+from .closed_form import branches, family
+from .newton import chain_jacobian, polish, pose_error
+from .one import TURN, turns_to_middle, where, why_not
+from .search import CLOSED, centring, null_space, search
+
+_KNOTS = 64
+"""Samples a numerical solution is followed over; between them a spline is the start."""
+_TRACKED = 12
+"""Postures at the first sample that are followed along the path."""
+_COMFORTABLE = 0.5
+"""Distance from a joint limit [rad] beyond which more of it is worth nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathSolution:
+    """
+    Joint positions along a path and how well the arm stands there.
+
+    Attributes
+    ----------
+    q : array, shape (N, n) [rad or m]
+    residual : array, shape (N, 2) [m, rad]
+        What is missing to each pose.
+    condition : array, shape (N,)
+        Condition number of the Jacobian with lengths divided by the arm's reach; large means
+        near a singularity.
+    manipulability : array, shape (N,)
+        Yoshikawa's measure, sqrt(det(J J^T)), of the same Jacobian.
+    limit_margin : array, shape (N,) [rad or m]
+        Distance to the nearest joint limit.
+    branch : int
+        Index of the posture among those found.
+    method : str
+        Family of the closed form, or 'search'.
+
+    References
+    ----------
+    .. [1] T. Yoshikawa, "Manipulability of robotic mechanisms", IJRR 4(2), 1985.
+
+    """
+
+    q: Array
+    residual: Array
+    condition: Array
+    manipulability: Array
+    limit_margin: Array
+    branch: int
+    method: str
+
+
+def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSolution:
+    """
+    Return joint positions on one branch along a path.
+
+    Of the branches that reach every sample within the limits and without a jump, the one with
+    most room to limits and singularities is taken, or the one that starts nearest the seed.
+
+    Parameters
+    ----------
+    robot : Robot
+    poses : array, shape (N, 4, 4)
+        ``T_world_tool``, close enough together that neighbours are one small motion apart.
+    seed : array, shape (n,), optional
+        Joint positions to start near.
+
+    Raises
+    ------
+    ReachError
+        Names the first sample out of reach, where it is and why.
+
+    """
+    poses = np.asarray(poses, dtype=np.float64)
+    if family(robot) is None:
+        tracks, method = _followed(robot, poses, seed), 'search'
+    else:
+        tracks, method = _closed(robot, poses, seed), str(family(robot))
+    failures = np.array([_first_failure(robot, q, poses) for q in tracks])
+    good = np.flatnonzero(failures == len(poses))
+    if not good.size:
+        raise ReachError(_explain(robot, tracks, failures, poses))
+    ranked = sorted(good, key=lambda k: _rank(robot, tracks[k], seed))
+    best = int(ranked[0])
+    q, error = polish(robot, tracks[best], poses)
+    residual = np.stack(
+        [np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)], axis=1
+    )
+    return PathSolution(q, residual, *_posture(robot, q), best, method)
+
+
+def reach(robot: Robot) -> float:
+    """Return the length of the stretched-out chain [m], an upper bound of the arm's reach."""
+    return float(np.hypot(robot.a, robot.d).sum() + np.linalg.norm(robot.T_flange_tool[:3, 3]))
+
+
+def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
+    """Return every closed-form branch, shape (8, N, n), unwrapped and on its best turn."""
+    q = branches(robot, poses)
+    for k, track in enumerate(q):
+        bad = ~np.isfinite(track).all(axis=-1)
+        if not bad.all():
+            q[k, ~bad] = _on_turn(robot, np.unwrap(track[~bad], axis=0), seed)
+    return q
+
+
+def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:
+    if seed is not None:
+        shift = np.round((np.asarray(seed) - q[0]) / TURN)
+        near = q + TURN * np.where(robot.prismatic, 0.0, shift)
+        if ((near >= robot.lower) & (near <= robot.upper)).all():
+            return near
+    return q + TURN * turns_to_middle(robot, q.min(axis=0), q.max(axis=0))
+
+
+def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
+    """Return tracks, shape (K, N, n), followed from every posture found at the first sample."""
+    starts, gap = search(robot, poses[0], seed)
+    if not len(starts):
+        why = f'the closest the arm gets is {gap:.3g} m or rad away'
+        raise ReachError(
+            f'{robot.name} cannot reach sample 0 at {where(poses[0])}: {why}; '
+            'move the seam or turn the torch'
+        )
+    if seed is None or robot.n > 6:
+        starts = np.array(sorted(starts, key=lambda q: _rank(robot, q[None], seed)))[:_TRACKED]
+    index = np.unique(np.linspace(0, len(poses) - 1, _KNOTS).round().astype(int))
+    knots = _track(robot, starts, poses[index])
+    if len(index) == len(poses):
+        return knots
+    along = _travel(poses, reach(robot))
+    spline = CubicSpline(along[index], np.where(np.isfinite(knots), knots, 0.0), axis=1)
+    tracks = spline(along)
+    lost = ~np.isfinite(knots).all(axis=-1)
+    for k, track in enumerate(tracks):
+        tracks[k] = polish(robot, track, poses)[0]
+        if lost[k].any():
+            tracks[k, index[max(int(np.argmax(lost[k])) - 1, 0)] + 1 :] = np.nan
+    return tracks
+
+
+def _track(robot: Robot, q: Array, poses: Array) -> Array:
+    """Follow postures q (K, n) over knots; NaN from where one is lost. Shape (K, M, n)."""
+    out = []
+    for pose in poses:
+        target = np.broadcast_to(pose, (len(q), 4, 4))
+        if robot.n > 6:
+            jacobian = chain_jacobian(robot, frames(robot, q))
+            q = q + 0.05 * null_space(jacobian, centring(robot, q))
+        q, error = polish(robot, q, target)
+        lost = ~(np.abs(error).max(axis=-1) < CLOSED)
+        out.append(np.where(lost[:, None], np.nan, q))
+    return np.stack(out, axis=1)
+
+
+def _travel(poses: Array, length: float) -> Array:
+    """Return a strictly increasing measure of the way along the poses, shape (N,)."""
+    turns = rotation_vector(poses[1:, :3, :3] @ np.swapaxes(poses[:-1, :3, :3], -1, -2))
+    steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) / length
+    steps = steps + np.linalg.norm(turns, axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps + 1e-9)])
+
+
+def _first_failure(robot: Robot, q: Array, poses: Array) -> int:
+    """Return the first sample that is not reached, past a limit or after a jump; N if none."""
+    fails = ~np.isfinite(q).all(axis=-1)
+    fails |= ((q < robot.lower) | (q > robot.upper)).any(axis=-1)
+    fails[1:] |= _jumps(robot, q, poses)
+    return int(np.argmax(fails)) if fails.any() else len(q)
+
+
+def _jumps(robot: Robot, q: Array, poses: Array) -> Array:
+    """
+    Tell, shape (N - 1,), where the arm leaves the path between two samples.
+
+    Half way between two joint positions of one motion the tool is near both; half way between
+    two branches it is somewhere else.
+    """
+    if len(q) < 2:
+        return np.zeros(0, dtype=bool)
+    chain = frames(robot, np.nan_to_num(0.5 * (q[1:] + q[:-1])))
+    size = reach(robot)
+    scale = np.array([1.0, 1.0, 1.0, size, size, size])
+    before = np.linalg.norm(pose_error(chain, poses[:-1]) * scale, axis=-1)
+    after = np.linalg.norm(pose_error(chain, poses[1:]) * scale, axis=-1)
+    step = np.diff(_travel(poses, size)) * size
+    return before + after > 3.0 * step + 1e-3 * size
+
+
+def _rank(robot: Robot, q: Array, seed: Array | None) -> float:
+    """Return a number that is smaller for a better track."""
+    if seed is not None:
+        return float(np.linalg.norm(q[0] - seed))
+    condition, _, margin = _posture(robot, q[:: max(1, len(q) // 100)])
+    room = min(float(margin.min()) / _COMFORTABLE, 1.0)
+    return -room / float(condition.max())
+
+
+def _posture(robot: Robot, q: Array) -> tuple[Array, Array, Array]:
+    """Return condition number, manipulability and distance to the nearest limit, (N,) each."""
+    jacobian = chain_jacobian(robot, frames(robot, q)).copy()
+    jacobian[:, :3] /= reach(robot)
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    condition = values[:, 0] / np.maximum(values[:, -1], 1e-300)
+    margin = np.minimum(q - robot.lower, robot.upper - q).min(axis=-1)
+    return condition, values.prod(axis=-1), margin
+
+
+def _explain(robot: Robot, tracks: Array, failures: Array, poses: Array) -> str:
+    """Return the sentence about the branch that gets farthest."""
+    best = int(np.argmax(failures))
+    k = int(failures[best])
+    text = f'{robot.name} cannot reach sample {k} at {where(poses[k])}: '
+    q = tracks[best, k]
+    if not np.isfinite(q).all():
+        return text + why_not(robot, poses[k])
+    outside = np.maximum(robot.lower - q, q - robot.upper)
+    joint = int(np.argmax(outside))
+    if outside[joint] > 0.0:
+        return text + (
+            f'joint {robot.joint_names[joint]!r} would have to go to {q[joint]:.3f}, outside '
+            f'[{robot.lower[joint]:.3f}, {robot.upper[joint]:.3f}]; move the seam or turn the torch'
+        )
+    return text + (
+        'the arm would have to change its posture there, next to a singularity; '
+        'move the seam, turn the torch or sample the path more densely'
+    )
+
+

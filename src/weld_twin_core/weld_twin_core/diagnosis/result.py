@@ -1,0 +1,217 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis says, as frozen values; `as_dict` is the content of diagnosis.json."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..effects.base import Effect
+from ..recording import Recording
+from .problem import Model
+
+SCHEMA = 'weld_twin/diagnosis/1'
+STATUSES = ('identified', 'ambiguous', 'unknown', 'none')
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Measured against the twin after alignment, before any found effect [m, rad]."""
+
+    rms_m: float
+    mean_m: float
+    max_m: float
+    orientation_rms_rad: float | None
+    samples: int
+    noise_floor_m: float
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding about the data: what was looked at, whether it passed, and a sentence."""
+
+    name: str
+    level: str
+    """'ok', 'note', 'warning'."""
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Where:
+    """
+    Where the gap lies; shares are of variance explained on stretches not used for fitting.
+
+    ``map_shares`` is the joint x regressor map: rows are joints, columns `map_regressors`.
+    """
+
+    joints: tuple[tuple[str, float], ...]
+    regimes: dict[str, float]
+    path: tuple[tuple[float, float, float, float], ...]
+    """Start [s], end [s], share of the squared gap, RMS [m]."""
+    direction: dict[str, float]
+    map_regressors: tuple[str, ...]
+    map_shares: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """One effect found, with the standard errors of its parameters."""
+
+    effect: Effect
+    std: dict[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of ``verdict.effects``."""
+        entry = self.effect.to_mapping()
+        name = entry.pop('effect')
+        joint = entry.pop('joint', None)
+        return {'effect': name, 'joint': joint, 'parameters': entry, 'std': self.std}
+
+
+@dataclass(frozen=True)
+class Site:
+    """A family on a joint (None: the robot as a whole)."""
+
+    effect: str
+    joint: str | None
+
+    def __str__(self) -> str:
+        """Return it as people read it."""
+        return f'{self.effect} of {self.joint}' if self.joint else self.effect
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A hypothesis for the leading effect, with its probability and what it would bring."""
+
+    site: Site
+    probability: float
+    rms_after_m: float
+    shrink: float
+    """Share of the RMS gap that it takes away on data not used for fitting."""
+
+
+@dataclass(frozen=True)
+class Shrink:
+    """Gap before and after on data not used for fitting."""
+
+    rms_before_m: float
+    rms_after_m: float
+    ratio: float
+    ci95: tuple[float, float]
+    held_out: str
+    steps: tuple[tuple[str, float], ...] = ()
+    """The waterfall: RMS [m] on unseen data as each effect is added in turn."""
+    alone: tuple[tuple[str, float], ...] = ()
+    """RMS [m] that would remain if only this one were mended."""
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What remains after the verdict."""
+
+    rms_m: float
+    above_noise: bool
+    structure: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Traces:
+    """Arrays for pictures, one entry per recording; positions in the measuring frame."""
+
+    t: tuple[Array, ...]
+    measured: tuple[Array, ...]
+    before: tuple[Array, ...]
+    """Position residual before, shape (M, 3) [m]."""
+    after: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The whole answer."""
+
+    gap: Gap
+    where: Where
+    status: str
+    effects: tuple[Found, ...]
+    confidence: float
+    indistinguishable: tuple[tuple[Site, ...], ...]
+    reasons: tuple[str, ...]
+    candidates: tuple[Candidate, ...]
+    shrink: Shrink
+    unexplained: Unexplained
+    next_experiment: dict[str, Any] | None
+    actions: tuple[str, ...]
+    checks: tuple[Check, ...]
+    model: Model
+    traces: Traces
+    absent: dict[str, str] = field(default_factory=dict)
+    recordings: tuple[Recording, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers, lists and strings in the public schema."""
+        return {
+            'schema': SCHEMA,
+            'gap': dict(vars(self.gap)),
+            'where': self._where(),
+            'verdict': {
+                'status': self.status,
+                'effects': [found.as_dict() for found in self.effects],
+                'confidence': self.confidence,
+                'indistinguishable': [
+                    [{'effect': s.effect, 'joint': s.joint} for s in group]
+                    for group in self.indistinguishable
+                ],
+                'reasons': list(self.reasons),
+                'actions': list(self.actions),
+            },
+            'candidates': [
+                {'effect': c.site.effect, 'joint': c.site.joint, 'probability': c.probability,
+                 'rms_after_m': c.rms_after_m, 'shrink': c.shrink}
+                for c in self.candidates
+            ],
+            'shrink': {
+                'rms_before_m': self.shrink.rms_before_m, 'rms_after_m': self.shrink.rms_after_m,
+                'ratio': self.shrink.ratio, 'ci95': list(self.shrink.ci95),
+                'held_out': self.shrink.held_out,
+                'steps': [{'added': n, 'rms_m': v} for n, v in self.shrink.steps],
+                'alone': [{'mended': n, 'rms_m': v} for n, v in self.shrink.alone],
+            },
+            'unexplained': {
+                'rms_m': self.unexplained.rms_m, 'above_noise': self.unexplained.above_noise,
+                'structure': list(self.unexplained.structure),
+            },
+            'next_experiment': self.next_experiment,
+            'checks': [dict(vars(check)) for check in self.checks],
+            'not_considered': dict(self.absent),
+            'model': {
+                'tool': _frame(self.model.robot.T_flange_tool),
+                'bases': [_frame(base) for base in self.model.bases],
+                'known': [effect.to_mapping() for effect in self.model.known],
+                'found': [effect.to_mapping() for effect in self.model.found],
+            },
+        }  # fmt: skip
+
+    def _where(self) -> dict[str, Any]:
+        where = self.where
+        return {
+            'joints': [{'name': name, 'share': share} for name, share in where.joints],
+            'regimes': dict(where.regimes),
+            'path': [
+                {'t_start': a, 't_end': b, 'share': share, 'rms_m': rms}
+                for a, b, share, rms in where.path
+            ],
+            'direction': dict(where.direction),
+            'map': {
+                'regressors': list(where.map_regressors),
+                'shares': [list(row) for row in where.map_shares],
+            },
+        }
+
+
+def _frame(matrix: Array) -> list[list[float]]:
+    return np.asarray(matrix).tolist()

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Many small errors at once: each kind's usual size is learned from the data, and each member is
+held to it.
+
+Fitted freely, dozens of small geometric errors or hundreds of ripple orders chase the noise. Here
+every group of like coordinates (a family; a joint's ripple within a band of orders) has a prior
+whose variance maximises the evidence; a group that the data do not need shrinks to nothing.
+
+References
+----------
+.. [1] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4, 1992.
+.. [2] M. E. Tipping, "Sparse Bayesian learning and the relevance vector machine", JMLR 1, 2001.
+
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ..arrays import Array
+from ..effects.base import Effect
+from .fit import Fit, design, fit
+from .problem import Model, Problem, Scale
+
+BANDS = (1, 2, 4, 8, 16, 24, 36, 54, 81, 121, 1000)
+"""Ripple orders whose amplitudes are expected to be alike: up to a band's last order."""
+ROUNDS = 15
+FREE = 3
+"""A group of fewer coordinates than this is fitted freely: too few to learn a size from."""
+
+
+def groups(found: tuple[Effect, ...]) -> tuple[Array, Array]:
+    """
+    Return the group number and the typical size of every fit coordinate, shapes (K,).
+
+    Number -1 marks coordinates that are fitted freely.
+    """
+    labels: list[tuple[str, str, int]] = []
+    scales: list[Array] = []
+    for effect in found:
+        size = effect.coordinates().size
+        scales.append(effect.coordinate_scales())
+        if effect.name == 'transmission_ripple':
+            band = np.searchsorted(BANDS, np.repeat(np.atleast_1d(effect.order), 2))
+            labels += [(effect.name, str(effect.site), int(b)) for b in band]
+        else:
+            labels += [(effect.name, '', 0)] * size
+    names = {label: k for k, label in enumerate(dict.fromkeys(labels))}
+    numbers = np.array([names[label] for label in labels], dtype=int)
+    counts = np.bincount(numbers, minlength=len(names)) if numbers.size else np.zeros(0, int)
+    free = counts[numbers] < FREE if numbers.size else np.zeros(0, bool)
+    return np.where(free, -1, numbers), np.concatenate([np.zeros(0), *scales])
+
+
+def learned_precision(
+    normal: Array, right: Array, rss: float, rows: int, labels: Array, scales: Array
+) -> Array:
+    """
+    Return the prior precision of every coordinate that maximises the evidence, shape (K,).
+
+    Parameters
+    ----------
+    normal, right, rss, rows
+        Normal equations of the coordinates with the nuisance frames projected out.
+    labels, scales : array, shape (K,)
+        As `groups` returns them.
+
+    """
+    # In units of the typical size, so that one variance serves a whole family.
+    normal = normal * np.outer(scales, scales)
+    right = right * scales
+    tied = labels >= 0
+    variance = np.ones(labels.max(initial=-1) + 1)
+    floor, noise = 1e-8, 1.0
+    for _ in range(ROUNDS):
+        precision = np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 1e-9)
+        system = normal / noise + np.diag(precision)
+        factor = cho_factor(system + 1e-12 * np.diag(np.diag(system)))
+        mean = cho_solve(factor, right / noise)
+        spread = np.diag(cho_solve(factor, np.eye(right.size)))
+        determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
+        left = rss - 2.0 * right @ mean + mean @ normal @ mean
+        noise = max(left / max(rows - determined.sum(), 1.0), 1e-6)
+        for k in range(variance.size):
+            mine = labels == k
+            if mine.any():
+                share = max(float(determined[mine].sum()), 1e-3)
+                variance[k] = max(float((mean[mine] ** 2).sum()) / share, floor)
+    precision = np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 0.0) / scales**2
+    # The fit works in whitened rows, so a prior counts against the noise actually there.
+    return precision * noise
+
+
+def shrunk_fit(problem: Problem, model: Model, scale: Scale, passes: int = 2) -> tuple[Fit, Array]:
+    """Return the fit with learned priors, and their precision, shape (K,)."""
+    precision = np.zeros(0)
+    result: Fit | None = None
+    for _ in range(passes):
+        residual = problem.whitened(problem.residuals(model), scale)
+        columns, _ = design(problem, model, scale)
+        labels, scales = groups(model.found)
+        x = np.concatenate([e.coordinates() for e in model.found])
+        frames = columns.shape[0] - x.size
+        # The linear target: what the coordinates explain already, put back.
+        target = residual + x @ columns[frames:]
+        normal, right = columns @ columns.T, columns @ target
+        rss = float(target @ target)
+        if frames:
+            solved = np.linalg.lstsq(
+                normal[:frames, :frames],
+                np.column_stack([normal[:frames, frames:], right[:frames]]), rcond=1e-12,
+            )[0]  # fmt: skip
+            rss -= float(right[:frames] @ solved[:, -1])
+            right = right[frames:] - normal[frames:, :frames] @ solved[:, -1]
+            normal = normal[frames:, frames:] - normal[frames:, :frames] @ solved[:, :-1]
+        precision = learned_precision(normal, right, rss, residual.size, labels, scales)
+        result = fit(problem, model, scale, precision, iterations=2)
+        model = result.model
+    assert result is not None
+    return result, precision

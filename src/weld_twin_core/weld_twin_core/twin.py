@@ -144,13 +144,13 @@ class Twin:
 
     def pose_change(self, run: Evaluation, shift: Shift) -> Array:
         """Return the change of pose, shape (6, ...), that a small change of channels makes."""
-        total: Array | float = 0.0
+        total = np.zeros((6, *run.chain.position.shape[:-1]))
         for channel, value in shift.items():
             for direct, factor in self.direct(channel):
                 total = total + factor * value * column(
                     self.robot, run.chain, direct, run.view.shift
                 )
-        return np.asarray(total)
+        return total
 
     def direct(self, channel: Channel) -> list[tuple[Channel, Any]]:
         """Resolve a load torque into the joint motion its springs make of it."""

@@ -26,7 +26,7 @@ from .view import Parameter, Stage, Value, View
 
 __all__ = ['Effect', 'MemoryEffect', 'Parameter', 'Stage', 'Value', 'View']
 
-RELATIVE_STEP = 1e-3
+RELATIVE_STEP = 1e-5
 """Step of numerical derivatives, in typical magnitudes of the parameter."""
 
 

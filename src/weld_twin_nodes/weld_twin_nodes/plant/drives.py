@@ -42,7 +42,7 @@ def displacement(causes: Causes, course: Course, richness: float) -> CubicSpline
     if course.command.static or not (lag.any() or shaking):
         return None
     t = rollout.grid(course.command.t[0], course.command.t[-1], STEP)
-    q, qd, qdd = (course.q(t, order) for order in range(3))
+    q, qdd = course.q(t), course.q(t, 2)
     gap = np.zeros_like(q)
     rotors = sorted(set(np.flatnonzero(lag)) | {causes.joint(item['joint']) for item in shaking})
     for i in rotors:
@@ -50,10 +50,12 @@ def displacement(causes: Causes, course: Course, richness: float) -> CubicSpline
         swing = [np.abs(qdd[:, i]).max() / _omega(item) ** 2 for item in own]
         model = _rotor(lag[i], own, swing, richness)
         force = np.zeros((len(t), model.nv))
-        force[:, 0] = (model.jnt_stiffness[0] * q[:, i] if lag[i]
-                       else rollout.follow(q[:, i], qd[:, i], qdd[:, i]))
         start, velocity = np.zeros((2, model.nv))
-        start[0], velocity[0] = q[0, i], 0.0 if lag[i] else qd[0, i]
+        start[0] = q[0, i]
+        if lag[i]:
+            force[:, 0] = model.jnt_stiffness[0] * q[:, i]
+        else:
+            force[:, 0], velocity[0] = rollout.follow(q[:, i], STEP)
         path = rollout.run(model, start, velocity, force)
         if lag[i]:
             gap[:, i] += path[:, 0] - q[:, i]

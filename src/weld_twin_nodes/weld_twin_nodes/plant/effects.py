@@ -4,8 +4,8 @@
 Effects that have a closed form: geometry as built, gearing, frames, the instrument.
 
 The names and parameters are those of the interface (section 3). Effects that need physics are in
-`drives` (servo_lag, vibration) and `arm` (backlash, joint_compliance, payload); causes that no
-library knows are in `outside`.
+`drives` (servo_lag, vibration) and in `tree` and `compliance` (backlash, joint_compliance,
+payload); causes that no library knows are in `outside`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -128,7 +128,8 @@ def gearing(causes: Causes, q: np.ndarray) -> np.ndarray:
         Motor side, in units of the joint.
 
     """
-    error = causes.per_joint('joint_offset', 'offset') + causes.per_joint('gear_ratio', 'scale') * q
+    error = causes.per_joint('gear_ratio', 'scale') * q
+    error += causes.per_joint('joint_offset', 'offset')
     for item in causes.of('transmission_ripple'):
         i = causes.joint(item['joint'])
         waves = np.broadcast_arrays(*(np.atleast_1d(np.asarray(item.get(key, 0.0), dtype=float))

@@ -20,14 +20,21 @@ from weld_twin_nodes.plant.geometry import Arm
 from weld_twin_nodes.plant.screws import Motion
 
 MASSLESS = 1e-6  # kg; MuJoCo wants some mass on every moving body
-GYRATION = 0.3   # radius of gyration of a link of unknown inertia, share of its length
+GYRATION = 0.3   # radius of gyration of a link, whose inertia is not known, per length
+SMALL = 0.03     # m, the least radius of gyration
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 
 
 @dataclass(frozen=True, eq=False)
 class Load:
     """
-    What the flange carries besides the tool: mass [kg] and its centre (3,) [m], tool frame.
+    What the flange carries besides the tool.
+
+    Attributes
+    ----------
+    mass : float [kg]
+    com : array, shape (3,) [m]
+        Centre of mass in the tool frame.
 
     """
 
@@ -58,10 +65,11 @@ def add_links(spec: mujoco.MjSpec, robot: Mapping, arm: Arm, load: Load) -> list
         _add_mass(parent, robot, i, _reach(arm, i))
         bodies.append(parent)
     tool = _add_body(parent, 'tool', arm.tool)
+    # the wrench acts at a body's centre of mass, so the tool needs one, at its tip
+    _weigh(tool, MASSLESS, np.zeros(3), 1e-9)
     if load.mass > 0.0:
-        body = _add_body(tool, 'payload', screws.identity())
-        body.mass, body.ipos, body.explicitinertial = load.mass, load.com, True
-        body.inertia = np.full(3, 1e-3 * load.mass)
+        _weigh(_add_body(tool, 'payload', screws.identity()), load.mass, load.com,
+               load.mass * SMALL ** 2)
     return bodies
 
 
@@ -78,11 +86,13 @@ def _add_mass(body, robot: Mapping, i: int, reach: float) -> None:
     links = robot.get('links') or []
     link = links[i] if i < len(links) else {}
     mass = max(float(link.get('mass', 0.0)), MASSLESS)
+    inertia = mass * max(GYRATION * reach, SMALL) ** 2 + 1e-6
+    _weigh(body, mass, np.array(link.get('com', [0.0, 0.0, 0.0]), dtype=float), inertia)
+
+
+def _weigh(body, mass: float, com: np.ndarray, inertia: float) -> None:
     body.explicitinertial = True
-    body.mass = mass
-    body.ipos = link.get('com', [0.0, 0.0, 0.0])
-    # a small link of unknown inertia is a ball 10 cm wide at least, so that no hinge runs free
-    body.inertia = np.full(3, mass * max(GYRATION * reach, 0.03) ** 2 + 1e-6)
+    body.mass, body.ipos, body.inertia = mass, com, np.full(3, inertia)
 
 
 def add_hinge(body, arm: Arm, at: geometry.Home, i: int, name: str, **options):

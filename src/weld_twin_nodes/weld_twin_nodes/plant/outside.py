@@ -8,10 +8,10 @@ Causes that no library knows: what a diagnosis should call unknown.
 | bearing_tilt | joint, tilt rad, phase rad | the axis leans by tilt cos(q + phase) as it turns |
 | station_step | time s, xyz m, rotvec rad | the measuring frame is knocked at a time |
 | tool_slip | time s, xyz m, rotvec rad | the tool slips in its holder at a time |
-| quadratic_scale | coefficient 1/m, origin m | p grows by coefficient |p - o| (p - o) |
+| quadratic_scale | coefficient 1/m, origin m | p - origin stretches with its own length |
 | column_bend | rotvec rad, time_constant s | the base leans over as the column warms up |
 | stick_slip | joint, amplitude rad | the link sticks, then jumps after the motor |
-| friction_wander | joint, amplitude rad, time_constant s | lost motion that wanders in size and sign |
+| friction_wander | joint, amplitude rad, time_constant s | lost motion of wandering size |
 | loaded_play | joint, width rad | the gear lies on the flank its load pulls it to |
 | dress_pack | joint, amplitude rad | a hose pulls, harder towards the ends of the joint's range |
 

@@ -4,26 +4,27 @@
 The plant: the cell as it really is, standing in for one on the shop floor.
 
 Order of things: command -> servo and flywheel (`drives`) -> gearing (`effects`) -> gap and spring
-under load (`arm`) -> geometry as built (`geometry`) -> tool under load -> instrument and clocks
-(`tracker`). Nothing here is shared with the twin that is to diagnose it.
+under load (`tree`, `compliance`) -> geometry as built (`geometry`) -> tool under load ->
+instrument and clocks (`tracker`). Nothing here is shared with the twin that is to diagnose it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from weld_twin_nodes.plant import arm as arm_side
-from weld_twin_nodes.plant import drives, effects, geometry, outside, rollout, screws, tracker
-from weld_twin_nodes.plant.arm import Compliant
+from weld_twin_nodes.plant import drives, geometry, outside, rollout, screws, tree
+from weld_twin_nodes.plant import effects as library
+from weld_twin_nodes.plant import tracker as sensors
+from weld_twin_nodes.plant.compliance import Compliant
 from weld_twin_nodes.plant.effects import Causes
 from weld_twin_nodes.plant.geometry import Arm
 from weld_twin_nodes.plant.recording import Command, Course, PlantRecording
 from weld_twin_nodes.plant.screws import Motion
 from weld_twin_nodes.plant.tracker import Tracker
 
-KNOWN = effects.LIBRARY | outside.OUTSIDE
+KNOWN = library.LIBRARY | outside.OUTSIDE
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,52 +73,48 @@ def run(robot: Mapping, effects: Sequence[Mapping], command: Command, tracker: T
     if command.q.shape[1] != len(arm.names):
         raise ValueError(f'the command moves {command.q.shape[1]} joints, '
                          f'the robot has {len(arm.names)}')
-    causes = _causes(effects, arm)
+    causes = library.causes_from(effects, arm, KNOWN)
     cell = _Cell(robot, arm, causes, Course(command), richness)
     return _record(cell, tracker, rng)
-
-
-def _causes(entries: Sequence[Mapping], arm: Arm) -> Causes:
-    return effects.causes_from(entries, arm, KNOWN)
 
 
 def _record(cell: _Cell, instrument: Tracker, rng: np.random.Generator) -> PlantRecording:
     command, static = cell.course.command, cell.course.command.static
     if static:
         # a lost station is lost on both sides: one joint state, one measurement each
-        t = t_joint = command.t[tracker.kept(len(command.t), instrument.drop, rng)]
+        t = t_joint = command.t[sensors.kept(len(command.t), instrument.drop, rng)]
         stamps, joint_stamps = t.copy(), t.copy()
     else:
-        t = tracker.instants(command.t, instrument.rate, instrument.drop, rng)
-        stamps = tracker.stamped(t, instrument.jitter, rng)
-        t_joint = tracker.instants(command.t, instrument.joint_rate, instrument.joint_drop, rng)
-        joint_stamps = tracker.stamped(t_joint, instrument.joint_jitter, rng)
+        t = sensors.instants(command.t, instrument.rate, instrument.drop, rng)
+        stamps = sensors.stamped(t, instrument.jitter, rng)
+        t_joint = sensors.instants(command.t, instrument.joint_rate, instrument.joint_drop, rng)
+        joint_stamps = sensors.stamped(t_joint, instrument.joint_jitter, rng)
     pose = true_poses(cell, t, rng)
-    sigma = np.sqrt(instrument.sigma ** 2
-                    + sum(float(item['sigma']) ** 2 for item in cell.causes.of('measurement_noise')))
-    position, quaternion = tracker.observe(instrument, pose, sigma, rng)
+    floors = [float(item['sigma']) for item in cell.causes.of('measurement_noise')]
+    sigma = float(np.linalg.norm([instrument.sigma, *floors]))
+    position, quaternion = sensors.observe(instrument, pose, sigma, rng)
     late = float(cell.causes.total('time_delay', 'delay')) + instrument.clock_offset
     return PlantRecording(
         joint_stamps, cell.course.q(t_joint),
         cell.course.q(t_joint, 1) if instrument.velocity else None,
         stamps + late, position, quaternion,
-        *tracker.wrench_stream(instrument, cell.course, rng),
-        *tracker.temperature_stream(instrument, cell.course, rng), static)
+        *sensors.wrench_stream(instrument, cell.course, rng),
+        *sensors.temperature_stream(instrument, cell.course, rng), static)
 
 
 def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
     """Return the tool as the measuring frame has it at true times (M,) [s], free of noise."""
     q, motor = _link_side(cell, t, rng)
     causes, arm, since = cell.causes, cell.arm, t - cell.start
-    rows = effects.rows_as_built(causes, arm, since, cell.course.temperature(t))
+    rows = library.rows_as_built(causes, arm, since, cell.course.temperature(t))
     lean = outside.wobble(causes, motor)
-    base, tool = effects.frames(causes, arm)
+    base, tool = library.frames(causes, arm)
     base = screws.compose(base, outside.frame_error(causes, 'column_bend', since))
     tool = screws.compose(tool, outside.frame_error(causes, 'tool_slip', since))
     flange = geometry.flange(arm, geometry.home(arm, rows), q, lean)
     pose = screws.compose(base, flange, tool)
-    pose = effects.yielding(causes, pose, cell.course.wrench(t))
-    return effects.measured(causes, outside.on_instrument(causes, pose, since), since)
+    pose = library.yielding(causes, pose, cell.course.wrench(t))
+    return library.measured(causes, outside.on_instrument(causes, pose, since), since)
 
 
 def _link_side(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> tuple:
@@ -125,8 +122,8 @@ def _link_side(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> tuple:
     compliant = Compliant(cell.robot, cell.arm, cell.causes, cell.richness)
     lost = drives.displacement(cell.causes, cell.course, cell.richness)
     motor = cell.course.q(t) + (0.0 if lost is None else lost(t))
-    geared = motor + effects.gearing(cell.causes, motor)
-    rounding = effects.rounding(cell.causes, motor)
+    geared = motor + library.gearing(cell.causes, motor)
+    rounding = library.rounding(cell.causes, motor)
     if cell.course.command.static:
         give = _at_rest(cell, compliant, rng)[np.searchsorted(cell.course.command.t, t)]
     else:
@@ -137,25 +134,25 @@ def _link_side(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> tuple:
 def _at_rest(cell: _Cell, compliant: Compliant, rng: np.random.Generator) -> np.ndarray:
     """Return what gives at every station, in the order they are visited, shape (N, n)."""
     command = cell.course.command
-    q = command.q + effects.gearing(cell.causes, command.q)
+    q = command.q + library.gearing(cell.causes, command.q)
     give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, command.wrench)
     return give + outside.on_joints(cell.causes, command.t, q,
                                     lambda: compliant.torque(q, command.wrench), rng)
 
 
 def _in_motion(cell: _Cell, compliant: Compliant, lost: CubicSpline | None,
-               rng: np.random.Generator):
+               rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray | float]:
     """Return what gives as a function of time."""
     flawed = any(item['effect'] in outside.JOINT_LEVEL for item in cell.causes.items)
     if compliant.rigid and not flawed:
         return lambda _: 0.0
     times = cell.course.command.t
-    grid = rollout.grid(times[0], times[-1], arm_side.STEP)
+    grid = rollout.grid(times[0], times[-1], tree.STEP)
     motor = cell.course.q(grid) + (0.0 if lost is None else lost(grid))
-    geared = motor + effects.gearing(cell.causes, motor)
+    geared = motor + library.gearing(cell.causes, motor)
     wrench = cell.course.wrench(grid)
     give = outside.on_joints(cell.causes, grid, geared,
                              lambda: compliant.torque(geared, wrench), rng)
     if not compliant.rigid:
-        give = give + compliant.moving(grid, CubicSpline(grid, geared), wrench)
+        give = give + tree.moving(compliant, grid, CubicSpline(grid, geared), wrench)
     return CubicSpline(grid, give)

@@ -34,6 +34,7 @@ class Command:
     temperature: np.ndarray | None = None
 
     def __post_init__(self) -> None:
+        """Keep read-only copies of the arrays, of the right shape."""
         count = np.shape(self.t)[0]
         for name, shape in (('t', (count,)), ('q', (count, np.shape(self.q)[-1])),
                             ('wrench', (count, 6)), ('temperature', (count,))):

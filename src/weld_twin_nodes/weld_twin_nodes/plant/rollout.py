@@ -8,7 +8,7 @@ import numpy as np
 
 CHUNK = 30000
 HEAVY = 1e4     # kg m^2; a motor side this heavy feels nothing of what it drives
-SERVO = 200.0   # rad/s, bandwidth of a motor side that merely follows
+SERVO = 200.0   # rad/s, of the spring that keeps a motor side on its course
 
 
 def grid(start: float, end: float, step: float) -> np.ndarray:
@@ -17,14 +17,38 @@ def grid(start: float, end: float, step: float) -> np.ndarray:
 
 
 def follower() -> dict:
-    """Return the hinge options of a motor side that follows a course given by `follow`."""
-    return {'armature': HEAVY, 'stiffness': [HEAVY * SERVO ** 2, 0.0, 0.0],
-            'damping': [2.0 * HEAVY * SERVO, 0.0, 0.0]}
+    """
+    Return the hinge options of a motor side that follows a course given by `follow`.
+
+    It has no damper: MuJoCo takes dampers into its step but not into its constraint forces, and
+    on a mass this heavy the difference would rattle the gaps.
+    """
+    return {'armature': HEAVY, 'stiffness': [HEAVY * SERVO ** 2, 0.0, 0.0]}
 
 
-def follow(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """Return the force that makes a follower hinge follow: feed-forward of all three."""
-    return HEAVY * (qdd + 2.0 * SERVO * qd + SERVO ** 2 * q)
+def follow(q: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """
+    Return what makes a follower hinge pass through every sample of its course.
+
+    Parameters
+    ----------
+    q : array, shape (N,)
+        Course [rad or m].
+    step : float [s]
+
+    Returns
+    -------
+    force : array, shape (N,)
+        Feed-forward of the second difference, which is what MuJoCo's integrator needs, and what
+        holds the spring of the servo.
+    velocity : float
+        To start with.
+
+    """
+    acceleration = np.diff(q, 2, prepend=q[0], append=q[-1]) / step ** 2
+    acceleration[0], acceleration[-1] = acceleration[1], acceleration[-2]
+    velocity = (q[1] - q[0]) / step - step * acceleration[0]
+    return HEAVY * (acceleration + SERVO ** 2 * q), velocity
 
 
 def run(model: mujoco.MjModel, start: np.ndarray, velocity: np.ndarray,
@@ -60,9 +84,9 @@ def run(model: mujoco.MjModel, start: np.ndarray, velocity: np.ndarray,
         control = np.ascontiguousarray(force[first:min(first + CHUNK, len(force) - 1)])
         states, _ = mujoco.rollout.rollout(model, data, state[None], control[None],
                                            control_spec=spec)
+        # after a warning the rollout stands still, which would look like a recording
+        if not np.isfinite(states).all() or any(entry.number for entry in data.warning):
+            raise FloatingPointError('the simulated arm came apart; effects out of range?')
         out.append(states[0, :, 1:1 + model.nv].copy())
         state = states[0, -1].copy()
-    path = np.concatenate(out)
-    if not np.isfinite(path).all():
-        raise FloatingPointError('the simulated arm came apart; the effects are out of range')
-    return path
+    return np.concatenate(out)

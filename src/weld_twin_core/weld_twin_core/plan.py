@@ -13,7 +13,7 @@ from .arrays import Array
 from .chain import frames
 from .errors import PathError
 from .inverse import PathSolution, solve_path
-from .inverse.newton import chain_jacobian, least_step, polish
+from .inverse.newton import chain_jacobian, least_step, polish, pose_error
 from .paths import Path, SeamFrames, Torch
 from .profiles import Profile, Timing, named
 from .recording import JointMotion
@@ -162,12 +162,15 @@ class _JointLine:
     def motion(self, timing: Timing) -> tuple[JointMotion, float]:
         """Return the motion and its largest error of closure."""
         poses = self.poses(timing.s)
-        q, error = polish(self.robot, self._spline(timing.s), poses)
+        q, _ = polish(self.robot, self._spline(timing.s), poses)
         rate = self._spline(timing.s, 1)
         jacobian = chain_jacobian(self.robot, frames(self.robot, q))
         missing = self._twist(timing.s) - (jacobian @ rate[..., None])[..., 0]
-        rate = rate + least_step(jacobian, missing)
-        return JointMotion(timing.t, q, rate * timing.sd[:, None]), float(np.abs(error).max())
+        velocity = (rate + least_step(jacobian, missing)) * timing.sd[:, None]
+        # Rounded, so that a joint at rest is at rest and not reversing within the last digit.
+        q = q.round(12)
+        residual = float(np.abs(pose_error(frames(self.robot, q), poses)).max())
+        return JointMotion(timing.t, q, velocity.round(9)), residual
 
     def _twist(self, s: Array) -> Array:
         """Return d(pose)/ds, shape (N, 6), by central differences."""
@@ -178,9 +181,7 @@ class _JointLine:
 
 
 def _slowed(timing: Timing, factor: float) -> Timing:
-    return Timing(
-        timing.t * factor, timing.s, timing.sd / factor, timing.sdd / factor**2
-    )
+    return Timing(timing.t * factor, timing.s, timing.sd / factor, timing.sdd / factor**2)
 
 
 def _accelerations(motion: JointMotion) -> Array:

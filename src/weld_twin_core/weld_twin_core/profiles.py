@@ -23,6 +23,7 @@ from scipy.interpolate import PPoly
 
 from .arrays import Array
 from .errors import PathError
+from .paths.base import positive
 
 
 class Timing(NamedTuple):
@@ -39,12 +40,8 @@ class Profile(ABC):
 
     def __post_init__(self) -> None:
         for field in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, field.name)
-            if not (isinstance(value, (int, float)) and np.isfinite(value) and value > 0.0):
-                raise PathError(
-                    f'{type(self).__name__.lower()} profile: {field.name} must be positive, '
-                    f'got {value!r}'
-                )
+            what = f'{type(self).__name__.lower()} profile: {field.name}'
+            positive(getattr(self, field.name), what)
 
     @abstractmethod
     def law(self, length: float) -> PPoly:
@@ -62,7 +59,7 @@ class Profile(ABC):
         """
         law = self.law(length)
         end = float(law.x[-1])
-        t = dt * np.arange(int(np.ceil(end / dt - 1e-9)) + 1)
+        t = dt * np.arange(int(np.ceil(end / dt - 1e-9)) + 1, dtype=np.float64)
         inside = np.minimum(t, end)
         moving = t <= end
         return Timing(
@@ -167,11 +164,16 @@ class Aggressive(Profile):
     reversals: int = 10
     back: float = 0.8
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.back > 1.0:
+            raise PathError(f'aggressive profile: back must be at most 1, got {self.back!r}')
+
     def law(self, length: float) -> PPoly:
         """Return s(t)."""
         advances = (int(self.reversals) + 1) // 2 + 1
         step = length / advances
-        over = step * min(self.back, 1.0)
+        over = step * self.back
         pieces = []
         for _ in range(advances - 1):
             pieces += _trapezoid(step + over, self.speed, self.acceleration)

@@ -24,8 +24,8 @@ DATA = {
     'name': 'kuka_kr6_r900',
     'convention': 'modified',
     'source': 'KUKA, "KR AGILUS sixx specification": geometry, range and speed, '
-    'as in the URDF of ROS-Industrial (kuka_kr6_support); KUKA publishes the mass of the whole arm '
-    'only (52 kg), so link masses and centres are an estimate; acceleration is an estimate '
+    'as in the URDF of ROS-Industrial (kuka_kr6_support); KUKA publishes the mass of the whole '
+    'arm only (52 kg), so link masses and centres are an estimate; acceleration is an estimate '
     '(full speed in 0.25 s)',
     'tool': {'quat_xyzw': [1.0, 0.0, 0.0, 0.0]},
     'joints': [

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ..arrays import Array
@@ -16,8 +17,11 @@ from ..robot import Robot
 from ..rotation import rotation_vector
 from .closed_form import branches, family
 from .newton import chain_jacobian, polish, pose_error
-from .one import TURN, turns_to_middle, where, why_not
+from .one import OTHER_POSTURE, gap, past_limit, where, why_not
 from .search import CLOSED, centring, null_space, search
+from .turns import TURN, turns_to_middle
+
+Mask = NDArray[np.bool_]
 
 _KNOTS = 64
 """Samples a numerical solution is followed over; between them a spline is the start."""
@@ -129,15 +133,13 @@ def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:
 
 def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     """Return tracks, shape (K, N, n), followed from every posture found at the first sample."""
-    starts, gap = search(robot, poses[0], seed)
+    starts, missing = search(robot, poses[0], seed)
     if not len(starts):
-        why = f'the closest the arm gets is {gap:.3g} m or rad away'
         raise ReachError(
-            f'{robot.name} cannot reach sample 0 at {where(poses[0])}: {why}; '
-            'move the seam or turn the torch'
+            f'{robot.name} cannot reach sample 0 at {where(poses[0])}: the nearest the tool gets '
+            f'is {gap(missing)}; move the seam or turn the torch'
         )
-    if seed is None or robot.n > 6:
-        starts = np.array(sorted(starts, key=lambda q: _rank(robot, q[None], seed)))[:_TRACKED]
+    starts = np.array(sorted(starts, key=lambda q: _rank(robot, q[None], seed)))[:_TRACKED]
     index = np.unique(np.linspace(0, len(poses) - 1, _KNOTS).round().astype(int))
     knots = _track(robot, starts, poses[index])
     if len(index) == len(poses):
@@ -145,12 +147,12 @@ def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     along = _travel(poses, reach(robot))
     spline = CubicSpline(along[index], np.where(np.isfinite(knots), knots, 0.0), axis=1)
     tracks = spline(along)
-    lost = ~np.isfinite(knots).all(axis=-1)
+    lost: Mask = np.any(np.isnan(knots), axis=-1)
     for k, track in enumerate(tracks):
-        tracks[k] = polish(robot, track, poses)[0]
+        tracks[k] = _on_turn(robot, polish(robot, track, poses)[0], seed)
         if lost[k].any():
             tracks[k, index[max(int(np.argmax(lost[k])) - 1, 0)] + 1 :] = np.nan
-    return tracks
+    return np.asarray(tracks)
 
 
 def _track(robot: Robot, q: Array, poses: Array) -> Array:
@@ -177,13 +179,12 @@ def _travel(poses: Array, length: float) -> Array:
 
 def _first_failure(robot: Robot, q: Array, poses: Array) -> int:
     """Return the first sample that is not reached, past a limit or after a jump; N if none."""
-    fails = ~np.isfinite(q).all(axis=-1)
-    fails |= ((q < robot.lower) | (q > robot.upper)).any(axis=-1)
+    fails: Mask = np.any(np.isnan(q) | (q < robot.lower) | (q > robot.upper), axis=-1)
     fails[1:] |= _jumps(robot, q, poses)
     return int(np.argmax(fails)) if fails.any() else len(q)
 
 
-def _jumps(robot: Robot, q: Array, poses: Array) -> Array:
+def _jumps(robot: Robot, q: Array, poses: Array) -> Mask:
     """
     Tell, shape (N - 1,), where the arm leaves the path between two samples.
 
@@ -198,16 +199,25 @@ def _jumps(robot: Robot, q: Array, poses: Array) -> Array:
     before = np.linalg.norm(pose_error(chain, poses[:-1]) * scale, axis=-1)
     after = np.linalg.norm(pose_error(chain, poses[1:]) * scale, axis=-1)
     step = np.diff(_travel(poses, size)) * size
-    return before + after > 3.0 * step + 1e-3 * size
+    return np.asarray(before + after > 3.0 * step + 1e-3 * size)
 
 
 def _rank(robot: Robot, q: Array, seed: Array | None) -> float:
     """Return a number that is smaller for a better track."""
     if seed is not None:
         return float(np.linalg.norm(q[0] - seed))
-    condition, _, margin = _posture(robot, q[:: max(1, len(q) // 100)])
+    some = q[:: max(1, len(q) // 100)]
+    condition, _, margin = _posture(robot, some)
     room = min(float(margin.min()) / _COMFORTABLE, 1.0)
-    return -room / float(condition.max())
+    return -room / float(condition.max()) * (1.0 if _above_base(robot, some) else 0.1)
+
+
+def _above_base(robot: Robot, q: Array) -> bool:
+    """Tell whether every joint stays on the arm's side of the surface the base stands on."""
+    chain = frames(robot, q)
+    up, foot = chain.base_rotation[:, 2], chain.base_point
+    heights = [np.moveaxis(row.z_point, 0, -1) @ up - foot @ up for row in chain.rows]
+    return min(float(height.min()) for height in heights) > -1e-6
 
 
 def _posture(robot: Robot, q: Array) -> tuple[Array, Array, Array]:
@@ -231,13 +241,5 @@ def _explain(robot: Robot, tracks: Array, failures: Array, poses: Array) -> str:
     outside = np.maximum(robot.lower - q, q - robot.upper)
     joint = int(np.argmax(outside))
     if outside[joint] > 0.0:
-        return text + (
-            f'joint {robot.joint_names[joint]!r} would have to go to {q[joint]:.3f}, outside '
-            f'[{robot.lower[joint]:.3f}, {robot.upper[joint]:.3f}]; move the seam or turn the torch'
-        )
-    return text + (
-        'the arm would have to change its posture there, next to a singularity; '
-        'move the seam, turn the torch or sample the path more densely'
-    )
-
-
+        return text + past_limit(robot, joint, q[joint])
+    return text + OTHER_POSTURE

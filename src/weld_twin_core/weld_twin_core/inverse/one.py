@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import Array
@@ -12,8 +14,12 @@ from ..robot import Robot
 from .closed_form import branches, family
 from .newton import polish
 from .search import CLOSED, search
+from .turns import centred
 
-TURN = 2.0 * np.pi
+OTHER_POSTURE = (
+    'the arm would have to change its posture on the way; '
+    'move the seam, turn the torch or sample the path more densely'
+)
 
 
 def solve(robot: Robot, pose: Array, seed: Array | None = None) -> Array:
@@ -52,42 +58,39 @@ def solve(robot: Robot, pose: Array, seed: Array | None = None) -> Array:
     return found
 
 
-def centred(robot: Robot, q: Array) -> Array:
-    """Return the positions, shape (..., n), shifted by whole turns to the middle of the limits."""
-    return q + TURN * turns_to_middle(robot, q, q)
-
-
-def turns_to_middle(robot: Robot, low: Array, high: Array) -> Array:
-    """Return how many turns, shape (..., n), bring the span low..high to the middle of the range."""
-    finite = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    middle = np.where(finite, 0.5 * (robot.lower + robot.upper), 0.0)
-    return np.where(robot.prismatic, 0.0, np.round((middle - 0.5 * (low + high)) / TURN))
-
-
 def where(pose: Array) -> str:
     """Return the position of a pose for a message."""
     x, y, z = pose[:3, 3]
     return f'({x:.3f}, {y:.3f}, {z:.3f}) m'
 
 
+def gap(missing: Array) -> str:
+    """Return how far a pose error, shape (6,), is for a message."""
+    away, turned = np.linalg.norm(missing[:3]), np.linalg.norm(missing[3:])
+    return f'{away:.3g} m and {np.degrees(turned):.3g} degrees away'
+
+
 def why_not(robot: Robot, pose: Array) -> str:
     """Return why a pose is not reached: too far, or past a joint limit."""
-    unlimited = _without_limits(robot)
-    found, gap = search(unlimited, pose)
+    found, missing = search(_without_limits(robot), pose)
     if not len(found):
-        return f'the closest the arm gets is {gap:.3g} m or rad away; move the seam or turn the torch'
+        return f'the nearest the tool gets is {gap(missing)}; move the seam or turn the torch'
     excess = np.maximum(robot.lower - found, found - robot.upper)
     best = int(np.argmin(excess.max(axis=-1)))
+    if excess[best].max() <= 0.0:
+        return OTHER_POSTURE
     joint = int(np.argmax(excess[best]))
+    return past_limit(robot, joint, found[best, joint])
+
+
+def past_limit(robot: Robot, joint: int, value: float) -> str:
+    """Return what is wrong with a joint position for a message."""
     return (
-        f'joint {robot.joint_names[joint]!r} would have to be at {found[best, joint]:.3f}, outside '
+        f'joint {robot.joint_names[joint]!r} would have to be at {value:.3f}, outside '
         f'[{robot.lower[joint]:.3f}, {robot.upper[joint]:.3f}]; move the seam or turn the torch'
     )
 
 
 def _without_limits(robot: Robot) -> Robot:
-    from dataclasses import replace
-
-    wide = np.full(robot.n, np.inf)
-    return replace(robot, lower=np.where(robot.prismatic, robot.lower, -wide),
-                   upper=np.where(robot.prismatic, robot.upper, wide))
+    lower = np.where(robot.prismatic, robot.lower, -np.inf)
+    return replace(robot, lower=lower, upper=np.where(robot.prismatic, robot.upper, np.inf))

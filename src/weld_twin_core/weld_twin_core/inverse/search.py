@@ -18,6 +18,7 @@ from ..arrays import Array
 from ..chain import frames
 from ..robot import Robot
 from .newton import chain_jacobian, least_step, polish, pose_error
+from .turns import centred, middle
 
 CLOSED = 1e-9
 """Largest error [m, rad] of a solution."""
@@ -26,9 +27,9 @@ _ROUNDS = 60
 _SAME = 1e-4
 
 
-def search(robot: Robot, pose: Array, seed: Array | None = None) -> tuple[Array, float]:
+def search(robot: Robot, pose: Array, seed: Array | None = None) -> tuple[Array, Array]:
     """
-    Return distinct solutions within the limits, shape (K, n), and the smallest error [m, rad].
+    Return distinct solutions within the limits, shape (K, n), and the smallest error, shape (6,).
 
     The starts are the same for every call, so the answer is repeatable. A chain with more
     than six joints gets from each start the solution nearest the middle of its range.
@@ -40,32 +41,31 @@ def search(robot: Robot, pose: Array, seed: Array | None = None) -> tuple[Array,
         One more start, tried first.
 
     """
-    lower, upper = search_range(robot)
+    lower, upper = _range(robot)
     rng = np.random.default_rng(0)
     starts = rng.uniform(lower, upper, size=(_STARTS, robot.n))
     if seed is not None:
         starts = np.concatenate([np.asarray(seed)[None], starts])
     poses = np.broadcast_to(pose, (len(starts), 4, 4))
     q, error = polish(robot, _descend(robot, starts, poses), poses)
+    q = centred(robot, q)
     size = np.abs(error).max(axis=-1)
     inside = ((q >= robot.lower - CLOSED) & (q <= robot.upper + CLOSED)).all(axis=-1)
-    return _distinct(robot, q[(size < CLOSED) & inside]), float(size.min())
+    return _distinct(robot, q[(size < CLOSED) & inside]), error[int(np.argmin(size))]
 
 
-def search_range(robot: Robot) -> tuple[Array, Array]:
+def _range(robot: Robot) -> tuple[Array, Array]:
     """Return where to look: the limits, cut to one turn about their middle."""
-    middle = np.where(
-        np.isfinite(robot.lower) & np.isfinite(robot.upper), 0.5 * (robot.lower + robot.upper), 0.0
-    )
     half = np.where(robot.prismatic, 2.0, np.pi)
-    return np.maximum(robot.lower, middle - half), np.minimum(robot.upper, middle + half)
+    centre = middle(robot)
+    return np.maximum(robot.lower, centre - half), np.minimum(robot.upper, centre + half)
 
 
 def centring(robot: Robot, q: Array) -> Array:
     """Return the joint motion, shape (..., n), towards the middle of the range."""
-    lower, upper = search_range(robot)
+    lower, upper = _range(robot)
     width = upper - lower
-    return (0.5 * (lower + upper) - q) / (width / width.max()) ** 2
+    return np.asarray((0.5 * (lower + upper) - q) / (width / width.max()) ** 2)
 
 
 def null_space(jacobian: Array, motion: Array) -> Array:
@@ -84,7 +84,11 @@ def _descend(robot: Robot, q: Array, poses: Array) -> Array:
         if robot.n > 6:
             step = step + 0.2 * null_space(jacobian, centring(robot, q))
         largest = np.abs(step).max(axis=-1, keepdims=True)
-        q = np.clip(q + step / np.maximum(1.0, largest / 0.5), robot.lower, robot.upper)
+        q = q + step / np.maximum(1.0, largest / 0.5)
+        # A limit would only stall a turning joint, which may come round the other way; without a
+        # choice of turns, or with freedom to use, staying inside is what finds a solution.
+        bounded = robot.prismatic | (robot.n > 6)
+        q = np.where(bounded, np.clip(q, robot.lower, robot.upper), q)
     return q
 
 

@@ -33,7 +33,7 @@ def angle_onto(axis: Array, start: Array, end: Array) -> Array:
     """Return the angle about the axis that turns ``start`` onto ``end`` (..., 3)."""
     sine = np.cross(start, end) @ axis
     cosine = (start * end).sum(axis=-1) - (start @ axis) * (end @ axis)
-    return np.arctan2(sine, cosine)
+    return np.asarray(np.arctan2(sine, cosine))
 
 
 def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array, readonly
 from ..errors import PathError
-from .base import Path, SeamFrames, frames_on, unit, up
+from .base import Path, SeamFrames, frames_on, positive, unit, up
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +107,7 @@ class Circle(Path):
         axis = unit(self.axis, 'circle axis')
         object.__setattr__(self, 'axis', axis)
         for name in ('radius', 'turns'):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise PathError(f'circle {name} must be positive, got {getattr(self, name)!r}')
+            object.__setattr__(self, name, positive(getattr(self, name), f'circle {name}'))
         aside = np.eye(3)[0 if abs(axis[0]) < 0.9 else 1] if self.start is None else self.start
         aside = np.asarray(aside, dtype=np.float64)
         start = unit(aside - (aside @ axis) * axis, 'circle start across the axis')

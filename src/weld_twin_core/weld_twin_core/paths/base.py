@@ -72,6 +72,21 @@ def unit(vector: ArrayLike, name: str) -> Array:
     return readonly(value / size, (3,), name)
 
 
+def positive(value: object, name: str) -> float:
+    """
+    Return a number that is positive and finite.
+
+    Raises
+    ------
+    PathError
+        It is not.
+
+    """
+    if not (isinstance(value, (int, float)) and np.isfinite(value) and value > 0.0):
+        raise PathError(f'{name} must be a positive number, got {value!r}')
+    return float(value)
+
+
 def frames_on(position: Array, tangent: Array, normal: Array) -> SeamFrames:
     """
     Return frames with the part of ``normal`` that is perpendicular to the travel.

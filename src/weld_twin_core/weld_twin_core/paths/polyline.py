@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array, readonly
 from ..errors import PathError
 from .arc import Arc
-from .base import Path, SeamFrames, frames_on, unit, up
+from .base import Path, SeamFrames, frames_on, positive, unit, up
 from .line import Line
 
 
@@ -39,11 +39,10 @@ class Polyline(Path):
         points = readonly(self.points, (None, 3), 'polyline points')
         if len(points) < 2:
             raise PathError(f'a polyline needs at least 2 points, got {len(points)}')
-        if not self.blend > 0.0:
-            raise PathError(f'polyline blend must be a positive radius, got {self.blend!r}')
+        object.__setattr__(self, 'blend', positive(self.blend, 'polyline blend'))
         object.__setattr__(self, 'points', points)
         object.__setattr__(self, 'normal', unit(self.normal, 'polyline normal'))
-        pieces = _pieces(points, float(self.blend))
+        pieces = _pieces(points, self.blend)
         object.__setattr__(self, '_pieces', pieces)
         object.__setattr__(self, '_ends', np.cumsum([piece.length for piece in pieces]))
 
@@ -79,6 +78,9 @@ def _pieces(points: Array, blend: float) -> list[Path]:
         raise PathError(f'polyline points {k} and {k + 1} are the same; drop one')
     directions = steps / sizes[:, None]
     cosines = np.clip((directions[:-1] * directions[1:]).sum(axis=1), -1.0, 1.0)
+    if (cosines < -1.0 + 1e-9).any():
+        k = int(np.argmin(cosines)) + 1
+        raise PathError(f'the polyline turns straight back at point {k}; split it there')
     cuts = np.concatenate([[0.0], blend * np.tan(0.5 * np.arccos(cosines)), [0.0]])
     pieces: list[Path] = []
     for k, size in enumerate(sizes):
@@ -88,7 +90,8 @@ def _pieces(points: Array, blend: float) -> list[Path]:
                 f'a blend radius of {blend:g} m does not fit between polyline points {k} and '
                 f'{k + 1}, {size:g} m apart; take a smaller radius'
             )
-        start, end = points[k] + cuts[k] * directions[k], points[k + 1] - cuts[k + 1] * directions[k]
+        start = points[k] + cuts[k] * directions[k]
+        end = points[k + 1] - cuts[k + 1] * directions[k]
         if room > 1e-9:
             pieces.append(_line(start, end))
         if cuts[k + 1] > 1e-9:

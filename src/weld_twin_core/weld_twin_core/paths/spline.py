@@ -61,6 +61,11 @@ class Spline(Path):
         """Return the arc length [m]."""
         return float(self.__dict__['_parameter'].x[-1])
 
+    @property
+    def detail(self) -> float:
+        """Return a few times the mean distance between points [m]."""
+        return 6.0 * self.length / (len(self.points) - 1)
+
     def sample(self, s: Array) -> SeamFrames:
         """Return the seam at arc lengths s, shape (N,) [m]."""
         curve, parameter = self.__dict__['_curve'], self.__dict__['_parameter']

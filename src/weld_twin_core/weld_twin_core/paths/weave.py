@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import PathError
-from .base import Path, SeamFrames
+from .base import Path, SeamFrames, positive
 
 FORMS = ('sine', 'zigzag', 'triangle')
 
@@ -45,9 +45,7 @@ class Weave(Path):
         if self.form not in FORMS:
             raise PathError(f'weave form must be one of {", ".join(FORMS)}, got {self.form!r}')
         for name in ('amplitude', 'wavelength'):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise PathError(f'weave {name} must be positive, got {value!r}')
+            object.__setattr__(self, name, positive(getattr(self, name), f'weave {name}'))
 
     @property
     def length(self) -> float:

@@ -33,6 +33,7 @@ from weld_twin_core.errors import DataError
 from ..convert import stamp_ns
 from ..topics import BY_NAME, RELIABLE
 from ..topics import Qos as TopicQos
+from .flush import flush
 from .reader import PROVENANCE_PREFIX
 from .store import TYPES
 
@@ -95,10 +96,35 @@ class BagWriter:
                 version=Writer.VERSION_LATEST,
                 storage_plugin=STORAGES[self._storage],
             )
-            for key, value in self._provenance.items():
-                self._writer.set_custom_data(PROVENANCE_PREFIX + key, json.dumps(value))
             self._writer.open()
+        for key, value in self._provenance.items():
+            self.note(key, value)
         return self
+
+    def note(self, key: str, value: Any) -> None:
+        """
+        Add to the provenance of the open bag, or change it.
+
+        Raises
+        ------
+        DataError
+            The bag is not open.
+
+        """
+        self._opened().set_custom_data(PROVENANCE_PREFIX + key, json.dumps(value))
+
+    def flush(self) -> None:
+        """
+        Put what was written on the disk, where it outlives this process.
+
+        Raises
+        ------
+        DataError
+            The bag is not open, or the disk refuses.
+
+        """
+        with self._clear_errors():
+            flush(self._opened())
 
     def write(self, topic: str, message: Any, log_ns: int | None = None) -> None:
         """
@@ -126,10 +152,9 @@ class BagWriter:
             The bag is not open, or the disk refuses.
 
         """
-        if self._writer is None:
-            raise DataError(f"bag '{self.path}' is not open for writing")
+        writer = self._opened()
         with self._clear_errors():
-            self._writer.write(self._connection(topic, kind), log_ns, data)
+            writer.write(self._connection(topic, kind), log_ns, data)
 
     def add_topic(self, topic: str, kind: str) -> None:
         """Announce a topic that may stay without messages."""
@@ -186,17 +211,21 @@ class BagWriter:
     def _connection(self, topic: str, kind: str) -> Connection:
         known = self._connections.get(topic)
         if known is None:
-            if self._writer is None:
-                raise DataError(f"bag '{self.path}' is not open for writing")
+            writer = self._opened()
             if kind not in TYPES.types:
                 raise DataError(f"topic '{topic}' has the type {kind!r}, which no bag here holds")
             row = BY_NAME.get(topic)
             offered = _offered(_DEFAULT_QOS if row is None else row.offered)
-            known = self._writer.add_connection(
+            known = writer.add_connection(
                 topic, kind, typestore=TYPES, offered_qos_profiles=[offered]
             )
             self._connections[topic] = known
         return known
+
+    def _opened(self) -> Writer:
+        if self._writer is None:
+            raise DataError(f"bag '{self.path}' is not open for writing")
+        return self._writer
 
     def _refuse_existing(self) -> None:
         if self.path.exists():

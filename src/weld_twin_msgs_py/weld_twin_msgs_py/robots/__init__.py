@@ -1,0 +1,9 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Robot models: bundled ones, YAML and URDF in; YAML and URDF out."""
+
+from .load import load_robot, read_robot_yaml, write_robot_yaml
+from .urdf_read import read_urdf
+from .urdf_write import write_urdf
+
+__all__ = ['load_robot', 'read_robot_yaml', 'read_urdf', 'write_robot_yaml', 'write_urdf']

@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot from whatever the user names: a bundled model, a YAML file or a URDF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from weld_twin_core import catalog
+from weld_twin_core.errors import ModelError
+from weld_twin_core.robot import Robot
+
+from ..outputs import write_text
+from ..yaml_file import read_yaml, yaml_text
+from .plausible import refuse_wrong_units
+from .urdf_read import read_urdf
+
+YAML_SUFFIXES = ('.yaml', '.yml')
+URDF_SUFFIXES = ('.urdf', '.xml')
+
+
+def load_robot(spec: str, base_link: str | None = None, tip_link: str | None = None) -> Robot:
+    """
+    Return a robot.
+
+    Parameters
+    ----------
+    spec : str
+        Name of a bundled model, or path of a YAML or URDF file.
+    base_link, tip_link : str, optional
+        Ends of the chain in a URDF; left out, its root and its only leaf (or ``tool0``).
+
+    Raises
+    ------
+    ModelError
+        Neither a bundled name nor a file, or a file that cannot be used.
+
+    """
+    path = Path(spec)
+    suffix = path.suffix.lower()
+    if suffix == '.xacro':
+        raise ModelError(f"'{spec}' is a xacro file; run 'xacro {spec}' to make the URDF of it")
+    if suffix in URDF_SUFFIXES:
+        return read_urdf(path, base_link, tip_link)
+    if suffix in YAML_SUFFIXES or path.is_file():
+        robot = read_robot_yaml(path)
+    elif spec.lower() in catalog.names():
+        robot = catalog.load(spec.lower())
+    else:
+        raise ModelError(
+            f'{spec!r} is neither a bundled robot ({", ".join(catalog.names())}) nor a .yaml or '
+            '.urdf file'
+        )
+    if base_link is not None or tip_link is not None:
+        raise ModelError(f'{spec!r} is no URDF, so it has no base link or tip link to choose')
+    return robot
+
+
+def read_robot_yaml(path: Path | str) -> Robot:
+    """
+    Read a robot file.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, is malformed, or looks like degrees or millimetres.
+
+    """
+    data = read_yaml(path, 'robot file')
+    try:
+        robot = Robot.from_mapping(data)
+        refuse_wrong_units(robot)
+    except ModelError as error:
+        raise ModelError(f"robot file '{path}': {error}") from None
+    return robot
+
+
+def write_robot_yaml(path: Path | str, robot: Robot, *, overwrite: bool = False) -> None:
+    """
+    Write a robot file; numbers round trip exactly.
+
+    Raises
+    ------
+    DataError
+        The file exists and ``overwrite`` is not set, or the place cannot be written.
+
+    """
+    write_text(path, yaml_text(robot.to_mapping()), overwrite=overwrite)

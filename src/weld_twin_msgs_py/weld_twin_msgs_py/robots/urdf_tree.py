@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The part of a URDF that matters here: joints, their frames, and link masses.
+
+Shapes, materials, transmissions and simulator tags are removed before parsing, so that nothing in
+them can stop a robot from being read.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import Element, ParseError
+
+import numpy as np
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+from urdf_parser_py import urdf
+from urdf_parser_py.xml_reflection.core import Path as XmlPath
+
+from weld_twin_core.arrays import Array, readonly
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_core.rotation import transform
+
+from ..yaml_file import read_text
+
+_KEPT = {
+    'link': {'name'}, 'joint': {'name', 'type'}, 'inertial': set(), 'mass': {'value'},
+    'origin': {'xyz', 'rpy'}, 'axis': {'xyz'}, 'parent': {'link'}, 'child': {'link'},
+    'limit': {'lower', 'upper', 'effort', 'velocity'}, 'mimic': {'joint', 'multiplier', 'offset'},
+}  # fmt: skip
+"""Tags the reading needs and their attributes; the parser complains on stderr of any other."""
+MOVABLE = {'revolute', 'continuous', 'prismatic'}
+
+
+class Link(NamedTuple):
+    """Mass [kg] and centre of mass in the link frame [m]."""
+
+    mass: float
+    com: Array
+
+
+class Joint(NamedTuple):
+    """
+    One joint: where its frame sits in its parent link, and how it moves.
+
+    Lower, upper and velocity limits are infinite where the URDF gives none.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    T_parent_joint: Array
+    axis: Array
+    lower: float
+    upper: float
+    velocity: float
+    mimic: bool
+
+
+class Tree(NamedTuple):
+    """A URDF: its name, links by name, and the joint above each link."""
+
+    name: str
+    links: dict[str, Link]
+    above: dict[str, Joint]
+
+    @property
+    def roots(self) -> list[str]:
+        """Return the links without a joint above them."""
+        return [name for name in self.links if name not in self.above]
+
+    @property
+    def leaves(self) -> list[str]:
+        """Return the links without a joint below them."""
+        parents = {joint.parent for joint in self.above.values()}
+        return [name for name in self.links if name not in parents]
+
+    def below(self, link: str) -> list[Joint]:
+        """Return the joints that hang on a link."""
+        return [joint for joint in self.above.values() if joint.parent == link]
+
+
+def read_tree(path: Path | str) -> Tree:
+    """
+    Read a URDF.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, is not well-formed, carries a DTD, or is no URDF.
+
+    """
+    text = read_text(path, 'URDF')
+    try:
+        root = fromstring(text, forbid_dtd=True)
+    except ParseError as error:
+        raise ModelError(f"URDF '{path}' is not well-formed XML: {error}") from None
+    except DefusedXmlException:
+        raise ModelError(
+            f"URDF '{path}' has a document type or entities, which a robot needs none of; "
+            'remove the <!DOCTYPE ...>'
+        ) from None
+    if root.tag != 'robot':
+        raise ModelError(f"'{path}' is no URDF: its outermost tag is <{root.tag}>, not <robot>")
+    if 'xacro' in text and any('xacro' in str(item.tag) for item in root.iter()):
+        raise ModelError(f"'{path}' is a xacro file; run 'xacro {path}' to make the URDF of it")
+    try:
+        model = urdf.URDF.from_xml(_pruned(root), XmlPath('robot'))
+        return _tree(model)
+    except (ModelError, DataError) as error:
+        raise ModelError(f"URDF '{path}': {error}") from None
+    except Exception as error:  # the parser raises bare Exception and AssertionError
+        raise ModelError(f"URDF '{path}': {' '.join(str(error).split())}") from None
+
+
+def _pruned(root: Element) -> Element:
+    out = Element('robot', {'name': root.get('name', 'robot')})
+    out.extend(_kept(item) for item in root if item.tag in ('link', 'joint'))
+    return out
+
+
+def _kept(item: Element) -> Element:
+    known = _KEPT[item.tag]
+    out = Element(item.tag, {key: value for key, value in item.attrib.items() if key in known})
+    if item.tag == 'limit':  # the parser insists on both, hand-written files often have neither
+        out.attrib = {'effort': '0', 'velocity': '0'} | out.attrib
+    out.extend(_kept(child) for child in item if child.tag in _KEPT)
+    return out
+
+
+def _tree(model: Any) -> Tree:
+    links = {link.name: _link(link) for link in model.links}
+    above: dict[str, Joint] = {}
+    for item in model.joints:
+        joint = _joint(item)
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                raise ModelError(f'joint {joint.name!r} names a link {end!r} that is not there')
+        if joint.child in above:
+            raise ModelError(f'link {joint.child!r} hangs on two joints; a chain needs one')
+        above[joint.child] = joint
+    if not links:
+        raise ModelError('there is no link in it')
+    return Tree(model.name, links, above)
+
+
+def _link(link: Any) -> Link:
+    inertial = link.inertial
+    if inertial is None or not inertial.mass:
+        return Link(0.0, np.zeros(3))
+    com = _frame(inertial.origin, f'inertial of link {link.name!r}')[:3, 3]
+    return Link(float(inertial.mass), com)
+
+
+def _joint(item: Any) -> Joint:
+    where = f'joint {item.name!r}'
+    axis = readonly((1.0, 0.0, 0.0) if item.axis is None else item.axis, (3,), f'axis of {where}')
+    length = float(np.linalg.norm(axis))
+    if item.type in MOVABLE and length < 1e-6:
+        raise ModelError(f'the axis of {where} has no direction')
+    lower, upper, velocity = _limits(item)
+    return Joint(
+        item.name, item.type, item.parent, item.child, _frame(item.origin, where),
+        axis / max(length, 1e-300), lower, upper, velocity, item.mimic is not None,
+    )  # fmt: skip
+
+
+def _limits(item: Any) -> tuple[float, float, float]:
+    """Return limits; equal ones (the default of an absent attribute) count as not given."""
+    limit = item.limit
+    if limit is None:
+        return -np.inf, np.inf, np.inf
+    lower, upper = float(limit.lower or 0.0), float(limit.upper or 0.0)
+    if item.type == 'continuous' or lower == upper:
+        lower, upper = -np.inf, np.inf
+    return lower, upper, float(limit.velocity or np.inf)
+
+
+def _frame(origin: Any, where: str) -> Array:
+    if origin is None:
+        return np.eye(4)
+    xyz = readonly(origin.xyz or (0.0, 0.0, 0.0), (3,), f'origin xyz of {where}')
+    roll, pitch, yaw = readonly(origin.rpy or (0.0, 0.0, 0.0), (3,), f'origin rpy of {where}')
+    return transform(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll), xyz)
+
+
+def turn(axis: int, angle: float) -> Array:
+    """Return the rotation (3, 3) about a coordinate axis [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    out = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out[i, i], out[j, j], out[i, j], out[j, i] = c, c, -s, s
+    return out

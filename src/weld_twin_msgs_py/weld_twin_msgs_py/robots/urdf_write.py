@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot to a URDF whose frames are exact, such as a corrected model for the controller."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.robot import Robot
+from weld_twin_core.rotation import transform
+
+from ..outputs import write_text
+from .urdf_tree import turn
+
+EFFORT = '1000.0'
+_NOTE = (
+    ' Kinematics and masses of {name}. Effort limits and inertias are placeholders: a model of '
+    'positional accuracy has none. Gravity in the base frame: {gravity} m/s^2. '
+)
+
+
+def write_urdf(path: Path | str, robot: Robot, *, overwrite: bool = False) -> None:
+    """
+    Write a URDF from the measuring frame (link ``world``) to the tool (link ``tool``).
+
+    Raises
+    ------
+    DataError
+        The file exists and ``overwrite`` is not set, or the place cannot be written.
+
+    """
+    root = Element('robot', {'name': robot.name})
+    gravity = ' '.join(f'{value:g}' for value in robot.gravity)
+    root.append(Comment(_NOTE.format(name=robot.name.replace('--', '-'), gravity=gravity)))
+    SubElement(root, 'link', {'name': 'world'})
+    parent, ahead = 'world', robot.T_world_base
+    for k, name in enumerate(robot.joint_names):
+        before, after = _split_row(robot, k)
+        joint = _joint(root, name, parent, f'link_{k + 1}', ahead @ before)
+        _motion(joint, robot, k)
+        parent, ahead = f'link_{k + 1}', after
+        link = SubElement(root, 'link', {'name': parent})
+        if robot.mass is not None and robot.com is not None:
+            _inertial(link, float(robot.mass[k]), after[:3, :3] @ robot.com[k] + after[:3, 3])
+    _joint(root, 'flange_to_tool', parent, 'tool', ahead @ robot.T_flange_tool)
+    tool = SubElement(root, 'link', {'name': 'tool'})
+    if robot.payload_mass > 0.0:
+        _inertial(tool, robot.payload_mass, robot.payload_com)
+    indent(root)
+    text = '<?xml version="1.0"?>\n' + tostring(root, encoding='unicode') + '\n'
+    write_text(path, text, overwrite=overwrite)
+
+
+def _split_row(robot: Robot, k: int) -> tuple[Array, Array]:
+    """Return the parts of a row before and after its motion, which is about or along z."""
+    turned = turn(0, robot.alpha[k]) @ turn(1, robot.beta[k])
+    spin = transform(turn(2, robot.theta[k]), np.array([0.0, 0.0, robot.d[k]]))
+    along = np.array([robot.a[k], 0.0, 0.0])
+    if robot.convention == 'standard':
+        return np.eye(4), spin @ transform(turned, along)
+    return transform(turned, turned @ along) @ spin, np.eye(4)
+
+
+def _joint(root: Element, name: str, parent: str, child: str, T: Array) -> Element:
+    joint = SubElement(root, 'joint', {'name': name, 'type': 'fixed'})
+    SubElement(joint, 'parent', {'link': parent})
+    SubElement(joint, 'child', {'link': child})
+    SubElement(joint, 'origin', {'xyz': _numbers(T[:3, 3]), 'rpy': _numbers(_rpy(T[:3, :3]))})
+    return joint
+
+
+def _motion(joint: Element, robot: Robot, k: int) -> None:
+    lower, upper, speed = robot.lower[k], robot.upper[k], robot.max_velocity[k]
+    limit = {'effort': EFFORT, 'velocity': repr(float(speed if np.isfinite(speed) else 0.0))}
+    bounded = bool(np.isfinite(lower) and np.isfinite(upper))
+    if bounded:
+        limit |= {'lower': repr(float(lower)), 'upper': repr(float(upper))}
+    kind = 'prismatic' if robot.prismatic[k] else 'revolute' if bounded else 'continuous'
+    joint.set('type', kind)
+    SubElement(joint, 'axis', {'xyz': '0 0 1'})
+    SubElement(joint, 'limit', limit)
+
+
+def _inertial(link: Element, mass: float, com: Array) -> None:
+    inertial = SubElement(link, 'inertial')
+    SubElement(inertial, 'origin', {'xyz': _numbers(com), 'rpy': '0 0 0'})
+    SubElement(inertial, 'mass', {'value': repr(float(mass))})
+    SubElement(inertial, 'inertia', dict.fromkeys(('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'), '0'))
+
+
+def _rpy(rotation: Array) -> Array:
+    """Return fixed-axis roll, pitch, yaw; each angle is taken out before the next is read."""
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    rest = turn(2, yaw).T @ rotation
+    pitch = np.arctan2(-rest[2, 0], rest[0, 0])
+    return np.array([np.arctan2(-rest[1, 2], rest[1, 1]), pitch, yaw])
+
+
+def _numbers(values: Array) -> str:
+    return ' '.join(repr(float(value)) for value in values)

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+YAML files of numbers: plain data only, small, without surprises.
+
+Against PyYAML's defaults, ``1e-3`` is a number (YAML 1.2), a key given twice is refused instead
+of the last one winning, and aliases are refused because a few lines of them can stand for
+gigabytes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from weld_twin_core.errors import ModelError
+
+SIZE_LIMIT = 1_000_000
+"""Bytes; robot and effects files are a few kilobytes."""
+
+
+class _Loader(yaml.SafeLoader):
+    """The safe loader with the three changes named above."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(problem='aliases are not accepted', problem_mark=mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Hashable, Any]:
+        seen = set()
+        for key, _ in node.value:
+            if key.value in seen and isinstance(key, yaml.ScalarNode):
+                raise yaml.MarkedYAMLError(
+                    problem=f'the key {key.value!r} is given twice', problem_mark=key.start_mark
+                )
+            if isinstance(key, yaml.ScalarNode):
+                seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+_Loader.add_implicit_resolver(
+    'tag:yaml.org,2002:float',
+    re.compile(r'^[-+]?[0-9]+(?:\.[0-9]*)?[eE][-+]?[0-9]+$'),
+    list('-+0123456789'),
+)
+
+
+def read_text(path: Path | str, kind: str) -> str:
+    """
+    Return the text of a small file.
+
+    Raises
+    ------
+    ModelError
+        There is no such file, it is too large, or it is no text; ``kind`` names what was wanted.
+
+    """
+    try:
+        data = _small(Path(path), kind)
+        return data.decode('utf-8-sig')
+    except UnicodeDecodeError:
+        raise ModelError(f"{kind} '{path}' is not UTF-8 text") from None
+    except OSError as error:
+        raise ModelError(f"{kind} '{path}' cannot be read: {error.strerror or error}") from None
+
+
+def _small(path: Path, kind: str) -> bytes:
+    with path.open('rb') as file:
+        data = file.read(SIZE_LIMIT + 1)
+    if len(data) > SIZE_LIMIT:
+        raise ModelError(f"{kind} '{path}' is larger than {SIZE_LIMIT / 1e6:g} MB")
+    return data
+
+
+def read_yaml(path: Path | str, kind: str) -> Any:
+    """
+    Return the data of a YAML file.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read or is malformed; the message names file and line.
+
+    """
+    return parse_yaml(read_text(path, kind), f"{kind} '{path}'")
+
+
+def parse_yaml(text: str, what: str) -> Any:
+    """
+    Return the data of YAML text; ``what`` names it in messages.
+
+    Raises
+    ------
+    ModelError
+        It is malformed; the message names the line.
+
+    """
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f' line {mark.line + 1}' if mark is not None else ''
+        raise ModelError(f'{what}{where}: {error.problem or error.context}') from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        reason = ' '.join(str(error).split()) or 'nested too deeply'
+        raise ModelError(f'{what}: {reason}') from None
+
+
+class _Dumper(yaml.SafeDumper):
+    """Rows of numbers on one line, everything else as a block."""
+
+
+def _is_row(value: Any) -> bool:
+    items = value.values() if isinstance(value, dict) else value
+    return all(not isinstance(item, list | dict) for item in items)
+
+
+def _represent_list(dumper: yaml.SafeDumper, data: list[Any]) -> yaml.Node:
+    return dumper.represent_sequence('tag:yaml.org,2002:seq', data, flow_style=_is_row(data))
+
+
+_Dumper.add_representer(list, _represent_list)
+_Dumper.ignore_aliases = lambda self, data: True  # type: ignore[method-assign]
+
+
+def yaml_text(data: Any) -> str:
+    """Return the YAML text of plain data; floats round trip exactly."""
+    return yaml.dump(
+        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=99,
+        default_flow_style=False,
+    )  # fmt: skip

@@ -52,9 +52,9 @@ class Picker:
 
     def take(self, values: Array) -> Array:
         """Return values (..., N, n) at the new stamps (..., M, n)."""
-        return np.moveaxis(self.pick(np.moveaxis(values, -1, -2)), -1, -2)
+        return np.stack([self.pick(joint) for joint in np.moveaxis(values, -1, 0)], axis=-1)
 
     def rates(self, values: Array) -> Array:
         """Return the slope of the straight lines through values (..., N, n), (..., M, n) [1/s]."""
-        low, high = self._ends(np.moveaxis(values, -1, -2))
-        return np.moveaxis(self._rate * (high - low), -1, -2)
+        ends = [self._ends(joint) for joint in np.moveaxis(values, -1, 0)]
+        return np.stack([self._rate * (high - low) for low, high in ends], axis=-1)

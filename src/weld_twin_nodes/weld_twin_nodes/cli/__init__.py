@@ -1,0 +1,7 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: one module of `commands` per subcommand."""
+
+from .main import main
+
+__all__ = ['main']

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Finds the subcommand, runs it, and turns an error into one line."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from inspect import getdoc
+from pathlib import Path
+from types import ModuleType
+
+USAGE_ERROR = 2
+INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """
+    Run the command line.
+
+    Returns
+    -------
+    int
+        0 on success, 2 on a usage or input error, 130 when interrupted.
+
+    """
+    words = sys.argv[1:] if argv is None else list(argv)
+    args = _parser(words).parse_args(words)
+    try:
+        return int(args.run(args))
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()  # whoever read our output has gone; there is nobody to tell
+        return 0
+    except Exception as error:
+        if not _expected(error):
+            raise
+        print(f'weld-twin: {_one_line(error)}', file=sys.stderr)
+        return USAGE_ERROR
+
+
+def _names() -> list[str]:
+    folder = Path(__file__).parent / 'commands'
+    return sorted(p.stem.rstrip('_') for p in folder.glob('[!_]*.py'))
+
+
+def _module(name: str) -> ModuleType:
+    suffix = '_' if name == 'import' else ''
+    return import_module(f'{__package__}.commands.{name}{suffix}')
+
+
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """Return the parser; only the subcommand in use is loaded with its options."""
+    parser = argparse.ArgumentParser(
+        prog='weld-twin', description="Digital twin of a welding robot's positional accuracy.",
+        epilog='weld-twin COMMAND --help tells more. Angles are rad, lengths m unless said.',
+    )  # fmt: skip
+    parser.add_argument('--version', action='version', version=_version())
+    subparsers = parser.add_subparsers(required=True, metavar='COMMAND')
+    names = _names()
+    chosen = next((word for word in words if not word.startswith('-')), None)
+    for name in [chosen] if chosen in names else names:
+        module = _module(str(name))
+        text = getdoc(module) or ''
+        sub = subparsers.add_parser(
+            str(name), help=text.partition('\n')[0], description=text,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
+        module.add_arguments(sub)
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+def _version() -> str:
+    from weld_twin_core import __version__
+
+    return f'weld-twin {__version__}'
+
+
+def _expected(error: Exception) -> bool:
+    """Tell whether the user can do something about it."""
+    from weld_twin_core.errors import TwinError
+
+    return isinstance(error, TwinError | OSError)
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        where = f" '{error.filename}'" if error.filename else ''
+        return f'{error.strerror}{where}'
+    return ' '.join(str(error).split())

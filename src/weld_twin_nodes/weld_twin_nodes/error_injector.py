@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Error injector: the stand-in for the real cell, moving as the injected effects have it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from weld_twin_core.effects import Effect
+from weld_twin_msgs_py.topics import ACTUAL_JOINT_STATES, MEASURED_POSE
+
+from .frames import WORLD
+from .joint_stream import Sample
+from .model_node import ModelNode
+from .noise import Noise
+from .running import run
+from .settings import Setting
+
+
+class ErrorInjector(ModelNode):
+    """Publishes the joint motion and the measured tool pose with the effects in them."""
+
+    settings = (
+        *ModelNode.settings,
+        Setting('seed', 0, 'seed of the measurement noise [1]', 0, 2**31 - 1),
+    )
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('error_injector', **kwargs)
+        self._joints = self.offer(ACTUAL_JOINT_STATES)
+        self._pose = self.offer(MEASURED_POSE)
+        self._noise = Noise(self.stream.twin.effects, self.setting('seed'))
+        self.start()
+
+    def on_effects(self, effects: tuple[Effect, ...]) -> None:
+        """Take note of changed effects, the noise among them."""
+        super().on_effects(effects)
+        self._noise.change(effects)
+
+    def publish(self, sample: Sample) -> None:
+        """Publish where the joints and the tool really are."""
+        names = self.robot.joint_names
+        self._joints.publish(self.messages.joint_state(sample.stamp, names, sample.q))
+        position = sample.poses.position + self._noise.draw(1)[0]
+        self._pose.publish(
+            self.messages.pose(sample.pose_stamp, position, sample.poses.rotation, WORLD)
+        )
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run(ErrorInjector, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

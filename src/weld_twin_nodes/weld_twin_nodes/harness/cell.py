@@ -1,0 +1,229 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A cell under test: its nodes, what is fed into it, what comes out, and waiting for it."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, TypeVar
+
+import rclpy
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from std_srvs.srv import Trigger
+
+from weld_twin_core.errors import TwinError
+from weld_twin_core.recording import JointMotion
+from weld_twin_msgs_py import convert
+from weld_twin_msgs_py.messages import ros_messages
+from weld_twin_msgs_py.topics import BY_NAME, JOINT_STATES, Topic
+
+from ..domain import own_domain
+from ..motions import stamps
+from ..pump import Pump
+from .process import NodeProcess
+from .tap import Tap
+
+LIMIT = 15.0
+"""Seconds to wait for anything: discovery alone has been seen to take three."""
+BURST = 50
+FIRST_STAMP = 1_000_000_000
+"""Stamp of the first sample fed [ns]."""
+
+N = TypeVar('N', bound=Node)
+
+
+class CellTimeout(TimeoutError):
+    """A condition did not come true in time; the message has the logs of the processes."""
+
+
+class Cell:
+    """
+    A context manager that ends every node it started.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Where logs and parameter files go; left out, a temporary directory.
+
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._folder = folder
+        self._stack = ExitStack()
+        self.messages = ros_messages()
+        self.processes: list[NodeProcess] = []
+
+    def __enter__(self) -> Cell:
+        """Take a domain and start listening."""
+        try:
+            self._open()
+        except BaseException:
+            self._stack.close()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End every node and give the domain back."""
+        self._stack.close()
+
+    def _open(self) -> None:
+        if self._folder is None:
+            self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+        self.domain = self._stack.enter_context(own_domain())
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, domain_id=self.domain)
+        self._stack.callback(self._context.try_shutdown)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._stack.callback(self._executor.shutdown)
+        self.node = self.add(Node, 'harness')
+        self._stack.callback(self._stop_all)
+
+    # Nodes -----------------------------------------------------------------------------------
+
+    def start(self, node: str | Sequence[str], **parameters: Any) -> NodeProcess:
+        """
+        Start a node in a process of its own.
+
+        Parameters
+        ----------
+        node : str or sequence of str
+            A node of this package, or a whole command.
+        parameters
+            Its ROS parameters.
+
+        """
+        assert self._folder is not None
+        folder = self._folder / f'{len(self.processes):02d}'
+        folder.mkdir(parents=True)
+        self.processes.append(NodeProcess(node, parameters, folder))
+        return self.processes[-1]
+
+    def add(self, make: Callable[..., N], *args: Any, **parameters: Any) -> N:
+        """Put a node into this process; it is served while the cell waits."""
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        node = make(*args, context=self._context, parameter_overrides=overrides)
+        self._executor.add_node(node)
+        self._stack.callback(node.destroy_node)
+        return node
+
+    def set_parameter(self, node: str, name: str, value: Any) -> SetParametersResult:
+        """Set a parameter of a running node, as `ros2 param set` does."""
+        client = AsyncParameterClient(self.node, node)
+        self.wait(client.services_are_ready, f'the parameters of {node}')
+        future = client.set_parameters([Parameter(name, value=value)])
+        self.wait(future.done, f'{node} to take {name}')
+        return future.result().results[0]
+
+    def trigger(self, service: str) -> Trigger.Response:
+        """Call a Trigger service."""
+        client = self.node.create_client(Trigger, service)
+        self.wait(client.service_is_ready, service)
+        future = client.call_async(Trigger.Request())
+        self.wait(future.done, f'{service} to answer')
+        return future.result()
+
+    # Streams ---------------------------------------------------------------------------------
+
+    def collect(self, topic: str, kind: Any = None) -> Tap:
+        """
+        Listen to a topic from now on.
+
+        Parameters
+        ----------
+        topic : str
+        kind : message class, optional
+            Not needed for topics of this project's table.
+
+        """
+        tap = Tap(topic)
+        row = BY_NAME.get(topic)
+        if row is None and kind is None:
+            raise TwinError(f'{topic!r} is not in the table of topics; say its message class')
+        self.node.create_subscription(
+            kind or row.message_class(), topic, tap.messages.append,
+            1000 if row is None else row.offered.to_rclpy(),
+        )  # fmt: skip
+        return tap
+
+    def publisher(self, topic: Topic = JOINT_STATES) -> Any:
+        """Return a publisher that somebody listens to already."""
+        out = self.node.create_publisher(
+            topic.message_class(), topic.name, topic.offered.to_rclpy()
+        )
+        self.wait(lambda: out.get_subscription_count() > 0, f'a subscriber of {topic.name}')
+        return out
+
+    def feed(
+        self, motion: JointMotion, joint_names: Sequence[str], *,
+        start_ns: int = FIRST_STAMP, listeners: int = 1, follow: Tap | None = None,
+        window: int = BURST,
+    ) -> None:  # fmt: skip
+        """
+        Publish a motion as joint states, as fast as the cell keeps up.
+
+        Parameters
+        ----------
+        motion : JointMotion
+        joint_names : sequence of str
+        start_ns : int [ns]
+        listeners : int
+            How many subscribers to wait for.
+        follow : Tap, optional
+            The last result of a joint state; at most ``window`` are under way without one.
+
+        """
+        publisher = self.publisher()
+        self.wait(lambda: publisher.get_subscription_count() >= listeners, 'all subscribers')
+        marks = stamps(motion.t, start_ns)
+        pump = Pump(marks, playback=0.0, window=window, answered=follow is not None)
+
+        def send() -> bool:
+            if follow:
+                pump.answer(convert.stamp_ns(follow.last))
+            for k in pump.due(time.monotonic_ns(), BURST):
+                publisher.publish(self.messages.joint_state(
+                    int(marks[k]), joint_names, motion.q[k], motion.velocity[k]
+                ))  # fmt: skip
+            return pump.done
+
+        self.wait(send, 'the motion to be taken', limit=LIMIT + 0.01 * motion.t.size)
+
+    # Waiting ---------------------------------------------------------------------------------
+
+    def wait(self, condition: Callable[[], bool], what: str, limit: float = LIMIT) -> None:
+        """
+        Serve the nodes of this process until a condition is true.
+
+        Raises
+        ------
+        CellTimeout
+            It is not true in time, or a process has died of an error meanwhile.
+
+        """
+        end = time.monotonic() + limit
+        while not condition():
+            if any(process.code for process in self.processes):
+                raise CellTimeout(f'a node died before {what}' + ''.join(self._logs()))
+            if time.monotonic() > end:
+                raise CellTimeout(f'waited {limit:g} s for {what}' + ''.join(self._logs()))
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def _logs(self) -> Iterator[str]:
+        for process in self.processes:
+            state = 'running' if process.code is None else f'ended with {process.code}'
+            yield f'\n--- {process.name}, {state}\n{process.log[-2000:]}'
+
+    def _stop_all(self) -> None:
+        for process in self.processes:
+            process.interrupt()
+        for process in self.processes:
+            process.stop()
+

@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A node as a process of its own, with its parameters and its log."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from weld_twin_core.errors import TwinError
+
+MODULES = {
+    'trajectory_generator': 'weld_twin_nodes.trajectory_generator',
+    'error_injector': 'weld_twin_nodes.error_injector',
+    'forward_kinematics_twin': 'weld_twin_nodes.twin',
+    'deviation_analyzer': 'weld_twin_nodes.deviation_analyzer',
+    'recorder': 'weld_twin_nodes.recorder',
+}
+GRACE = 5.0
+"""Seconds a process has to end after SIGINT before it is killed."""
+
+
+class NodeProcess:
+    """
+    A running node.
+
+    Parameters
+    ----------
+    node : str or sequence of str
+        A node of this package, or a whole command.
+    parameters : mapping
+    folder : Path
+        Where the parameter file and the log go.
+
+    """
+
+    def __init__(
+        self, node: str | Sequence[str], parameters: Mapping[str, Any], folder: Path
+    ) -> None:
+        self.name = node if isinstance(node, str) else Path(node[0]).name
+        self._log = folder / f'{self.name}.log'
+        command = _command(node)
+        if parameters:
+            file = folder / f'{self.name}.yaml'
+            file.write_text(yaml.safe_dump({'/**': {'ros__parameters': dict(parameters)}}))
+            command += ['--ros-args', '--params-file', str(file)]
+        with self._log.open('w') as log:
+            self._process = subprocess.Popen(
+                command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+            )
+
+    @property
+    def log(self) -> str:
+        """Return what the process has written so far."""
+        return self._log.read_text(errors='replace')
+
+    @property
+    def code(self) -> int | None:
+        """Return the exit code, None while it runs."""
+        return self._process.poll()
+
+    def signal(self, number: int) -> None:
+        """Send a signal."""
+        self._process.send_signal(number)
+
+    def end(self, timeout: float = GRACE) -> int:
+        """Wait for the process to end by itself; return its exit code."""
+        return self._process.wait(timeout)
+
+    def interrupt(self) -> None:
+        """Send what Ctrl-C sends, if the process still runs."""
+        if self.code is None:
+            self.signal(signal.SIGINT)
+
+    def stop(self) -> int:
+        """Interrupt the process, kill it if that does not help; return its exit code."""
+        self.interrupt()
+        try:
+            return self.end()
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            return self._process.wait()
+
+
+def _command(node: str | Sequence[str]) -> list[str]:
+    if not isinstance(node, str):
+        return list(node)
+    if node not in MODULES:
+        raise TwinError(f'no node is called {node!r}; there are ' + ', '.join(MODULES))
+    return [sys.executable, '-m', MODULES[node]]

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a topic carried, in the order it came."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from weld_twin_msgs_py import convert
+
+
+class Tap:
+    """
+    Messages of one topic.
+
+    Attributes
+    ----------
+    topic : str
+    messages : list
+
+    """
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.messages: list[Any] = []
+
+    def __len__(self) -> int:
+        return len(self.messages)
+
+    @property
+    def last(self) -> Any:
+        """Return the newest message."""
+        return self.messages[-1]
+
+    @property
+    def stamps(self) -> np.ndarray:
+        """Return the header stamps, int64 [ns]."""
+        return np.array([convert.stamp_ns(message) for message in self.messages], dtype=np.int64)

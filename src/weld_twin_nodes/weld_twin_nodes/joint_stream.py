@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states in, stamped poses out: what the injector and the twin both do with a message."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.poses import Poses
+from weld_twin_core.twin import Twin
+from weld_twin_msgs_py import convert
+
+from .order import Forward
+
+
+class Sample(NamedTuple):
+    """
+    The arm at one joint stamp.
+
+    Attributes
+    ----------
+    stamp : int [ns]
+        Of the joint state.
+    pose_stamp : int [ns]
+        Of a measurement that shows this pose; later by the delay of the measurement clock.
+    q : array, shape (n,) [rad or m]
+    poses : Poses
+        One position (3,) and rotation (3, 3).
+
+    """
+
+    stamp: int
+    pose_stamp: int
+    q: Array
+    poses: Poses
+
+
+class JointStream:
+    """A live twin fed with messages; wrench and temperature are held until the next one."""
+
+    def __init__(self, twin: Twin) -> None:
+        self._live = twin.live()
+        self._order = Forward()
+        self._epoch: int | None = None
+        self._before: tuple[int, Array] | None = None
+        self._wrench: Array | None = None
+        self._wrench_frame = 'tool'
+        self._temperature: float | None = None
+
+    @property
+    def twin(self) -> Twin:
+        """Return the robot with its effects."""
+        return self._live.twin
+
+    def change(self, twin: Twin) -> None:
+        """Go on with other effects; those that stay keep their memory."""
+        self._live.twin = twin
+
+    def take_wrench(self, message: Any) -> None:
+        """Take the load on the tool."""
+        self._wrench = convert.wrench(message)
+        self._wrench_frame = 'base' if 'base' in message.header.frame_id else 'tool'
+
+    def take_temperature(self, message: Any) -> None:
+        """Take the temperature."""
+        self._temperature = convert.temperature(message)
+
+    def step(self, message: Any) -> Sample:
+        """
+        Return the arm at a joint state.
+
+        Raises
+        ------
+        DataError
+            The message cannot be used; nothing has changed then.
+
+        """
+        robot = self._live.twin.robot
+        stamp = convert.stamp_ns(message)
+        q = convert.joint_positions(message, robot.joint_names)
+        robot.check_positions(q)
+        qd = convert.joint_velocities(message, robot.joint_names)
+        if self._order.restarted_at(stamp):
+            self._live.reset()
+            self._epoch = self._before = None
+        if self._epoch is None:
+            self._epoch = stamp
+        if qd is None:
+            qd = self._difference(stamp, q)
+        joints, poses = self._live.step(
+            (stamp - self._epoch) / convert.NANOSECONDS, q, qd,
+            self._wrench, self._temperature, self._wrench_frame,
+        )  # fmt: skip
+        self._before = (stamp, q)
+        delay = round(self._live.twin.delay * convert.NANOSECONDS)
+        return Sample(stamp, stamp + delay, joints, poses)
+
+    def _difference(self, stamp: int, q: Array) -> Array:
+        """Return the velocity since the sample before, for controllers that do not tell it."""
+        if self._before is None:
+            return np.zeros_like(q)
+        return (q - self._before[1]) * (convert.NANOSECONDS / (stamp - self._before[0]))

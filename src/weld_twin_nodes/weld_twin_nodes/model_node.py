@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the injector and the twin share: a robot, effects that can be changed, a joint stream."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+from weld_twin_core.effects import Effect
+from weld_twin_core.errors import TwinError
+from weld_twin_core.twin import Twin
+from weld_twin_msgs_py.topics import JOINT_STATES, TEMPERATURE, TOOL_WRENCH
+
+from .cell_node import CellNode
+from .joint_stream import JointStream, Sample
+from .models import load_effects, parse_effects
+from .robot_settings import ROBOT_SETTINGS, robot_of
+from .settings import Setting
+
+MODEL_SETTINGS = (
+    *ROBOT_SETTINGS,
+    Setting('model', '', 'effects file, or diagnosis.json with the effects found; ~/reload '
+            'reads it again'),
+    Setting('effects', '', 'more effects, as the YAML list of an effects file', live=True),
+)  # fmt: skip
+
+
+class ModelNode(CellNode):
+    """Steps a twin with every joint state; its effects may change between two messages."""
+
+    settings = MODEL_SETTINGS
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        super().__init__(name, **kwargs)
+        self.robot = robot_of(self)
+        effects = self._effects(self.setting('effects'))
+        self.stream = JointStream(Twin(self.robot, effects))
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._changed)
+        self.create_service(Trigger, '~/reload', self._reload)
+
+    def start(self) -> None:
+        """Take input; to be called when the outputs are there."""
+        self.listen(TOOL_WRENCH, self.stream.take_wrench)
+        self.listen(TEMPERATURE, self.stream.take_temperature)
+        self.listen(JOINT_STATES, lambda message: self.publish(self.stream.step(message)))
+
+    @abstractmethod
+    def publish(self, sample: Sample) -> None:
+        """Publish what follows from one joint state."""
+
+    def on_effects(self, effects: tuple[Effect, ...]) -> None:
+        """Take note of changed effects."""
+        self.stream.change(Twin(self.robot, effects))
+
+    def _effects(self, text: str) -> tuple[Effect, ...]:
+        path = self.setting('model')
+        known = load_effects(path, self.robot) if path else ()
+        return known + parse_effects(text, self.robot)
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == 'effects':
+                try:
+                    self._effects(parameter.value)
+                except TwinError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _changed(self, parameters: list[Parameter]) -> None:
+        if any(parameter.name == 'effects' for parameter in parameters):
+            self.on_effects(self._effects(self.setting('effects')))
+
+    def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            effects = self._effects(self.setting('effects'))
+        except TwinError as error:
+            response.message = str(error)
+            return response
+        self.on_effects(effects)
+        response.success = True
+        response.message = f'{len(effects)} effects'
+        return response

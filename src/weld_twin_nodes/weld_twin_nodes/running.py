@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Running a node as a program: one loop that Ctrl-C and SIGTERM always end."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import rclpy
+from rclpy.exceptions import (
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+    ROSInterruptException,
+)
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.task import Future
+
+from weld_twin_core.errors import TwinError
+
+from .cell_node import CellNode
+
+LOOP = 0.25
+"""Seconds of one turn of the loop; also how late an end may be noticed."""
+
+
+def executor() -> Executor:
+    """Return the events executor, a third of the others' cost per message, where there is one."""
+    try:
+        from rclpy.experimental import EventsExecutor
+    except ImportError:
+        return SingleThreadedExecutor()
+    return EventsExecutor()
+
+
+def spin(node: CellNode) -> None:
+    """
+    Serve callbacks until the node is finished or ROS shuts down.
+
+    The events executor can hang in an endless `spin`, and an idle one can miss SIGTERM; turns of
+    bounded length do neither.
+    """
+    runner = executor()
+    runner.add_node(node)
+    try:
+        while rclpy.ok() and not node.finished:
+            runner.spin_until_future_complete(Future(), timeout_sec=LOOP)
+    finally:
+        runner.shutdown()
+
+
+def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
+    """Run a node until it is done or stopped; return the exit code, 2 for unusable settings."""
+    rclpy.init(args=args)
+    node = None
+    try:
+        node = make()
+        spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
+        pass
+    except (
+        TwinError, OSError, InvalidParameterValueException, InvalidParameterTypeException,
+    ) as error:  # fmt: skip
+        print(f'weld_twin: {error}', file=sys.stderr)
+        return 2
+    except Exception:
+        if rclpy.ok():
+            raise
+        # A callback was publishing when the signal closed ROS under it.
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of a node: declared once, with unit and range, in a table at the top of its file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+
+
+@dataclass(frozen=True)
+class Setting:
+    """
+    One parameter.
+
+    Attributes
+    ----------
+    name : str
+    default : bool, int, float, str or list of str
+        Also fixes the type.
+    description : str
+        What it is for, with its unit in square brackets.
+    low, high : float, optional
+        Range of a number, ends included.
+    live : bool
+        May be changed while the node runs.
+
+    """
+
+    name: str
+    default: Any
+    description: str
+    low: float | None = None
+    high: float | None = None
+    live: bool = False
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return what `ros2 param describe` shows and rclpy enforces."""
+        out = ParameterDescriptor(description=self.description, read_only=not self.live)
+        if self.low is None or self.high is None:
+            return out
+        if isinstance(self.default, float):
+            limits = FloatingPointRange(from_value=float(self.low), to_value=float(self.high))
+            out.floating_point_range = [limits]
+        else:
+            limits = IntegerRange(from_value=int(self.low), to_value=int(self.high), step=1)
+            out.integer_range = [limits]
+        return out

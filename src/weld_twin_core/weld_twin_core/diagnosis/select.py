@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..effects.base import Effect
-from .fit import Fit, design, fit, robust_scale
+from .fit import Fit, design, fit
 from .gram import Gram
 from .library import Library, Unit
 from .problem import Model, Problem, Scale
@@ -91,15 +91,16 @@ def forward(
     """
     steps: list[Step] = []
     now = start
-    taken: list[tuple[str, str | None]] = []
+    taken = [(e.name, e.site) for e in start.model.found]
     while len(steps) < most:
         gram = work.conditioned(now.model, now.residual)
-        count = effective(now)
-        ranked = ranking(gram, work.library.units, count)
+        # Until the cause is in the model the residual is all signal and looks autocorrelated;
+        # only the fit with a choice tells how many rows were independent.
+        ranked = ranking(gram, work.library.units, float(now.residual.size))
         ranked = [c for c in ranked if c.nats > ENTER and not _repeats(c, taken)]
         if not ranked:
             break
-        best = _refined(work, now, gram, ranked, count)
+        best = _refined(work, now, gram, ranked, effective)
         if best is None:
             break
         steps.append(best)
@@ -121,7 +122,11 @@ def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
 
 
 def _refined(
-    work: Workspace, now: Fit, gram: Gram, ranked: list[Choice], count: float
+    work: Workspace,
+    now: Fit,
+    gram: Gram,
+    ranked: list[Choice],
+    effective: Callable[[Fit], float],
 ) -> Step | None:
     """Return the best of the leading choices after a nonlinear fit of each."""
     close = [c for c in ranked if c.nats > ranked[0].nats - max(8.0, SLACK * ranked[0].nats)]
@@ -131,14 +136,10 @@ def _refined(
         gain = now.rss - result.rss
         freedom = result.coordinates.size - now.coordinates.size
         tried = float(np.log(choice.unit.trials))
-        nats = evidence(_with_rss(gram, now.rss), gain, freedom, count) - tried
+        nats = evidence(replace(gram, rss=now.rss), gain, freedom, effective(result)) - tried
         if nats > ENTER and (best is None or nats > best.nats):
             best = Step(choice.unit, nats, result)
     return best
-
-
-def _with_rss(gram: Gram, rss: float) -> Gram:
-    return replace(gram, rss=rss)
 
 
 def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
@@ -179,7 +180,3 @@ def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fi
         now = worst[1]
     return now
 
-
-def rescaled(problem: Problem, model: Model, least: Scale | None = None) -> Scale:
-    """Return noise and weights from a model's own residual."""
-    return robust_scale(problem, problem.residuals(model), least)

@@ -43,6 +43,7 @@ class Backlash(MemoryEffect):
     name = 'backlash'
     of = 'joint'
     stage = Stage.PLAY
+    regime = 'reversal'
     parameters = (Parameter('width', 'rad', typical=5e-4, lower=0.0, linear=False),)
     options = ('form',)
     needs = frozenset({'order'})

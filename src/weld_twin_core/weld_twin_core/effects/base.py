@@ -44,6 +44,9 @@ class Effect(Parametric, ABC):
     stage: ClassVar[Stage]
     needs: ClassVar[frozenset[str]] = frozenset()
     """Inputs beyond joint position: 'velocity', 'order', 'time', 'wrench', 'load', 'temperature'."""
+    regime: ClassVar[str] = 'static'
+    """What brings it out: 'static', 'reversal', 'speed', 'acceleration', 'load', 'temperature' or
+    'time'."""
 
     @abstractmethod
     def displace(self, view: View) -> Shift:

@@ -25,6 +25,7 @@ class CartesianCompliance(Effect):
     name = 'cartesian_compliance'
     of = 'robot'
     stage = Stage.POSE
+    regime = 'load'
     parameters = (Parameter('compliance', 'm/N', size=3, typical=1e-6),)
     needs = frozenset({'wrench'})
 

@@ -20,6 +20,7 @@ class Drift(Effect):
     name = 'drift'
     of = 'robot'
     stage = Stage.POSE
+    regime = 'time'
     parameters = (Parameter('xyz_rate', 'm/s', size=3, typical=1e-6),)
     needs = frozenset({'time'})
 

@@ -21,6 +21,7 @@ class JointCompliance(Effect):
     name = 'joint_compliance'
     of = 'joint'
     stage = Stage.ELASTIC
+    regime = 'load'
     parameters = (Parameter('compliance', 'rad/(N m)', typical=1e-5),)
     needs = frozenset({'load'})
 

@@ -28,6 +28,7 @@ class ServoLag(MemoryEffect):
     name = 'servo_lag'
     of = 'joint'
     stage = Stage.SERVO
+    regime = 'speed'
     parameters = (Parameter('time_constant', 's', typical=5e-3, lower=0.0, linear=False),)
     needs = frozenset({'velocity', 'time'})
 

@@ -37,6 +37,7 @@ class ThermalGrowth(Effect):
     name = 'thermal_growth'
     of = 'links'
     stage = Stage.LINK
+    regime = 'temperature'
     parameters = (Parameter('coefficient', '1/K', typical=1.2e-5),)
     options = ('reference', 'links', 'warmup')
     needs = frozenset({'temperature'})

@@ -20,6 +20,7 @@ class TimeDelay(Effect):
     name = 'time_delay'
     of = 'robot'
     stage = Stage.CLOCK
+    regime = 'speed'
     parameters = (Parameter('delay', 's', typical=5e-3),)
     needs = frozenset({'velocity', 'time'})
 

@@ -36,6 +36,7 @@ class Vibration(MemoryEffect):
     name = 'vibration'
     of = 'joint'
     stage = Stage.SERVO
+    regime = 'acceleration'
     parameters = (
         Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False),
         Parameter('damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False),

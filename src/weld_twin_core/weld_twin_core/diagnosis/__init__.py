@@ -1,0 +1,240 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The diagnosis of the sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..arrays import Array
+from ..effects.base import Effect
+from ..recording import Recording
+from ..robot import Robot
+from .advice import actions, next_experiment
+from .alignment import initial_frames
+from .families import family_verdict
+
+from .flexible import structure
+from .heldout import TRUSTED, Unseen
+from .noise import noise_floor
+from .problem import Model, Problem, usable
+from .result import (
+    Candidate,
+    Check,
+    Diagnosis,
+    Found,
+    Gap,
+    Shrink,
+    Site,
+    Traces,
+    Unexplained,
+    Where,
+)
+from .rivals import Rival, rivals
+from .search import Search, search
+from .soundness import check
+from .validation import held_out_shrink
+from .verdict import Evidence, Verdict, decide
+from .where import locate
+
+__all__ = [
+    'Candidate', 'Check', 'Diagnosis', 'Found', 'Gap', 'Shrink', 'Site', 'Traces', 'Unexplained',
+    'Where', 'diagnose',
+]  # fmt: skip
+
+Progress = Callable[[str], None]
+
+
+def diagnose(
+    recordings: Sequence[Recording],
+    robot: Robot,
+    *,
+    align: frozenset[str] = frozenset(),
+    known: Sequence[Effect] = (),
+    exclude: Sequence[str] = (),
+    holdout: Sequence[Recording] = (),
+    progress: Progress = lambda text: None,
+) -> Diagnosis:
+    """
+    Diagnose the gap between a robot and recordings of the real cell.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Joint streams with measured poses or points; each has its own base frame when ``align``
+        names 'base'.
+    robot : Robot
+        The nominal model.
+    align : frozenset of str
+        Frames fitted as nuisance in every hypothesis: 'base', 'tool'.
+    known : sequence of Effect
+        Put into the twin first; what remains is diagnosed.
+    exclude : sequence of str
+        Families taken out of the library.
+    holdout : sequence of Recording
+        Never fitted; judge the shrink. Left out, stretches of the recordings take their turn.
+    progress : callable
+        Told what has been done.
+
+    Raises
+    ------
+    DataError
+        The data cannot be diagnosed; the message says what to mend.
+
+    """
+    problem = Problem(tuple(usable(r) for r in recordings), frozenset(align))
+    start = Model(robot, tuple(robot.T_world_base for _ in recordings), tuple(known))
+    start = initial_frames(problem, start)
+    checks = check(problem, start)
+    progress('data checked')
+    found = search(problem, start, exclude, progress)
+    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
+    kept = list(range(len(found.final.model.found)))
+    floor = noise_floor(found.problem, found.problem.residuals(found.final.model)) * np.sqrt(3.0)
+    loose = structure(unseen, found.final.model, kept)
+    progress('looked for what is left')
+    before, after = unseen.predict([]), unseen.predict(kept)
+    slots = () if found.dense else _slots(found, progress)
+    evidence = Evidence(slots, loose, unseen.rms(before), unseen.rms(after), float(floor))
+    verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
+    baseline = Unseen.of(found.problem, found.scale, found.baseline, np.zeros(0))
+    where = locate(found.problem, baseline, found.baseline.model, unseen, found.final.model)
+    progress('located')
+    effects = _effects(found, unseen, verdict)
+    return Diagnosis(
+        gap=_gap(found, float(floor)), where=where, status=verdict.status, effects=effects,
+        confidence=verdict.confidence, indistinguishable=verdict.sets, reasons=verdict.reasons,
+        candidates=_candidates(found, slots, evidence, unseen),
+        shrink=held_out_shrink(found, unseen, holdout),
+        unexplained=_unexplained(evidence, unseen, after),
+        next_experiment=_next(found, slots, verdict),
+        actions=actions([f.effect for f in effects], robot), checks=checks,
+        model=found.final.model, traces=_traces(found), absent=found.library.absent,
+        recordings=found.problem.recordings,
+    )  # fmt: skip
+
+
+def _slots(found: Search, progress: Progress) -> tuple[tuple[Rival, ...], ...]:
+    out = []
+    for k in range(len(found.small.model.found)):
+        out.append(rivals(found.work, found.small, k, found.effective))
+        progress(f'rivals of {out[-1][0].site} weighed')
+    return tuple(out)
+
+
+def _gap(found: Search, floor: float) -> Gap:
+    parts = found.problem.residuals(found.baseline.model)
+    good = [w >= TRUSTED for w in found.scale.weights]
+    distance = np.concatenate(
+        [np.linalg.norm(p[:3, g], axis=0) for p, g in zip(parts, good, strict=True)]
+    )
+    turns = [p[3:, g] for p, g in zip(parts, good, strict=True) if p.shape[0] > 3]
+    turn = None
+    if turns:
+        turn = float(np.sqrt(np.mean(np.concatenate([(t**2).sum(axis=0) for t in turns]))))
+    return Gap(
+        float(np.sqrt((distance**2).mean())), float(distance.mean()), float(distance.max()),
+        turn, int(distance.size), floor,
+    )  # fmt: skip
+
+
+def _effects(found: Search, unseen: Unseen, verdict: Verdict) -> tuple[Found, ...]:
+    """Return the effects named, those that bring most on unseen data first."""
+    if verdict.status in ('none', 'unknown') and not verdict.sets:
+        return ()
+    model = found.final.model
+    everything = list(range(len(model.found)))
+    after = unseen.rms(unseen.predict(everything))
+    worth = [
+        unseen.rms(unseen.predict([j for j in everything if j != k])) - after for k in everything
+    ]
+    covariance = found.final.covariance(1.0 / _independent(found))
+    named = {site for group in verdict.sets for site in group}
+    at, out = 0, []
+    for k, effect in enumerate(model.found):
+        size = effect.coordinates().size
+        block = covariance[at : at + size, at : at + size]
+        at += size
+        if Site(effect.name, effect.site) in named:
+            out.append((worth[k], Found(effect, _std(effect, np.diag(block)))))
+    return tuple(item for _, item in sorted(out, key=lambda pair: -pair[0]))
+
+
+def _independent(found: Search) -> float:
+    return max(found.effective(found.small) / found.small.residual.size, 1e-3)
+
+
+def _std(effect: Effect, variance: Array) -> dict[str, object]:
+    """Return standard errors in the shape of the parameters; those not fitted have none."""
+    std = np.sqrt(np.maximum(variance, 0.0))
+    if effect.name == 'transmission_ripple':
+        pairs = std.reshape(-1, 2)
+        amplitude = np.atleast_1d(np.asarray(effect.amplitude))  # type: ignore[attr-defined]
+        spread = np.sqrt((pairs**2).mean(axis=1))
+        phase = spread / np.maximum(amplitude, 1e-300)
+        many = np.ndim(effect.amplitude) > 0  # type: ignore[attr-defined]
+        return {
+            'amplitude': spread.tolist() if many else float(spread[0]),
+            'phase': np.minimum(phase, np.pi).tolist() if many else float(min(phase[0], np.pi)),
+        }
+    out: dict[str, object] = {}
+    at = 0
+    for parameter, index in effect.components():
+        if not parameter.differentiable:
+            continue
+        if index is None:
+            out[parameter.name] = float(std[at])
+        else:
+            values = out.setdefault(parameter.name, [])
+            assert isinstance(values, list)
+            values.append(float(std[at]))
+        at += 1
+    return out
+
+
+def _candidates(
+    found: Search, slots: tuple[tuple[Rival, ...], ...], evidence: Evidence, unseen: Unseen
+) -> tuple[Candidate, ...]:
+    """Return the hypotheses for every slot, those of the strongest effect first."""
+    out = []
+    for slot in slots:
+        least = slot[0].fit.rss
+        for rival in slot:
+            rms = evidence.after * float(np.sqrt(rival.fit.rss / max(least, 1e-300)))
+            shrink = 1.0 - rms / max(evidence.gap, 1e-300)
+            out.append(Candidate(rival.site, rival.probability, rms, shrink))
+    return tuple(out)
+
+
+def _unexplained(evidence: Evidence, unseen: Unseen, after: Array) -> Unexplained:
+    above = evidence.structured and evidence.after > 1.1 * evidence.floor
+    names = evidence.structure.depends_on if evidence.structured else ()
+    return Unexplained(evidence.after, above, names)
+
+
+def _next(
+    found: Search, slots: tuple[tuple[Rival, ...], ...], verdict: Verdict
+) -> dict[str, object] | None:
+    if verdict.status not in ('ambiguous', 'unknown'):
+        return None
+    model = found.small.model
+    alternatives = [model.found]
+    for slot in slots:
+        chosen = [r for r in slot if r.site in {s for group in verdict.sets for s in group}]
+        alternatives += [r.fit.model.found for r in chosen if r.fit.model.found != model.found]
+    return next_experiment(found.work.problem, model, alternatives[:4], found.work.scale)
+
+
+def _traces(found: Search) -> Traces:
+    recordings = found.problem.recordings
+    before = found.problem.residuals(found.baseline.model)
+    after = found.problem.residuals(found.final.model)
+    return Traces(
+        tuple(r.measured.t for r in recordings if r.measured is not None),
+        tuple(r.measured.position for r in recordings if r.measured is not None),
+        tuple(p[:3].T for p in before), tuple(p[:3].T for p in after),
+    )  # fmt: skip
+
+

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The verdict when many small errors act together: families are named, with their members."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .heldout import Unseen
+from .result import Site
+from .search import Search
+from .verdict import CALIBRATION, STRUCTURE, Evidence, Verdict
+
+WORTH = 0.002
+"""A family that brings less than this share of the squared gap on unseen data is not named."""
+CERTAIN = 2.0
+
+
+def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict:
+    """Return the families that earn their place on unseen data, each with its members."""
+    model = found.final.model
+    members: dict[str, list[int]] = {}
+    for k, effect in enumerate(model.found):
+        members.setdefault(effect.name, []).append(k)
+    everything = list(range(len(model.found)))
+    total = unseen.squares(unseen.predict([])).mean()
+    full = unseen.squares(unseen.predict(everything))
+    labels = unseen.trusted_labels()
+    named: list[tuple[float, str]] = []
+    for name, index in members.items():
+        less = unseen.squares(unseen.predict([k for k in everything if k not in index]))
+        falls = np.array([(less - full)[labels == b].mean() for b in np.unique(labels)])
+        error = falls.std(ddof=1) / np.sqrt(falls.size) if falls.size > 1 else np.inf
+        if falls.mean() > max(WORTH * total, CERTAIN * error):
+            named.append((float(falls.mean()), name))
+    sets = tuple(
+        (Site(effect.name, effect.site),)
+        for _, name in sorted(named, reverse=True)
+        for effect in (model.found[k] for k in members[name])
+    )
+    left = evidence.unexplained if evidence.structured else 0.0
+    status = 'unknown' if left > STRUCTURE else 'identified'
+    reasons = (
+        'many small errors act together; members of one family are fitted jointly and only their '
+        'sum is certain',
+    )
+    return Verdict(status, CALIBRATION / (1.0 + (left / STRUCTURE) ** 3), sets, reasons)

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far the gap shrinks on data that were not used for fitting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import Array
+from ..recording import Recording
+from .fit import fit
+from .heldout import Unseen, ratio_interval
+from .problem import Model, Problem, usable
+from .result import Shrink
+from .search import Search
+
+MOVED = 5.0
+"""A held-out bag whose frame is this many times better refitted stems from another set-up."""
+
+
+def held_out_shrink(found: Search, unseen: Unseen, holdout: Sequence[Recording]) -> Shrink:
+    """Return the gap before and after, on the held-out bags or on stretches taking their turn."""
+    model = found.final.model
+    steps, alone = _waterfall(unseen, model)
+    if holdout:
+        before, after, labels = _on_bags(found, holdout)
+        source = ', '.join(r.name for r in holdout)
+    else:
+        everything = list(range(len(model.found)))
+        before = unseen.squares(unseen.predict([]))
+        after = unseen.squares(unseen.predict(everything))
+        labels, source = unseen.trusted_labels(), 'blocked cross-validation'
+    ratio, interval = ratio_interval(before, after, labels)
+    return Shrink(
+        float(np.sqrt(before.mean())), float(np.sqrt(after.mean())), ratio, interval, source,
+        steps, alone,
+    )  # fmt: skip
+
+
+def _waterfall(
+    unseen: Unseen, model: Model
+) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
+    """Return RMS on unseen stretches as families are added in turn, and with one mended alone."""
+    members: dict[str, list[int]] = {}
+    single = len(model.found) <= 8
+    for k, effect in enumerate(model.found):
+        name = f'{effect.name} of {effect.site}' if single and effect.site else effect.name
+        members.setdefault(name, []).append(k)
+    alone = {name: unseen.rms(unseen.predict(index)) for name, index in members.items()}
+    steps: list[tuple[str, float]] = []
+    kept: list[int] = []
+    rest = dict(members)
+    while rest:
+        trials = {n: unseen.rms(unseen.predict(kept + index)) for n, index in rest.items()}
+        best = min(trials, key=lambda n: trials[n])
+        kept += rest.pop(best)
+        steps.append((best, trials[best]))
+    return tuple(steps), tuple(alone.items())
+
+
+def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array, Array]:
+    """Return squared errors before and after on held-out bags, and a stretch for every sample."""
+    before, after, labels = [], [], []
+    for recording in holdout:
+        problem = Problem((usable(recording),), frozenset({'base'}) & found.problem.align)
+        pair = []
+        for model in (found.baseline.model, found.final.model):
+            parts = problem.residuals(_for_bag(problem, model))
+            pair.append((parts[0][:3] ** 2).sum(axis=0))
+        good = pair[0] < 100.0 * np.median(pair[0])
+        before.append(pair[0][good])
+        after.append(pair[1][good])
+        stretch = np.arange(good.sum()) * 8 // max(int(good.sum()), 1)
+        labels.append(stretch + 8 * len(labels))
+    return np.concatenate(before), np.concatenate(after), np.concatenate(labels)
+
+
+def _for_bag(problem: Problem, model: Model) -> Model:
+    """Return the model with the base of the recording that the bag's set-up matches, or its own."""
+    choices = [Model(model.robot, (base,), model.known, model.found) for base in model.bases]
+    sizes = [_size(problem, choice) for choice in choices]
+    best = choices[int(np.argmin(sizes))]
+    if 'base' in problem.align:
+        bare = best.with_found(())
+        frames = fit(problem, bare, problem.unit_scale()).model
+        own = Model(model.robot, frames.bases, model.known, model.found)
+        if min(sizes) > MOVED * _size(problem, own):
+            return own
+    return best
+
+
+def _size(problem: Problem, model: Model) -> float:
+    return float(np.median(np.linalg.norm(problem.residuals(model)[0][:3], axis=0)))

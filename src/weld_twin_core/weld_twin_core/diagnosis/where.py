@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the gap lies: joints, regimes, stretches of the path, directions along the seam."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array
+from ..effects import REGISTRY
+from ..features import Features
+from .heldout import Unseen
+from .problem import Model, Problem
+from .result import Where
+
+REGRESSORS = (
+    'constant', 'angle, low order', 'angle, high order', 'reversal', 'speed', 'acceleration',
+    'load', 'temperature', 'time',
+)  # fmt: skip
+REGIMES = ('static', 'reversal', 'speed', 'acceleration', 'load', 'temperature', 'time')
+STRETCHES = 12
+
+
+def locate(problem: Problem, baseline: Unseen, start: Model, final: Unseen, found: Model) -> Where:
+    """
+    Return where the gap lies.
+
+    Parameters
+    ----------
+    problem : Problem
+    baseline : Unseen
+        Of the model before any effect was found.
+    start : Model
+    final : Unseen
+        Of the final model.
+    found : Model
+
+    """
+    shares = _map(problem, baseline, start)
+    joints, regimes = _explained(final, found)
+    if not found.found:
+        joints = {name: float(row.max()) for name, row in zip(start.robot.joint_names, shares,
+                                                             strict=True)}  # fmt: skip
+        regimes = _map_regimes(shares)
+    ordered = sorted(joints.items(), key=lambda item: -item[1])
+    return Where(
+        tuple(ordered), regimes, _path(problem, start), _direction(problem, start),
+        REGRESSORS, tuple(tuple(float(v) for v in row) for row in shares),
+    )  # fmt: skip
+
+
+def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str, float]]:
+    """Return how much of the unseen squared gap the effects of every joint and regime explain."""
+    everything = list(range(len(found.found)))
+    total = final.squares(final.predict([])).mean()
+    after = final.squares(final.predict(everything)).mean()
+    joints = dict.fromkeys(found.robot.joint_names, 0.0)
+    regimes = dict.fromkeys(REGIMES, 0.0)
+    falls = []
+    for k in everything:
+        less = final.squares(final.predict([j for j in everything if j != k])).mean()
+        falls.append(max(less - after, 0.0))
+    scale = max(total - after, 0.0) / max(sum(falls), 1e-300) / max(total, 1e-300)
+    for effect, fall in zip(found.found, falls, strict=True):
+        if effect.site is not None:
+            joints[effect.site] += fall * scale
+        regimes[REGISTRY[effect.name].regime] += fall * scale
+    return joints, regimes
+
+
+def _map(problem: Problem, baseline: Unseen, model: Model) -> Array:
+    """Return the share of unseen squared gap that each joint x regressor explains, (n, R)."""
+    features = problem.features(model)
+    kept = list(range(len(baseline.parts)))
+    before = baseline.squares(baseline.predict(kept)).mean()
+    out = np.zeros((model.robot.n, len(REGRESSORS)))
+    for i in range(model.robot.n):
+        for r, name in enumerate(REGRESSORS):
+            parts = []
+            for k, maker in enumerate(features):
+                values = _regressor(maker, i, name)
+                column = maker.column(('q', i))[None, : problem.rows[k]]
+                parts.append(column * values[:, None, :])
+            block = problem.whitened(parts, baseline.scale)
+            size = np.sqrt((block**2).mean(axis=1))
+            block = block[size > 1e-12] / size[size > 1e-12, None]
+            if block.shape[0]:
+                after = baseline.squares(baseline.predict(kept, block, 1.0)).mean()
+                out[i, r] = max(0.0, 1.0 - float(after / max(before, 1e-300)))
+    return out
+
+
+def _regressor(maker: Features, i: int, name: str) -> Array:
+    view = maker.view
+    q, qd = view.q[:, i], view.qd[:, i]
+    one = np.ones_like(q)
+    match name:
+        case 'constant':
+            return one[None]
+        case 'angle, low order':
+            return np.stack([q, np.sin(q), np.cos(q), np.sin(2 * q), np.cos(2 * q)])
+        case 'angle, high order':
+            return np.stack([f(n * q) for n in range(3, 41) for f in (np.sin, np.cos)])
+        case 'reversal':
+            if view.static:
+                return np.sign(np.diff(q, prepend=q[:1]))[None]
+            fast = max(float(np.abs(qd).max()), 1e-12)
+            return np.tanh(qd / (0.02 * fast))[None]
+        case 'speed':
+            return qd[None]
+        case 'acceleration':
+            return np.zeros((1, q.size)) if view.static else np.gradient(qd, view.t)[None]
+        case 'load':
+            return np.asarray(view.shift[('tau', i)])[None] * one
+        case 'temperature':
+            return np.zeros((1, q.size)) if view.temperature is None else view.temperature[None]
+        case _:
+            return view.elapsed[None]
+
+
+def _map_regimes(shares: Array) -> dict[str, float]:
+    best = {name: float(shares[:, r].max()) for r, name in enumerate(REGRESSORS)}
+    best['static'] = max(best[name] for name in REGRESSORS[:3])
+    return {name: best[name] for name in REGIMES}
+
+
+def _path(problem: Problem, model: Model) -> tuple[tuple[float, float, float, float], ...]:
+    """Return stretches of time with their share of the squared gap and their RMS."""
+    out = []
+    parts = problem.residuals(model)
+    total = sum(float((part[:3] ** 2).sum()) for part in parts)
+    for recording, part in zip(problem.recordings, parts, strict=True):
+        assert recording.measured is not None
+        squares = (part[:3] ** 2).sum(axis=0)
+        count = max(1, round(STRETCHES * squares.size / max(sum(problem.samples), 1)))
+        for index in np.array_split(np.arange(squares.size), count):
+            if index.size:
+                t = recording.measured.t[index]
+                share = float(squares[index].sum()) / max(total, 1e-300)
+                rms = float(np.sqrt(squares[index].mean()))
+                out.append((float(t[0]), float(t[-1]), share, rms))
+    return tuple(out)
+
+
+def _direction(problem: Problem, model: Model) -> dict[str, float]:
+    """
+    Return the RMS gap along the path, across it, and along the tool's axis (stick-out), [m].
+
+    Along is the direction of travel; stations have none and count as across.
+    """
+    sums = np.zeros(3)
+    for recording, part, maker in zip(
+        problem.recordings, problem.residuals(model), problem.features(model), strict=True
+    ):
+        error, poses = part[:3].T, maker.run.poses
+        normal = poses.rotation[:, :, 2]
+        travel = np.zeros_like(error)
+        if not recording.joints.static and error.shape[0] > 2:
+            travel = np.gradient(poses.position, maker.at, axis=0)
+        size = np.linalg.norm(travel, axis=1, keepdims=True)
+        along = np.where(size > 1e-6, travel / np.maximum(size, 1e-12), 0.0)
+        normal = normal - along * (normal * along).sum(axis=1, keepdims=True)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        a, c = (error * along).sum(axis=1), (error * normal).sum(axis=1)
+        across = np.maximum((error**2).sum(axis=1) - a**2 - c**2, 0.0)
+        sums += [float((a**2).sum()), float(across.sum()), float((c**2).sum())]
+    rms = np.sqrt(sums / max(sum(problem.samples), 1))
+    return {'along_m': float(rms[0]), 'across_m': float(rms[1]), 'normal_m': float(rms[2])}

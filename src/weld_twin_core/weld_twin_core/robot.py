@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Array, readonly
 from .errors import DataError, ModelError
@@ -60,7 +61,7 @@ class Robot:
     d: Array
     theta: Array
     beta: Array
-    prismatic: np.ndarray
+    prismatic: NDArray[np.bool_]
     lower: Array
     upper: Array
     max_velocity: Array
@@ -87,7 +88,7 @@ class Robot:
                 f'got {self.convention!r}'
             )
         shapes: dict[str, tuple[int | None, ...]] = {
-            **{k: (n,) for k in ('a', 'alpha', 'd', 'theta', 'beta')},
+            **dict.fromkeys(('a', 'alpha', 'd', 'theta', 'beta'), (n,)),
             'payload_com': (3,), 'gravity': (3,), 'T_world_base': (4, 4), 'T_flange_tool': (4, 4),
         }  # fmt: skip
         if self.mass is not None:
@@ -97,9 +98,12 @@ class Robot:
         for key in ('lower', 'upper', 'max_velocity', 'max_acceleration'):
             value = readonly(getattr(self, key), (n,), f'{key} of {self.name!r}', finite=False)
             self._set(key, value)
-        self._set('prismatic', np.array(self.prismatic, dtype=bool))
-        if (self.lower >= self.upper).any():
-            k = int(np.argmax(self.lower >= self.upper))
+        prismatic = readonly(self.prismatic, (n,), f'prismatic of robot {self.name!r}').astype(bool)
+        prismatic.setflags(write=False)
+        self._set('prismatic', prismatic)
+        wrong = ~(self.lower < self.upper)
+        if wrong.any():
+            k = int(np.argmax(wrong))
             raise ModelError(f'joint {self.joint_names[k]!r}: lower limit is not below upper')
         if self.mass is not None and (self.mass < 0.0).any():
             raise ModelError(f'robot {self.name!r} has a link of negative mass')
@@ -197,13 +201,15 @@ class Robot:
 
     @classmethod
     def _from_rows(cls, name: str, rows: Sequence[Any], data: Mapping[str, Any]) -> Robot:
-        def column(key: str, default: float = 0.0) -> list[Any]:
+        def column(key: str, default: Any = 0.0, rows: Sequence[Any] = rows) -> Any:
             return [row.get(key, default) for row in rows]
 
         links = data.get('links')
         payload = data.get('payload') or {}
         if links is not None and len(links) != len(rows):
-            raise ModelError(f'{len(links)} links for {len(rows)} joints; give one per joint')
+            raise ModelError(
+                f'robot {name!r} has {len(links)} links for {len(rows)} joints; give one per joint'
+            )
         return cls(
             name=name,
             joint_names=tuple(str(row['name']) for row in rows),
@@ -216,8 +222,8 @@ class Robot:
             convention=str(data.get('convention', 'standard')),
             T_world_base=_frame(data.get('base'), 'base'),
             T_flange_tool=_frame(data.get('tool'), 'tool'),
-            mass=None if links is None else [link.get('mass', 0.0) for link in links],
-            com=None if links is None else [link.get('com', (0.0, 0.0, 0.0)) for link in links],
+            mass=None if links is None else column('mass', rows=links),
+            com=None if links is None else column('com', (0.0, 0.0, 0.0), links),
             payload_mass=float(payload.get('mass', 0.0)),
             payload_com=payload.get('com', np.zeros(3)),
             gravity=data.get('gravity', STANDARD_GRAVITY),

@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array
+from ..errors import DataError
 from ..rotation import angle_between, transform
 from .fit import fit, robust_scale
 from .problem import Model, Problem
@@ -61,11 +62,16 @@ class Track:
         """Return how far each sample is off, position and turn together, shape (M,) [m]."""
         turn = base[:3, :3] @ self.turn
         reached = self.point @ base[:3, :3].T + base[:3, 3] + turn @ tool[:3, 3]
-        off = np.linalg.norm(self.position - reached, axis=1)
+        off: Array = np.linalg.norm(self.position - reached, axis=1)
         if self.rotation is None:
             return off
         angle = angle_between(self.rotation, turn @ tool[:3, :3])
-        return off + LEVER * np.linalg.norm(angle, axis=1)
+        return np.asarray(off + LEVER * np.linalg.norm(angle, axis=1))
+
+    @property
+    def turns(self) -> Array:
+        """Return measured rotations, none where only points were measured."""
+        return np.zeros((0, 3, 3)) if self.rotation is None else self.rotation
 
 
 def initial_frames(problem: Problem, model: Model) -> Model:
@@ -97,6 +103,8 @@ def _attempts(align: frozenset[str]) -> list[Callable[[list[Track], Model], Mode
 
 def _track(problem: Problem, model: Model, k: int) -> Track:
     measured = problem.recordings[k].measured
+    if measured is None:
+        raise DataError(f'{problem.recordings[k].name} holds no measured poses or points')
     bare = replace(
         model,
         robot=model.robot.with_frames(tool=np.eye(4)),
@@ -212,11 +220,12 @@ def _tool_rotation(tracks: list[Track], start: Array) -> Array:
     With y the entries of R_tool^T, recording k leaves a squared gap of
     M - y' C_k C_k' y / M where C_k is the sum of kron(R_measured', R_flange').
     """
-    rotation, weights = start, [np.ones(len(track.position)) for track in tracks]
+    rotation = start
+    weights: list[Array] = [np.ones(len(track.position)) for track in tracks]
     for _ in range(ROUNDS):
         total = np.zeros((9, 9))
         for track, weight in zip(tracks, weights, strict=True):
-            product = np.einsum('m,mki,mlj->ijkl', weight, track.rotation, track.turn)
+            product = np.einsum('m,mki,mlj->ijkl', weight, track.turns, track.turn)
             kron = product.reshape(9, 9)
             total += kron @ kron.T / weight.sum()
         size, vectors = np.linalg.eigh(total)
@@ -230,10 +239,11 @@ def _tool_rotation(tracks: list[Track], start: Array) -> Array:
 
 def _turn_weight(track: Track, tool: Array) -> Array:
     """Return least-absolute weights of the samples' turns, with the base that fits best."""
-    turned, weight = track.turn @ tool, np.ones(len(track.turn))
+    turned = track.turn @ tool
+    weight: Array = np.ones(len(turned))
     for _ in range(3):
-        base = nearest_rotation(np.einsum('m,mik,mjk', weight, track.rotation, turned))
-        angle = np.linalg.norm(angle_between(track.rotation, base @ turned), axis=1)
+        base = nearest_rotation(np.einsum('m,mik,mjk', weight, track.turns, turned))
+        angle = np.linalg.norm(angle_between(track.turns, base @ turned), axis=1)
         weight = 1.0 / np.maximum(angle, FLOOR / LEVER)
     return weight
 
@@ -255,4 +265,4 @@ def _in_turn(tracks: list[Track], model: Model) -> Model:
 def nearest_rotation(matrix: Array) -> Array:
     """Return the rotation R that makes trace(R' matrix) largest."""
     u, _, vt = np.linalg.svd(matrix)
-    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)

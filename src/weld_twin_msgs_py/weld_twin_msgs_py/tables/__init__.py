@@ -1,0 +1,8 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of joint angles and measured positions or poses, as laboratories leave them."""
+
+from .build import Table, read_table
+from .options import TableOptions
+
+__all__ = ['Table', 'TableOptions', 'read_table']

@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A table to a recording of static stations, with every assumption put into words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
+from weld_twin_core.robot import Robot
+from weld_twin_core.rotation import matrix_from_quaternion
+
+from .agreement import misfit
+from .cells import Cells, read_cells
+from .columns import Columns, find_columns
+from .options import TableOptions
+from .rotations import AGREES, disagreement, find_convention, rotations
+from .stamps import stamps
+from .units import METRES, RADIANS, angle_unit, length_unit
+
+_FAR = 10.0
+"""A row this many times farther off than the median row is pointed out."""
+_WRONG = 0.05
+"""A typical misfit beyond this share of the arm's reach means the table is misread."""
+
+
+class Table(NamedTuple):
+    """A recording of static stations, and the sentences that say how the table was read."""
+
+    recording: Recording
+    assumptions: tuple[str, ...]
+
+
+def read_table(path: Path | str, robot: Robot, options: TableOptions | None = None) -> Table:
+    """
+    Read a table of joint angles and measured positions or poses.
+
+    Parameters
+    ----------
+    path : Path or str
+        A text file with a header line, cells separated by comma, semicolon or tab.
+    robot : Robot
+        Its kinematics decide between units and rotation conventions.
+    options : TableOptions, optional
+        What the user knows; the rest is read from the table and reported.
+
+    Raises
+    ------
+    DataError
+        The table cannot be read, or more than one reading is possible; the message names the
+        option that decides.
+
+    """
+    options = options or TableOptions()
+    cells = read_cells(path, options.delimiter, options.decimal)
+    said = list(cells.said)
+    try:
+        return _read(cells, robot, options, said)
+    except DataError as error:
+        text = str(error)
+        raise DataError(text if str(path) in text else f"table '{path}': {text}") from None
+
+
+def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) -> Table:
+    columns = find_columns(cells.header, robot, options)
+    cells = _usable(cells, columns, options, said)
+    said.append('joint columns are ' + ', '.join(columns.joints))
+    q = _joints(cells, robot, columns, options, said)
+    position, scale = _position(cells, robot, q, columns, options, said)
+    rotation = _rotation(cells, robot, q, columns, options, said) if columns.rotation else None
+    sigma = _sigma(cells, columns, scale, said) if columns.sigma else None
+    _check(cells, robot, q, position, said)
+    t, sentence = stamps(cells, columns.time, columns.unit((columns.time or '',)))
+    said.append(sentence)
+    epoch = 0
+    if t is None:
+        t = np.arange(float(len(q)))
+    else:
+        epoch, t = round(float(t[0])) * 1_000_000_000, t - round(float(t[0]))
+    temperature = None
+    if columns.temperature is not None:
+        values = cells.numbers(columns.temperature)
+        temperature = Signal(t, values)
+        said.append(f'temperature is {columns.temperature!r} in degC')
+    recording = Recording(
+        cells.path.stem, JointMotion(t, q, static=True),
+        Measurements(t, position, rotation, sigma), temperature=temperature,
+        epoch_ns=max(epoch, 0), notes=tuple(said),
+    )  # fmt: skip
+    return Table(recording, tuple(said))
+
+
+def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[str]) -> Cells:
+    """Return the cells without the rows to skip and those with a gap in a needed column."""
+    needed = columns.joints + columns.position + columns.target + columns.difference
+    needed += columns.rotation + columns.sigma
+    needed += () if columns.temperature is None else (columns.temperature,)
+    whole = np.isfinite(cells.stack(needed)).all(axis=1)
+    asked = np.zeros(len(cells.rows), bool)
+    for row in options.skip_rows:
+        if not 1 <= row <= len(cells.rows):
+            raise DataError(f'--skip-rows names row {row}, the table has rows 1 to {asked.size}')
+        asked[row - 1] = True
+    gaps = np.flatnonzero(~whole & ~asked)
+    if gaps.size:
+        said.append(f'{gaps.size} rows with empty cells left out, the first in line '
+                    f'{cells.lines[gaps[0]]}')  # fmt: skip
+    keep = np.flatnonzero(whole & ~asked)
+    if not keep.size:
+        raise DataError(f"table '{cells.path}' has no complete row")
+    return Cells(
+        cells.path, cells.header, [cells.rows[k] for k in keep], [cells.lines[k] for k in keep],
+        cells.decimal, cells.said,
+    )  # fmt: skip
+
+
+def _joints(
+    cells: Cells, robot: Robot, columns: Columns, options: TableOptions, said: list[str]
+) -> Array:
+    q = cells.stack(columns.joints)
+    turning = ~robot.prismatic
+    given = options.angle_unit or columns.unit(columns.joints)
+    unit, sentence = angle_unit(q[:, turning], given, 'joint angles')
+    if sentence:
+        said.append(sentence)
+    q[:, turning] *= RADIANS[unit]
+    outside = ((q < robot.lower - 1e-6) | (q > robot.upper + 1e-6)).any(axis=1)
+    if outside.any():
+        said.append(f'{outside.sum()} rows leave the joint limits of robot {robot.name!r}')
+    return q
+
+
+def _position(
+    cells: Cells,
+    robot: Robot,
+    q: Array,
+    columns: Columns,
+    options: TableOptions,
+    said: list[str],
+) -> tuple[Array, float]:
+    """Return measured positions (M, 3) [m] and the factor from the table's unit."""
+    if columns.position:
+        named = columns.position
+        position = cells.stack(named)
+        said.append('measured positions are ' + ', '.join(named))
+    else:
+        named = columns.target
+        sign = 1.0 if options.difference == 'add' else -1.0
+        position = cells.stack(named) + sign * cells.stack(columns.difference)
+        word = 'plus' if sign > 0.0 else 'minus'
+        said.append(
+            f'measured = target ({", ".join(named)}) {word} difference '
+            f'({", ".join(columns.difference)}); --difference decides'
+        )
+    given = options.length_unit or columns.unit(named)
+    unit, sentence = length_unit(position, robot, q, given)
+    if sentence:
+        said.append(sentence)
+    return position * METRES[unit], METRES[unit]
+
+
+def _rotation(
+    cells: Cells,
+    robot: Robot,
+    q: Array,
+    columns: Columns,
+    options: TableOptions,
+    said: list[str],
+) -> Array:
+    values = cells.stack(columns.rotation)
+    if values.shape[1] == 4:
+        rotation = matrix_from_quaternion(values, 'measured quaternion')
+        said.append('measured quaternions are ' + ', '.join(columns.rotation))
+        off = disagreement(rotation, robot, q)
+        if off > AGREES:
+            said.append(
+                f'relative rotations disagree with the arm by {np.degrees(off):.3g} deg: the '
+                'quaternion or joint columns may not be what they seem'
+            )
+        return rotation
+    given = options.rotation_unit or columns.unit(columns.rotation)
+    unit, sentence = angle_unit(values, given, 'measured angles')
+    if sentence:
+        said.append(sentence)
+    angles = values * RADIANS[unit]
+    convention = options.rotation
+    if convention is None:
+        convention, sentence = find_convention(angles, robot, q)
+        said.append(sentence)
+    return rotations(angles, convention)
+
+
+def _sigma(cells: Cells, columns: Columns, scale: float, said: list[str]) -> Array:
+    values = cells.stack(columns.sigma) * scale
+    said.append('standard deviations are ' + ', '.join(columns.sigma) + ', joined by mean square')
+    return np.asarray(np.sqrt((values**2).mean(axis=1)))
+
+
+def _check(cells: Cells, robot: Robot, q: Array, position: Array, said: list[str]) -> None:
+    """Say how far the positions are from the nominal arm, and which rows stand out."""
+    if len(q) < 8:
+        said.append('too few rows to check the positions against the arm')
+        return
+    off = misfit(robot, q, position)
+    typical = float(np.median(off))
+    reach = float(abs(robot.a).sum() + abs(robot.d).sum())
+    said.append(
+        f'with base and tool fitted, positions are {typical * 1e3:.3g} mm (median) from the '
+        'nominal arm'
+    )
+    if typical > _WRONG * reach:
+        raise DataError(
+            f'positions are {typical * 1e3:.3g} mm from where robot {robot.name!r} would be, with '
+            'base and tool fitted: wrong robot, joint columns, or units; --joint-columns, '
+            '--angle-unit or --length-unit decide'
+        )
+    far = np.flatnonzero(off > _FAR * typical)
+    if far.size:
+        worst = int(far[off[far].argmax()])
+        said.append(
+            f'{far.size} rows stand out, most of all line {cells.lines[worst]} with '
+            f'{off[worst] * 1e3:.3g} mm; they are kept, --skip-rows leaves rows out'
+        )

@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The cells of a delimited text file: delimiter, decimal sign, numbers."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+
+DELIMITERS = (';', '\t', ',')
+_LOOK = 20
+"""Lines from which the delimiter is read."""
+_EMPTY = {'', 'nan', 'na', 'n/a', 'null', 'none', '-'}
+_NUMBER = re.compile(r'^[-+]?\d*[.,]?\d+(?:[eE][-+]?\d+)?$')
+_COMMA_NUMBER = re.compile(r'^[-+]?\d+,\d+(?:[eE][-+]?\d+)?$')
+_POINT_NUMBER = re.compile(r'^[-+]?\d*\.\d+(?:[eE][-+]?\d+)?$')
+
+
+@dataclass(frozen=True)
+class Cells:
+    """
+    The table as text.
+
+    Attributes
+    ----------
+    path : Path
+    header : list of str
+    rows : list of list of str
+    lines : list of int
+        Line number of each row in the file.
+    decimal : str
+    said : list of str
+        What was found out, one sentence each.
+
+    """
+
+    path: Path
+    header: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    decimal: str
+    said: list[str]
+
+    def column(self, name: str) -> list[str]:
+        """
+        Return a column as text.
+
+        Raises
+        ------
+        DataError
+            There is no such column; the message lists those there are.
+
+        """
+        if name not in self.header:
+            raise DataError(
+                f"table '{self.path}' has no column {name!r}; its columns are "
+                + ', '.join(self.header)
+            )
+        k = self.header.index(name)
+        return [row[k] for row in self.rows]
+
+    def numbers(self, name: str) -> Array:
+        """
+        Return a column as numbers, shape (rows,); NaN where a cell is empty.
+
+        Raises
+        ------
+        DataError
+            A cell is no number; the message names line and column.
+
+        """
+        out = np.empty(len(self.rows))
+        for k, text in enumerate(self.column(name)):
+            if text.lower() in _EMPTY:
+                out[k] = np.nan
+                continue
+            try:
+                out[k] = float(text.replace(',', '.') if self.decimal == ',' else text)
+            except ValueError:
+                raise DataError(
+                    f"table '{self.path}' line {self.lines[k]}, column {name!r}: {text!r} is no "
+                    f'number with decimal {self.decimal!r}; --decimal or --delimiter decides'
+                ) from None
+        return out
+
+    def stack(self, names: tuple[str, ...]) -> Array:
+        """Return columns side by side, shape (rows, len(names))."""
+        return np.stack([self.numbers(name) for name in names], axis=1)
+
+
+def read_cells(path: Path | str, delimiter: str | None, decimal: str | None) -> Cells:
+    """
+    Read a delimited text file with a header line.
+
+    Raises
+    ------
+    DataError
+        No such file, no table, ragged rows, or a delimiter or decimal sign that is not clear.
+
+    """
+    path = Path(path)
+    said: list[str] = []
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"table '{path}' cannot be read: {error.strerror or error}") from None
+    lines = _decoded(path, text).splitlines()
+    if sum(1 for line in lines if line.strip()) < 2:
+        raise DataError(f"table '{path}' needs a header line and at least one row")
+    if delimiter is None:
+        delimiter = _delimiter(path, lines)
+        said.append(f'columns are separated by {_spoken(delimiter)}')
+    header, rows, numbers = _split(path, lines, delimiter)
+    if decimal is None:
+        decimal = _decimal(path, rows, delimiter)
+        if decimal == ',':
+            said.append('the decimal sign is a comma')
+    return Cells(path, header, rows, numbers, decimal, said)
+
+
+def _decoded(path: Path, data: bytes) -> str:
+    if b'\0' in data[:4096]:
+        raise DataError(f"table '{path}' is no text; save it as CSV (UTF-8) first")
+    try:
+        return data.decode('utf-8-sig')
+    except UnicodeDecodeError:
+        return data.decode('latin-1')  # a degree sign from a Windows instrument
+
+
+def _spoken(delimiter: str) -> str:
+    return 'tabs' if delimiter == '\t' else f'{delimiter!r}'
+
+
+def _delimiter(path: Path, lines: list[str]) -> str:
+    """Return the one delimiter that cuts the first lines into equally many cells."""
+    head = [line for line in islice(lines, _LOOK) if line.strip()]
+    even = []
+    for sign in DELIMITERS:
+        counts = {len(row) for row in csv.reader(head, delimiter=sign)}
+        if len(counts) == 1 and counts.pop() > 1:
+            even.append(sign)
+    in_header = [sign for sign in even or DELIMITERS if sign in head[0]]
+    if len(in_header) != 1:
+        raise DataError(
+            f"table '{path}': no single delimiter (comma, semicolon or tab) cuts its lines "
+            'evenly; --delimiter decides'
+        )
+    return in_header[0]
+
+
+def _split(
+    path: Path, lines: list[str], delimiter: str
+) -> tuple[list[str], list[list[str]], list[int]]:
+    header: list[str] = []
+    rows: list[list[str]] = []
+    numbers: list[int] = []
+    for k, row in enumerate(csv.reader(lines, delimiter=delimiter), start=1):
+        cells = [cell.strip() for cell in row]
+        if not any(cells):
+            continue
+        if not header:
+            header = cells
+            continue
+        if len(cells) != len(header):
+            raise DataError(
+                f"table '{path}' line {k} has {len(cells)} cells, the header has {len(header)}"
+            )
+        rows.append(cells)
+        numbers.append(k)
+    _check_header(path, header)
+    return header, rows, numbers
+
+
+def _check_header(path: Path, header: list[str]) -> None:
+    twice = sorted({name for name in header if header.count(name) > 1 and name})
+    if twice:
+        raise DataError(f"table '{path}' has two columns called {twice[0]!r}; rename one")
+    if all(_NUMBER.match(cell) for cell in header):
+        raise DataError(
+            f"table '{path}' has numbers in its first line; put a header line above that names "
+            'the columns'
+        )
+
+
+def _decimal(path: Path, rows: list[list[str]], delimiter: str) -> str:
+    if delimiter == ',':
+        return '.'
+    comma = any(_COMMA_NUMBER.match(cell) for row in rows for cell in row)
+    point = any(_POINT_NUMBER.match(cell) for row in rows for cell in row)
+    if comma and point:
+        raise DataError(
+            f"table '{path}' has numbers with a decimal comma and with a decimal point; "
+            '--decimal decides'
+        )
+    return ',' if comma else '.'

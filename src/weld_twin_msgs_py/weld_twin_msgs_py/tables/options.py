@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a user may say about a table; whatever is left out is read from it and reported."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from weld_twin_core.errors import DataError
+
+EULER_ORDERS = ('XYZ', 'XZY', 'YXZ', 'YZX', 'ZXY', 'ZYX')
+ROTATION_VECTOR = 'rotvec'
+_CHOICES = {
+    'delimiter': (',', ';', '\t'),
+    'decimal': ('.', ','),
+    'length_unit': ('m', 'mm'),
+    'angle_unit': ('rad', 'deg'),
+    'rotation_unit': ('rad', 'deg'),
+    'rotation': (*EULER_ORDERS, ROTATION_VECTOR),
+    'difference': ('add', 'subtract'),
+}
+_LENGTHS = {'position_columns': (3,), 'target_columns': (3,), 'difference_columns': (3,),
+            'rotation_columns': (3, 4), 'sigma_columns': (1, 3)}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class TableOptions:
+    """
+    Options of a table import; each is ``--name-with-dashes`` on the command line.
+
+    Attributes
+    ----------
+    delimiter, decimal : str, optional
+    joint_columns : tuple of str, optional
+        In chain order.
+    position_columns : tuple of 3 str, optional
+        Measured x, y, z.
+    target_columns, difference_columns : tuple of 3 str, optional
+        Commanded position and its difference, where no measured position is given.
+    difference : str
+        'add': measured = target + difference; 'subtract': measured = target - difference.
+    rotation_columns : tuple of 3 or 4 str, optional
+        Three angles about x, y, z (or a rotation vector), or a quaternion x, y, z, w.
+    rotation : str, optional
+        'XYZ' means R = Rx Ry Rz (intrinsic); 'ZYX' is roll-pitch-yaw; 'rotvec' a rotation vector.
+    length_unit, angle_unit, rotation_unit : str, optional
+        Of positions, joint angles and measured angles.
+    sigma_columns : tuple of 1 or 3 str, optional
+        Standard deviation of the position, in its unit.
+    temperature_column, time_column : str, optional
+    positions_only : bool
+        Leave measured orientation out.
+    skip_rows : tuple of int
+        Rows to leave out, the first under the header being 1.
+
+    """
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    joint_columns: tuple[str, ...] | None = None
+    position_columns: tuple[str, ...] | None = None
+    target_columns: tuple[str, ...] | None = None
+    difference_columns: tuple[str, ...] | None = None
+    difference: str = 'add'
+    rotation_columns: tuple[str, ...] | None = None
+    rotation: str | None = None
+    length_unit: str | None = None
+    angle_unit: str | None = None
+    rotation_unit: str | None = None
+    sigma_columns: tuple[str, ...] | None = None
+    temperature_column: str | None = None
+    time_column: str | None = None
+    positions_only: bool = False
+    skip_rows: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value, flag = getattr(self, item.name), flag_of(item.name)
+            choices = _CHOICES.get(item.name)
+            if value is not None and choices is not None and value not in choices:
+                raise DataError(f'{flag} must be one of {", ".join(choices)}, got {value!r}')
+            lengths = _LENGTHS.get(item.name)
+            if value is not None and lengths is not None and len(value) not in lengths:
+                wanted = ' or '.join(str(n) for n in lengths)
+                raise DataError(f'{flag} needs {wanted} column names, got {len(value)}')
+
+
+def flag_of(option: str) -> str:
+    """Return how an option is called on the command line."""
+    return '--' + option.replace('_', '-')

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from weld_twin_core.effects import Effect
+from weld_twin_core.twin import Twin
 from weld_twin_msgs_py.topics import ACTUAL_JOINT_STATES, MEASURED_POSE
 
 from .frames import WORLD
@@ -32,10 +32,10 @@ class ErrorInjector(ModelNode):
         self._noise = Noise(self.stream.twin.effects, self.setting('seed'))
         self.start()
 
-    def on_effects(self, effects: tuple[Effect, ...]) -> None:
-        """Take note of changed effects, the noise among them."""
-        super().on_effects(effects)
-        self._noise.change(effects)
+    def on_twin(self, twin: Twin) -> None:
+        """Go on with changed effects, the noise among them."""
+        super().on_twin(twin)
+        self._noise.change(twin.effects)
 
     def publish(self, sample: Sample) -> None:
         """Publish where the joints and the tool really are."""

@@ -91,7 +91,7 @@ class JointStream:
         if qd is None:
             qd = self._difference(stamp, q)
         joints, poses = self._live.step(
-            (stamp - self._epoch) / convert.NANOSECONDS, q, qd,
+            (stamp - self._epoch) * 1e-9, q, qd,
             self._wrench, self._temperature, self._wrench_frame,
         )  # fmt: skip
         self._before = (stamp, q)

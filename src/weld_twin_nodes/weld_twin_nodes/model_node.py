@@ -11,14 +11,13 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from weld_twin_core.effects import Effect
 from weld_twin_core.errors import TwinError
 from weld_twin_core.twin import Twin
 from weld_twin_msgs_py.topics import JOINT_STATES, TEMPERATURE, TOOL_WRENCH
 
 from .cell_node import CellNode
 from .joint_stream import JointStream, Sample
-from .models import load_effects, parse_effects
+from .models import build_twin
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .settings import Setting
 
@@ -38,8 +37,7 @@ class ModelNode(CellNode):
     def __init__(self, name: str, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
         self.robot = robot_of(self)
-        effects = self._effects(self.setting('effects'))
-        self.stream = JointStream(Twin(self.robot, effects))
+        self.stream = JointStream(self._twin(self.setting('effects')))
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._changed)
         self.create_service(Trigger, '~/reload', self._reload)
@@ -54,35 +52,33 @@ class ModelNode(CellNode):
     def publish(self, sample: Sample) -> None:
         """Publish what follows from one joint state."""
 
-    def on_effects(self, effects: tuple[Effect, ...]) -> None:
-        """Take note of changed effects."""
-        self.stream.change(Twin(self.robot, effects))
+    def on_twin(self, twin: Twin) -> None:
+        """Go on with changed effects."""
+        self.stream.change(twin)
 
-    def _effects(self, text: str) -> tuple[Effect, ...]:
-        path = self.setting('model')
-        known = load_effects(path, self.robot) if path else ()
-        return known + parse_effects(text, self.robot)
+    def _twin(self, effects: str) -> Twin:
+        return build_twin(self.robot, self.setting('model'), effects)
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:
             if parameter.name == 'effects':
                 try:
-                    self._effects(parameter.value)
+                    self._twin(parameter.value)
                 except TwinError as error:
                     return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _changed(self, parameters: list[Parameter]) -> None:
         if any(parameter.name == 'effects' for parameter in parameters):
-            self.on_effects(self._effects(self.setting('effects')))
+            self.on_twin(self._twin(self.setting('effects')))
 
     def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            effects = self._effects(self.setting('effects'))
+            twin = self._twin(self.setting('effects'))
         except TwinError as error:
             response.message = str(error)
             return response
-        self.on_effects(effects)
+        self.on_twin(twin)
         response.success = True
-        response.message = f'{len(effects)} effects'
+        response.message = f'{len(twin.effects)} effects'
         return response

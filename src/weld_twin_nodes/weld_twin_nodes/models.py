@@ -1,61 +1,66 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Effects as parameters and the command line give them: as a file, as a diagnosis, as text."""
+"""A twin as parameters and the command line describe it: effects file, diagnosis, text."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core.effects import Effect, effects_from_list
+from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import ModelError
 from weld_twin_core.robot import Robot
+from weld_twin_core.twin import Twin
 from weld_twin_msgs_py.effects_file import read_effects
-from weld_twin_msgs_py.yaml_file import parse_yaml, read_text
+from weld_twin_msgs_py.models import load_model, read_diagnosis
+from weld_twin_msgs_py.yaml_file import parse_yaml
 
 
-def load_effects(path: Path | str, robot: Robot) -> tuple[Effect, ...]:
+def build_twin(robot: Robot, model: Path | str = '', effects: str = '') -> Twin:
     """
-    Return the effects of an effects file, or those a diagnosis has found (a ``.json`` file).
+    Return a robot with the effects of a file and those of a text.
+
+    Parameters
+    ----------
+    robot : Robot
+    model : Path or str
+        An effects file, or a diagnosis (``.json``) with what it found; empty for none.
+    effects : str
+        More effects, in the form of an effects file.
 
     Raises
     ------
     ModelError
-        The file cannot be read, or names an effect the robot cannot have.
+        A file or the text cannot be read, or names an effect the robot cannot have.
 
     """
-    if Path(path).suffix.lower() != '.json':
-        return read_effects(path, robot)
-    text = read_text(path, 'diagnosis')
+    more = effects_from_list(parse_yaml(effects, 'effects'), robot)
+    if not str(model):
+        return Twin(robot, more)
+    if Path(model).suffix.lower() != '.json':
+        return Twin(robot, read_effects(model, robot) + more)
+    known = _diagnosed(robot, model)
+    return Twin(known.robot, known.effects + more)
+
+
+def _diagnosed(robot: Robot, path: Path | str) -> Twin:
+    """Return the model of a diagnosis, or the effects of its verdict where it holds no model."""
+    data = read_diagnosis(path)
+    if 'model' in data:
+        return load_model(robot, path)
     try:
-        found = json.loads(text)['verdict']['effects']
-        return effects_from_list([_flat(entry) for entry in found], robot)
-    except json.JSONDecodeError as error:
-        raise ModelError(f"diagnosis '{path}' line {error.lineno}: {error.msg}") from None
+        found = [_flat(entry) for entry in data['verdict']['effects']]
+        return Twin(robot, effects_from_list(found, robot))
     except (KeyError, TypeError, AttributeError):
         raise ModelError(f"diagnosis '{path}' has no list 'verdict.effects'") from None
     except ModelError as error:
         raise ModelError(f"diagnosis '{path}': {error}") from None
 
 
-def parse_effects(text: str, robot: Robot) -> tuple[Effect, ...]:
-    """
-    Return the effects of a text in the form of an effects file.
-
-    Raises
-    ------
-    ModelError
-        The text is malformed, or names an effect the robot cannot have.
-
-    """
-    return effects_from_list(parse_yaml(text, 'effects'), robot)
-
-
 def _flat(entry: Mapping[str, Any]) -> dict[str, Any]:
     """Return the entry of an effects file for one of a diagnosis."""
-    known = {key: entry[key] for key in entry if key not in ('parameters', 'std')}
+    known = {key: value for key, value in entry.items() if key not in ('parameters', 'std')}
     if known.get('joint') is None:
         known.pop('joint', None)
     return {**known, **entry['parameters']}

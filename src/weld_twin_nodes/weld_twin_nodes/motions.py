@@ -4,18 +4,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.paths import KINDS, default_seam
 from weld_twin_core.plan import Plan, plan
+from weld_twin_core.profiles import named
 from weld_twin_core.robot import Robot
 from weld_twin_msgs_py.convert import NANOSECONDS
 
 from .path_file import read_path
 
 
-def plan_motion(robot: Robot, path: str, profile: str = 'smooth', rate: float = 125.0) -> Plan:
+def plan_motion(
+    robot: Robot, path: str, profile: str = 'smooth', rate: float = 125.0, speed: float = 0.0
+) -> Plan:
     """
     Return the planned motion along a seam.
 
@@ -27,6 +32,8 @@ def plan_motion(robot: Robot, path: str, profile: str = 'smooth', rate: float = 
     profile : str
         Name of a time law.
     rate : float [1/s]
+    speed : float [m/s]
+        Speed of the time law; 0 is its own.
 
     Raises
     ------
@@ -34,10 +41,13 @@ def plan_motion(robot: Robot, path: str, profile: str = 'smooth', rate: float = 
         The seam cannot be read, reached or followed.
 
     """
+    law = named(profile)
+    if speed:
+        law = replace(law, speed=speed)  # type: ignore[call-arg] - every law has one
     if path in KINDS:
-        return plan(robot, default_seam(robot, path), profile, rate)
+        return plan(robot, default_seam(robot, path), law, rate)
     seam, torch = read_path(path)
-    return plan(robot, seam, profile, rate, torch=torch)
+    return plan(robot, seam, law, rate, torch=torch)
 
 
 def stamps(t: Array, start_ns: int) -> np.ndarray:

@@ -18,7 +18,7 @@ from weld_twin_msgs_py.robots import load_robot
 from weld_twin_msgs_py.topics import BY_NAME, TOPICS
 
 from .cell_node import CellNode
-from .models import load_effects, parse_effects
+from .models import build_twin
 from .running import run
 from .settings import Setting
 
@@ -81,8 +81,7 @@ class Recorder(CellNode):
         robot_name, base, tip, model, text = [v.string_value for v in answer.result().values[:5]]
         try:
             robot = load_robot(robot_name, base or None, tip or None)
-            effects = load_effects(model, robot) if model else ()
-            effects += parse_effects(text, robot)
+            effects = build_twin(robot, model, text).effects
         except TwinError as error:
             self.refuse(name, str(error))
             return

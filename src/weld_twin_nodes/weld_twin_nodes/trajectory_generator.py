@@ -34,6 +34,7 @@ class TrajectoryGenerator(CellNode):
         *ROBOT_SETTINGS,
         Setting('path', 'line', 'kind of the bundled seam, or path of a path file'),
         Setting('profile', 'smooth', 'time law: constant, trapezoid, s-curve, smooth, aggressive'),
+        Setting('speed', 0.0, "speed along the seam [m/s]; 0: the time law's own", 0.0, 10.0),
         Setting('rate', 125.0, 'samples of the motion [1/s]', 1.0, 10_000.0),
         Setting('playback', 1.0, 'speed against real time [1]; 0: as fast as the subscribers '
                 'keep up', 0.0, 1000.0),
@@ -48,8 +49,9 @@ class TrajectoryGenerator(CellNode):
         super().__init__('trajectory_generator', **kwargs)
         self._robot = robot_of(self)
         plan = plan_motion(
-            self._robot, self.setting('path'), self.setting('profile'), self.setting('rate')
-        )
+            self._robot, self.setting('path'), self.setting('profile'), self.setting('rate'),
+            self.setting('speed'),
+        )  # fmt: skip
         self._motion = plan.motion
         self._publisher = self.offer(JOINT_STATES)
         self._stamps = np.zeros(0, dtype=np.int64)

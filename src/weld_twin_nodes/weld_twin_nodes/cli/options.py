@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several subcommands share."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from weld_twin_core.robot import Robot
+    from weld_twin_msgs_py.topics import TopicNames
+
+TOPIC_OPTIONS = ('joint', 'pose', 'point', 'wrench', 'temperature')
+
+
+def add_robot(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
+    """Add the options that name a robot."""
+    parser.add_argument(
+        '--robot', required=required, metavar='R',
+        help='bundled robot (weld-twin info --robots lists them), robot file or URDF',
+    )  # fmt: skip
+    parser.add_argument('--base-link', metavar='LINK', help='first link of a chain in a URDF')
+    parser.add_argument('--tip-link', metavar='LINK', help='last link of a chain in a URDF')
+
+
+def robot_of(args: argparse.Namespace) -> Robot:
+    """Return the robot the options name."""
+    from weld_twin_msgs_py.robots import load_robot
+
+    return load_robot(args.robot, args.base_link, args.tip_link)
+
+
+def add_topics(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say what the topics of a bag are called."""
+    group = parser.add_argument_group('topics, for bags recorded elsewhere')
+    for name in TOPIC_OPTIONS:
+        group.add_argument(f'--{name}-topic', metavar='TOPIC')
+
+
+def topics_of(args: argparse.Namespace) -> TopicNames:
+    """Return the names of the topics."""
+    from weld_twin_msgs_py.topics import TopicNames
+
+    given = {name: getattr(args, f'{name}_topic') for name in TOPIC_OPTIONS}
+    named = {'joints' if name == 'joint' else name: value for name, value in given.items() if value}
+    return TopicNames(**named)
+
+
+def add_bag_output(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a command that writes a bag."""
+    parser.add_argument('--out', required=True, metavar='BAG', help='bag to write; must not exist')
+    parser.add_argument('--storage', choices=('mcap', 'sqlite3'), default='mcap')

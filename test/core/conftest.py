@@ -169,7 +169,8 @@ def textbook():
 def cubic_motion(n, seed=7):
     """Return joint position and velocity as cubics in time: Hermite interpolation keeps them."""
     rng = np.random.default_rng(seed)
-    polynomials = [np.polynomial.Polynomial(rng.normal(scale=(0.6, 0.5, 0.2, 0.05))) for _ in range(n)]
+    spread = (0.6, 0.5, 0.2, 0.05)
+    polynomials = [np.polynomial.Polynomial(rng.normal(scale=spread)) for _ in range(n)]
 
     def at(t):
         return np.stack([p(np.asarray(t)) for p in polynomials], axis=-1)

@@ -3,6 +3,7 @@
 """Every effect against its definition, written a second time as loops over plain matrices."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -233,7 +234,7 @@ def test_backlash_of_stations_follows_their_order(arm, make_recording):
 
 def reversal_loop(q, width):
     out, last = [q[0]], 0.0
-    for before, now in zip(q[:-1], q[1:], strict=True):
+    for before, now in pairwise(q):
         way = np.sign(now - before)
         out.append(now - width if way * last < 0 else now)
         last = way if way else last
@@ -260,7 +261,7 @@ def test_servo_lag_solves_its_differential_equation(arm, make_recording, tau):
         return (np.interp(now, t, q) - y) / tau
 
     expected, y = [q[0]], [q[0]]
-    for start, end in zip(t[:-1], t[1:], strict=True):
+    for start, end in pairwise(t):
         run = solve_ivp(law, (start, end), y, method='Radau', rtol=1e-9, atol=1e-12)
         y = run.y[:, -1]
         expected.append(y[0])

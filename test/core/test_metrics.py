@@ -36,7 +36,7 @@ def test_the_papers_two_normalisations_meet_at_the_largest_deviation():
     over_time = metrics.normalized_deviation(OFF, 0.7)
     found = metrics.deviation_metrics(NOMINAL + OFF, NOMINAL)
     assert over_time.max() == pytest.approx(found.d_norm)
-    with pytest.raises(DataError, match='^a path of length 0.0 m cannot normalise a deviation$'):
+    with pytest.raises(DataError, match=r'^a path of length 0.0 m cannot normalise a deviation$'):
         metrics.normalized_deviation(OFF, 0.0)
 
 

@@ -282,14 +282,14 @@ def test_an_effect_of_the_users_own_works_like_a_bundled_one(
 
 def test_registering_what_breaks_the_contract_is_refused(registered):
     registered(Sagging)
-    with pytest.raises(ModelError, match="^an effect named 'backlash' is registered already$"):
+    with pytest.raises(ModelError, match=r"^an effect named 'backlash' is registered already$"):
         registered(type('Other', (Sagging,), {'name': 'backlash'}))
     with pytest.raises(ModelError, match="acts in stage PLAY, which runs in order of time"):
         registered(type('Sagging', (Sagging,), {'name': 'x', 'stage': Stage.PLAY}))
-    with pytest.raises(ModelError, match="^effect 'x' is a spring in a joint; name its"):
+    with pytest.raises(ModelError, match=r"^effect 'x' is a spring in a joint; name its"):
         registered(type('Sagging', (Sagging,), {'name': 'x', 'stage': Stage.ELASTIC}))
     parameters = (Parameter('height', 'm'),)
-    with pytest.raises(ModelError, match="^effect 'x' declares 'height' but has no such field$"):
+    with pytest.raises(ModelError, match=r"^effect 'x' declares 'height' but has no such field$"):
         registered(type('Sagging', (Sagging,), {'name': 'x', 'parameters': parameters}))
     assert issubclass(REGISTRY['backlash'], MemoryEffect)
 

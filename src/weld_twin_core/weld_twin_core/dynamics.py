@@ -110,4 +110,5 @@ def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
     else:
         origin, x, z = following.x_point, following.x, row.z
         y = cross(z, x)
-    return origin + point[0] * x + point[1] * y + point[2] * z
+    place: Array = origin + point[0] * x + point[1] * y + point[2] * z
+    return place

@@ -179,7 +179,8 @@ def path_performance(
         raise DataError(_too_few(len(attained)))
     goal = readonly(command, (None, 3), 'command path')
     crossed = np.stack([
-        normal_plane_crossings(path, goal, tangent, f'cycle {k}') for k, path in enumerate(attained)
+        normal_plane_crossings(path, goal, tangent, f'cycle {k}')
+        for k, path in enumerate(attained)
     ])
     off = np.linalg.norm(crossed.mean(axis=0) - goal, axis=-1)
     spread = _repeatability(crossed)
@@ -286,7 +287,7 @@ def _too_few(count: int) -> str:
 
 
 def _repeatability(points: Array) -> Array:
-    """Return mean distance plus three standard deviations over axis 0, shape points.shape[1:-1]."""
+    """Return mean distance plus three standard deviations over the cycles, axis 0."""
     distance = np.linalg.norm(points - points.mean(axis=0), axis=-1)
     spread: Array = distance.mean(axis=0) + 3.0 * distance.std(axis=0, ddof=1)
     return spread

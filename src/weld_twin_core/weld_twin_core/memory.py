@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Effects with memory over the joint stream: they run in series, each on what the last one left."""
+"""Effects with memory over the joint stream, in series: each runs on what the last one left."""
 
 from __future__ import annotations
 

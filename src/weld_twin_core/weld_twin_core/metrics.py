@@ -70,7 +70,8 @@ class DeviationMetrics:
 
 def deviation(deviations: ArrayLike) -> Array:
     """Return D, shape (...) [m]: the length of deviations actual minus nominal, shape (..., 3)."""
-    return np.linalg.norm(np.asarray(deviations, dtype=np.float64), axis=-1)
+    size: Array = np.linalg.norm(np.asarray(deviations, dtype=np.float64), axis=-1)
+    return size
 
 
 def normalized_deviation(deviations: ArrayLike, path_length_m: float) -> Array:
@@ -90,7 +91,8 @@ def normalized_deviation(deviations: ArrayLike, path_length_m: float) -> Array:
 
 def orientation_error(actual: Array, nominal: Array) -> Array:
     """Return the angles, shape (...) [rad], between rotation matrices, shape (..., 3, 3)."""
-    return np.linalg.norm(angle_between(actual, nominal), axis=-1)
+    angle: Array = np.linalg.norm(angle_between(actual, nominal), axis=-1)
+    return angle
 
 
 def root_mean_square(values: ArrayLike) -> float:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -59,7 +60,7 @@ class JointMotion:
             return self.qd
         if self.static or self.t.size < 2:
             return readonly(np.zeros_like(self.q), self.q.shape, 'joint velocities')
-        edge = 2 if self.t.size > 2 else 1
+        edge: Literal[1, 2] = 2 if self.t.size > 2 else 1
         rates = np.gradient(self.q, self.t, axis=0, edge_order=edge)
         return readonly(rates, self.q.shape, 'joint velocities')
 
@@ -184,9 +185,9 @@ class Recording:
                 f'wrench_frame must be one of {", ".join(WRENCH_FRAMES)}, '
                 f'got {self.wrench_frame!r}'
             )
-        for name, signal, axes in (('wrench', self.wrench, 2), ('temperature', self.temperature, 1)):
-            if signal is not None and signal.value.ndim != axes:
-                wanted = '(K, 6)' if axes == 2 else '(K,)'
+        sides = (('wrench', self.wrench, '(K, 6)'), ('temperature', self.temperature, '(K,)'))
+        for name, signal, wanted in sides:
+            if signal is not None and signal.value.ndim != wanted.count('6') + 1:
                 raise DataError(
                     f'{name} of recording {self.name!r} must have shape {wanted}, '
                     f'got {signal.value.shape}'

@@ -98,7 +98,7 @@ class Robot:
         for key in ('lower', 'upper', 'max_velocity', 'max_acceleration'):
             value = readonly(getattr(self, key), (n,), f'{key} of {self.name!r}', finite=False)
             self._set(key, value)
-        prismatic = readonly(self.prismatic, (n,), f'prismatic of robot {self.name!r}').astype(bool)
+        prismatic = readonly(self.prismatic, (n,), f'prismatic of {self.name!r}').astype(bool)
         prismatic.setflags(write=False)
         self._set('prismatic', prismatic)
         wrong = ~(self.lower < self.upper)

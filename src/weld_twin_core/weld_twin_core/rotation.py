@@ -61,7 +61,8 @@ def left_jacobian(rotvec: ArrayLike) -> Array:
 def rotation_vector(matrix: Array) -> Array:
     """Return rotation vectors, shape (..., 3) [rad], of rotation matrices, shape (..., 3, 3)."""
     flat = Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_rotvec()
-    return flat.reshape(matrix.shape[:-2] + (3,))
+    vectors: Array = flat.reshape(matrix.shape[:-2] + (3,))
+    return vectors
 
 
 def matrix_from_quaternion(quaternion: ArrayLike, name: str = 'quaternion') -> Array:
@@ -83,13 +84,15 @@ def matrix_from_quaternion(quaternion: ArrayLike, name: str = 'quaternion') -> A
             f'{name} {k} has length {length[k]:.4g}, a rotation needs 1; '
             'check the order (x y z w) and that it is not left at zero'
         )
-    return Rotation.from_quat(flat).as_matrix().reshape(values.shape[:-1] + (3, 3))
+    matrices: Array = Rotation.from_quat(flat).as_matrix().reshape(values.shape[:-1] + (3, 3))
+    return matrices
 
 
 def quaternion_from_matrix(matrix: Array) -> Array:
     """Return quaternions x y z w with w >= 0, shape (..., 4), of rotation matrices."""
     flat = Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_quat(canonical=True)
-    return flat.reshape(matrix.shape[:-2] + (4,))
+    quaternions: Array = flat.reshape(matrix.shape[:-2] + (4,))
+    return quaternions
 
 
 def transform(rotation: Array, position: Array) -> Array:

@@ -15,16 +15,19 @@ References
 
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Array
 
 
 def play(q: Array, width: Array | float, start: Array) -> Array:
-    """
+    r"""
     Return the output of the play (dead-zone hysteresis) operator.
 
-    .. math:: w_k = \\min(q_k + \\delta/2, \\max(q_k - \\delta/2, w_{k-1}))
+    .. math:: w_k = \min(q_k + \delta/2, \max(q_k - \delta/2, w_{k-1}))
 
     Parameters
     ----------
@@ -49,16 +52,18 @@ def play(q: Array, width: Array | float, start: Array) -> Array:
         low[..., step:] = np.clip(before_low, now_low, now_high)
         high[..., step:] = np.clip(before_high, now_low, now_high)
         step *= 2
-    return np.clip(np.asarray(start)[..., None], low, high)
+    output: Array = np.clip(np.asarray(start)[..., None], low, high)
+    return output
 
 
-def last_true(mask: Array) -> Array:
+def last_true(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Return for each sample the index of the last true entry up to it, or -1; shape as mask."""
     index = np.where(mask, np.arange(mask.shape[-1]), -1)
-    return np.maximum.accumulate(index, axis=-1)
+    last: NDArray[np.intp] = np.maximum.accumulate(index, axis=-1)
+    return last
 
 
-def linear(gain: Array, drive: Array, start: Array) -> Array:
+def linear(gain: NDArray[Any], drive: NDArray[Any], start: NDArray[Any]) -> NDArray[Any]:
     """
     Return y_k = gain_k y_{k-1} + drive_k; real or complex, |gain| <= 1.
 

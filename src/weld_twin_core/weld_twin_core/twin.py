@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +28,8 @@ __all__ = ['Component', 'Evaluation', 'LiveTwin', 'Poses', 'Twin', 'load_torque'
 POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
 
 
-class Component(NamedTuple):
+@dataclass(frozen=True)
+class Component:
     """One differentiable scalar of one effect."""
 
     effect: int
@@ -200,7 +201,7 @@ class Twin:
         view = _view(self.robot, recording, t, q, qd)
         if not want:
             return view, []
-        picked = [
+        picked: list[Tangent] = [
             (k, c, {key: v if picker is None else picker.pick(v) for key, v in shift.items()})
             for k, c, shift in tangents
         ]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Vectors kept components first, shape (3, ...), so that operations run over contiguous samples."""
+"""Vectors kept components first, shape (3, ...), so that operations run over contiguous data."""
 
 import numpy as np
 
@@ -9,7 +9,8 @@ from .arrays import Array
 
 def components(vector: Array) -> Array:
     """Return vectors (..., 3) with their components first, shape (3, ...)."""
-    return vector.transpose(-1, *range(vector.ndim - 1))
+    first: Array = vector.transpose(-1, *range(vector.ndim - 1))
+    return first
 
 
 def pad(vector: Array, axes: int) -> Array:

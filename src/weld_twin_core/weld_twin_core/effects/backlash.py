@@ -4,11 +4,11 @@
 Backlash: play (dead-zone hysteresis) of full width delta.
 
 The paper writes "theta - delta where the direction changes, theta otherwise" (eq. II.iii.d). Read
-literally, the joint jumps for the one sample at which it reverses and is perfect again at the next:
-the size of the deviation depends on the sample rate, and a slow reversal costs nothing. A gear
-with a gap behaves as the *play operator*: the output stays while the input crosses the gap and
-then trails by half of it until the next reversal. Play is the default; the literal form is the
-variant ``form: reversal``.
+literally, the joint jumps for the one sample at which it reverses and is perfect again at the
+next: the size of the deviation depends on the sample rate, and a slow reversal costs nothing. A
+gear with a gap behaves as the *play operator*: the output stays while the input crosses the gap
+and then trails by half of it until the next reversal. Play is the default; the literal form is
+the variant ``form: reversal``.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import scan
 from ..arrays import Array
@@ -82,7 +83,7 @@ class Backlash(MemoryEffect):
         at = np.broadcast_to(np.maximum(touched, 0), tangent.shape)
         return np.take_along_axis(tangent, at, -1)
 
-    def _contact(self, q: Array) -> tuple[Array, Array]:
+    def _contact(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return output minus input where a side is touched (else 0), and when it last was."""
         width = self.number('width')
         lag = scan.play(q, width, q[..., 0]) - q

@@ -43,7 +43,7 @@ class Effect(Parametric, ABC):
     """What it sits on: 'joint', 'link', 'links' or 'robot'."""
     stage: ClassVar[Stage]
     needs: ClassVar[frozenset[str]] = frozenset()
-    """Inputs beyond joint position: 'velocity', 'order', 'time', 'wrench', 'load', 'temperature'."""
+    """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
     regime: ClassVar[str] = 'static'
     """What brings it out: 'static', 'reversal', 'speed', 'acceleration', 'load', 'temperature' or
     'time'."""
@@ -91,7 +91,7 @@ class Effect(Parametric, ABC):
 
     @classmethod
     def trials(cls, view: View, joint: str | None) -> float:
-        """Return how many different instances `seeds` chose among; 0 means as many as it yields."""
+        """Return how many instances `seeds` chose among; 0 means as many as it yields."""
         return 0.0
 
     def atoms(self, view: View) -> list[Shift]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Base pose: the robot does not stand where the model says (paper IV.ii, initialization offset)."""
+"""Base pose: the robot stands elsewhere (paper IV.ii, initialization offset)."""
 
 from dataclasses import dataclass
 

@@ -42,10 +42,11 @@ class CartesianCompliance(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return the deflection on the pose."""
-        total = sum(
+        x, y, z = (
             np.asarray(self.number('compliance', k))[..., None] * force
             for k, force in enumerate(self._axis_forces(view))
         )
+        total = x + y + z
         return {('pose', j): total[..., j] for j in range(3)}
 
     def gradient(self, view: View) -> list[Shift | None]:

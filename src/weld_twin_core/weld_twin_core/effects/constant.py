@@ -15,7 +15,7 @@ from .view import Parameter, Stage, View, single
 
 
 class ChannelError(Effect):
-    """A constant error of one channel of one joint or row: its one parameter is the displacement."""
+    """A constant error of one channel of one joint or row; the parameter displaces it."""
 
     channel: ClassVar[str]
 

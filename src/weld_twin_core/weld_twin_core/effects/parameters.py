@@ -37,7 +37,7 @@ class Parametric:
                 object.__setattr__(self, parameter.name, self._frozen(parameter, value))
 
     def _frozen(self, parameter: Parameter, value: Any) -> Array:
-        array = self._numeric(parameter, value).copy()
+        array: Array = np.array(self._numeric(parameter, value))
         array.setflags(write=False)
         return array
 

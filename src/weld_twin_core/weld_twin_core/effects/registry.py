@@ -76,7 +76,8 @@ def effect_from_mapping(entry: Mapping[str, Any]) -> Effect:
                 f'effect {kind.name!r} has no parameter {key!r}; it takes '
                 + ', '.join(sorted(allowed))
             )
-        values[key] = value if key in kind.options or key == 'joint' else _numbers(kind, key, value)
+        given = key in kind.options or key == 'joint'
+        values[key] = value if given else _numbers(kind, key, value)
     try:
         return kind(**values)
     except TypeError as error:

@@ -12,7 +12,7 @@ from .view import Value
 @register
 @dataclass(frozen=True, eq=False)
 class ToolPose(FrameError):
-    """The tool centre point is displaced by xyz of the flange; the tool turns by rotvec of itself."""
+    """The tool point is displaced by xyz of the flange; the tool turns by rotvec of itself."""
 
     xyz: Value = (0.0, 0.0, 0.0)
     rotvec: Value = (0.0, 0.0, 0.0)

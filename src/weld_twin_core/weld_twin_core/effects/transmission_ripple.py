@@ -69,7 +69,7 @@ class TransmissionRipple(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return the sum of sines on the joint."""
-        total = sum(a * np.sin(angle) for a, _, angle in self._terms(view))
+        total = _sum(a * np.sin(angle) for a, _, angle in self._terms(view))
         return {('q', view.robot.index(self.joint)): total}
 
     def gradient(self, view: View) -> list[Shift | None]:
@@ -82,7 +82,7 @@ class TransmissionRipple(Effect):
 
     def slope(self, view: View) -> Shift:
         """Return sum A n cos(n theta + phase)."""
-        total = sum(a * n * np.cos(angle) for a, n, angle in self._terms(view))
+        total = _sum(a * n * np.cos(angle) for a, n, angle in self._terms(view))
         return {('q', view.robot.index(self.joint)): total}
 
     @classmethod
@@ -100,7 +100,7 @@ class TransmissionRipple(Effect):
         orders = np.atleast_1d(np.asarray(self.order, dtype=np.float64))
         return [{site: f(n * theta)} for n in orders for f in (np.sin, np.cos)]
 
-    def from_atoms(self, coefficients: Array) -> Effect:
+    def from_atoms(self, coefficients: Array) -> TransmissionRipple:
         """Return amplitude and phase of sine and cosine coefficients, pairs in `atoms` order."""
         sine, cosine = np.asarray(coefficients, dtype=np.float64).reshape(-1, 2).T
         amplitude, phase = np.hypot(sine, cosine), np.arctan2(cosine, sine)
@@ -114,7 +114,7 @@ class TransmissionRipple(Effect):
         phase = np.atleast_1d(np.asarray(self.phase, dtype=np.float64))
         return np.stack([amplitude * np.cos(phase), amplitude * np.sin(phase)], -1).ravel()
 
-    def with_coordinates(self, values: Array) -> Effect:
+    def with_coordinates(self, values: Array) -> TransmissionRipple:
         """Return the ripple with other sine and cosine coefficients."""
         return self.from_atoms(values)
 
@@ -125,3 +125,7 @@ class TransmissionRipple(Effect):
     def coordinate_scales(self) -> Array:
         """Return the typical amplitude for every coefficient."""
         return np.full(2 * np.size(self.order), self.parameters[0].typical)
+
+
+def _sum(waves: Iterable[Array]) -> Array:
+    return np.asarray(sum(waves))

@@ -26,7 +26,7 @@ from .view import Parameter, Stage, Value, View
 @register
 @dataclass(frozen=True, eq=False)
 class Vibration(MemoryEffect):
-    """Lightly damped oscillation of one joint, excited by its acceleration; gain 1 is a free end."""
+    """Damped oscillation of one joint, excited by its acceleration; gain 1 is a free end."""
 
     joint: str
     frequency: Value = 10.0
@@ -107,7 +107,8 @@ class Vibration(MemoryEffect):
         pole, damped = self._mode()
         decay = np.exp(pole * dt)
         z = scan.linear(decay, -decay * kick / damped, np.zeros(tangent.shape[:-1]))
-        return tangent + self.number('gain') * z.imag
+        pushed: Array = tangent + self.number('gain') * z.imag
+        return pushed
 
     @classmethod
     def seeds(

@@ -131,7 +131,9 @@ def _places(robot: Robot) -> Iterator[Place]:
     base = robot.T_world_base
     weight = float(np.linalg.norm(robot.gravity))
     up = -robot.gravity / weight if weight > 0.0 else np.array([0.0, 0.0, 1.0])
-    for height in (0.15, 0.3, 0.05, 0.45, -0.1):
+    # Hanging from a ceiling, the wire points away from the base and the work lies far from it.
+    heights = (0.15, 0.3, 0.05, 0.45, -0.1) if up[2] > -0.5 else (0.65, 0.55, 0.75, 0.45, 0.85)
+    for height in heights:
         for distance in (0.5, 0.4, 0.6, 0.3):
             for along in ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)):
                 flat = np.asarray(along) - (up @ along) * up

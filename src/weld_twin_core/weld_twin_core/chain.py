@@ -13,14 +13,14 @@ Inside, vectors are kept components first (see `vectors`); public results have t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .arrays import Array
 from .robot import Robot
 from .rotation import left_jacobian, rotation_matrix, transform
-from .vectors import components, cross, pad
+from .vectors import components, cross, pad, samples_first
 
 Channel = tuple[str, int]
 Shift = Mapping[Channel, Array]
@@ -110,16 +110,17 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     row = _standard_row if robot.convention == 'standard' else _modified_row
     rows = []
     for i in range(robot.n):
-        values = {}
-        for key in ROW_CHANNELS:
-            values[key] = np.asarray(getattr(robot, key)[i] + shift.get((key, i), 0.0))
+        values: dict[str, Any] = {key: getattr(robot, key)[i] for key in ROW_CHANNELS}
         moved = 'd' if robot.prismatic[i] else 'theta'
-        values[moved] = values[moved] + q[..., i] + shift.get(('q', i), 0.0)
+        values[moved] = values[moved] + q[..., i]
+        for key, channel in ((moved, ('q', i)), *((key, (key, i)) for key in ROW_CHANNELS)):
+            if channel in shift:
+                values[key] = values[key] + shift[channel]
         x, y, z, p, row_axes = row(x, y, z, p, values)
         rows.append(row_axes)
-    flange = np.stack([np.moveaxis(v, 0, -1) for v in np.broadcast_arrays(x, y, z)], axis=-1)
+    flange = np.stack([samples_first(v) for v in np.broadcast_arrays(x, y, z)], axis=-1)
     tool_rotation, tool_point = tool_frame(robot, shift)
-    flange_point = np.moveaxis(p, 0, -1)
+    flange_point = samples_first(p)
     position = flange_point + (flange @ tool_point[..., None])[..., 0]
     return Frames(
         flange @ tool_rotation, position, tuple(rows), flange, flange_point, base_rotation,
@@ -128,7 +129,7 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
 
 
 def _standard_row(
-    x: Array, y: Array, z: Array, p: Array, v: dict[str, Array]
+    x: Array, y: Array, z: Array, p: Array, v: dict[str, Any]
 ) -> tuple[Array, Array, Array, Array, RowAxes]:
     z_row, z_point = z, p
     x, y = _turn(x, y, v['theta'])
@@ -136,18 +137,18 @@ def _standard_row(
     x_row, x_point = x, p
     y, z = _turn(y, z, v['alpha'])
     y_row, y_point = y, p
-    if np.any(v['beta']):
+    if np.ndim(v['beta']) or v['beta'] != 0.0:
         z, x = _turn(z, x, v['beta'])
     return x, y, z, p, RowAxes(z_row, z_point, x_row, x_point, y_row, y_point)
 
 
 def _modified_row(
-    x: Array, y: Array, z: Array, p: Array, v: dict[str, Array]
+    x: Array, y: Array, z: Array, p: Array, v: dict[str, Any]
 ) -> tuple[Array, Array, Array, Array, RowAxes]:
     alpha_axis, start = x, p
     y, z = _turn(y, z, v['alpha'])
     y_row = y
-    if np.any(v['beta']):
+    if np.ndim(v['beta']) or v['beta'] != 0.0:
         z, x = _turn(z, x, v['beta'])
     p = p + v['a'] * x
     # alpha turns about the x before beta and a moves along the x after it; the two differ only

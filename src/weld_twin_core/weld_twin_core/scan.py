@@ -74,8 +74,7 @@ def linear(gain: NDArray[Any], drive: NDArray[Any], start: NDArray[Any]) -> NDAr
         y before the first sample.
 
     """
-    factor, value = np.broadcast_arrays(gain, drive)
-    factor, value = factor.copy(), value.copy()
+    factor, value = (np.array(part) for part in np.broadcast_arrays(gain, drive))
     value[..., 0] += factor[..., 0] * start
     step = 1
     while step < value.shape[-1]:

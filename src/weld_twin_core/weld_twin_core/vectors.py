@@ -13,6 +13,12 @@ def components(vector: Array) -> Array:
     return first
 
 
+def samples_first(vector: Array) -> Array:
+    """Return vectors (3, ...) with their samples first, shape (..., 3)."""
+    last: Array = vector.transpose(*range(1, vector.ndim), 0)
+    return last
+
+
 def pad(vector: Array, axes: int) -> Array:
     """Return components-first vectors with at least ``axes`` sample axes, new ones in front."""
     missing = axes + 1 - vector.ndim

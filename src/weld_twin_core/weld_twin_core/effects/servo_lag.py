@@ -76,7 +76,8 @@ class ServoLag(MemoryEffect):
         dt = np.diff(view.t, prepend=view.t[0])
         change = np.diff(tangent, axis=-1, prepend=tangent[..., :1])
         decay, weight = self._coefficients(dt)
-        return tangent + scan.linear(decay, -weight * change, np.zeros(tangent.shape[:-1]))
+        x: Array = scan.linear(decay, -weight * change, np.zeros(tangent.shape[:-1]))
+        return tangent + x
 
     @classmethod
     def seeds(

@@ -1,0 +1,9 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A diagnosis as people read it: one self-contained page, and a summary for the terminal."""
+
+from .page import report_page
+from .provenance import InputFile, hashed
+from .terminal import print_summary
+
+__all__ = ['InputFile', 'hashed', 'print_summary', 'report_page']

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which effect: what was found, what else was considered, what cannot be told apart."""
+
+from __future__ import annotations
+
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .html import Child, Html, bars, joined, section, table, tag
+from .quantities import MISSING, millimetres, odds, parameter_rows, percent
+from .words import found_name, listed, site_name
+
+_CANDIDATES = 10
+
+
+def causes_section(diagnosis: Diagnosis) -> Html:
+    """Return parameters, candidates and equivalence sets."""
+    return section(
+        'Which effect', _found(diagnosis), _candidates(diagnosis), _sets(diagnosis),
+        _absent(diagnosis), id_='causes',
+    )  # fmt: skip
+
+
+def _found(diagnosis: Diagnosis) -> Html:
+    if not diagnosis.effects:
+        return tag('p', 'No effect was put into the twin.')
+    alone = dict(diagnosis.shrink.alone)
+    rows: list[list[Child]] = []
+    for found in diagnosis.effects:
+        site = found_name(found)
+        after = _looked_up(alone, found.effect.name, found.effect.site)
+        for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
+            left = millimetres(after) if k == 0 else ''
+            rows.append([site if k == 0 else '', name, value, left])
+    heads = ('Effect', 'Parameter', 'Value ± standard error', 'Left if only this is mended')
+    return joined([tag('h3', 'Effects found'), table(heads, rows, 'effects')])
+
+
+def _looked_up(alone: dict[str, float], effect: str, joint: str | None) -> float | None:
+    return alone.get(f'{effect} of {joint}' if joint else effect)
+
+
+def _candidates(diagnosis: Diagnosis) -> Html | None:
+    shown = diagnosis.candidates[:_CANDIDATES]
+    if not shown:
+        return None
+    rows = [
+        (site_name(c.site), c.probability,
+         f'{odds(c.probability)} · leaves {millimetres(c.rms_after_m)} '
+         f'({percent(c.shrink)} less)')
+        for c in shown
+    ]  # fmt: skip
+    more = len(diagnosis.candidates) - len(shown)
+    note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
+    return joined([
+        tag('h3', 'Candidates for the leading effect, with their probabilities'),
+        bars(rows, 'wide'), note,
+    ])  # fmt: skip
+
+
+def _sets(diagnosis: Diagnosis) -> Html:
+    sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
+    title = tag('h3', 'What these data cannot tell apart')
+    if not sets and not diagnosis.reasons:
+        return joined([title, tag('p', 'Nothing: every effect named stands alone.')])
+    items = [
+        tag('li', f'{listed([site_name(site) for site in group], "or")} '
+            'move the tool alike here; naming one of them would be a guess.')
+        for group in sets
+    ]  # fmt: skip
+    items += [tag('li', reason) for reason in diagnosis.reasons]
+    return joined([title, tag('ul', *items, class_='sentences')])
+
+
+def _absent(diagnosis: Diagnosis) -> Html | None:
+    if not diagnosis.absent:
+        return None
+    rows = sorted(diagnosis.absent.items())
+    return tag(
+        'details', tag('summary', f'{len(rows)} effects not considered, and why'),
+        table(('Effect', 'Why'), rows),
+    )  # fmt: skip
+
+
+def leftover(diagnosis: Diagnosis) -> Html:
+    """Return what remains after the verdict."""
+    rest = diagnosis.unexplained
+    if not rest.above_noise:
+        text = f'What remains, {millimetres(rest.rms_m)}, is at the level of the noise.'
+        return tag('p', text)
+    items = [tag('li', line) for line in rest.structure] or [tag('li', MISSING)]
+    return joined([
+        tag('p', f'{millimetres(rest.rms_m)} above the noise remain unexplained. It depends on:'),
+        tag('ul', *items, class_='sentences'),
+    ])  # fmt: skip

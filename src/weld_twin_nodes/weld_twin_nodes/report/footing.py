@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the answer stands on and where to go from it: next measurement, data checks, inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from weld_twin_core import __version__
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .html import Child, Html, section, table, tag
+from .provenance import InputFile
+
+_ORDER = {'warning': 0, 'note': 1, 'ok': 2}
+
+
+def next_section(diagnosis: Diagnosis) -> Html:
+    """Return the measurement that would decide, or that none is needed."""
+    wanted = diagnosis.next_experiment
+    if wanted is None:
+        content: Html = tag('p', 'No further measurement is needed for this verdict.')
+    else:
+        content = tag('dl', *_entries(wanted), class_='pairs')
+    return section('What to measure next', content, id_='next')
+
+
+def _entries(mapping: dict[str, Any]) -> list[Html]:
+    out = []
+    for key, value in mapping.items():
+        if value is None or _is_bulk(value):
+            continue
+        out += [tag('dt', key.replace('_', ' ').capitalize()), tag('dd', _plain(value))]
+    return out
+
+
+def _is_bulk(value: Any) -> bool:
+    """Tell lists of numbers, which belong into a file and not onto a page."""
+    return isinstance(value, list) and len(value) > 12
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, float):
+        return f'{value:.4g}'
+    if isinstance(value, list | tuple):
+        return ', '.join(_plain(item) for item in value)
+    if isinstance(value, dict):
+        return '; '.join(f'{key.replace("_", " ")}: {_plain(v)}' for key, v in value.items())
+    return str(value)
+
+
+def checks_section(diagnosis: Diagnosis) -> Html:
+    """Return the checks of the data, those that need attention first."""
+    ordered = sorted(diagnosis.checks, key=lambda check: _ORDER.get(check.level, 0))
+    items = [
+        tag('li', tag('span', check.level, class_=f'level {check.level}'),
+            tag('span', tag('b', check.name.replace('_', ' ')), ' ', check.sentence))
+        for check in ordered
+    ]  # fmt: skip
+    notes = [
+        tag('li', tag('span', 'note', class_='level note'),
+            tag('span', tag('b', recording.name), ' ', note))
+        for recording in diagnosis.recordings for note in recording.notes
+    ]  # fmt: skip
+    return section(
+        'Are the data sound', tag('ul', *items, *notes, class_='checks'), id_='checks',
+        lead='Looked at before any cause was.',
+    )
+
+
+def inputs_section(inputs: Sequence[InputFile]) -> Html:
+    """Return inputs and version, so that the answer can be had again."""
+    rows: list[list[Child]] = [
+        [item.use, tag('code', item.path), tag('code', item.sha256, class_='hash')]
+        for item in inputs
+    ]
+    return section(
+        'Made from', table(('Use', 'Path', 'SHA-256'), rows, 'inputs'),
+        tag('p', f'weld_twin {__version__}', class_='note'), id_='inputs',
+    )

@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Markup from values: whatever is not markup already is escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+
+_EMPTY = frozenset({'br', 'meta', 'line', 'path', 'input'})
+
+
+class Html(str):
+    """Text that is markup already."""
+
+    __slots__ = ()
+
+
+Child = str | None
+
+
+def tag(name: str, *children: Child, **attributes: str | float | None) -> Html:
+    """
+    Return an element.
+
+    Attribute names take ``_`` for ``-``, and a trailing one keeps a name off Python's keywords;
+    attributes and children that are None are left out.
+    """
+    parts = [f'<{name}']
+    for key, value in attributes.items():
+        if value is not None:
+            parts.append(f' {key.rstrip("_").replace("_", "-")}="{escape(str(value))}"')
+    if name in _EMPTY:
+        return Html(''.join(parts) + '>')
+    inside = joined(children)
+    return Html(f'{"".join(parts)}>{inside}</{name}>')
+
+
+def joined(children: Iterable[Child]) -> Html:
+    """Return children side by side."""
+    return Html(''.join(
+        child if isinstance(child, Html) else escape(str(child))
+        for child in children if child is not None
+    ))  # fmt: skip
+
+
+def section(title: str, *children: Child, id_: str, lead: str | None = None) -> Html:
+    """Return a section with its heading and a sentence that says how to read it."""
+    opening = tag('p', lead, class_='lead') if lead else None
+    return tag('section', tag('h2', title), opening, *children, id_=id_)
+
+
+def table(heads: Iterable[str], rows: Iterable[Iterable[Child]], class_: str = '') -> Html:
+    """Return a table; the first cell of a row is its heading."""
+    body = []
+    for row in rows:
+        first, *rest = row
+        body.append(
+            tag('tr', tag('th', first, scope='row'), *(tag('td', cell) for cell in rest))
+        )
+    top = tag('tr', *(tag('th', head, scope='col') for head in heads))
+    whole = tag('table', tag('thead', top), tag('tbody', *body), class_=class_ or None)
+    return tag('div', whole, class_='scroll')
+
+
+def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:
+    """Return horizontal bars: label, length as a share of the full width, text."""
+    out = []
+    for label, share, text in rows:
+        width = f'width:{100.0 * min(max(share, 0.0), 1.0):.2f}%'
+        out.append(tag(
+            'li', tag('span', label, class_='label'),
+            tag('span', tag('i', style=width), class_='track'),
+            tag('span', text, class_='figure'),
+        ))  # fmt: skip
+    return tag('ul', *out, class_=f'bars {class_}'.strip())

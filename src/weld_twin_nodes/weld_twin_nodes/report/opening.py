@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The top of the page: the verdict in two sentences, the figures behind it, what to do."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .html import Html, tag
+from .quantities import milliradians, millimetres, odds, percent
+from .words import STATUS, verdict
+
+_FIRST_REAL_STAMP = 10**18
+"""Stamps [ns] before 2001 count from something else than the epoch."""
+
+
+def header(diagnosis: Diagnosis) -> Html:
+    """Return what was diagnosed."""
+    robot = diagnosis.model.robot
+    names = ', '.join(recording.name for recording in diagnosis.recordings)
+    parts = [robot.name, names, _date(diagnosis)]
+    return tag(
+        'header', tag('p', 'Positional accuracy ', tag('b', 'diagnosis'), class_='kind'),
+        tag('p', ' · '.join(part for part in parts if part), class_='subject'),
+    )  # fmt: skip
+
+
+def _date(diagnosis: Diagnosis) -> str:
+    stamps = [r.epoch_ns for r in diagnosis.recordings if r.epoch_ns > _FIRST_REAL_STAMP]
+    if not stamps:
+        return ''
+    when = datetime.fromtimestamp(min(stamps) * 1e-9, tz=timezone.utc)
+    return f'recorded {when:%Y-%m-%d %H:%M} UTC'
+
+
+def opening(diagnosis: Diagnosis) -> Html:
+    """Return status, verdict, figures and actions."""
+    first, second = verdict(diagnosis)
+    return tag(
+        'section',
+        tag('p', STATUS[diagnosis.status], class_=f'status {diagnosis.status}'),
+        tag('h1', first), tag('p', second, class_='second'),
+        _figures(diagnosis), _actions(diagnosis),
+        id_='verdict',
+    )  # fmt: skip
+
+
+def _figures(diagnosis: Diagnosis) -> Html:
+    gap, shrink = diagnosis.gap, diagnosis.shrink
+    low, high = shrink.ci95
+    rows = [
+        ('Gap', millimetres(gap.rms_m), f'RMS of {gap.samples} samples; '
+         f'{millimetres(gap.max_m)} at most'),
+        ('Left over', millimetres(shrink.rms_after_m),
+         f'{percent(shrink.ratio)} of it on unseen data '
+         f'({_interval(low, high)})'),
+        ('Noise floor', millimetres(gap.noise_floor_m), 'what the data cannot resolve'),
+    ]  # fmt: skip
+    if diagnosis.status != 'none':
+        rows.append(('Sure', odds(diagnosis.confidence), 'that the causes named are right'))
+    if gap.orientation_rms_rad is not None:
+        rows.append(('Orientation', milliradians(gap.orientation_rms_rad), 'RMS gap'))
+    cells = [
+        tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
+        for name, value, note in rows
+    ]
+    return tag('dl', *cells, class_='figures')
+
+
+def _interval(low: float, high: float) -> str:
+    return f'95 % interval {100 * low:.0f} to {100 * high:.0f} %'
+
+
+def _actions(diagnosis: Diagnosis) -> Html | None:
+    if not diagnosis.actions:
+        return None
+    items = [tag('li', action) for action in diagnosis.actions]
+    return tag('div', tag('h3', 'What to do'), tag('ul', *items), class_='actions')

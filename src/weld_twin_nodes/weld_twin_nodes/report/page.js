@@ -1,0 +1,246 @@
+// SPDX-FileCopyrightText: weld_twin contributors
+// SPDX-License-Identifier: Apache-2.0
+// Draws the seam: an orthographic view turned by hand, the same for both pictures.
+'use strict';
+(() => {
+  const data = JSON.parse(document.getElementById('data').textContent);
+  const canvases = [...document.querySelectorAll('canvas[data-side]')];
+  const VIEWS = { angled: [-0.9, 0.55], top: [-Math.PI / 2, Math.PI / 2], front: [-Math.PI / 2, 0], side: [0, 0] };
+  const COLOURS = [[58, 110, 190], [34, 160, 140], [226, 168, 20], [214, 74, 40], [150, 10, 70]];
+  const view = { turn: VIEWS.angled[0], tilt: VIEWS.angled[1], zoom: 1, stretch: data.stretch };
+  const frame = extent();
+
+  function extent() {
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    for (const run of data.runs) {
+      for (let i = 0; i < run.path.length; i++) {
+        low[i % 3] = Math.min(low[i % 3], run.path[i]);
+        high[i % 3] = Math.max(high[i % 3], run.path[i]);
+      }
+    }
+    if (!Number.isFinite(low[0])) return { middle: [0, 0, 0], radius: 1 };
+    const middle = low.map((v, k) => (v + high[k]) / 2);
+    const radius = Math.hypot(...low.map((v, k) => (high[k] - v) / 2)) || 1000;
+    return { middle, radius };
+  }
+
+  function style(name) {
+    return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  }
+
+  function colour(share) {
+    const at = Math.min(Math.max(share, 0), 1) * (COLOURS.length - 1);
+    const k = Math.min(Math.floor(at), COLOURS.length - 2), part = at - k;
+    const mix = COLOURS[k].map((v, j) => Math.round(v + part * (COLOURS[k + 1][j] - v)));
+    return `rgb(${mix})`;
+  }
+
+  function sized(canvas) {
+    const ratio = Math.max(window.devicePixelRatio || 1, 2);
+    const width = canvas.clientWidth, height = canvas.clientHeight;
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    const pen = canvas.getContext('2d');
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.font = '12px system-ui, sans-serif';
+    return { pen, width, height };
+  }
+
+  // The projection: turn about the vertical, then tilt towards the viewer.
+  function projector(width, height) {
+    const scale = 0.43 * Math.min(width, height) * view.zoom / frame.radius;
+    const ct = Math.cos(view.turn), st = Math.sin(view.turn);
+    const ci = Math.cos(view.tilt), si = Math.sin(view.tilt);
+    const direction = (x, y, z) => [-x * st + y * ct, -(z * ci - (x * ct + y * st) * si)];
+    const point = (x, y, z) => {
+      const [u, v] = direction(x - frame.middle[0], y - frame.middle[1], z - frame.middle[2]);
+      return [width / 2 + scale * u, height / 2 + scale * v];
+    };
+    return { point, direction, scale };
+  }
+
+  function draw(canvas) {
+    const { pen, width, height } = sized(canvas);
+    const project = projector(width, height);
+    for (const run of data.runs) drawRun(pen, project.point, run, run[canvas.dataset.side]);
+    drawAxes(pen, project.direction, height);
+    drawRuler(pen, project.scale, width, height);
+  }
+
+  function drawRun(pen, point, run, gap) {
+    const count = run.path.length / 3, stretch = view.stretch;
+    const nominal = [], measured = [], size = [];
+    for (let i = 0; i < count; i++) {
+      const [x, y, z] = run.path.slice(3 * i, 3 * i + 3);
+      const [a, b, c] = gap.slice(3 * i, 3 * i + 3);
+      nominal.push(point(x, y, z));
+      measured.push(point(x + stretch * a, y + stretch * b, z + stretch * c));
+      size.push(Math.hypot(a, b, c) / data.top);
+    }
+    pen.lineCap = pen.lineJoin = 'round';
+    pen.strokeStyle = style('--soft');
+    pen.lineWidth = 0.8;
+    if (run.dots) {
+      drawDots(pen, nominal, measured, size);
+      return;
+    }
+    pen.beginPath();
+    nominal.forEach(([u, v], i) => (i ? pen.lineTo(u, v) : pen.moveTo(u, v)));
+    pen.stroke();
+    pen.lineWidth = 2.4;
+    for (let i = 1; i < count; i++) {
+      pen.strokeStyle = colour((size[i - 1] + size[i]) / 2);
+      pen.beginPath();
+      pen.moveTo(...measured[i - 1]);
+      pen.lineTo(...measured[i]);
+      pen.stroke();
+    }
+  }
+
+  function drawDots(pen, nominal, measured, size) {
+    nominal.forEach((from, i) => {
+      pen.strokeStyle = pen.fillStyle = colour(size[i]);
+      pen.lineWidth = 1.2;
+      pen.beginPath();
+      pen.moveTo(...from);
+      pen.lineTo(...measured[i]);
+      pen.stroke();
+      pen.beginPath();
+      pen.arc(...measured[i], 1.8, 0, 7);
+      pen.fill();
+    });
+  }
+
+  function drawAxes(pen, direction, height) {
+    const at = [30, height - 30];
+    pen.lineWidth = 1.2;
+    pen.fillStyle = pen.strokeStyle = style('--soft');
+    pen.textAlign = 'center';
+    pen.textBaseline = 'middle';
+    [['x', 1, 0, 0], ['y', 0, 1, 0], ['z', 0, 0, 1]].forEach(([name, ...axis]) => {
+      const [u, v] = direction(...axis);
+      if (Math.hypot(u, v) < 0.15) return;
+      pen.beginPath();
+      pen.moveTo(...at);
+      pen.lineTo(at[0] + 18 * u, at[1] + 18 * v);
+      pen.stroke();
+      pen.fillText(name, at[0] + 25 * u, at[1] + 25 * v);
+    });
+  }
+
+  function drawRuler(pen, scale, width, height) {
+    const wanted = 0.25 * width / scale;
+    const power = 10 ** Math.floor(Math.log10(wanted));
+    const length = power * [5, 2, 1].find((k) => k * power <= wanted);
+    const end = width - 14, start = end - length * scale, y = height - 14;
+    pen.strokeStyle = pen.fillStyle = style('--soft');
+    pen.lineWidth = 1.2;
+    pen.beginPath();
+    pen.moveTo(start, y - 4);
+    pen.lineTo(start, y);
+    pen.lineTo(end, y);
+    pen.lineTo(end, y - 4);
+    pen.stroke();
+    pen.textAlign = 'right';
+    pen.textBaseline = 'bottom';
+    pen.fillText(length >= 1e4 ? `${length / 1e3} mm` : `${length} µm`, end, y - 5);
+  }
+
+  function drawLegend() {
+    const { pen, width, height } = sized(document.getElementById('legend'));
+    for (let x = 0; x < width; x++) {
+      pen.fillStyle = colour(x / width);
+      pen.fillRect(x, 2, 1.5, 10);
+    }
+    pen.fillStyle = style('--soft');
+    pen.textBaseline = 'bottom';
+    ['left', 'center', 'right'].forEach((side, k) => {
+      pen.textAlign = side;
+      const value = (k * data.top / 2000).toPrecision(2);
+      const text = k ? `${Number(value)}${k === 2 ? ' mm and more' : ''}` : '0';
+      pen.fillText(text, k * width / 2, height - 4);
+    });
+  }
+
+  function redraw() {
+    canvases.forEach(draw);
+    drawLegend();
+    document.getElementById('times').textContent = `${view.stretch} ×`;
+  }
+
+  let waiting = false;
+  function later() {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; redraw(); });
+  }
+
+  function turned(u, v) {
+    view.turn -= 0.01 * u;
+    view.tilt = Math.min(Math.max(view.tilt + 0.01 * v, -Math.PI / 2), Math.PI / 2);
+    later();
+  }
+
+  function zoomed(factor) {
+    view.zoom = Math.min(Math.max(view.zoom * factor, 0.2), 60);
+    later();
+  }
+
+  function listen(canvas) {
+    const fingers = new Map();
+    const spread = () => {
+      const [a, b] = [...fingers.values()];
+      return Math.hypot(a[0] - b[0], a[1] - b[1]);
+    };
+    canvas.addEventListener('pointerdown', (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    });
+    canvas.addEventListener('pointermove', (event) => {
+      const last = fingers.get(event.pointerId);
+      if (!last) return;
+      const before = fingers.size === 2 ? spread() : 0;
+      fingers.set(event.pointerId, [event.clientX, event.clientY]);
+      if (fingers.size === 1) turned(event.clientX - last[0], event.clientY - last[1]);
+      else if (before > 0) zoomed(spread() / before);
+    });
+    for (const end of ['pointerup', 'pointercancel']) {
+      canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+    }
+    canvas.addEventListener('wheel', (event) => {
+      event.preventDefault();
+      zoomed(Math.exp(-0.001 * event.deltaY));
+    }, { passive: false });
+    canvas.addEventListener('keydown', (event) => {
+      const step = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] }[event.key];
+      if (step) turned(...step);
+      else if (event.key === '+' || event.key === '-') zoomed(event.key === '+' ? 1.2 : 1 / 1.2);
+      else return;
+      event.preventDefault();
+    });
+  }
+
+  function controls() {
+    document.querySelectorAll('button[data-view]').forEach((button) => {
+      button.addEventListener('click', () => {
+        [view.turn, view.tilt] = VIEWS[button.dataset.view];
+        view.zoom = 1;
+        later();
+      });
+    });
+    const slider = document.getElementById('stretch'), most = Math.log10(data.stretch * 10);
+    slider.value = String(Math.log10(data.stretch) / most);
+    slider.addEventListener('input', () => {
+      view.stretch = Number((10 ** (most * Number(slider.value))).toPrecision(1));
+      later();
+    });
+  }
+
+  canvases.forEach(listen);
+  controls();
+  redraw();
+  new ResizeObserver(later).observe(document.querySelector('.panels'));
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', later);
+  window.addEventListener('beforeprint', redraw);
+  window.addEventListener('afterprint', later);
+})();

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far the gap shrinks: the waterfall on unseen data, and the residual over time."""
+
+from __future__ import annotations
+
+import numpy as np
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .causes import leftover
+from .html import Html, section, tag
+from .quantities import millimetres
+from .words import cause
+
+_STEPS = 12
+_COLUMNS = 500
+_RECORDINGS = 6
+_HEIGHT, _WIDTH = 100.0, 1000.0
+
+
+def shrink_section(diagnosis: Diagnosis) -> Html:
+    """Return the waterfall and one chart over time per recording."""
+    shrink = diagnosis.shrink
+    charts = [_chart(diagnosis, k) for k in range(min(len(diagnosis.traces.t), _RECORDINGS))]
+    more = len(diagnosis.traces.t) - len(charts)
+    note = tag('p', f'{more} more recordings look on in diagnosis.json.') if more > 0 else None
+    return section(
+        'How far it shrinks', _waterfall(diagnosis), tag('h3', 'Deviation over time'),
+        _key(), *charts, note, leftover(diagnosis), id_='shrink',
+        lead=f'RMS gap on data not used for fitting ({shrink.held_out}), as each effect is put '
+        'into the twin in turn.',
+    )  # fmt: skip
+
+
+def _waterfall(diagnosis: Diagnosis) -> Html:
+    steps = [('as given', diagnosis.shrink.rms_before_m), *(
+        (_readable(name), rms) for name, rms in diagnosis.shrink.steps)]
+    if len(steps) > _STEPS + 1:
+        skipped = len(steps) - _STEPS
+        steps = [*steps[:_STEPS], (f'{skipped} more effects', steps[-1][1])]
+    largest = max(*(rms for _, rms in steps), diagnosis.gap.noise_floor_m, 1e-12)
+    rows, before = [], steps[0][1]
+    for k, (name, rms) in enumerate(steps):
+        rows.append(_step(('+ ' if k else '') + name, rms / largest, before / largest, rms))
+        before = rms
+    floor = diagnosis.gap.noise_floor_m
+    rows.append(_step('noise floor', floor / largest, floor / largest, floor, 'floor'))
+    return tag('ul', *rows, class_='bars waterfall wide')
+
+
+def _readable(name: str) -> str:
+    effect, _, joint = name.partition(' of ')
+    return cause(effect, joint or None)
+
+
+def _step(label: str, share: float, before: float, rms: float, class_: str = '') -> Html:
+    fallen = max(before - share, 0.0)
+    return tag(
+        'li', tag('span', label, class_='label'),
+        tag('span', tag('i', style=f'width:{100 * share:.2f}%'),
+            tag('i', style=f'width:{100 * fallen:.2f}%', class_='fallen'), class_='track'),
+        tag('span', millimetres(rms), class_='figure'), class_=class_ or None,
+    )  # fmt: skip
+
+
+def _key() -> Html:
+    return tag(
+        'p', tag('span', 'before', class_='key before'), tag('span', 'after', class_='key after'),
+        tag('span', 'noise floor', class_='key floor'), class_='keys',
+    )  # fmt: skip
+
+
+def _chart(diagnosis: Diagnosis, k: int) -> Html:
+    """Return |deviation| over time; over the station number where nothing moved."""
+    traces = diagnosis.traces
+    recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
+    static = recording is not None and recording.joints.static
+    sizes = [np.linalg.norm(part, axis=1) for part in (traces.before[k], traces.after[k])]
+    if sizes[0].size == 0:
+        return tag('p', 'No samples.')
+    x = np.arange(sizes[0].size, dtype=float) if static else traces.t[k]
+    # a single outlier must not flatten the rest
+    top = 1.15 * max(float(np.percentile(np.concatenate(sizes), 99.5)), 1e-7)
+    lines = [_line(x, size, top, name) for size, name in zip(sizes, ('before', 'after'),
+                                                             strict=True)]  # fmt: skip
+    level = f'{_HEIGHT * (1.0 - min(diagnosis.gap.noise_floor_m / top, 1.0)):.2f}'
+    floor = tag('line', x1='0', x2=f'{_WIDTH:.0f}', y1=level, y2=level, class_='floor')
+    picture = tag(
+        'svg', *lines, floor, viewBox=f'0 0 {_WIDTH:.0f} {_HEIGHT:.0f}',
+        preserveAspectRatio='none', role='img', aria_label='Deviation before and after',
+    )  # fmt: skip
+    unit = ('station 1', f'station {x.size}') if static else (f'{x[0]:.1f} s', f'{x[-1]:.1f} s')
+    title = recording.name if recording is not None else f'recording {k + 1}'
+    return tag(
+        'figure', tag('figcaption', title),
+        tag('div', tag('span', millimetres(top)), tag('span', '0'), class_='y'), picture,
+        tag('div', tag('span', unit[0]), tag('span', unit[1]), class_='x'), class_='time',
+    )  # fmt: skip
+
+
+def _line(x: Array, y: Array, top: float, name: str) -> Html:
+    """Return a line, or the band between least and most where samples are denser than pixels."""
+    span = max(float(x[-1] - x[0]), 1e-12)
+    across = _WIDTH * (x - x[0]) / span
+    down = _HEIGHT * (1.0 - np.minimum(y / top, 1.0))
+    if x.size <= 2 * _COLUMNS:
+        return tag('path', d=_drawn(across, down), class_=name)
+    bins = np.array_split(np.arange(x.size), _COLUMNS)
+    middle = np.array([across[b].mean() for b in bins])
+    low = np.array([down[b].min() for b in bins])
+    high = np.array([down[b].max() for b in bins])
+    outline = _drawn(np.append(middle, middle[::-1]), np.append(low, high[::-1]))
+    return tag('path', d=f'{outline}Z', class_=f'{name} band')
+
+
+def _drawn(x: Array, y: Array) -> str:
+    return 'M' + 'L'.join(f'{a:.1f},{b:.2f}' for a, b in zip(x, y, strict=True))

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A diagnosis on the terminal: the verdict, what was found, what to do."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+from rich.padding import Padding
+from rich.table import Table
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .quantities import millimetres, odds, parameter_rows, percent
+from .words import STATUS, found_name, listed, site_name, verdict
+
+_COLOURS = {'identified': 'green', 'ambiguous': 'yellow', 'unknown': 'red', 'none': 'cyan'}
+_MOST = 8
+
+
+def print_summary(diagnosis: Diagnosis, console: Console) -> None:
+    """Print the verdict in two sentences, then tables as far as there is something in them."""
+    first, second = verdict(diagnosis)
+    colour = _COLOURS[diagnosis.status]
+    console.print(f'[bold {colour}]{STATUS[diagnosis.status]}[/]  {escape(first)}')
+    console.print(Padding(escape(second), (0, 0, 1, 0)))
+    if diagnosis.effects:
+        console.print(_effects(diagnosis))
+    if len(diagnosis.candidates) > 1:
+        console.print(_candidates(diagnosis))
+    _print_sets(diagnosis, console)
+    for check in diagnosis.checks:
+        if check.level == 'warning':
+            console.print(f'[yellow]data:[/] {escape(check.sentence)}')
+    for action in diagnosis.actions:
+        console.print(f'[bold]do:[/] {escape(action)}')
+
+
+def _effects(diagnosis: Diagnosis) -> Table:
+    table = Table(box=None, title='effects found', title_justify='left', pad_edge=False)
+    for head in ('effect', 'parameter', 'value ± standard error'):
+        table.add_column(head, header_style='dim', overflow='fold')
+    for found in diagnosis.effects[:_MOST]:
+        for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
+            table.add_row(escape(found_name(found)) if k == 0 else '', name, value)
+    more = len(diagnosis.effects) - _MOST
+    if more > 0:
+        table.add_row(f'and {more} more in effects.yaml')
+    return table
+
+
+def _candidates(diagnosis: Diagnosis) -> Table:
+    table = Table(box=None, title='candidates', title_justify='left', pad_edge=False)
+    for head in ('effect', 'probability', 'gap left', 'shrinks by'):
+        table.add_column(head, header_style='dim', overflow='fold')
+    for item in diagnosis.candidates[:_MOST]:
+        table.add_row(
+            escape(site_name(item.site)), odds(item.probability), millimetres(item.rms_after_m),
+            percent(item.shrink),
+        )  # fmt: skip
+    return table
+
+
+def _print_sets(diagnosis: Diagnosis, console: Console) -> None:
+    for group in diagnosis.indistinguishable:
+        if len(group) > 1:
+            names = listed([site_name(site) for site in group], 'or')
+            console.print(f'[yellow]cannot tell apart:[/] {escape(names)}')

@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A diagnosis in plain sentences."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
+
+from .quantities import millimetres, odds
+
+CAUSES = {
+    'joint_offset': 'zero offset', 'link_length': 'link length error',
+    'link_offset': 'link offset error', 'link_twist': 'link twist error',
+    'axis_parallelism': 'axis out of parallel', 'base_pose': 'base pose error',
+    'tool_pose': 'tool pose error', 'gear_ratio': 'gear ratio error',
+    'transmission_ripple': 'transmission ripple', 'joint_coupling': 'coupling',
+    'backlash': 'backlash', 'joint_compliance': 'compliance',
+    'cartesian_compliance': 'compliance at the tool', 'payload': 'wrong payload',
+    'servo_lag': 'servo lag', 'time_delay': 'clock delay', 'thermal_growth': 'thermal growth',
+    'drift': 'drift of the frame', 'vibration': 'vibration', 'quantization': 'encoder resolution',
+    'measurement_scale': 'scale error of the instrument',
+}  # fmt: skip
+STATUS = {
+    'identified': 'Identified', 'ambiguous': 'Ambiguous', 'unknown': 'Unknown cause',
+    'none': 'No gap',
+}  # fmt: skip
+REGIMES = {
+    'static': 'at rest', 'reversal': 'at reversals', 'speed': 'with speed',
+    'acceleration': 'with acceleration', 'load': 'with load', 'temperature': 'with temperature',
+    'time': 'with time',
+}  # fmt: skip
+_NAMED = 3
+
+
+def cause(effect: str, joint: str | None) -> str:
+    """Return an effect at its place as people say it."""
+    name = CAUSES.get(effect, effect.replace('_', ' '))
+    return f'{name} of {joint}' if joint else name
+
+
+def found_name(found: Found) -> str:
+    """Return a found effect as people say it."""
+    return cause(found.effect.name, found.effect.site)
+
+
+def site_name(site: Site) -> str:
+    """Return a site as people say it."""
+    return cause(site.effect, site.joint)
+
+
+def listed(names: Sequence[str], word: str = 'and') -> str:
+    """Return 'a, b and c'."""
+    if len(names) < 2:
+        return ''.join(names)
+    return f'{", ".join(names[:-1])} {word} {names[-1]}'
+
+
+def verdict(diagnosis: Diagnosis) -> tuple[str, str]:
+    """Return the verdict in two sentences: the cause, and what knowing it brings."""
+    return {
+        'identified': _identified, 'ambiguous': _ambiguous, 'unknown': _unknown, 'none': _none,
+    }[diagnosis.status](diagnosis)  # fmt: skip
+
+
+def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
+    size = millimetres(diagnosis.gap.rms_m)
+    names = [found_name(found) for found in diagnosis.effects]
+    sure = odds(diagnosis.confidence)
+    if len(names) <= _NAMED:
+        return f'The gap of {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
+    first = (
+        f'The gap of {size} comes from {len(names)} errors together, mostly '
+        f'{_families(diagnosis)}; the largest is {names[0]} ({sure} sure).'
+    )
+    return first, _gain(diagnosis)
+
+
+def _families(diagnosis: Diagnosis) -> str:
+    counts = Counter(found.effect.name for found in diagnosis.effects)
+    return listed([f'{CAUSES.get(name, name)} ({n})' for name, n in counts.most_common(2)])
+
+
+def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
+    size = millimetres(diagnosis.gap.rms_m)
+    open_sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
+    settled = _settled(diagnosis)
+    if not open_sets:
+        what = f'{listed([found_name(f) for f in diagnosis.effects])} among others'
+    else:
+        what = '; and '.join(_either(group) for group in open_sets[:2])
+    start = f'Part of the gap of {size} comes from {listed(settled)}; the rest' if settled else (
+        f'The gap of {size}')  # fmt: skip
+    return f'{start} is explained equally well by {what}.', _gain(diagnosis, 'Either way')
+
+
+def _either(group: Sequence[Site]) -> str:
+    names = [site_name(site) for site in group]
+    if len(names) > _NAMED:
+        names = [*names[:_NAMED], f'{len(names) - _NAMED} more']
+    return listed(names, 'or')
+
+
+def _settled(diagnosis: Diagnosis) -> list[str]:
+    """Return the effects that stand in no set with others."""
+    unsure = {
+        (site.effect, site.joint)
+        for group in diagnosis.indistinguishable if len(group) > 1 for site in group
+    }  # fmt: skip
+    return [
+        found_name(f) for f in diagnosis.effects if (f.effect.name, f.effect.site) not in unsure
+    ]
+
+
+def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
+    size, left = millimetres(diagnosis.gap.rms_m), millimetres(diagnosis.unexplained.rms_m)
+    if diagnosis.effects:
+        names = listed([found_name(found) for found in diagnosis.effects[:_NAMED]])
+        first = (
+            f'Of the gap of {size}, {names} explains a part, but {left} above the noise remains '
+            'that no effect in the library explains.'
+        )
+    else:
+        first = f'No effect in the library explains the gap of {size}.'
+    structure = diagnosis.unexplained.structure
+    if not structure:
+        return first, 'What remains is above the noise, but shows no simple dependence.'
+    return first, f'What remains: {structure[0].rstrip(".")}.'
+
+
+def _none(diagnosis: Diagnosis) -> tuple[str, str]:
+    first = (
+        f'There is no gap above the noise: measured and twin differ by '
+        f'{millimetres(diagnosis.gap.rms_m)}, of which {millimetres(diagnosis.gap.noise_floor_m)} '
+        'is noise.'
+    )
+    return first, 'As far as these data reach, the twin is the robot.'
+
+
+def _gain(diagnosis: Diagnosis, start: str = '') -> str:
+    shrink = diagnosis.shrink
+    what = 'it' if len(diagnosis.effects) == 1 else 'them'
+    opening = f'{start}, with {what} in the twin' if start else f'With {what} in the twin'
+    return (
+        f'{opening}, {millimetres(shrink.rms_before_m)} shrinks to '
+        f'{millimetres(shrink.rms_after_m)} on data not used for fitting; the noise floor is '
+        f'{millimetres(diagnosis.gap.noise_floor_m)}.'
+    )

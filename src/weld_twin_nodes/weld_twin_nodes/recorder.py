@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import partial
 from typing import Any
 
@@ -11,6 +12,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 
+from std_srvs.srv import Trigger
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.bags import BagWriter
@@ -46,7 +48,7 @@ class Recorder(CellNode):
             self.setting('out'), storage=self.setting('storage'),
             provenance={'version': __version__},
         ).open()  # fmt: skip
-        self.recorded = 0
+        self._counts = dict.fromkeys(self.setting('topics'), 0)
         for name in self.setting('topics'):
             if name not in BY_NAME:
                 raise DataError(f'cannot record {name!r}; topics are {", ".join(BY_NAME)}')
@@ -56,6 +58,7 @@ class Recorder(CellNode):
         self._unasked = {name: AsyncParameterClient(self, name) for name in ASKED}
         self._changes: list[dict[str, Any]] = []
         self.create_subscription(ParameterEvent, '/parameter_events', self._changed, 10)
+        self.create_service(Trigger, '~/counts', self._tell)
         self._asking = self.create_timer(ASK_EVERY, self._ask)
 
     def destroy_node(self) -> None:
@@ -65,7 +68,12 @@ class Recorder(CellNode):
 
     def _write(self, topic: str, kind: str, data: bytes) -> None:
         self._writer.write_cdr(topic, kind, data, self.get_clock().now().nanoseconds)
-        self.recorded += 1
+        self._counts[topic] += 1
+
+    def _tell(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = True
+        response.message = json.dumps(self._counts)
+        return response
 
     def _ask(self) -> None:
         for name, client in list(self._unasked.items()):

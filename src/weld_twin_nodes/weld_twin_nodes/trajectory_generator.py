@@ -26,6 +26,9 @@ TICK = 0.002
 BURST = 50
 """Samples sent at one look; well below the depth of the listeners' queues."""
 
+ACKNOWLEDGED = 3.0
+"""Seconds to wait for the subscribers' middleware to have received everything."""
+
 
 class TrajectoryGenerator(CellNode):
     """Publishes planned positions and velocities once its subscribers are there."""
@@ -103,11 +106,10 @@ class TrajectoryGenerator(CellNode):
                 int(self._stamps[k]), self._robot.joint_names,
                 self._motion.q[k], self._motion.velocity[k],
             ))  # fmt: skip
-        if self.setting('playback') == 0.0:
-            self._publisher.wait_for_all_acked(Duration(seconds=1.0))
+        if self._pump.done or (self.setting('playback') == 0.0 and not self.setting('follow')):
+            self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED))
         if self._pump.done:
             self._timer.cancel()
-            self._publisher.wait_for_all_acked(Duration(seconds=1.0))
             self.get_logger().info(f'{self._pump.sent} joint states sent')
             self.finished = self.setting('exit_when_done')
 

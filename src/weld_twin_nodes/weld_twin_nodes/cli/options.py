@@ -43,8 +43,8 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
     from weld_twin_msgs_py.topics import TopicNames
 
     given = {name: getattr(args, f'{name}_topic') for name in TOPIC_OPTIONS}
-    named = {'joints' if name == 'joint' else name: value for name, value in given.items() if value}
-    return TopicNames(**named)
+    given['joints'] = given.pop('joint')
+    return TopicNames(**{name: value for name, value in given.items() if value})
 
 
 def add_bag_output(parser: argparse.ArgumentParser) -> None:

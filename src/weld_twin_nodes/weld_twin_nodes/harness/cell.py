@@ -4,15 +4,17 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TypeVar
 
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -60,6 +62,7 @@ class Cell:
         self._stack = ExitStack()
         self.messages = ros_messages()
         self.processes: list[NodeProcess] = []
+        self._services: dict[str, Client] = {}
 
     def __enter__(self) -> Cell:
         """Take a domain and start listening."""
@@ -124,7 +127,9 @@ class Cell:
 
     def trigger(self, service: str) -> Trigger.Response:
         """Call a Trigger service."""
-        client = self.node.create_client(Trigger, service)
+        if service not in self._services:
+            self._services[service] = self.node.create_client(Trigger, service)
+        client = self._services[service]
         self.wait(client.service_is_ready, service)
         future = client.call_async(Trigger.Request())
         self.wait(future.done, f'{service} to answer')
@@ -195,6 +200,14 @@ class Cell:
             return pump.done
 
         self.wait(send, 'the motion to be taken', limit=LIMIT + 0.01 * motion.t.size)
+
+    def wait_recorded(self, counts: Mapping[str, int]) -> None:
+        """Wait until the recorder holds at least so many messages of each topic."""
+        def all_there() -> bool:
+            held = json.loads(self.trigger('/recorder/counts').message)
+            return all(held[topic] >= count for topic, count in counts.items())
+
+        self.wait(all_there, f'the recorder to hold {dict(counts)}')
 
     # Waiting ---------------------------------------------------------------------------------
 

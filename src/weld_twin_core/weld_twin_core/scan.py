@@ -43,6 +43,8 @@ def play(q: Array, width: Array | float, start: Array) -> Array:
     array, shape (..., N) [rad]
 
     """
+    if q.ndim == 1 and np.ndim(width) > 1:
+        return _play_of_many(q, 0.5 * np.asarray(width), np.asarray(start))
     low, high = np.broadcast_arrays(q - 0.5 * width, q + 0.5 * width)
     low, high = low.copy(), high.copy()
     step = 1
@@ -54,6 +56,22 @@ def play(q: Array, width: Array | float, start: Array) -> Array:
         step *= 2
     output: Array = np.clip(np.asarray(start)[..., None], low, high)
     return output
+
+
+def _play_of_many(q: Array, half: Array, start: Array) -> Array:
+    """Return play of one input, shape (N,), in many gaps: a stretch without a turn at a time."""
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(q)))) + 1
+    out = np.empty(half.shape[:-1] + q.shape)
+    before = np.clip(start[..., None], q[:1] - half, q[:1] + half)
+    out[..., :1] = before
+    for first, last in zip([0, *turns], [*turns, q.size - 1], strict=True):
+        stretch = q[first + 1 : last + 1]
+        if q[last] > q[first]:
+            np.maximum(before, stretch - half, out=out[..., first + 1 : last + 1])
+        else:
+            np.minimum(before, stretch + half, out=out[..., first + 1 : last + 1])
+        before = out[..., last : last + 1]
+    return out
 
 
 def last_true(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -1,0 +1,181 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Deviations of very many draws at once, by the second-order expansion of the chain.
+
+Tolerances are small: a deviation is the Jacobian times the errors, plus half the Hessian times
+their products, and the third order is a millionth of the first. Along a seam all columns of both
+live in a space of some twenty shapes, so a run costs a few multiplications with small matrices.
+The displacements that play and lag make are not polynomials of their parameters; what their linear
+part leaves is run exactly and carried by the Jacobian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import jacobian
+from ..effects import REGISTRY, Stage
+from ..twin import Twin
+from .outcome import Outcomes, joined, outcomes
+from .remembered import MEMORY, Remembered, Rest, remembered
+from .study import Study
+from .tolerance import Tolerance, with_draws
+
+CHUNK = 60_000
+"""Runs times path points worked on at once; a few of such arrays fit the processor's cache."""
+_BLOCK = 8192
+"""Runs whose play and lag are worked out together."""
+_RANK = 1e-7
+"""Shapes weaker than this part of the strongest are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """
+    The study around its nominal motion.
+
+    Attributes
+    ----------
+    study : Study
+    tolerances : tuple of Tolerance
+    scale : array, shape (P,)
+        Errors are counted in units of these.
+    products : pair of arrays, shape (F,)
+        Which two errors every quadratic feature multiplies.
+    weights : array, shape (P + F, R)
+        From features to strengths of the shapes.
+    shapes : array, shape (3, R, N) [m]
+        Along, across and normal.
+    memory : tuple of Remembered
+    moved : array, shape (joints with memory, 3, N)
+        How far the tool goes with each joint.
+
+    """
+
+    study: Study
+    tolerances: tuple[Tolerance, ...]
+    scale: Array
+    products: tuple[Array, Array]
+    weights: Array
+    shapes: Array
+    memory: tuple[Remembered, ...]
+    moved: Array
+
+    def deviations(self, draws: Array) -> Array:
+        """Return deviations along, across and normal, shape (3, D, N) [m], of draws (D, P)."""
+        return self._deviations(draws, self._rests(draws), slice(None))
+
+    def outcomes(self, draws: Array) -> Outcomes:
+        """Return what runs come to, in chunks of bounded memory."""
+        rows = max(1, CHUNK // self.study.samples)
+        parts = []
+        for start in range(0, len(draws), _BLOCK):
+            block = draws[start : start + _BLOCK]
+            rests = self._rests(block)
+            for k in range(0, len(block), rows):
+                chunk = slice(k, k + rows)
+                off = self._deviations(block[chunk], rests, chunk)
+                parts.append(outcomes(*off, self.study.length))
+        return joined(parts)
+
+    def _rests(self, draws: Array) -> list[Rest]:
+        return [part.rest(self.study, draws) for part in self.memory]
+
+    def _deviations(self, draws: Array, rests: list[Rest], chunk: slice) -> Array:
+        x = draws / self.scale
+        first, second = self.products
+        features = np.concatenate([x, x[:, first] * x[:, second]], axis=1)
+        out: Array = (features @ self.weights) @ self.shapes
+        for rest, moved in zip(rests, self.moved, strict=True):
+            if rest.span.stop > rest.span.start:
+                values = rest.table[rest.row[chunk]]
+                for axis in range(3):
+                    out[axis, :, rest.span] += moved[axis, rest.span] * values
+        return out
+
+
+def expandable(tolerances: Sequence[Tolerance]) -> bool:
+    """Tell whether every tolerance displaces the chain in proportion, or by memory of a joint."""
+    return all(
+        REGISTRY[tolerance.effect].stage in MEMORY or _is_linear(tolerance)
+        for tolerance in tolerances
+    )
+
+
+def _is_linear(tolerance: Tolerance) -> bool:
+    kind = REGISTRY[tolerance.effect]
+    parameter = next(p for p in kind.parameters if p.name == tolerance.parameter)
+    pointwise = kind.stage not in (Stage.CLOCK, Stage.NOISE)
+    return parameter.linear and parameter.differentiable and pointwise
+
+
+def expand(study: Study, tolerances: Sequence[Tolerance]) -> Expansion:
+    """Return the expansion of a study by its tolerances; see `expandable`."""
+    tolerances = tuple(tolerances)
+    scale = np.array([abs(t.distribution.mean) + t.distribution.std for t in tolerances])
+    memory = remembered(study, tolerances, scale)
+    products = np.triu_indices(len(tolerances))
+    columns = _columns(_Runs(study, tolerances, scale, memory), *products)
+    flat = columns.reshape(len(columns), -1)
+    strength, left = np.linalg.eigh(flat @ flat.T)
+    left = left[:, strength > _RANK**2 * strength[-1]]
+    shapes = (left.T @ flat).reshape(-1, 3, study.samples).swapaxes(0, 1)
+    chain = jacobian(study.robot, study.recording.joints.q if study.at is None else
+                     study.recording.joints.at(study.at)[0])  # fmt: skip
+    moved = [study.on_seam(chain[:, :3, part.joint]).T for part in memory]
+    return Expansion(
+        study, tolerances, scale, products, left,
+        np.ascontiguousarray(shapes), memory, np.array(moved),
+    )  # fmt: skip
+
+
+class _Runs(NamedTuple):
+    """Exact runs in which play and lag keep to their slopes."""
+
+    study: Study
+    tolerances: tuple[Tolerance, ...]
+    scale: Array
+    memory: tuple[Remembered, ...]
+
+    def deviations(self, steps: Array) -> Array:
+        """Return deviations, shape (D, 3, N), of errors in units of the scale, shape (D, P)."""
+        rows = max(1, CHUNK // self.study.samples)
+        parts = [self._some(steps[k : k + rows]) for k in range(0, len(steps), rows)]
+        return np.concatenate(parts)
+
+    def _some(self, steps: Array) -> Array:
+        study, draws = self.study, steps * self.scale
+        slow = {k for part in self.memory for k in part.columns}
+        rest = [k for k in range(len(self.tolerances)) if k not in slow]
+        effects = with_draws(study.known, [self.tolerances[k] for k in rest], draws[:, rest])
+        twin = Twin(study.robot, effects)
+        first = tuple(effect for effect in effects if effect.stage in (*MEMORY, Stage.CLOCK))
+        view = Twin(study.robot, first).evaluate(study.recording, study.at).view
+        if self.memory:
+            moved = np.zeros((len(draws), *view.q.shape))
+            for part in self.memory:
+                moved[..., part.joint] = draws[:, part.columns] @ part.slope
+            view = replace(view, q=view.q + moved)
+        position = twin.pointwise(view).poses.position
+        deviation = study.on_seam(position - study.nominal.position)
+        wide = np.broadcast_to(deviation, (len(draws), *deviation.shape[-2:]))
+        return wide.swapaxes(-1, -2)
+
+
+def _columns(runs: _Runs, first: Array, second: Array) -> Array:
+    """Return first and second derivatives by scaled errors, shape (P + F, 3, N)."""
+    unit = np.eye(len(runs.tolerances))
+    off = first != second
+    up, down = runs.deviations(unit), runs.deviations(-unit)
+    quadratic = np.empty((len(first), *up.shape[1:]))
+    # Deviations vanish without errors, so half the sum of both sides is the pure second order.
+    quadratic[~off] = 0.5 * (up + down)
+    quadratic[off] = runs.deviations(unit[first[off]] + unit[second[off]])
+    quadratic[off] -= up[first[off]] + up[second[off]]
+    return np.concatenate([0.5 * (up - down), quadratic])

@@ -1,0 +1,206 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Sobol indices: which error the scatter of the deviation comes from, alone and with the others.
+
+SALib draws the design and estimates the indices. Its seeds and its silence about results that are
+not numbers are taken care of here.
+
+References
+----------
+.. [1] A. Saltelli et al., "Variance based sensitivity analysis of model output", Computer Physics
+   Communications 181, 2010.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import DataError
+from .evaluate import Function
+from .outcome import refuse_unfinite
+
+CONFIDENCE = 0.95
+SETTLED = 0.05
+"""Half-width of the interval of a total index below which a study counts as converged."""
+
+
+@dataclass(frozen=True, eq=False)
+class SobolIndices:
+    """
+    First-order and total indices of G inputs or groups of inputs.
+
+    Attributes
+    ----------
+    names : tuple of str, length G
+    first, total : array, shape (G,)
+    first_half, total_half : array, shape (G,)
+        Half-widths of the 95 % intervals.
+    base_samples, runs : int
+    mean, std : float
+        Of the result over the runs.
+    halves : array, shape (K, 2)
+        For K growing parts of the base samples: how many, and the largest half-width of a total
+        index with them.
+    converged : bool
+        Whether the last of these is below `SETTLED`.
+    seed : int
+
+    """
+
+    names: tuple[str, ...]
+    first: Array
+    first_half: Array
+    total: Array
+    total_half: Array
+    base_samples: int
+    runs: int
+    mean: float
+    std: float
+    halves: Array
+    converged: bool
+    seed: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers and lists."""
+        rows = [
+            {
+                'name': name, 'S1': float(self.first[k]), 'S1_half': float(self.first_half[k]),
+                'ST': float(self.total[k]), 'ST_half': float(self.total_half[k]),
+            }
+            for k, name in enumerate(self.names)
+        ]  # fmt: skip
+        return {
+            'base_samples': self.base_samples, 'runs': self.runs, 'seed': self.seed,
+            'confidence': CONFIDENCE, 'mean': self.mean, 'std': self.std,
+            'sum_S1': float(self.first.sum()), 'converged': self.converged,
+            'convergence': [
+                {'base_samples': int(n), 'largest_ST_half': float(h)} for n, h in self.halves
+            ],
+            'indices': rows,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SobolDesign:
+    """
+    Which runs Sobol indices need.
+
+    Attributes
+    ----------
+    names : tuple of str, length P
+    base_samples : int
+        A power of two.
+    groups : tuple of str, length P, optional
+        Inputs of one group are drawn together and get one index.
+    seed : int
+
+    """
+
+    names: tuple[str, ...]
+    base_samples: int = 1024
+    groups: tuple[str, ...] | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        n = self.base_samples
+        if n < 16 or n & (n - 1):
+            raise DataError(f'Sobol indices need a power of two of at least 16 samples, got {n}')
+        if self.seed < 0:
+            raise DataError(f'a seed must not be negative, got {self.seed}')
+        if len(set(self.names)) != len(self.names):
+            raise DataError('two inputs of a sensitivity study have the same name')
+        if self.groups is not None and len(self.groups) != len(self.names):
+            raise DataError(f'{len(self.names)} inputs need as many groups, got {len(self.groups)}')
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Return what gets an index: the inputs, or the groups in order of appearance."""
+        return tuple(dict.fromkeys(self.groups)) if self.groups else self.names
+
+    def _problem(self) -> dict[str, Any]:
+        bounds = [[0.0, 1.0]] * len(self.names)
+        problem = {'num_vars': len(self.names), 'names': list(self.names), 'bounds': bounds}
+        if self.groups:
+            problem['groups'] = list(self.groups)
+        return problem
+
+    def samples(self) -> Array:
+        """Return probabilities of every input, shape (N (G + 2), P)."""
+        from SALib.sample import sobol  # noqa: PLC0415 - SALib brings pandas along
+
+        values: Array = sobol.sample(
+            self._problem(), self.base_samples, calc_second_order=False, seed=self.seed
+        )
+        return values
+
+    def indices(self, results: Array) -> SobolIndices:
+        """
+        Return the indices of model results, shape (N (G + 2),), in the order of `samples`.
+
+        Raises
+        ------
+        DataError
+            A result is not a number, or there are more or fewer than samples.
+
+        """
+        block = len(self.labels) + 2
+        values = np.asarray(results, dtype=np.float64)
+        if values.shape != (self.base_samples * block,):
+            raise DataError(
+                f'{self.base_samples * block} samples need as many results, got {values.shape}'
+            )
+        refuse_unfinite(values, 'Sobol indices')
+        if np.ptp(values) == 0.0:
+            raise DataError('the result is the same in all runs; there is no scatter to share out')
+        parts = [self.base_samples // 4, self.base_samples // 2, self.base_samples]
+        found = [self._analyse(values[: n * block]) for n in parts]
+        halves = np.array([[n, f['ST_conf'].max()] for n, f in zip(parts, found, strict=True)])
+        last = found[-1]
+        return SobolIndices(
+            self.labels, last['S1'], last['S1_conf'], last['ST'], last['ST_conf'],
+            self.base_samples, values.size, float(values.mean()), float(values.std()), halves,
+            bool(halves[-1, 1] < SETTLED), self.seed,
+        )  # fmt: skip
+
+    def _analyse(self, values: Array) -> dict[str, Array]:
+        from SALib.analyze import sobol  # noqa: PLC0415 - SALib brings pandas along
+
+        # SALib takes the seed 0 for no seed; a generator it takes for what it is.
+        rng = np.random.default_rng(self.seed)
+        found = sobol.analyze(
+            self._problem(), values, calc_second_order=False, conf_level=CONFIDENCE, seed=rng
+        )
+        return {key: np.asarray(value) for key, value in found.items()}
+
+
+def sobol_indices(
+    function: Function, names: Sequence[str], base_samples: int = 1024, *,
+    groups: Sequence[str] | None = None, seed: int = 0,
+) -> SobolIndices:  # fmt: skip
+    """
+    Return the Sobol indices of a function of independent inputs.
+
+    Parameters
+    ----------
+    function : callable
+        Probabilities of every input, shape (D, P), to results, shape (D,).
+    names, groups, base_samples, seed
+        See `SobolDesign`.
+
+    Raises
+    ------
+    DataError
+        A result is not a number; see `SobolDesign.indices`.
+
+    """
+    design = SobolDesign(
+        tuple(names), base_samples, None if groups is None else tuple(groups), seed
+    )
+    return design.indices(function(design.samples()))

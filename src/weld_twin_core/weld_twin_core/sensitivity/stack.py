@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The tolerance stack by Monte Carlo: how far off the seam, and how often inside the weld's."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import beta, binom
+
+from ..arrays import Array
+from ..errors import DataError
+from .outcome import Outcomes, refuse_unfinite
+
+PERCENTILES = (5.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0)
+_COVERAGE = 0.95
+
+
+@dataclass(frozen=True)
+class WeldTolerance:
+    """
+    How far off a weld may be.
+
+    Attributes
+    ----------
+    across_m : float [m]
+        Most to either side of the seam; half a wire diameter suits MIG.
+    stickout_m : float [m]
+        Most along the work normal, which changes the wire's free length.
+
+    """
+
+    across_m: float = 5e-4
+    stickout_m: float = 1e-3
+
+    def __post_init__(self) -> None:
+        if not (self.across_m > 0.0 and self.stickout_m > 0.0):
+            raise DataError(
+                f'weld tolerances must be positive, got {self.across_m} m across and '
+                f'{self.stickout_m} m of stick-out'
+            )
+
+
+@dataclass(frozen=True)
+class Probability:
+    """A frequency with its 95 % Clopper-Pearson interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class ToleranceStack:
+    """
+    What the tolerances add up to.
+
+    Attributes
+    ----------
+    runs, seed : int
+    percentiles : mapping
+        For d_norm, max_m, across_m and stickout_m: value and 95 % interval at `PERCENTILES`,
+        shape (K, 3).
+    inside_across, inside_stickout, inside_both : Probability
+        That the whole seam stays inside the weld's tolerance.
+    tolerance : WeldTolerance
+    half : float
+        Half-width of the widest of the three intervals; tells whether there were enough runs.
+
+    """
+
+    runs: int
+    seed: int
+    percentiles: dict[str, Array]
+    inside_across: Probability
+    inside_stickout: Probability
+    inside_both: Probability
+    tolerance: WeldTolerance
+
+    @property
+    def half(self) -> float:
+        """Return the half-width of the widest interval of a probability."""
+        all_three = (self.inside_across, self.inside_stickout, self.inside_both)
+        return max(0.5 * (p.high - p.low) for p in all_three)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers and lists."""
+        return {
+            'runs': self.runs, 'seed': self.seed, 'tolerance': asdict(self.tolerance),
+            'percentiles': {
+                key: [
+                    {'percent': p, 'value': float(v), 'low': float(a), 'high': float(b)}
+                    for p, (v, a, b) in zip(PERCENTILES, rows, strict=True)
+                ]
+                for key, rows in self.percentiles.items()
+            },
+            'inside': {
+                'across': asdict(self.inside_across), 'stickout': asdict(self.inside_stickout),
+                'both': asdict(self.inside_both), 'widest_half': self.half,
+            },
+        }  # fmt: skip
+
+
+def probabilities(runs: int, inputs: int, seed: int = 0) -> Array:
+    """Return independent probabilities, shape (runs, inputs)."""
+    if runs < 20:
+        raise DataError(f'a tolerance stack needs at least 20 runs, got {runs}')
+    return np.random.default_rng(seed).random((runs, inputs))
+
+
+def tolerance_stack(
+    found: Outcomes, tolerance: WeldTolerance | None = None, *, seed: int = 0
+) -> ToleranceStack:
+    """
+    Return what independent runs say about the weld.
+
+    Parameters
+    ----------
+    found : Outcomes
+        Of runs at `probabilities`.
+    tolerance : WeldTolerance, optional
+    seed : int
+        The runs' own, for the record.
+
+    Raises
+    ------
+    DataError
+        A result is not a number.
+
+    """
+    refuse_unfinite(np.stack(found, axis=1), 'tolerance stack')
+    limits = tolerance or WeldTolerance()
+    across, stickout = found.across_m <= limits.across_m, found.stickout_m <= limits.stickout_m
+    keys = ('d_norm', 'max_m', 'across_m', 'stickout_m')
+    return ToleranceStack(
+        len(found.d_norm), seed, {key: _percentiles(getattr(found, key)) for key in keys},
+        _frequency(across), _frequency(stickout), _frequency(across & stickout), limits,
+    )  # fmt: skip
+
+
+def _frequency(inside: np.ndarray) -> Probability:
+    hits, runs, tail = int(inside.sum()), inside.size, 0.5 * (1.0 - _COVERAGE)
+    low = float(beta.ppf(tail, hits, runs - hits + 1)) if hits else 0.0
+    high = float(beta.ppf(1.0 - tail, hits + 1, runs - hits)) if hits < runs else 1.0
+    return Probability(hits / runs, low, high)
+
+
+def _percentiles(values: Array) -> Array:
+    """Return percentiles with the interval that order statistics give without a model."""
+    ordered, runs, tail = np.sort(values), values.size, 0.5 * (1.0 - _COVERAGE)
+    out = []
+    for percent in PERCENTILES:
+        ranks = binom.ppf([tail, 1.0 - tail], runs, percent / 100.0)
+        low, high = np.clip(ranks.astype(int), 0, runs - 1)
+        out.append([float(np.percentile(ordered, percent)), ordered[low], ordered[high]])
+    return np.array(out)

@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The steps of the demo in their order.
+
+A further step is one more entry of `STEPS`: a title and a function that takes the job and a
+function to report progress with; it leaves its files in ``job.folder`` and its words in
+``job.lines``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from weld_twin_core import catalog
+from weld_twin_core.effects import effects_from_list
+
+from ..motions import plan_motion
+from ..outputs import new_directory
+from .analysis import analyse
+from .job import Job, Step
+from .live import run_live
+from .picture import draw
+from .table import MARK, write_table
+
+ROBOT = 'ur5'
+SEAM = 'polyline'
+RATE = 50.0
+SEED = 1
+EFFECTS = [
+    {'effect': 'backlash', 'joint': 'shoulder_pan_joint', 'width': 8e-4},
+    {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 3e-4},
+    {'effect': 'measurement_noise', 'sigma': 2e-5},
+]
+
+
+def plan_seam(job: Job, _: object) -> None:
+    """Plan the seam as joint motion."""
+    job.plan = plan_motion(job.robot, job.seam, 'smooth', job.rate)
+
+
+STEPS = (
+    Step('plan the seam', plan_seam),
+    Step('weld it with five live nodes and record', run_live),
+    Step('compare the bag with the twin', analyse),
+    Step('write the table', write_table),
+    Step('draw the seam', draw),
+)
+
+
+def run_demo(out: Path | str, steps: tuple[Step, ...] = STEPS) -> None:
+    """
+    Run the steps into a directory that appears when all are done.
+
+    Raises
+    ------
+    TwinError
+        The directory cannot be made, or a step fails.
+
+    """
+    console = Console()
+    robot = catalog.load(ROBOT)
+    with new_directory(out, mark=MARK) as folder:
+        job = Job(folder, robot, effects_from_list(EFFECTS, robot), SEAM, RATE, SEED)
+        columns = TextColumn('{task.description:<40}'), BarColumn(), TimeElapsedColumn()
+        with Progress(*columns, console=console) as bars:
+            for step in steps:
+                bar = bars.add_task(step.title, total=1.0)
+                step.run(job, lambda part, bar=bar: bars.update(bar, completed=part))
+                bars.update(bar, completed=1.0)
+    for line in job.lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    console.print(f'results in {out}', highlight=False)

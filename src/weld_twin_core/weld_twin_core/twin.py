@@ -68,14 +68,12 @@ class Twin:
         object.__setattr__(self, 'effects', tuple(self.effects))
         for effect in self.effects:
             effect.check(self.robot)
-        try:
-            self.draws  # noqa: B018 - raises where the effects' draws do not fit together
-        except ValueError:
-            counts = sorted({effect.vector().shape[0] for effect in self.effects
-                             if effect.vector().ndim > 1})  # fmt: skip
+        counts = {effect.vector().shape[:-1] for effect in self.effects} - {(), (1,)}
+        if len(counts) > 1:
             raise ModelError(
-                f'the effects carry different numbers of draws: {counts}; give all the same'
-            ) from None
+                'the effects carry different numbers of draws: '
+                f'{sorted(count for (count,) in counts)}; give all the same'
+            )
 
     @property
     def draws(self) -> tuple[int, ...]:
@@ -124,11 +122,10 @@ class Twin:
         """
         run = self._evaluate(recording, at, True)
         poses = self._full(run)
-        samples = poses.position.shape[:-1]
-        out = np.empty((*samples, 6, len(run.tangents)))
+        out = np.empty((6, len(run.tangents), *poses.position.shape[:-1]))
         for k, (_, _, shift) in enumerate(run.tangents):
-            out[..., k] = np.moveaxis(self.pose_change(run, shift), 0, -1)
-        return poses, out
+            out[:, k] = self.pose_change(run, shift)
+        return poses, np.moveaxis(out, (0, 1), (-2, -1))
 
     @property
     def delay(self) -> float:

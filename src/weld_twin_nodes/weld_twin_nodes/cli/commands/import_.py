@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of joint angles and measured positions or poses into a bag.
+
+Delimiter, units and columns are read from the table where they are plain, and every guess is
+printed; an option settles what is not. Lists of columns are separated by commas.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from ..options import add_bag_output, add_robot, robot_of
+
+LISTS = ('joint', 'position', 'target', 'difference', 'rotation', 'sigma')
+"""Options that take several columns."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options; each is an attribute of `weld_twin_msgs_py.tables.TableOptions`."""
+    parser.add_argument('file', metavar='FILE.csv')
+    add_robot(parser)
+    add_bag_output(parser)
+    parser.add_argument('--table', metavar='CSV', help='also write every deviation from the twin')
+    parser.add_argument('--picture', metavar='PNG', help='also draw them')
+    group = parser.add_argument_group('how to read the table')
+    for name in LISTS:
+        group.add_argument(f'--{name}-columns', metavar='A,B,C', type=_names)
+    group.add_argument('--temperature-column', metavar='A')
+    group.add_argument('--time-column', metavar='A')
+    group.add_argument('--length-unit', choices=('m', 'mm'))
+    group.add_argument('--angle-unit', choices=('rad', 'deg'), help='of the joints')
+    group.add_argument('--rotation-unit', choices=('rad', 'deg'), help='of measured angles')
+    group.add_argument(
+        '--rotation', metavar='ORDER', help='XYZ, ZYX, ... (intrinsic) or rotvec'
+    )
+    group.add_argument(
+        '--difference', choices=('add', 'subtract'), default='add',
+        help='measured is target plus or minus difference',
+    )  # fmt: skip
+    group.add_argument('--positions-only', action='store_true', help='leave orientation out')
+    group.add_argument('--skip-rows', metavar='N,N', type=_numbers, default=(),
+                       help='rows to leave out, the first under the header being 1')  # fmt: skip
+    group.add_argument('--delimiter', help='comma, semicolon or tab')
+    group.add_argument('--decimal', choices=('.', ','))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the bag, say how the table was read and how far the nominal twin is off."""
+    from dataclasses import fields  # noqa: PLC0415
+
+    from weld_twin_core.metrics import deviation_metrics  # noqa: PLC0415
+    from weld_twin_core.twin import Twin  # noqa: PLC0415
+    from weld_twin_msgs_py.bags import write_recording  # noqa: PLC0415
+    from weld_twin_msgs_py.tables import TableOptions, read_table  # noqa: PLC0415
+
+    robot = robot_of(args)
+    options = TableOptions(**{f.name: getattr(args, f.name) for f in fields(TableOptions)})
+    recording, said = read_table(args.file, robot, options)
+    measured = recording.measured
+    assert measured is not None
+    expected = Twin(robot).poses(recording, measured.t)
+    off = measured.position - expected.position
+    write_recording(
+        args.out, recording, robot, twin=expected, deviation=off, storage=args.storage,
+        provenance={'source': args.file, 'assumptions': list(said)},
+    )  # fmt: skip
+    for sentence in said:
+        print(sentence)
+    if args.table or args.picture:
+        _write_deviations(args, recording, off)
+    found = deviation_metrics(measured.position, expected.position)
+    print(
+        f'{args.out}: {found.samples} stations; from the nominal twin, base and tool frame not '
+        f'fitted: RMS {found.rms_m * 1e3:.3f} mm, max {found.max_m * 1e3:.3f} mm'
+    )
+    return 0
+
+
+def _write_deviations(args: argparse.Namespace, recording: object, off: object) -> None:
+    from weld_twin_nodes import stations  # noqa: PLC0415
+
+    if args.table:
+        stations.write_table(args.table, recording, off)
+    if args.picture:
+        stations.draw(args.picture, recording, off)
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(','))
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(','))

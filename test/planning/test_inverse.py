@@ -154,6 +154,25 @@ def test_a_joint_that_passes_half_a_turn_goes_on_and_does_not_jump_back():
     np.testing.assert_allclose(solution.q, q, atol=1e-9)
 
 
+@pytest.mark.parametrize('name', ['abb_irb120', 'ur5'])
+def test_a_path_through_a_singularity_of_the_wrist_goes_straight_on(name):
+    robot = catalog.load(name)
+    bent = np.linspace(-0.3, 0.3, 40)[:, None] * np.eye(6)[4]
+    q = np.array([0.3, -0.9, 0.7, 0.5, 0.0, -0.7]) + bent
+    solution = solve_path(robot, forward(robot, q), q[0])
+    np.testing.assert_allclose(solution.q, q, atol=1e-7)
+
+
+def test_a_flip_between_two_samples_is_refused():
+    robot = catalog.load('abb_irb120')
+    q = np.array([[0.3, 0.4, -0.2, 0.5, 0.025, -0.7]])
+    # Straight on, joint 5 would pass zero and its new limit; the other way round is a flip.
+    narrow = replace(robot, lower=np.where(np.arange(6) == 4, 0.0, robot.lower))
+    bent = np.linspace(0.0, -0.05, 6)[:, None] * np.eye(6)[4]
+    with pytest.raises(ReachError, match='sample 3 at'):
+        solve_path(narrow, forward(robot, q + bent))
+
+
 def test_the_posture_report_is_that_of_the_jacobian():
     robot = catalog.load('kuka_kr6_r900')
     poses = Torch().poses(Line([0.5, -0.1, 0.2], [0.5, 0.1, 0.2]).sample(np.linspace(0, 0.2, 9)))

@@ -57,11 +57,22 @@ def test_the_aggressive_plan_reverses_the_joints_that_carry_the_seam():
         assert (np.diff(direction) != 0).sum() >= 10
 
 
-def test_a_joint_the_seam_does_not_need_stays_exactly_at_rest():
-    robot = catalog.load('ur5')
+@pytest.mark.parametrize('name, joint', [('ur5', 4), ('abb_irb120', 3), ('kuka_kr6_r900', 3)])
+def test_a_joint_the_seam_does_not_need_stays_exactly_at_rest(name, joint):
+    robot = catalog.load(name)
     planned = plan(robot, default_seam(robot), 'aggressive')
-    assert len(np.unique(planned.motion.q[:, 4])) == 1
-    assert not planned.motion.qd[:, 4].any()
+    assert len(np.unique(planned.motion.q[:, joint])) == 1
+    assert not planned.motion.qd[:, joint].any()
+
+
+@pytest.mark.parametrize('name', ['ur5', 'ur10'])
+def test_the_elbow_stays_above_the_table_the_arm_stands_on(name, pinocchio_model):
+    pin = pytest.importorskip('pinocchio')
+    robot, model = catalog.load(name), pinocchio_model(name)
+    data = model.createData()
+    for q in plan(robot, default_seam(robot)).motion.q[::100]:
+        pin.forwardKinematics(model, data, q)
+        assert min(data.oMi[joint].translation[2] for joint in range(1, 7)) >= 0.0
 
 
 def test_the_same_place_on_the_seam_is_the_same_posture_each_time():

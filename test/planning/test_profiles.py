@@ -91,6 +91,14 @@ def test_the_aggressive_law_reverses_as_often_as_told_at_its_acceleration():
     assert np.abs(timing.sdd).max() == pytest.approx(3.0)
 
 
+def test_the_aggressive_law_turns_where_told():
+    # Three advances of 0.1 m, of which the first two go 0.05 m too far and come back.
+    timing = Aggressive(0.3, 3.0, reversals=4, back=0.5).sample(0.3, 1e-4)
+    turns = np.flatnonzero(np.diff(np.sign(timing.sd[1:-1])) != 0) + 1
+    turns = turns[np.append(np.diff(turns) > 1, True)]
+    np.testing.assert_allclose(timing.s[turns], [0.15, 0.1, 0.25, 0.2], atol=1e-6)
+
+
 def test_constant_speed_is_constant():
     np.testing.assert_allclose(Constant(0.05).sample(0.1, 0.01).sd, 0.05)
 

@@ -7,21 +7,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ..arrays import Array
 from ..chain import frames
 from ..errors import ReachError
 from ..robot import Robot
-from ..rotation import rotation_vector
 from .closed_form import branches, family
-from .newton import chain_jacobian, polish, pose_error
+from .continuity import Mask, joined, jumps, reach, travel
+from .newton import chain_jacobian, polish
 from .one import OTHER_POSTURE, gap, past_limit, where, why_not
 from .search import CLOSED, centring, null_space, search
 from .turns import TURN, turns_to_middle
-
-Mask = NDArray[np.bool_]
 
 _KNOTS = 64
 """Samples a numerical solution is followed over; between them a spline is the start."""
@@ -107,14 +104,9 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
     return PathSolution(q, residual, *_posture(robot, q), best, method)
 
 
-def reach(robot: Robot) -> float:
-    """Return the length of the stretched-out chain [m], an upper bound of the arm's reach."""
-    return float(np.hypot(robot.a, robot.d).sum() + np.linalg.norm(robot.T_flange_tool[:3, 3]))
-
-
 def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     """Return every closed-form branch, shape (8, N, n), unwrapped and on its best turn."""
-    q = branches(robot, poses)
+    q = joined(branches(robot, poses))
     for k, track in enumerate(q):
         bad = ~np.isfinite(track).all(axis=-1)
         if not bad.all():
@@ -144,7 +136,7 @@ def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     knots = _track(robot, starts, poses[index])
     if len(index) == len(poses):
         return knots
-    along = _travel(poses, reach(robot))
+    along = travel(robot, poses)
     spline = CubicSpline(along[index], np.where(np.isfinite(knots), knots, 0.0), axis=1)
     tracks = spline(along)
     lost: Mask = np.any(np.isnan(knots), axis=-1)
@@ -169,37 +161,11 @@ def _track(robot: Robot, q: Array, poses: Array) -> Array:
     return np.stack(out, axis=1)
 
 
-def _travel(poses: Array, length: float) -> Array:
-    """Return a strictly increasing measure of the way along the poses, shape (N,)."""
-    turns = rotation_vector(poses[1:, :3, :3] @ np.swapaxes(poses[:-1, :3, :3], -1, -2))
-    steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) / length
-    steps = steps + np.linalg.norm(turns, axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps + 1e-9)])
-
-
 def _first_failure(robot: Robot, q: Array, poses: Array) -> int:
     """Return the first sample that is not reached, past a limit or after a jump; N if none."""
     fails: Mask = np.any(np.isnan(q) | (q < robot.lower) | (q > robot.upper), axis=-1)
-    fails[1:] |= _jumps(robot, q, poses)
+    fails[1:] |= jumps(robot, q, poses)
     return int(np.argmax(fails)) if fails.any() else len(q)
-
-
-def _jumps(robot: Robot, q: Array, poses: Array) -> Mask:
-    """
-    Tell, shape (N - 1,), where the arm leaves the path between two samples.
-
-    Half way between two joint positions of one motion the tool is near both; half way between
-    two branches it is somewhere else.
-    """
-    if len(q) < 2:
-        return np.zeros(0, dtype=bool)
-    chain = frames(robot, np.nan_to_num(0.5 * (q[1:] + q[:-1])))
-    size = reach(robot)
-    scale = np.array([1.0, 1.0, 1.0, size, size, size])
-    before = np.linalg.norm(pose_error(chain, poses[:-1]) * scale, axis=-1)
-    after = np.linalg.norm(pose_error(chain, poses[1:]) * scale, axis=-1)
-    step = np.diff(_travel(poses, size)) * size
-    return np.asarray(before + after > 3.0 * step + 1e-3 * size)
 
 
 def _rank(robot: Robot, q: Array, seed: Array | None) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import PathError, ReachError
 from ..inverse import solve_path
-from ..inverse.along import reach
+from ..inverse.continuity import reach
 from ..robot import Robot
 from .arc import Arc, Circle
 from .base import Path

@@ -99,6 +99,7 @@ def test_rotations_are_batched_even_when_there_are_none():
         assert rotation.rotation_vector(matrix).shape == (*lead, 3)
         assert rotation.quaternion_from_matrix(matrix).shape == (*lead, 4)
         assert rotation.angle_between(matrix, matrix).shape == (*lead, 3)
+        assert rotation.matrix_from_quaternion(np.ones((*lead, 4)) / 2).shape == (*lead, 3, 3)
 
 
 def test_a_quaternion_of_wrong_length_names_its_sample():

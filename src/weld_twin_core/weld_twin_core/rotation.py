@@ -60,9 +60,13 @@ def left_jacobian(rotvec: ArrayLike) -> Array:
 
 def rotation_vector(matrix: Array) -> Array:
     """Return rotation vectors, shape (..., 3) [rad], of rotation matrices, shape (..., 3, 3)."""
-    flat = Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_rotvec()
-    vectors: Array = flat.reshape(matrix.shape[:-2] + (3,))
-    return vectors
+    vectors = _rotations(matrix).as_rotvec() if matrix.size else np.zeros(0)
+    return np.reshape(vectors, matrix.shape[:-2] + (3,))
+
+
+def _rotations(matrix: Array) -> Rotation:
+    """Return scipy's rotations; before 1.12 it takes neither read-only arrays nor none at all."""
+    return Rotation.from_matrix(np.array(matrix).reshape(-1, 3, 3))
 
 
 def matrix_from_quaternion(quaternion: ArrayLike, name: str = 'quaternion') -> Array:
@@ -84,15 +88,15 @@ def matrix_from_quaternion(quaternion: ArrayLike, name: str = 'quaternion') -> A
             f'{name} {k} has length {length[k]:.4g}, a rotation needs 1; '
             'check the order (x y z w) and that it is not left at zero'
         )
-    matrices: Array = Rotation.from_quat(flat).as_matrix().reshape(values.shape[:-1] + (3, 3))
-    return matrices
+    matrices = Rotation.from_quat(np.array(flat)).as_matrix() if flat.size else np.zeros(0)
+    return np.reshape(matrices, values.shape[:-1] + (3, 3))
 
 
 def quaternion_from_matrix(matrix: Array) -> Array:
     """Return quaternions x y z w with w >= 0, shape (..., 4), of rotation matrices."""
-    flat = Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_quat(canonical=True)
-    quaternions: Array = flat.reshape(matrix.shape[:-2] + (4,))
-    return quaternions
+    values = _rotations(matrix).as_quat() if matrix.size else np.zeros((0, 4))
+    canonical = np.where(values[:, 3:] < 0.0, -values, values)
+    return np.reshape(canonical, matrix.shape[:-2] + (4,))
 
 
 def transform(rotation: Array, position: Array) -> Array:

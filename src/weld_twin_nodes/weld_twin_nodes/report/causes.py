@@ -77,7 +77,7 @@ def _absent(diagnosis: Diagnosis) -> Html | None:
         return None
     rows = sorted(diagnosis.absent.items())
     return tag(
-        'details', tag('summary', f'{len(rows)} effects not considered, and why'),
+        'details', tag('summary', f'Not considered, and why ({len(rows)})'),
         table(('Effect', 'Why'), rows),
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from html import escape
 
-_EMPTY = frozenset({'br', 'meta', 'line', 'path', 'input'})
+_EMPTY = frozenset({'br', 'meta', 'input'})
 
 
 class Html(str):

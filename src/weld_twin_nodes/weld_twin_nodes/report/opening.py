@@ -9,9 +9,14 @@ from datetime import datetime, timezone
 from weld_twin_core.diagnosis.result import Diagnosis
 
 from .html import Html, tag
-from .quantities import milliradians, millimetres, odds, percent
+from .quantities import millimetres, milliradians, odds, percent
 from .words import STATUS, verdict
 
+_SURE_OF = {
+    'identified': 'that the causes named are right',
+    'ambiguous': 'that one of those named is right',
+    'unknown': 'that the cause is none of those known',
+}
 _FIRST_REAL_STAMP = 10**18
 """Stamps [ns] before 2001 count from something else than the epoch."""
 
@@ -58,8 +63,8 @@ def _figures(diagnosis: Diagnosis) -> Html:
          f'({_interval(low, high)})'),
         ('Noise floor', millimetres(gap.noise_floor_m), 'what the data cannot resolve'),
     ]  # fmt: skip
-    if diagnosis.status != 'none':
-        rows.append(('Sure', odds(diagnosis.confidence), 'that the causes named are right'))
+    if diagnosis.status in _SURE_OF:
+        rows.append(('Confidence', odds(diagnosis.confidence), _SURE_OF[diagnosis.status]))
     if gap.orientation_rms_rad is not None:
         rows.append(('Orientation', milliradians(gap.orientation_rms_rad), 'RMS gap'))
     cells = [

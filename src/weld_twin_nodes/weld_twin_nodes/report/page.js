@@ -7,10 +7,10 @@
   const canvases = [...document.querySelectorAll('canvas[data-side]')];
   const VIEWS = { angled: [-0.9, 0.55], top: [-Math.PI / 2, Math.PI / 2], front: [-Math.PI / 2, 0], side: [0, 0] };
   const COLOURS = [[58, 110, 190], [34, 160, 140], [226, 168, 20], [214, 74, 40], [150, 10, 70]];
-  const view = { turn: VIEWS.angled[0], tilt: VIEWS.angled[1], zoom: 1, stretch: data.stretch };
-  const frame = extent();
+  const view = { turn: 0, tilt: 0, zoom: 1, stretch: data.stretch };
+  const middle = centre();
 
-  function extent() {
+  function centre() {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     for (const run of data.runs) {
       for (let i = 0; i < run.path.length; i++) {
@@ -18,10 +18,21 @@
         high[i % 3] = Math.max(high[i % 3], run.path[i]);
       }
     }
-    if (!Number.isFinite(low[0])) return { middle: [0, 0, 0], radius: 1 };
-    const middle = low.map((v, k) => (v + high[k]) / 2);
-    const radius = Math.hypot(...low.map((v, k) => (high[k] - v) / 2)) || 1000;
-    return { middle, radius };
+    return low.map((v, k) => (Number.isFinite(v) ? (v + high[k]) / 2 : 0));
+  }
+
+  // Looks from one of the named directions, near enough to fill the picture.
+  function look(name) {
+    [view.turn, view.tilt] = VIEWS[name];
+    view.zoom = 1;
+    view.half = [1, 1];
+    const { direction } = projector(1, 1);
+    for (const run of data.runs) {
+      for (let i = 0; i < run.path.length; i += 3) {
+        const at = run.path.slice(i, i + 3).map((v, k) => v - middle[k] + view.stretch * run.before[i + k]);
+        direction(...at).forEach((v, k) => { view.half[k] = Math.max(view.half[k], Math.abs(v)); });
+      }
+    }
   }
 
   function style(name) {
@@ -48,12 +59,12 @@
 
   // The projection: turn about the vertical, then tilt towards the viewer.
   function projector(width, height) {
-    const scale = 0.43 * Math.min(width, height) * view.zoom / frame.radius;
+    const scale = view.zoom * Math.min(0.43 * width / view.half[0], 0.38 * height / view.half[1]);
     const ct = Math.cos(view.turn), st = Math.sin(view.turn);
     const ci = Math.cos(view.tilt), si = Math.sin(view.tilt);
     const direction = (x, y, z) => [-x * st + y * ct, -(z * ci - (x * ct + y * st) * si)];
     const point = (x, y, z) => {
-      const [u, v] = direction(x - frame.middle[0], y - frame.middle[1], z - frame.middle[2]);
+      const [u, v] = direction(x - middle[0], y - middle[1], z - middle[2]);
       return [width / 2 + scale * u, height / 2 + scale * v];
     };
     return { point, direction, scale };
@@ -223,8 +234,7 @@
   function controls() {
     document.querySelectorAll('button[data-view]').forEach((button) => {
       button.addEventListener('click', () => {
-        [view.turn, view.tilt] = VIEWS[button.dataset.view];
-        view.zoom = 1;
+        look(button.dataset.view);
         later();
       });
     });
@@ -236,6 +246,7 @@
     });
   }
 
+  look('angled');
   canvases.forEach(listen);
   controls();
   redraw();

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.result import Diagnosis
 
@@ -14,7 +15,7 @@ from .html import Html, section, tag
 
 _POINTS = 3000
 """Points on the page, over all recordings; more cannot be told apart on a screen."""
-_SHOWN = 0.07
+_SHOWN = 0.04
 """Part of the seam's extent that a large deviation is drawn at."""
 
 

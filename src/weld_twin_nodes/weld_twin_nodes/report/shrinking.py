@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.result import Diagnosis
 

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
+
 from weld_twin_core.diagnosis.result import Diagnosis
 
 from .quantities import millimetres, odds, parameter_rows, percent

@@ -86,5 +86,4 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
         for start, end, share, rms in path
     ]  # fmt: skip
     return _part('Along the recording', tag('div', tag('ol', *cells, class_='strip'), tag(
-        'p', f'RMS in mm over {len(path)} stretches, from {seconds(path[0][0])} to '
-        f'{seconds(path[-1][1])}', class_='note')))  # fmt: skip
+        'p', 'RMS gap in mm of each stretch, in the order of time.', class_='note')))  # fmt: skip

@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Say where the gap lies, which effect causes it, and how far it shrinks.
+
+Writes diagnosis.json, a page to read (report.html) and the corrected model to the directory.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..options import add_robot, add_topics, robot_of, topics_of
+
+if TYPE_CHECKING:
+    from weld_twin_core.diagnosis import Diagnosis
+    from weld_twin_nodes.report import InputFile
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        'bags', nargs='+', metavar='BAG', help='recordings of the cell, of one robot'
+    )
+    add_robot(parser)
+    parser.add_argument(
+        '--holdout', action='append', default=[], metavar='BAG',
+        help='a recording that is not fitted, to judge the shrink on; may be given again',
+    )  # fmt: skip
+    parser.add_argument(
+        '--align', default='', metavar='FRAMES',
+        help='frames that are not known and fitted along: base, tool, or base,tool',
+    )  # fmt: skip
+    parser.add_argument(
+        '--effects-known', default='', metavar='FILE',
+        help='effects file or diagnosis.json put into the twin first',
+    )  # fmt: skip
+    parser.add_argument(
+        '--exclude-effect', action='extend', nargs='+', default=[], metavar='NAME',
+        help='families left out of the library',
+    )  # fmt: skip
+    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+    add_topics(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, write the results, print the verdict."""
+    from rich.console import Console
+
+    from weld_twin_nodes.outputs import new_directory
+    from weld_twin_nodes.report import print_summary
+    from weld_twin_nodes.report.files import PAGE, RESULT, write_results
+
+    with new_directory(args.out, mark=RESULT) as place:
+        diagnosis = _diagnosis(args)
+        write_results(place, diagnosis, _inputs(args))
+    console = Console(highlight=False)
+    print_summary(diagnosis, console)
+    console.print(f'report: {Path(args.out) / PAGE}', markup=False)
+    return 0
+
+
+def _diagnosis(args: argparse.Namespace) -> Diagnosis:
+    from weld_twin_core.diagnosis import diagnose
+    from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_nodes.models import build_twin
+
+    align, excluded = _align(args.align), _families(args.exclude_effect)
+    twin = build_twin(robot_of(args), args.effects_known)
+    topics = topics_of(args)
+    with _progress() as tell:
+        recordings = []
+        for path in (*args.bags, *args.holdout):
+            tell(f'reading {path}')
+            recordings.append(read_recording(path, twin.robot, topics))
+        count = len(args.bags)
+        return diagnose(
+            recordings[:count], twin.robot, align=align, known=twin.effects, exclude=excluded,
+            holdout=recordings[count:], progress=tell,
+        )  # fmt: skip
+
+
+def _align(text: str) -> frozenset[str]:
+    from weld_twin_core.diagnosis.problem import FRAMES
+    from weld_twin_core.errors import ModelError
+
+    frames = frozenset(part.strip() for part in text.split(',') if part.strip())
+    for frame in sorted(frames - set(FRAMES)):
+        raise ModelError(f'--align takes base, tool or base,tool; {frame!r} is neither')
+    return frames
+
+
+def _families(names: Sequence[str]) -> tuple[str, ...]:
+    from weld_twin_core.effects import REGISTRY
+    from weld_twin_core.errors import ModelError
+
+    for name in names:
+        if name not in REGISTRY:
+            raise ModelError(
+                f'--exclude-effect: there is no effect {name!r}; known effects are '
+                + ', '.join(sorted(REGISTRY))
+            )
+    return tuple(names)
+
+
+def _inputs(args: argparse.Namespace) -> list[InputFile]:
+    from weld_twin_nodes.report import hashed
+
+    out = [hashed('recording', path) for path in args.bags]
+    out += [hashed('held out', path) for path in args.holdout]
+    if Path(args.robot).is_file():
+        out.append(hashed('robot', args.robot))
+    if args.effects_known:
+        out.append(hashed('effects known', args.effects_known))
+    return out
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """Yield where to tell progress; it shows on a terminal and leaves other streams alone."""
+    from rich.console import Console
+    from rich.markup import escape
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda text: None
+        return
+    with console.status('starting') as status:
+        yield lambda text: status.update(escape(text))

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Write the model of a diagnosis in a form that other software loads."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ..options import add_robot, robot_of
+
+_FORMATS = ('yaml', 'urdf', 'offsets', 'effects', 'left-over')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('model', metavar='MODEL', help='diagnosis.json')
+    add_robot(parser)
+    parser.add_argument(
+        '--format', choices=_FORMATS, default='yaml',
+        help='yaml, urdf: the corrected robot; offsets: per joint, as CSV; effects: all, for the '
+        'nominal robot; left-over: what the corrected robot cannot hold (default: yaml)',
+    )  # fmt: skip
+    parser.add_argument('--out', metavar='FILE', help='file to write; left out, the terminal')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write one file, or print it."""
+    from tempfile import TemporaryDirectory
+
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.models import read_model
+    from weld_twin_nodes.exports import FORMATS
+
+    model = read_model(robot_of(args), args.model)
+    name, write = FORMATS[args.format]
+    if args.out is None:
+        with TemporaryDirectory() as scratch:
+            write(Path(scratch) / name, model)
+            sys.stdout.write((Path(scratch) / name).read_text(encoding='utf-8'))
+        return 0
+    if Path(args.out).exists():
+        raise DataError(f"'{args.out}' exists already and is not overwritten")
+    write(Path(args.out), model)
+    return 0

@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Add the identified effects to the twin: its tool pose at every joint state, as a bag.
+
+Poses are in the frame of the measurements: what the instrument would read at each stamp.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from ..options import add_bag_output, add_robot, add_topics, robot_of, topics_of
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('bag', metavar='BAG', help='recording with joint states')
+    add_robot(parser)
+    parser.add_argument(
+        '--model', required=True, metavar='FILE', help='diagnosis.json, or an effects file'
+    )
+    parser.add_argument(
+        '--setup', type=int, metavar='N',
+        help='where the set-up moved between the recordings of the diagnosis: which of them',
+    )  # fmt: skip
+    add_bag_output(parser)
+    add_topics(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the bag; say how far measured and twin are apart where something was measured."""
+    from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_nodes.prediction import prediction_twin, write_prediction
+
+    robot = robot_of(args)
+    twin = prediction_twin(robot, args.model, args.bag, args.setup)
+    recording = read_recording(args.bag, robot, topics_of(args))
+    made = {'model': str(args.model)}
+    left = write_prediction(args.out, twin, recording, storage=args.storage, provenance=made)
+    line = f'{args.out}: {recording.joints.t.size} poses with {len(twin.effects)} effects'
+    print(line if left is None else f'{line}; measured minus twin RMS {left * 1e3:.4f} mm')
+    return 0

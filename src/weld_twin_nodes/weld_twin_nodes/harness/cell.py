@@ -62,6 +62,7 @@ class Cell:
         self._stack = ExitStack()
         self.messages = ros_messages()
         self.processes: list[NodeProcess] = []
+        self._nodes: list[Node] = []
         self._services: dict[str, Client] = {}
 
     def __enter__(self) -> Cell:
@@ -86,6 +87,7 @@ class Cell:
         self._stack.callback(self._context.try_shutdown)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._stack.callback(self._executor.shutdown)
+        self._stack.callback(self._remove_all)
         self.node = self.add(Node, 'harness')
         self._stack.callback(self._stop_all)
 
@@ -114,8 +116,14 @@ class Cell:
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         node = make(*args, context=self._context, parameter_overrides=overrides)
         self._executor.add_node(node)
-        self._stack.callback(node.destroy_node)
+        self._nodes.append(node)
         return node
+
+    def remove(self, node: Node) -> None:
+        """Take a node out of this process."""
+        self._nodes.remove(node)
+        self._executor.remove_node(node)
+        node.destroy_node()
 
     def set_parameter(self, node: str, name: str, value: Any) -> SetParametersResult:
         """Set a parameter of a running node, as `ros2 param set` does."""
@@ -233,6 +241,10 @@ class Cell:
         for process in self.processes:
             state = 'running' if process.code is None else f'ended with {process.code}'
             yield f'\n--- {process.name}, {state}\n{process.log[-2000:]}'
+
+    def _remove_all(self) -> None:
+        for node in list(self._nodes):
+            self.remove(node)
 
     def _stop_all(self) -> None:
         for process in self.processes:

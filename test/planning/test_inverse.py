@@ -163,14 +163,15 @@ def test_a_path_through_a_singularity_of_the_wrist_goes_straight_on(name):
     np.testing.assert_allclose(solution.q, q, atol=1e-7)
 
 
-def test_a_flip_between_two_samples_is_refused():
+def test_a_flip_at_a_sample_on_the_singularity_itself_is_refused():
     robot = catalog.load('abb_irb120')
-    q = np.array([[0.3, 0.4, -0.2, 0.5, 0.025, -0.7]])
-    # Straight on, joint 5 would pass zero and its new limit; the other way round is a flip.
-    narrow = replace(robot, lower=np.where(np.arange(6) == 4, 0.0, robot.lower))
-    bent = np.linspace(0.0, -0.05, 6)[:, None] * np.eye(6)[4]
-    with pytest.raises(ReachError, match='sample 3 at'):
-        solve_path(narrow, forward(robot, q + bent))
+    # Joint 5 is straight at sample 2: joints 4 and 6 share an axis and neither is determined.
+    bent = np.linspace(0.02, -0.02, 5)[:, None] * np.eye(6)[4]
+    poses = forward(robot, np.array([0.3, 0.4, -0.2, 1.3, 0.0, -0.7]) + bent)
+    with pytest.raises(
+        ReachError, match=r'sample [23] at .* have to change its posture on the way'
+    ):
+        solve_path(robot, poses)
 
 
 def test_the_posture_report_is_that_of_the_jacobian():

@@ -31,6 +31,7 @@ class Qos:
         from rclpy.qos import (  # only nodes have rclpy
             DurabilityPolicy,
             HistoryPolicy,
+            LivelinessPolicy,
             QoSProfile,
             ReliabilityPolicy,
         )
@@ -40,6 +41,7 @@ class Qos:
             depth=self.depth,
             reliability=ReliabilityPolicy[self.reliability.upper()],
             durability=DurabilityPolicy.VOLATILE,
+            liveliness=LivelinessPolicy.AUTOMATIC,
         )
 
 

@@ -108,7 +108,8 @@ def parse_yaml(text: str, what: str) -> Any:
         where = f' line {mark.line + 1}' if mark is not None else ''
         raise ModelError(f'{what}{where}: {error.problem or error.context}') from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        reason = ' '.join(str(error).split()) or 'nested too deeply'
+        deep = isinstance(error, RecursionError)
+        reason = 'nested too deeply' if deep else ' '.join(str(error).split())
         raise ModelError(f'{what}: {reason}') from None
 
 

@@ -14,6 +14,7 @@ from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from struct import unpack_from
+from traceback import clear_frames
 from types import TracebackType
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from rosbags.rosbag2 import Reader
 from weld_twin_core.errors import DataError, TwinError
 
 from ..convert import NANOSECONDS
-from .store import TYPES
+from .store import TYPES, decode
 
 SUFFIXES = ('.mcap', '.db3')
 PROVENANCE_PREFIX = 'weld_twin/'
@@ -73,6 +74,8 @@ class BagReader:
         files = _storage_paths(self.path)
         try:
             with clear_errors(self.path):
+                for file in _databases(files):
+                    _refuse_truncated(file)
                 for file in files:
                     self._readers.append(self._stack.enter_context(Reader(file)))
                 self._list_topics()
@@ -107,7 +110,7 @@ class BagReader:
                 if not wanted:
                     continue
                 for connection, log_ns, data in reader.messages(wanted):
-                    message = TYPES.deserialize_cdr(data, connection.msgtype)
+                    message = decode(data, connection.msgtype)
                     yield BagMessage(connection.topic, connection.msgtype, log_ns, message)
 
     def stamps(self) -> Iterator[tuple[str, int, bool]]:
@@ -173,11 +176,38 @@ def clear_errors(path: Path) -> Iterator[None]:
     except PermissionError:
         raise DataError(f"bag '{path}' cannot be read: permission denied") from None
     except Exception as error:  # a flipped bit surfaces as anything from KeyError to ZstdError
+        _let_go(error)
         reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
         raise DataError(
             f"bag '{path}' is damaged or was cut short ({reason[:200]}); record it again, or "
             "repair it with 'mcap recover' or 'sqlite3 .recover'"
         ) from None
+
+
+def _databases(paths: list[Path]) -> list[Path]:
+    """Return the sqlite3 files among storage files, or in a bag directory."""
+    inside = [file for path in paths if path.is_dir() for file in sorted(path.glob('*.db3'))]
+    return inside + [path for path in paths if path.suffix == '.db3']
+
+
+def _let_go(error: BaseException | None) -> None:
+    """Drop what the frames of a failed open still hold: a database nobody else would close."""
+    while error is not None:
+        clear_frames(error.__traceback__)
+        error = error.__context__
+
+
+def _refuse_truncated(path: Path) -> None:
+    """SQLite reads a file that lacks its last pages and says nothing; its header knows better."""
+    with path.open('rb') as file:
+        head = file.read(32)
+    if len(head) < 32:
+        raise ValueError('the file is too short to be a database')
+    page = int.from_bytes(head[16:18], 'big')
+    pages = int.from_bytes(head[28:32], 'big')
+    expected = (65536 if page == 1 else page) * pages
+    if path.stat().st_size < expected:
+        raise ValueError(f'the file has {path.stat().st_size} of {expected} bytes')
 
 
 def _storage_paths(path: Path) -> list[Path]:

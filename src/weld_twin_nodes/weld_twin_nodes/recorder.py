@@ -11,8 +11,8 @@ from typing import Any
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
-
 from std_srvs.srv import Trigger
+
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.bags import BagWriter
@@ -44,14 +44,15 @@ class Recorder(CellNode):
         super().__init__('recorder', **kwargs)
         if not self.setting('out'):
             raise DataError("the recorder needs the parameter 'out', the path of the bag")
+        unknown = [name for name in self.setting('topics') if name not in BY_NAME]
+        if unknown:
+            raise DataError(f'cannot record {unknown[0]!r}; topics are {", ".join(BY_NAME)}')
         self._writer = BagWriter(
             self.setting('out'), storage=self.setting('storage'),
             provenance={'version': __version__},
         ).open()  # fmt: skip
         self._counts = dict.fromkeys(self.setting('topics'), 0)
-        for name in self.setting('topics'):
-            if name not in BY_NAME:
-                raise DataError(f'cannot record {name!r}; topics are {", ".join(BY_NAME)}')
+        for name in self._counts:
             topic = BY_NAME[name]
             self.listen(topic, partial(self._write, topic.name, topic.type), raw=True)
         self.create_timer(self.setting('flush_every'), self._writer.flush)

@@ -111,10 +111,29 @@ class Cell:
         self.processes.append(NodeProcess(node, parameters, folder))
         return self.processes[-1]
 
-    def add(self, make: Callable[..., N], *args: Any, **parameters: Any) -> N:
-        """Put a node into this process; it is served while the cell waits."""
+    def add(
+        self, make: Callable[..., N], *args: Any, cli_args: list[str] | None = None,
+        **parameters: Any,
+    ) -> N:  # fmt: skip
+        """
+        Put a node into this process; it is served while the cell waits.
+
+        Parameters
+        ----------
+        make : node class
+            Takes ``context``, ``parameter_overrides`` and ``cli_args`` as `rclpy.node.Node` does.
+        args
+            Its other arguments.
+        cli_args : list of str, optional
+            Such as remappings.
+        parameters
+            Its ROS parameters.
+
+        """
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-        node = make(*args, context=self._context, parameter_overrides=overrides)
+        node = make(
+            *args, context=self._context, parameter_overrides=overrides, cli_args=cli_args
+        )
         self._executor.add_node(node)
         self._nodes.append(node)
         return node

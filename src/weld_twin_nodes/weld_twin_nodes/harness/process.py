@@ -21,6 +21,7 @@ MODULES = {
     'forward_kinematics_twin': 'weld_twin_nodes.twin',
     'deviation_analyzer': 'weld_twin_nodes.deviation_analyzer',
     'recorder': 'weld_twin_nodes.recorder',
+    'live_diagnosis': 'weld_twin_nodes.live_diagnosis',
 }
 GRACE = 5.0
 """Seconds a process has to end after SIGINT before it is killed."""

@@ -14,6 +14,7 @@ from weld_twin_core import catalog
 from weld_twin_core.chain import forward, jacobian
 from weld_twin_core.errors import ReachError
 from weld_twin_core.inverse import family, polish, solve, solve_path
+from weld_twin_core.inverse.continuity import jumps
 from weld_twin_core.inverse.subproblems import angle_to_distance, angle_to_height, turn
 from weld_twin_core.paths import Line, Torch
 from weld_twin_core.rotation import angle_between
@@ -163,15 +164,27 @@ def test_a_path_through_a_singularity_of_the_wrist_goes_straight_on(name):
     np.testing.assert_allclose(solution.q, q, atol=1e-7)
 
 
-def test_a_flip_at_a_sample_on_the_singularity_itself_is_refused():
+def test_a_sample_on_the_singularity_itself_gets_the_posture_around_it():
+    # The pose does not determine joints 4 and 6 there; the neighbours do, to a part of a step.
     robot = catalog.load('abb_irb120')
-    # Joint 5 is straight at sample 2: joints 4 and 6 share an axis and neither is determined.
-    bent = np.linspace(0.02, -0.02, 5)[:, None] * np.eye(6)[4]
-    poses = forward(robot, np.array([0.3, 0.4, -0.2, 1.3, 0.0, -0.7]) + bent)
-    with pytest.raises(
-        ReachError, match=r'sample [23] at .* have to change its posture on the way'
-    ):
-        solve_path(robot, poses)
+    step = 0.015
+    bent = step * np.arange(-20, 21)[:, None] * np.eye(6)[4]
+    q = np.array([0.3, -0.9, 0.7, 0.5, 0.0, -0.7]) + bent
+    poses = forward(robot, q)
+    solution = solve_path(robot, poses, q[0])
+    assert solution.residual.max() < 1e-9
+    np.testing.assert_allclose(
+        np.delete(solution.q, 20, axis=0), np.delete(q, 20, axis=0), atol=1e-7
+    )
+    np.testing.assert_allclose(solution.q[20], q[20], atol=0.05 * step)
+
+
+def test_a_joint_that_spins_while_the_tool_rests_is_a_jump():
+    robot = catalog.load('abb_irb120')
+    q = np.array([[0.3, 0.4, -0.2, 1.3, 0.001, -0.7], [0.3, 0.4, -0.2, -0.5, 0.001, 1.1]])
+    assert jumps(robot, q, forward(robot, q)).all()
+    q[1] = q[0] + 0.3
+    assert not jumps(robot, q, forward(robot, q)).any()
 
 
 def test_the_posture_report_is_that_of_the_jacobian():

@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..chain import frames
 from ..errors import ReachError
 from ..robot import Robot
+from ..rotation import rotation_matrix, rotation_vector, transform
 from .closed_form import branches, family
 from .continuity import Mask, joined, jumps, reach, travel
 from .newton import chain_jacobian, polish
@@ -24,6 +25,9 @@ _KNOTS = 64
 """Samples a numerical solution is followed over; between them a spline is the start."""
 _TRACKED = 12
 """Postures at the first sample that are followed along the path."""
+_SINGULAR = 1e-8
+"""Determinant of the Jacobian below which a closed form loses digits."""
+_NUDGE = 1e-3
 _COMFORTABLE = 0.5
 """Distance from a joint limit [rad] beyond which more of it is worth nothing."""
 
@@ -106,12 +110,35 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
 
 def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     """Return every closed-form branch, shape (8, N, n), unwrapped and on its best turn."""
-    q = joined(branches(robot, poses))
+    q = joined(_determined(robot, branches(robot, poses), poses))
     for k, track in enumerate(q):
         bad = ~np.isfinite(track).all(axis=-1)
         if not bad.all():
             q[k, ~bad] = _on_turn(robot, np.unwrap(track[~bad], axis=0), seed)
     return q
+
+
+def _determined(robot: Robot, q: Array, poses: Array) -> Array:
+    """
+    Return branches (K, N, n) with samples on a singularity replaced by what they tend to.
+
+    There the pose leaves joints undetermined; a little way towards the next sample it does not.
+    The straight way there bends off the path, so the joints are right to a part of a step.
+    """
+    jacobian = chain_jacobian(robot, frames(robot, np.nan_to_num(q)))
+    singular = np.flatnonzero((np.abs(np.linalg.det(jacobian)) < _SINGULAR).any(axis=0))
+    if singular.size and len(poses) > 1:
+        other = np.where(singular + 1 < len(poses), singular + 1, singular - 1)
+        q = q.copy()
+        q[:, singular] = branches(robot, _between(poses[singular], poses[other], _NUDGE))
+    return q
+
+
+def _between(start: Array, end: Array, part: float) -> Array:
+    """Return poses (N, 4, 4) a part of the way from one to the other."""
+    turn = rotation_vector(end[:, :3, :3] @ np.swapaxes(start[:, :3, :3], -1, -2))
+    rotation = rotation_matrix(part * turn) @ start[:, :3, :3]
+    return transform(rotation, start[:, :3, 3] + part * (end[:, :3, 3] - start[:, :3, 3]))
 
 
 def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.effects import REGISTRY, Effect, effect_from_mapping
+from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin import Twin
 
 ENTRIES = {
@@ -124,6 +125,12 @@ def test_all_effects_together_are_off_by_products_of_small_displacements_only(
     check(
         robot, [effect(name) for name in ENTRIES], recording, stamps(recording), 5e-3, 2e-7
     )
+
+
+def test_while_a_wide_gap_is_crossed_the_derivative_stays_with_the_side_left(arm):
+    t = np.linspace(0.0, 20.0, 1003)
+    recording = Recording('slow', JointMotion(t, np.sin(t)[:, None] * np.ones(6)))
+    check(arm, [effect('backlash', width=0.3)], recording, t, 1e-6)
 
 
 def test_a_closed_gap_opens_to_the_side_it_trails(arm, make_recording, stamps):

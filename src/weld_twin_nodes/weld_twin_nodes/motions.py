@@ -33,7 +33,8 @@ def plan_motion(
         Name of a time law.
     rate : float [1/s]
     speed : float [m/s]
-        Speed of the time law; 0 is its own.
+        Speed of the time law, refused where a joint cannot follow; 0 is the law's own, slowed
+        down as far as the joints need it.
 
     Raises
     ------
@@ -45,9 +46,9 @@ def plan_motion(
     if speed:
         law = replace(law, speed=speed)  # type: ignore[call-arg] - every law has one
     if path in KINDS:
-        return plan(robot, default_seam(robot, path), law, rate)
+        return plan(robot, default_seam(robot, path), law, rate, fit=not speed)
     seam, torch = read_path(path)
-    return plan(robot, seam, law, rate, torch=torch)
+    return plan(robot, seam, law, rate, torch=torch, fit=not speed)
 
 
 def stamps(t: Array, start_ns: int) -> np.ndarray:

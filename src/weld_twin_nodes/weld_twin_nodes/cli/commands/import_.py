@@ -47,12 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the bag, say how the table was read and how far the nominal twin is off."""
-    from dataclasses import fields  # noqa: PLC0415
+    from dataclasses import fields
 
-    from weld_twin_core.metrics import deviation_metrics  # noqa: PLC0415
-    from weld_twin_core.twin import Twin  # noqa: PLC0415
-    from weld_twin_msgs_py.bags import write_recording  # noqa: PLC0415
-    from weld_twin_msgs_py.tables import TableOptions, read_table  # noqa: PLC0415
+    from weld_twin_core.metrics import deviation_metrics
+    from weld_twin_core.twin import Twin
+    from weld_twin_msgs_py.bags import write_recording
+    from weld_twin_msgs_py.tables import TableOptions, read_table
 
     robot = robot_of(args)
     options = TableOptions(**{f.name: getattr(args, f.name) for f in fields(TableOptions)})
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write_deviations(args: argparse.Namespace, recording: object, off: object) -> None:
-    from weld_twin_nodes import stations  # noqa: PLC0415
+    from weld_twin_nodes import stations
 
     if args.table:
         stations.write_table(args.table, recording, off)

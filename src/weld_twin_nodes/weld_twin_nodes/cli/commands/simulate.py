@@ -25,7 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--profile', default='smooth',
         help='time law: constant, trapezoid, s-curve, smooth, aggressive (default: smooth)',
     )  # fmt: skip
-    parser.add_argument('--speed', type=float, default=0.0, metavar='M/S', help='travel speed')
+    parser.add_argument('--speed', type=float, default=0.0, metavar='M/S',
+                        help='travel speed; left out, as fast as the profile and the joints go')
     parser.add_argument('--rate', type=float, default=125.0, metavar='HZ', help='samples a second')
     parser.add_argument('--seed', type=int, default=0, help='of the measurement noise')
     parser.add_argument(
@@ -53,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
     )  # fmt: skip
     made = {'path': args.path, 'profile': args.profile, 'rate_hz': args.rate}
     metrics = write_simulation(args.out, simulation, storage=args.storage, provenance=made)
+    if plan.report.slowed > 1.0:
+        print(f'slowed down {plan.report.slowed:.2f} times, as the joint limits demand')
     print(
         f'{args.out}: {plan.motion.t.size} joint states in {plan.report.duration:.1f} s along '
         f'{plan.length:.3f} m; deviation RMS {metrics["RMS"] * 1e3:.4f} mm, '

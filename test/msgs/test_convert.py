@@ -83,7 +83,8 @@ def test_a_quarter_turn_about_z_takes_x_to_y(make):
 
 
 def test_rotations_survive_the_message(make):
-    for matrix in Rotation.random(20, random_state=3).as_matrix():
+    halves = [np.diag(d) for d in ([1.0, -1, -1], [-1.0, 1, -1], [-1.0, -1, 1])]
+    for matrix in [*Rotation.random(200, random_state=3).as_matrix(), np.eye(3), *halves]:
         _, back = convert.pose(make.pose(NS, np.zeros(3), matrix))
         np.testing.assert_allclose(back, matrix, atol=1e-15)
 

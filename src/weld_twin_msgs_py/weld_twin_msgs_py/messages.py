@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.rotation import quaternion_from_matrix
 
 from .convert import NANOSECONDS
 
@@ -68,7 +67,7 @@ class Messages:
 
     def pose(self, ns: int, position: Array, rotation: Array, frame_id: str = 'base') -> Any:
         """Return a PoseStamped from position (3,) [m] and rotation (3, 3)."""
-        x, y, z, w = (float(v) for v in quaternion_from_matrix(rotation))
+        x, y, z, w = _quaternion(rotation)
         turned = self._make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
         inner = self._make(
             'geometry_msgs/msg/Pose', position=self._xyz('Point', position), orientation=turned
@@ -124,6 +123,38 @@ class Messages:
         return self._make(
             'diagnostic_msgs/msg/DiagnosticArray', header=self.header(ns, ''), status=[status]
         )
+
+
+def _quaternion(rotation: Array) -> list[float]:
+    """
+    Return the quaternion x y z w, w >= 0, of one rotation (3, 3).
+
+    In plain numbers, because a live node makes one per sample and scipy takes a third of a
+    millisecond for it.
+
+    References
+    ----------
+    .. [1] S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1, 1978.
+
+    """
+    r = rotation.tolist()
+    squares = [1.0 + 2.0 * r[k][k] - r[0][0] - r[1][1] - r[2][2] for k in range(3)]
+    squares.append(1.0 + r[0][0] + r[1][1] + r[2][2])
+    largest = max(range(4), key=squares.__getitem__)  # dividing by it loses no digits
+    out = [0.0] * 4
+    out[largest] = squares[largest]
+    if largest == 3:
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            out[k] = r[j][i] - r[i][j]
+    else:
+        i, j = (largest + 1) % 3, (largest + 2) % 3
+        out[i] = r[i][largest] + r[largest][i]
+        out[j] = r[j][largest] + r[largest][j]
+        out[3] = r[j][i] - r[i][j]
+    length = sum(value * value for value in out) ** 0.5
+    sign = -1.0 if out[3] < 0.0 else 1.0
+    return [sign * value / length for value in out]
 
 
 def _text(value: Any) -> str:

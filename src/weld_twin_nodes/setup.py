@@ -10,7 +10,7 @@ setup(
     name=NAME,
     version='0.1.0',
     packages=find_packages(),
-    package_data={NAME: ['py.typed', '**/*.yaml', '**/*.csv', '**/*.html']},
+    package_data={NAME: ['py.typed', '**/*.yaml', '**/*.csv', '**/*.css', '**/*.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
@@ -32,6 +32,7 @@ setup(
             'forward_kinematics_twin = weld_twin_nodes.twin:main',
             'deviation_analyzer = weld_twin_nodes.deviation_analyzer:main',
             'recorder = weld_twin_nodes.recorder:main',
+            'live_diagnosis = weld_twin_nodes.live_diagnosis:main',
         ]
     },
 )

@@ -105,6 +105,10 @@ DEVIATION_METRICS = _result(
     '/deviation/metrics', 'diagnostic_msgs/msg/DiagnosticArray', 10,
     'D(t), D_norm, D_cum, RMS, max, samples, dropped',
 )  # fmt: skip
+DIAGNOSIS = _result(
+    '/diagnosis', 'diagnostic_msgs/msg/DiagnosticArray', 10,
+    'verdict over the last minute: status, effects found, gap before and after',
+)  # fmt: skip
 TOOL_WRENCH = _stream(
     '/tool_wrench', 'geometry_msgs/msg/WrenchStamped', 100,
     'load on the tool, in the tool frame unless the header names another [N, N m]',
@@ -116,7 +120,7 @@ TEMPERATURE = _stream(
 
 TOPICS = (
     JOINT_STATES, ACTUAL_JOINT_STATES, MEASURED_POSE, MEASURED_POINT, MEASURED_SIGMA, TWIN_POSE,
-    DEVIATION, DEVIATION_METRICS, TOOL_WRENCH, TEMPERATURE,
+    DEVIATION, DEVIATION_METRICS, DIAGNOSIS, TOOL_WRENCH, TEMPERATURE,
 )  # fmt: skip
 BY_NAME = {topic.name: topic for topic in TOPICS}
 

@@ -23,7 +23,7 @@ from .turns import TURN, turns_to_middle
 
 _KNOTS = 64
 """Samples a numerical solution is followed over; between them a spline is the start."""
-_TRACKED = 12
+_TRACKED = 6
 """Postures at the first sample that are followed along the path."""
 _SINGULAR = 1e-8
 """Determinant of the Jacobian below which a closed form loses digits."""

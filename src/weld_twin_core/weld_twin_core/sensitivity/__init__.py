@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which tolerance to tighten: local and global sensitivity, the tolerance stack, advice."""
+
+from .advice import (
+    Placement,
+    PlacementResult,
+    ProfileResult,
+    Room,
+    advise,
+    compare_profiles,
+    expected_deviation,
+    expected_rms,
+)
+from .distribution import Distribution
+from .evaluate import Model, draws_at, exact_deviations, model
+from .local import LocalSensitivity, Posture, arc_weights, local_sensitivity, posture
+from .morris import Screening, morris_screening
+from .outcome import Outcomes, outcomes
+from .scenario import Sizes, cumulative, scenario_deviations
+from .sobol import SobolDesign, SobolIndices, sobol_indices
+from .stack import Probability, ToleranceStack, WeldTolerance, probabilities, tolerance_stack
+from .study import POINTS, Study, planned_study, recorded_study, study_of_plan, with_known
+from .sweep import Sweep, default_values, end_of_linearity, sweep, together
+from .tolerance import (
+    FAMILIES,
+    Tolerance,
+    default_tolerances,
+    scaled,
+    tolerances_from_list,
+    with_draws,
+)
+
+__all__ = [
+    'FAMILIES', 'POINTS', 'Distribution', 'LocalSensitivity', 'Model', 'Outcomes', 'Placement',
+    'PlacementResult', 'Posture', 'Probability', 'ProfileResult', 'Room', 'Screening', 'Sizes',
+    'SobolDesign', 'SobolIndices', 'Study', 'Sweep', 'Tolerance', 'ToleranceStack',
+    'WeldTolerance', 'advise', 'arc_weights', 'compare_profiles', 'cumulative',
+    'default_tolerances', 'default_values', 'draws_at', 'end_of_linearity', 'exact_deviations',
+    'expected_deviation', 'expected_rms', 'local_sensitivity', 'model', 'morris_screening',
+    'outcomes', 'planned_study', 'posture', 'probabilities', 'recorded_study', 'scaled',
+    'scenario_deviations', 'sobol_indices', 'study_of_plan', 'sweep', 'together',
+    'tolerance_stack', 'tolerances_from_list', 'with_draws', 'with_known',
+]  # fmt: skip

@@ -1,0 +1,8 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's claims: what is measured on each robot and seam, and what that says of each."""
+
+from .case import Case, measure_case
+from .judge import CaseName, Claim, judge
+
+__all__ = ['Case', 'CaseName', 'Claim', 'judge', 'measure_case']

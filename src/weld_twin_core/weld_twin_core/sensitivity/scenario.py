@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's error scenarios (IV.ii to IV.vi): each source alone, and all of them together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..effects import Effect
+from ..effects.backlash import Backlash
+from ..effects.base_pose import BasePose
+from ..effects.joint_offset import JointOffset
+from ..effects.link_length import LinkLength
+from ..robot import Robot
+from .study import Study
+from .sweep import DEGREE
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """
+    Errors of the scenarios; the same on every joint.
+
+    Attributes
+    ----------
+    offset : float [rad]
+    length : float [m]
+    initial : float [m]
+        Size of the initialization offset, along the diagonal of the world frame.
+    width : float [rad]
+
+    """
+
+    offset: float = 0.05 * DEGREE
+    length: float = 1e-4
+    initial: float = 5e-4
+    width: float = 0.03 * DEGREE
+
+
+def sources(robot: Robot, sizes: Sizes | None = None) -> dict[str, tuple[Effect, ...]]:
+    """Return the effects of every source of the combined scenario."""
+    size = sizes or Sizes()
+    joints = robot.joint_names
+    return {
+        'angular': tuple(JointOffset(joint, size.offset) for joint in joints),
+        'link length': tuple(LinkLength(joint, size.length) for joint in joints),
+        'initialization': (BasePose(xyz=np.full(3, size.initial / np.sqrt(3.0))),),
+        'backlash': tuple(Backlash(joint, size.width) for joint in joints),
+    }
+
+
+def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, Array]:
+    """Return deviations (N, 3) [m] in seam axes of every source alone, and 'combined'."""
+    each = sources(study.robot, sizes)
+    out = {name: study.deviations((*study.known, *effects)) for name, effects in each.items()}
+    every = tuple(effect for effects in each.values() for effect in effects)
+    return {**out, 'combined': study.deviations((*study.known, *every))}
+
+
+def cumulative(deviations: Array) -> Array:
+    """Return D_cum up to every sample (paper, eq. III.iv), shape (N,) [m]."""
+    return np.cumsum(np.linalg.norm(deviations, axis=-1))

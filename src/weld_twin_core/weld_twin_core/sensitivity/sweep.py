@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Sweeps: the deviation over the size of one error, and where it stops being proportional."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from .evaluate import exact_deviations
+from .study import Study
+from .tolerance import Tolerance
+
+DEGREE = np.pi / 180.0
+RANGES: dict[str, tuple[float, float]] = {
+    'joint_offset': (0.01 * DEGREE, 0.5 * DEGREE),
+    'link_length': (0.0, 0.5e-3),
+    'link_twist': (0.01 * DEGREE, 0.5 * DEGREE),
+    'backlash': (0.0, 0.1 * DEGREE),
+    'base_pose': (0.0, 1e-3),
+}
+"""First and last size swept; those of offsets and lengths are the paper's (III.v)."""
+BENT = 0.01
+"""Departure from proportion that counts as the end of linearity."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """
+    The deviation over the size of one error.
+
+    Attributes
+    ----------
+    name, unit : str
+    values : array, shape (K,) [unit]
+    max_m, mean_m : array, shape (K,) [m]
+    linear_m : array, shape (K,) [m]
+        Largest deviation if it were proportional, from the slope at no error.
+    length : float [m]
+
+    """
+
+    name: str
+    unit: str
+    values: Array
+    max_m: Array
+    mean_m: Array
+    linear_m: Array
+    length: float
+
+    @property
+    def departure(self) -> Array:
+        """Return how far D is above proportion, as a part of it, shape (K,); negative below."""
+        safe = np.where(self.linear_m > 0.0, self.linear_m, 1.0)
+        return np.where(self.linear_m > 0.0, self.max_m / safe - 1.0, 0.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers and lists."""
+        return {
+            'name': self.name, 'unit': self.unit, 'values': self.values.tolist(),
+            'd_norm': (self.max_m / self.length).tolist(), 'max_m': self.max_m.tolist(),
+            'mean_m': self.mean_m.tolist(), 'departure': self.departure.tolist(),
+        }  # fmt: skip
+
+
+def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
+    """Return the deviation over the size of one error."""
+    return together(study, (tolerance,), values, tolerance.name)
+
+
+def together(study: Study, tolerances: Sequence[Tolerance], values: Array, name: str) -> Sweep:
+    """Return the deviation over the size of several errors that are all equal."""
+    # The slope at no error, from an error too small to bend and large enough to compute.
+    small = 1e-4 * float(np.abs(values).max())
+    sizes = np.concatenate([[small], np.asarray(values, dtype=np.float64)])
+    draws = np.repeat(sizes[:, None], len(tolerances), axis=1)
+    distance = np.linalg.norm(exact_deviations(study, tolerances, draws), axis=-1)
+    largest = distance.max(axis=-1)
+    return Sweep(
+        name, tolerances[0].unit, sizes[1:], largest[1:], distance[1:].mean(axis=-1),
+        largest[0] / small * np.abs(sizes[1:]), study.length,
+    )  # fmt: skip
+
+
+def default_values(tolerance: Tolerance, count: int = 25) -> Array:
+    """Return the sizes swept for an error: the paper's range, or up to three times typical."""
+    last = 3.0 * (abs(tolerance.distribution.mean) + tolerance.distribution.std)
+    ends = RANGES.get(tolerance.effect, (0.0, last))
+    if tolerance.effect == 'base_pose' and tolerance.parameter == 'rotvec':
+        ends = RANGES['joint_offset']
+    return np.linspace(*ends, count)
+
+
+def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -> float | None:
+    """Return the smallest error at which D departs from proportion by `BENT`, None beyond."""
+    found = sweep(study, tolerance, np.geomspace(1e-3 * largest, largest, 121))
+    bent = np.abs(found.departure) > BENT
+    return float(found.values[np.argmax(bent)]) if bent.any() else None

@@ -128,6 +128,18 @@ def test_points_are_read_where_there_are_no_poses(tmp_path, robot, recording):
     assert back.sigma is None
 
 
+def test_poses_win_over_points_with_a_note(tmp_path, robot):
+    make = bag_messages()
+    pose = make.pose(SECOND, np.ones(3), np.eye(3))
+    point = make.point(SECOND, np.zeros(3))
+    write_messages(tmp_path / 'bag', [
+        *joint_states([SECOND]), ('/measured/tool_point', point), ('/measured/tool_pose', pose),
+    ])  # fmt: skip
+    back = read_recording(tmp_path / 'bag', robot)
+    np.testing.assert_array_equal(back.measured.position, np.ones((1, 3)))
+    assert "'/measured/tool_pose' is used, '/measured/tool_point' beside it is not" in back.notes
+
+
 def test_results_are_written_beside_the_inputs(tmp_path, robot, recording):
     m = recording.measured
     n = recording.joints.t.size

@@ -76,7 +76,7 @@ def read_recording(
         roles = _roles(robot, names, bag.topics)
         streams = {topic: Stream(topic, role.width) for topic, role in roles.items()}
         passed = _fill(bag, roles, streams, names.joints, robot)
-        made = bag.provenance
+        made, points = bag.provenance, bag.topics.get(names.point, ('', 0))[1]
     if not len(streams[names.joints]) and not streams[names.joints].unstamped:
         raise DataError(
             f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
@@ -84,6 +84,8 @@ def read_recording(
         )
     samples = {topic: stream.samples() for topic, stream in streams.items()}
     notes = [note for item in samples.values() for note in item.notes]
+    if names.pose in samples and points:
+        notes.append(f"'{names.pose}' is used, '{names.point}' beside it is not")
     if passed:
         notes.append(f"{passed} messages of '{names.joints}' hold no joint of the robot")
     frames = streams[names.wrench].frames if names.wrench in streams else set()

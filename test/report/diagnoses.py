@@ -130,7 +130,8 @@ def _where(robot, found, lines, recordings):
 def _candidates(robot, found, before, after):
     out = [Candidate(Site(e.name, e.site), 0.9 / (k + 1), after, 1 - after / before)
            for k, e in enumerate(found[:3])]  # fmt: skip
-    return (*out, Candidate(Site('joint_compliance', robot.joint_names[1]), 0.004, 0.7 * before, 0.3))
+    last = Site('joint_compliance', robot.joint_names[1])
+    return (*out, Candidate(last, 0.004, 0.7 * before, 0.3))
 
 
 def backlash():
@@ -150,8 +151,8 @@ def ambiguous():
     return diagnosis(
         'ambiguous', robot, true, true, [moving(robot, 'line', 'smooth')], confidence=0.93,
         indistinguishable=(pair,),
-        reasons=(f'Turning the base about the axis of {first} and offsetting {first} move the tool '
-                 'alike at every sample.',),
+        reasons=(f'Turning the base about the axis of {first} and offsetting {first} move the '
+                 'tool alike at every sample.',),
         next_experiment={'why': 'Only the base can be surveyed apart from the arm.',
                          'measure': 'three reference points on the pedestal', 'stations': 3},
         actions=(f'Survey the base, then re-master {first} if it is not at fault.',),

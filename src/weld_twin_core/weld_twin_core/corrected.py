@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Constant effects written into the robot model, for controllers that load numbers, not effects."""
+"""Constant effects written into the robot model, for controllers that load numbers only."""
 
 from __future__ import annotations
 

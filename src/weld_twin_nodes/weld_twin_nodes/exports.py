@@ -17,7 +17,7 @@ from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
 from weld_twin_msgs_py.yaml_file import yaml_text
 
 _EVERYTHING = '# Every effect of the twin; goes with the nominal robot.\n'
-_LEFT_OVER = '# What the numbers of robot.yaml cannot hold; goes with that robot, not the nominal.\n'
+_LEFT_OVER = '# What the corrected robot.yaml cannot hold; goes with it, not with the nominal one.\n'
 
 
 def write_yaml(path: Path, model: Model) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import Recording
 from weld_twin_core.robot import Robot

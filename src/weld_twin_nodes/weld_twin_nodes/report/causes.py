@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, millimetres, odds, parameter_rows, percent
@@ -24,20 +24,22 @@ def causes_section(diagnosis: Diagnosis) -> Html:
 def _found(diagnosis: Diagnosis) -> Html:
     if not diagnosis.effects:
         return tag('p', 'No effect was put into the twin.')
-    alone = dict(diagnosis.shrink.alone)
+    heads = ['Effect', 'Parameter', 'Value ± standard error']
+    alone = [_alone(diagnosis, found) for found in diagnosis.effects]
+    told = any(left is not None for left in alone)
     rows: list[list[Child]] = []
-    for found in diagnosis.effects:
-        site = found_name(found)
-        after = _looked_up(alone, found.effect.name, found.effect.site)
+    for found, left in zip(diagnosis.effects, alone, strict=True):
         for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
-            left = millimetres(after) if k == 0 else ''
-            rows.append([site if k == 0 else '', name, value, left])
-    heads = ('Effect', 'Parameter', 'Value ± standard error', 'Left if only this is mended')
+            row: list[Child] = [found_name(found) if k == 0 else '', name, value]
+            rows.append(row + [millimetres(left) if k == 0 else ''] * told)
+    heads += ['Left if only this is mended'] * told
     return joined([tag('h3', 'Effects found'), table(heads, rows, 'effects')])
 
 
-def _looked_up(alone: dict[str, float], effect: str, joint: str | None) -> float | None:
-    return alone.get(f'{effect} of {joint}' if joint else effect)
+def _alone(diagnosis: Diagnosis, found: Found) -> float | None:
+    """Return the gap [m] left if only one effect were mended, where it is known by itself."""
+    site = Site(found.effect.name, found.effect.site)
+    return dict(diagnosis.shrink.alone).get(str(site))
 
 
 def _candidates(diagnosis: Diagnosis) -> Html | None:
@@ -53,7 +55,7 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
     more = len(diagnosis.candidates) - len(shown)
     note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
     return joined([
-        tag('h3', 'Candidates for the leading effect, with their probabilities'),
+        tag('h3', 'Candidates and their probabilities'),
         bars(rows, 'wide'), note,
     ])  # fmt: skip
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_msgs_py.outputs import write_text

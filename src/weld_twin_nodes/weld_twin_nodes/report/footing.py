@@ -63,8 +63,10 @@ def checks_section(diagnosis: Diagnosis) -> Html:
             tag('span', tag('b', recording.name), ' ', note))
         for recording in diagnosis.recordings for note in recording.notes
     ]  # fmt: skip
+    found = tag('ul', *items, *notes, class_='checks')
     return section(
-        'Are the data sound', tag('ul', *items, *notes, class_='checks'), id_='checks',
+        'Are the data sound', found if items or notes else tag('p', 'Nothing stood out.'),
+        id_='checks',
         lead='Looked at before any cause was.',
     )
 

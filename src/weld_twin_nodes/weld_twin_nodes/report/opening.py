@@ -9,7 +9,7 @@ from datetime import datetime, timezone
 from weld_twin_core.diagnosis.result import Diagnosis
 
 from .html import Html, tag
-from .quantities import millimetres, milliradians, odds, percent
+from .quantities import interval, millimetres, milliradians, odds, percent
 from .words import STATUS, verdict
 
 _SURE_OF = {
@@ -54,13 +54,12 @@ def opening(diagnosis: Diagnosis) -> Html:
 
 def _figures(diagnosis: Diagnosis) -> Html:
     gap, shrink = diagnosis.gap, diagnosis.shrink
-    low, high = shrink.ci95
     rows = [
         ('Gap', millimetres(gap.rms_m), f'RMS of {gap.samples} samples; '
          f'{millimetres(gap.max_m)} at most'),
         ('Left over', millimetres(shrink.rms_after_m),
          f'{percent(shrink.ratio)} of it on unseen data '
-         f'({_interval(low, high)})'),
+         f'({interval(shrink)})'),
         ('Noise floor', millimetres(gap.noise_floor_m), 'what the data cannot resolve'),
     ]  # fmt: skip
     if diagnosis.status in _SURE_OF:
@@ -72,10 +71,6 @@ def _figures(diagnosis: Diagnosis) -> Html:
         for name, value, note in rows
     ]
     return tag('dl', *cells, class_='figures')
-
-
-def _interval(low: float, high: float) -> str:
-    return f'95 % interval {100 * low:.0f} to {100 * high:.0f} %'
 
 
 def _actions(diagnosis: Diagnosis) -> Html | None:

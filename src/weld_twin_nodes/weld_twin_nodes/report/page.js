@@ -252,6 +252,9 @@
   redraw();
   new ResizeObserver(later).observe(document.querySelector('.panels'));
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', later);
-  window.addEventListener('beforeprint', redraw);
+  window.addEventListener('beforeprint', () => {
+    document.querySelectorAll('details').forEach((item) => { item.open = true; });
+    redraw();
+  });
   window.addEventListener('afterprint', later);
 })();

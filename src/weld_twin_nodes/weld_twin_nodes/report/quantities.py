@@ -7,7 +7,11 @@ from __future__ import annotations
 from math import floor, isfinite, log10
 from typing import Any
 
-from weld_twin_core.effects import Effect
+import numpy as np
+
+from weld_twin_core.diagnosis.result import Shrink
+from weld_twin_core.effects import Effect, Parameter
+from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 
 _BY_UNIT = {
     'm': (1e3, 'mm'), 'rad': (1e3, 'mrad'), 's': (1e3, 'ms'), 'm/s': (1e6, 'µm/s'),
@@ -16,6 +20,7 @@ _BY_UNIT = {
 }  # fmt: skip
 _BY_NAME = {'phase': (1.0, 'rad'), 'scale': (1e6, 'ppm'), 'ratio': (1e6, 'ppm')}
 MISSING = '\N{EN DASH}'
+_GAP = '\N{NO-BREAK SPACE}'
 
 
 def millimetres(metres: float | None) -> str:
@@ -24,25 +29,31 @@ def millimetres(metres: float | None) -> str:
         return MISSING
     value = 1e3 * metres
     if 0.0 < abs(value) < 0.0005:
-        return '< 0.001 mm'
-    return f'{value:.{2 if abs(value) >= 10.0 else 3}f} mm'
+        return f'<{_GAP}0.001{_GAP}mm'
+    return f'{value:.{2 if abs(value) >= 10.0 else 3}f}{_GAP}mm'
 
 
 def milliradians(radians: float | None) -> str:
     """Return an angle as '0.42 mrad'."""
     if radians is None or not isfinite(radians):
         return MISSING
-    return f'{1e3 * radians:.3f} mrad'
+    return f'{1e3 * radians:.3f}{_GAP}mrad'
 
 
 def percent(share: float) -> str:
     """Return a share as '93 %'; never 0 or 100 for what is only close to it."""
     value = 100.0 * share
     if 0.0 < value < 0.5:
-        return '< 1 %'
+        return f'<{_GAP}1{_GAP}%'
     if 99.5 < value < 100.0:
-        return '> 99 %'
-    return f'{value:.0f} %'
+        return f'>{_GAP}99{_GAP}%'
+    return f'{value:.0f}{_GAP}%'
+
+
+def interval(shrink: Shrink) -> str:
+    """Return how sure the ratio of after to before is."""
+    low, high = shrink.ci95
+    return f'95{_GAP}% interval {100 * low:.0f} to {percent(high)}'
 
 
 def odds(probability: float) -> str:
@@ -60,26 +71,47 @@ def uncertain(value: float, std: float | None, factor: float = 1.0, unit: str = 
     value = factor * value
     tail = f' {unit}' if unit else ''
     if std is None or not isfinite(std) or std <= 0.0:
-        return f'{value:.4g}{tail}'
+        return f'{_signed(f"{value:.4g}")}{tail}'
     std = factor * std
     places = min(max(1 - floor(log10(std)), 0), 9)
-    return f'{value:.{places}f} ± {std:.{places}f}{tail}'
+    return f'{_signed(f"{value:.{places}f}")} ± {std:.{places}f}{tail}'
+
+
+def _signed(number: str) -> str:
+    return number.replace('-', '\N{MINUS SIGN}')
 
 
 def parameter_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return name and value of every component of an effect's parameters."""
-    out = []
-    for parameter, k in effect.components():
-        value, error = getattr(effect, parameter.name), std.get(parameter.name)
-        name = parameter.name
-        if k is not None:
-            name = f'{name} {"xyz"[k] if parameter.size == 3 else k + 1}'
-            value = value[k]
-            error = error[k] if isinstance(error, list | tuple) and k < len(error) else None
-        factor, unit = display_unit(parameter.name, parameter.unit)
-        number = None if error is None or isinstance(error, list | tuple) else float(error)
-        out.append((name, uncertain(float(value), number, factor, unit)))
-    return out
+    """Return name and value of every parameter of an effect; a ripple has a row per order."""
+    if isinstance(effect, TransmissionRipple):
+        return _orders(effect, std)
+    return [
+        (p.name, _shown(p, getattr(effect, p.name), std.get(p.name))) for p in effect.parameters
+    ]
+
+
+def _shown(parameter: Parameter, value: Any, std: Any) -> str:
+    factor, unit = display_unit(parameter.name, parameter.unit)
+    if np.ndim(value) == 0:
+        return uncertain(float(value), None if np.ndim(std) else std, factor, unit)
+    errors = std if np.ndim(std) and len(std) == len(value) else [None] * len(value)
+    parts = [uncertain(float(v), e, factor) for v, e in zip(value, errors, strict=True)]
+    return f'{", ".join(parts)} {unit}'.rstrip()
+
+
+def _orders(ripple: TransmissionRipple, std: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return amplitude and phase for every order, the largest first."""
+    columns = [np.atleast_1d(getattr(ripple, p.name)).tolist() for p in ripple.parameters]
+    errors = [
+        np.atleast_1d(std[key]).tolist() if key in std else [None] * len(columns[0])
+        for key in ('amplitude', 'phase')
+    ]
+    rows = sorted(zip(*columns, *errors, strict=True), key=lambda row: -row[0])
+    return [
+        (f'order {order:g}', f'{uncertain(size, error, 1e3, "mrad")} at '
+         f'{uncertain(phase, turn, 1.0, "rad")}')
+        for size, order, phase, error, turn in rows
+    ]  # fmt: skip
 
 
 def display_unit(name: str, unit: str) -> tuple[float, str]:

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .causes import leftover
 from .html import Html, section, tag
-from .quantities import millimetres
+from .quantities import interval, millimetres, percent
 from .words import cause
 
 _STEPS = 12
@@ -25,12 +25,15 @@ def shrink_section(diagnosis: Diagnosis) -> Html:
     shrink = diagnosis.shrink
     charts = [_chart(diagnosis, k) for k in range(min(len(diagnosis.traces.t), _RECORDINGS))]
     more = len(diagnosis.traces.t) - len(charts)
-    note = tag('p', f'{more} more recordings look on in diagnosis.json.') if more > 0 else None
+    note = tag('p', f'{more} more recordings are not drawn.', class_='note') if more > 0 else None
+    judged = (
+        f'Judged on {shrink.held_out}, {percent(shrink.ratio)} of the gap is left '
+        f'({interval(shrink)}).'
+    )
     return section(
-        'How far it shrinks', _waterfall(diagnosis), tag('h3', 'Deviation over time'),
-        _key(), *charts, note, leftover(diagnosis), id_='shrink',
-        lead=f'RMS gap on data not used for fitting ({shrink.held_out}), as each effect is put '
-        'into the twin in turn.',
+        'How far it shrinks', _waterfall(diagnosis), tag('p', judged),
+        tag('h3', 'Deviation over time'), _key(), *charts, note, leftover(diagnosis), id_='shrink',
+        lead='RMS gap as each effect is put into the twin in turn, on data not used for fitting.',
     )  # fmt: skip
 
 

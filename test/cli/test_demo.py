@@ -41,7 +41,7 @@ def test_the_demo_leaves_bag_table_and_picture_that_agree(tmp_path):
     np.testing.assert_allclose(
         np.linalg.norm(seam, axis=1), np.linalg.norm(off, axis=1), rtol=1e-8
     )
-    assert [e['effect'] for e in provenance(out / 'bag')['effects']][0] == 'backlash'
+    assert provenance(out / 'bag')['effects'][0]['effect'] == 'backlash'
     rms = np.sqrt((off**2).sum(axis=1).mean()) * 1e3
     assert f'{rms:8.4f} mm' in (out / 'summary.txt').read_text()
     assert (out / 'seam.png').read_bytes().startswith(b'\x89PNG')

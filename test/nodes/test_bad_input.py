@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from weld_twin_core.chain import forward
 from weld_twin_core.twin import Twin
 from weld_twin_msgs_py import convert

@@ -8,6 +8,7 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
+
 from weld_twin_core import catalog
 from weld_twin_msgs_py import convert
 from weld_twin_msgs_py.bags import BagReader, provenance
@@ -116,7 +117,7 @@ def test_the_recorded_bag_says_how_it_came_about(live_and_offline):
     assert made['seed'] == 7
     assert made['version']
     assert made['effects'] == provenance(offline)['effects']
-    assert [e['effect'] for e in made['effects']][0] == 'backlash'
+    assert made['effects'][0]['effect'] == 'backlash'
 
 
 def test_another_tool_opens_the_recorded_bag(live_and_offline):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from weld_twin_core.errors import DataError
 from weld_twin_core.metrics import deviation_metrics
 from weld_twin_nodes.order import RESTART_AFTER, Forward

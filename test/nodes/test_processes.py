@@ -14,6 +14,7 @@ from mcap.exceptions import EndOfFile
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from rosgraph_msgs.msg import Clock
+
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py import convert
 from weld_twin_nodes.harness import Cell, CellTimeout

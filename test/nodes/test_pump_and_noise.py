@@ -3,6 +3,7 @@
 """Pacing and noise: the parts of the live cell that decide when and how much."""
 
 import numpy as np
+
 from weld_twin_core.effects.measurement_noise import MeasurementNoise
 from weld_twin_nodes.noise import Noise
 from weld_twin_nodes.pump import Pump

@@ -26,7 +26,7 @@ LOOP = 0.25
 
 def executor() -> Executor:
     """Return the events executor, a third of the others' cost per message, where there is one."""
-    try:
+    try:  # it came with an update of Jazzy
         from rclpy.experimental import EventsExecutor
     except ImportError:
         return SingleThreadedExecutor()

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The tree as a colcon workspace: built, then each executable started as `ros2 run` does."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+pytest.importorskip('colcon_core', reason='needs colcon')
+
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.harness.process import MODULES
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes']
+NODES = list(MODULES)
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope='module')
+def workspace(tmp_path_factory) -> Path:
+    """Build the three packages away from the tree; return the folder with ``install``."""
+    folder = tmp_path_factory.mktemp('ws')
+    subprocess.run(
+        [sys.executable, '-m', 'colcon', '--log-base', 'log', 'build',
+         '--base-paths', str(ROOT / 'src'), '--build-base', 'build', '--install-base', 'install'],
+        cwd=folder, check=True, capture_output=True, text=True, env=os.environ | {
+            'PYTHONPATH': '', 'PATH': f'{Path(sys.executable).parent}:{os.environ["PATH"]}'},
+    )  # fmt: skip
+    return folder
+
+
+@pytest.fixture(scope='module')
+def sourced(workspace) -> dict[str, str]:
+    """Return the environment after ``source install/setup.bash``."""
+    script = f'source {shlex.quote(str(workspace / "install/setup.bash"))} && env -0'
+    clean = {k: v for k, v in os.environ.items() if k != 'PYTHONPATH'}
+    out = subprocess.run(
+        ['bash', '-c', script], check=True, capture_output=True, text=True, env=clean
+    ).stdout
+    return dict(item.split('=', 1) for item in out.split('\0') if '=' in item)
+
+
+def test_colcon_finds_exactly_the_three_packages():
+    found = subprocess.run(
+        [sys.executable, '-m', 'colcon', 'list', '--names-only'],
+        cwd=ROOT, check=True, capture_output=True, text=True,
+    ).stdout.split()  # fmt: skip
+    assert sorted(found) == PACKAGES
+
+
+def test_each_package_is_in_the_index_with_its_files(workspace):
+    for name in PACKAGES:
+        share = workspace / 'install' / name / 'share'
+        assert (share / 'ament_index/resource_index/packages' / name).is_file()
+        assert (share / name / 'package.xml').is_file()
+    share = workspace / 'install/weld_twin_nodes/share/weld_twin_nodes'
+    assert (share / 'launch/demo.launch.py').is_file()
+    assert (share / 'config/demo.yaml').is_file()
+
+
+def test_each_node_runs_as_installed_with_the_parameter_file(workspace, sourced, tmp_path):
+    installed = workspace / 'install/weld_twin_nodes'
+    config = installed / 'share/weld_twin_nodes/config/demo.yaml'
+    with Cell(tmp_path / 'cell') as cell:
+        own = {k: v for k, v in os.environ.items() if k.startswith('ROS_')}
+        started = {}
+        for name in NODES:
+            command = [str(installed / 'lib/weld_twin_nodes' / name), '--ros-args',
+                       '--params-file', str(config)]  # fmt: skip
+            if name == 'recorder':
+                command += ['-p', f'out:={tmp_path / "bag"}']
+            assigned = [f'{k}={v}' for k, v in {**sourced, **own}.items()]
+            started[name] = cell.start(['env', '-i', *assigned, *command])
+        cell.wait(
+            lambda: set(NODES) <= set(cell.node.get_node_names()), 'the installed nodes', 30.0
+        )
+        deviations = cell.collect('/deviation')
+        cell.wait(lambda: len(deviations) > 0, 'a deviation', 30.0)
+        for process in started.values():
+            process.interrupt()
+        codes = {name: process.end() for name, process in started.items()}
+        assert codes == dict.fromkeys(NODES, 0)
+    assert (tmp_path / 'bag/metadata.yaml').is_file()
+
+
+def test_the_command_line_runs_as_installed(workspace, sourced):
+    program = workspace / 'install/weld_twin_nodes/lib/weld_twin_nodes/weld-twin'
+    out = subprocess.run(
+        [program, 'info', '--robots'], env=sourced, capture_output=True, text=True
+    )
+    assert out.returncode == 0, out.stderr
+    assert 'franka_panda' in out.stdout

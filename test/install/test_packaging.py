@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One version, one description of each package, and no import that nothing asks for."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from weld_twin_core import __version__
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    tomllib = pytest.importorskip('tomli')
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes']
+PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
+MODULES = {
+    'PyYAML': 'yaml', 'urdf-parser-py': 'urdf_parser_py', 'pin': 'pinocchio', 'SALib': 'SALib',
+}  # fmt: skip
+"""Modules of the distributions that are called otherwise."""
+ROS = {
+    'ament_index_python', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros',
+    'rcl_interfaces', 'rclpy', 'rosgraph_msgs', 'sensor_msgs', 'std_srvs',
+}  # fmt: skip
+
+
+def setup_keywords(package):
+    tree = ast.parse((ROOT / 'src' / package / 'setup.py').read_text())
+    call = next(
+        node for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and getattr(node.func, 'id', '') == 'setup'
+    )  # fmt: skip
+    return {item.arg: item.value for item in call.keywords}
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_package_xml_and_setup_py_agree(package):
+    xml = ElementTree.parse(ROOT / 'src' / package / 'package.xml').getroot()
+    told = setup_keywords(package)
+    assert xml.findtext('name') == package
+    assert xml.findtext('version') == told['version'].value == __version__
+    assert xml.findtext('description') == told['description'].value
+    assert xml.findtext('license') == told['license'].value == 'Apache-2.0'
+    assert xml.findtext('export/build_type') == 'ament_python'
+
+
+def test_both_ways_of_installing_have_the_same_programs():
+    listed = setup_keywords('weld_twin_nodes')['entry_points']
+    programs = dict(line.split(' = ') for line in ast.literal_eval(listed)['console_scripts'])
+    assert programs == PROJECT['scripts']
+
+
+def imported(package, *, at_once=False):
+    """Yield the modules a package imports, or only those importing it brings in at once."""
+    for file in (ROOT / 'src' / package).rglob('*.py'):
+        tree = ast.parse(file.read_text())
+        for node in tree.body if at_once else ast.walk(tree):
+            if isinstance(node, ast.Import):
+                yield from (name.name.split('.')[0] for name in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                yield node.module.split('.')[0]
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_everything_imported_is_declared(package):
+    lists = [PROJECT['dependencies'], *PROJECT['optional-dependencies'].values()]
+    declared = {re.match(r'[\w.-]+', item).group() for items in lists for item in items}
+    known = {MODULES.get(name, name.replace('-', '_')) for name in declared} | {'setuptools'}
+    used = set(imported(package)) - sys.stdlib_module_names - set(PACKAGES)
+    assert used - known - (set() if package == 'weld_twin_core' else ROS) == set()
+
+
+@pytest.mark.parametrize(('package', 'forbidden'), [
+    ('weld_twin_core', {'weld_twin_msgs_py', 'weld_twin_nodes', 'rclpy', 'rosbags', 'yaml'}),
+    ('weld_twin_msgs_py', {'weld_twin_nodes'}),
+])  # fmt: skip
+def test_imports_point_one_way(package, forbidden):
+    assert set(imported(package)) & forbidden == set()
+
+
+def test_messages_and_bags_do_without_a_ros_installation():
+    assert set(imported('weld_twin_msgs_py', at_once=True)) & ROS == set()

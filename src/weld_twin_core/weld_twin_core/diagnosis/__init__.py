@@ -141,15 +141,11 @@ def _gap(found: Search, floor: float) -> Gap:
 
 
 def _effects(found: Search, unseen: Unseen, verdict: Verdict) -> tuple[Found, ...]:
-    """Return the effects named, those that bring most on unseen data first."""
+    """Return the effects named, those that move the tool most first."""
     if verdict.status in ('none', 'unknown') and not verdict.sets:
         return ()
     model = found.final.model
-    everything = list(range(len(model.found)))
-    after = unseen.rms(unseen.predict(everything))
-    worth = [
-        unseen.rms(unseen.predict([j for j in everything if j != k])) - after for k in everything
-    ]
+    worth = (unseen.targets[1:] ** 2).sum(axis=1)
     covariance = found.final.covariance(1.0 / _independent(found))
     named = {site for group in verdict.sets for site in group}
     at, out = 0, []

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import DataError
-from ..rotation import angle_between, transform
+from ..rotation import transform
 from .fit import fit, robust_scale
 from .problem import Model, Problem
 
@@ -40,7 +40,7 @@ TIE = 1e-6
 """Pull towards the given frames, relative; decides only what the data leave open."""
 MOST_ROWS = 3000
 ROUNDS = 15
-REACHES = (0.0, 0.15, 0.4)
+REACHES = (0.1, 0.4)
 """Lengths [m] of the tool vectors tried where only positions were measured."""
 
 
@@ -65,8 +65,7 @@ class Track:
         off: Array = np.linalg.norm(self.position - reached, axis=1)
         if self.rotation is None:
             return off
-        angle = angle_between(self.rotation, turn @ tool[:3, :3])
-        return np.asarray(off + LEVER * np.linalg.norm(angle, axis=1))
+        return off + LEVER * chord(self.rotation, turn @ tool[:3, :3])
 
     @property
     def turns(self) -> Array:
@@ -92,7 +91,22 @@ def initial_frames(problem: Problem, model: Model) -> Model:
             best = found
         if _gap(tracks, best) < NEAR:
             break
-    return _polished(few, best)
+    return refined(few, best)
+
+
+def rough_frames(problem: Problem, model: Model, *, thorough: bool = False) -> Model:
+    """Return the model with base and tool frames in closed form, both free."""
+    tracks = [_track(problem, model, k) for k in range(len(problem.recordings))]
+    return _base_and_tool(tracks, model, REACHES if thorough else ())
+
+
+def refined(problem: Problem, model: Model) -> Model:
+    """Return the frames after a robust least-squares fit of the frames in ``problem.align``."""
+    found, model = model.found, model.with_found(())
+    for _ in range(3):
+        scale = robust_scale(problem, problem.residuals(model))
+        model = fit(problem, model, scale, iterations=8).model
+    return model.with_found(found)
 
 
 def _attempts(align: frozenset[str]) -> list[Callable[[list[Track], Model], Model]]:
@@ -115,28 +129,27 @@ def _track(problem: Problem, model: Model, k: int) -> Track:
 
 
 def _gap(tracks: list[Track], model: Model) -> float:
-    tool = model.robot.T_flange_tool
-    gaps = [track.gap(base, tool) for track, base in zip(tracks, model.bases, strict=True)]
+    return _median_gap(tracks, model.bases, model.robot.T_flange_tool)
+
+
+def _median_gap(tracks: list[Track], bases: tuple[Array, ...], tool: Array) -> float:
+    gaps = [track.gap(base, tool) for track, base in zip(tracks, bases, strict=True)]
     return float(np.median(np.concatenate(gaps)))
-
-
-def _polished(problem: Problem, model: Model) -> Model:
-    """Return the frames after a robust least-squares fit of nothing else."""
-    found, model = model.found, model.with_found(())
-    for _ in range(3):
-        scale = robust_scale(problem, problem.residuals(model))
-        model = fit(problem, model, scale, iterations=8).model
-    return model.with_found(found)
 
 
 # One frame at a time ---------------------------------------------------------------------------
 
 
-def _base_only(tracks: list[Track], model: Model, rounds: int = ROUNDS) -> Model:
-    tool = model.robot.T_flange_tool
-    pairs = zip(tracks, model.bases, strict=True)
-    bases = tuple(_base(track, tool, start, rounds) for track, start in pairs)
+def _base_only(tracks: list[Track], model: Model) -> Model:
+    bases = _bases(tracks, model.robot.T_flange_tool, model.bases, ROUNDS)
     return replace(model, bases=bases)
+
+
+def _bases(
+    tracks: list[Track], tool: Array, starts: tuple[Array, ...], rounds: int
+) -> tuple[Array, ...]:
+    pairs = zip(tracks, starts, strict=True)
+    return tuple(_base(track, tool, start, rounds) for track, start in pairs)
 
 
 def _base(track: Track, tool: Array, start: Array, rounds: int) -> Array:
@@ -168,12 +181,9 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
                 moment += np.einsum('m,mki,mkj', weight, turn, track.rotation)
         tie = max(TIE * np.linalg.norm(moment), 1e-12)
         rotation = nearest_rotation(moment + tie * start[:3, :3])
-        vector = _tool_vector(tracks, model.bases, weights, start[:3, 3], free=False)
+        vector = _tool_vector(tracks, model.bases, weights, start[:3, 3], False)
         tool = transform(rotation, vector)
-        weights = [
-            1.0 / np.maximum(track.gap(base, tool), FLOOR)
-            for track, base in zip(tracks, model.bases, strict=True)
-        ]
+        weights = _weights(tracks, model.bases, tool)
     return replace(model, robot=model.robot.with_frames(tool=tool))
 
 
@@ -200,17 +210,19 @@ def _tool_vector(
 # Both ------------------------------------------------------------------------------------------
 
 
-def _base_and_tool(tracks: list[Track], model: Model) -> Model:
+def _base_and_tool(
+    tracks: list[Track], model: Model, reaches: tuple[float, ...] = REACHES
+) -> Model:
     tool = model.robot.T_flange_tool
     if all(track.rotation is not None for track in tracks):
         starts = [transform(_tool_rotation(tracks, tool[:3, :3]), tool[:3, 3])]
     else:
         ways = np.concatenate([np.eye(3), -np.eye(3)])
-        vectors = [tool[:3, 3], *(reach * way for reach in REACHES for way in ways)]
+        vectors = [tool[:3, 3], *(reach * way for reach in reaches for way in ways)]
         starts = [transform(tool[:3, :3], vector) for vector in vectors]
-    trials = [_in_turn(tracks, replace(model, robot=model.robot.with_frames(tool=start)))
-              for start in starts]  # fmt: skip
-    return min(trials, key=lambda trial: _gap(tracks, trial))
+    trials = [_in_turn(tracks, model.bases, start) for start in starts]
+    bases, tool = min(trials, key=lambda trial: _median_gap(tracks, *trial))
+    return replace(model, bases=bases, robot=model.robot.with_frames(tool=tool))
 
 
 def _tool_rotation(tracks: list[Track], start: Array) -> Array:
@@ -243,26 +255,33 @@ def _turn_weight(track: Track, tool: Array) -> Array:
     weight: Array = np.ones(len(turned))
     for _ in range(3):
         base = nearest_rotation(np.einsum('m,mik,mjk', weight, track.turns, turned))
-        angle = np.linalg.norm(angle_between(track.turns, base @ turned), axis=1)
-        weight = 1.0 / np.maximum(angle, FLOOR / LEVER)
+        weight = 1.0 / np.maximum(chord(track.turns, base @ turned), FLOOR / LEVER)
     return weight
 
 
-def _in_turn(tracks: list[Track], model: Model) -> Model:
-    """Return base frames and tool vector found alternately."""
+def _in_turn(
+    tracks: list[Track], bases: tuple[Array, ...], tool: Array
+) -> tuple[tuple[Array, ...], Array]:
+    """Return base frames and tool found alternately, the tool's turn as it is."""
     for _ in range(ROUNDS):
-        model = _base_only(tracks, model, rounds=3)
-        tool = model.robot.T_flange_tool
-        weights = [
-            1.0 / np.maximum(track.gap(base, tool), FLOOR)
-            for track, base in zip(tracks, model.bases, strict=True)
-        ]
-        vector = _tool_vector(tracks, model.bases, weights, tool[:3, 3], free=True)
-        model = replace(model, robot=model.robot.with_frames(tool=transform(tool[:3, :3], vector)))
-    return _base_only(tracks, model)
+        bases = _bases(tracks, tool, bases, rounds=3)
+        vector = _tool_vector(tracks, bases, _weights(tracks, bases, tool), tool[:3, 3], True)
+        tool = transform(tool[:3, :3], vector)
+    return _bases(tracks, tool, bases, ROUNDS), tool
+
+
+def _weights(tracks: list[Track], bases: tuple[Array, ...], tool: Array) -> list[Array]:
+    """Return the weights that turn least squares into least absolute deviations."""
+    pairs = zip(tracks, bases, strict=True)
+    return [1.0 / np.maximum(track.gap(base, tool), FLOOR) for track, base in pairs]
 
 
 def nearest_rotation(matrix: Array) -> Array:
     """Return the rotation R that makes trace(R' matrix) largest."""
     u, _, vt = np.linalg.svd(matrix)
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
+
+
+def chord(first: Array, second: Array) -> Array:
+    """Return 2 sin(angle / 2) of the turns between rotations, shape (M,): their angle when small."""
+    return np.asarray(np.linalg.norm(first - second, axis=(1, 2)) / np.sqrt(2.0))

@@ -21,7 +21,8 @@ def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict
     model = found.final.model
     members: dict[str, list[int]] = {}
     for k, effect in enumerate(model.found):
-        members.setdefault(effect.name, []).append(k)
+        if effect.cause:
+            members.setdefault(effect.name, []).append(k)
     everything = list(range(len(model.found)))
     total = unseen.squares(unseen.predict([])).mean()
     full = unseen.squares(unseen.predict(everything))

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..features import Features
-from .heldout import Unseen
+from .heldout import Base, Unseen
 from .problem import Model, Problem, Scale
 
 KNOTS = 8
@@ -50,11 +50,12 @@ class Structure:
 
 def structure(unseen: Unseen, model: Model, kept: list[int]) -> Structure:
     """Return what generic columns add to a model on stretches not used for fitting."""
-    before = unseen.squares(unseen.predict(kept))
+    base = unseen.base(kept)
+    before = unseen.squares(base.residual)
     labels = unseen.trusted_labels()
     found: list[tuple[float, float, str, Array]] = []
     for name, columns in _generic(unseen.problem, model, unseen.scale):
-        gain, sure, squares = _best(unseen, kept, columns, before, labels)
+        gain, sure, squares = _best(base, columns, before, labels)
         found.append((gain, sure, name, squares))
     found.sort(key=lambda item: -item[0])
     gain, sure, _, squares = found[0]
@@ -63,12 +64,12 @@ def structure(unseen: Unseen, model: Model, kept: list[int]) -> Structure:
 
 
 def _best(
-    unseen: Unseen, kept: list[int], columns: Array, before: Array, labels: Array
+    base: Base, columns: Array, before: Array, labels: Array
 ) -> tuple[float, float, Array]:
     """Return gain, its certainty and the squared errors at the best of a few ridges."""
     best: tuple[float, float, Array] | None = None
-    for ridge in RIDGES:
-        after = unseen.squares(unseen.predict(kept, columns, ridge))
+    for residual in base.extended(columns, RIDGES):
+        after = base.unseen.squares(residual)
         gain = 1.0 - float(after.mean() / before.mean())
         if best is None or gain > best[0]:
             names = np.unique(labels)

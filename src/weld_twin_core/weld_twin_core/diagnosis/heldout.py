@@ -5,7 +5,8 @@ What models with more or fewer effects predict on stretches they were not fitted
 
 The found effects are small, so around the final fit every smaller model is linear: the exact
 contribution of each effect is put back into the residual where it is left out, and the coordinates
-of those kept are fitted anew on the other stretches.
+of those kept are fitted anew on the other stretches. Normal equations of every stretch are formed
+once; a model is a choice of columns and targets.
 """
 
 from __future__ import annotations
@@ -14,13 +15,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from ..arrays import Array
 from .fit import Fit, design
-from .gram import Gram
 from .problem import Model, Problem, Scale
 
 BLOCKS = 8
+TRUSTED = 0.2
+"""A sample of less weight is an outlier: reported, and left out of every quoted RMS."""
+TETHER = 0.3
+"""A coordinate moves about this share of its size when the stretches that show it are left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,32 +35,31 @@ class Unseen:
 
     Attributes
     ----------
+    problem, scale : Problem, Scale
     labels : array, shape (rows,)
         Stretch of every row.
-    residual : array, shape (rows,)
-        Of the final fit.
     columns : array, shape (P, rows)
         Frames, then the coordinates of every found effect.
     parts : tuple of slice
         Columns of every effect.
-    contributions : array, shape (K, rows)
-        What each effect takes off the residual, exactly.
-    precision, offset : array, shape (P,)
-        Prior of every column and where the fit is now, in units of the coordinates.
-    scale : Scale
-    problem : Problem
+    targets : array, shape (1 + K, rows)
+        The final residual, then what each effect takes off it, exactly.
+    precision, pull : array, shape (P,)
+        Prior precision of every column, and how hard it pulls from where the fit is now.
+    normals : array, shape (blocks, P, P);  rights : array, shape (blocks, P, 1 + K)
 
     """
 
     problem: Problem
     scale: Scale
     labels: Array
-    residual: Array
     columns: Array
     parts: tuple[slice, ...]
-    contributions: Array
+    targets: Array
     precision: Array
-    offset: Array
+    pull: Array
+    normals: Array
+    rights: Array
 
     @classmethod
     def of(cls, problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
@@ -68,16 +72,24 @@ class Unseen:
             size = effect.coordinates().size
             parts.append(slice(at, at + size))
             at += size
-        contributions = [
+        targets = [fit.residual] + [
             problem.whitened(problem.residuals(_without(model, k)), scale) - fit.residual
             for k in range(len(model.found))
         ]
-        zero = np.zeros(frames)
-        prior = np.zeros(fit.coordinates.size) if precision.size == 0 else precision
+        prior = np.zeros(columns.shape[0])
+        if precision.size:
+            prior[frames:] = precision
+        x = np.concatenate([np.zeros(frames), fit.coordinates])
+        tether = np.concatenate([np.zeros(frames), _tether(model)])
+        labels = problem.block_labels(BLOCKS)
+        stacked = np.array(targets)
+        bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
+        spans = list(zip(bounds[:-1], bounds[1:], strict=True))
+        normals = np.array([columns[:, a:b] @ columns[:, a:b].T for a, b in spans])
+        rights = np.array([columns[:, a:b] @ stacked[:, a:b].T for a, b in spans])
         return cls(
-            problem, scale, problem.block_labels(BLOCKS), fit.residual, columns, tuple(parts),
-            np.array(contributions).reshape(len(parts), fit.residual.size),
-            np.concatenate([zero, prior]), np.concatenate([zero, fit.coordinates]),
+            problem, scale, labels, columns, tuple(parts), stacked, prior + tether, prior * x,
+            normals, rights,
         )  # fmt: skip
 
     @property
@@ -85,46 +97,36 @@ class Unseen:
         """Return the number of nuisance columns."""
         return self.parts[0].start if self.parts else self.columns.shape[0]
 
-    def predict(self, kept: Sequence[int], extra: Array | None = None, ridge: float = 0.0) -> Array:
-        """
-        Return the residual on every stretch of the model fitted on the others, shape (rows,).
+    def predict(self, kept: Sequence[int]) -> Array:
+        """Return the residual on every stretch of the model fitted on the others, (rows,)."""
+        return self.base(kept).residual
 
-        Parameters
-        ----------
-        kept : sequence of int
-            Effects in the model.
-        extra : array, shape (E, rows), optional
-            Further columns, with prior precision ``ridge``.
-
-        """
-        left_out = [k for k in range(len(self.parts)) if k not in kept]
-        target = self.residual + self.contributions[left_out].sum(axis=0)
+    def base(self, kept: Sequence[int]) -> Base:
+        """Return a model of some effects, fitted with each stretch left out in turn."""
         index = np.concatenate(
-            [np.arange(self.frames), *(np.arange(p.start, p.stop) for p in map(self._part, kept))]
-        ).astype(int)
-        columns, precision = self.columns[index], self.precision[index]
-        offset = self.offset[index]
-        if extra is not None:
-            columns = np.concatenate([columns, extra])
-            precision = np.concatenate([precision, np.full(extra.shape[0], ridge)])
-            offset = np.concatenate([offset, np.zeros(extra.shape[0])])
-        if columns.shape[0] == 0:
-            return target
-        total = Gram.of(columns, target)
-        everything = np.arange(columns.shape[0])
-        out = np.empty_like(target)
-        for label in range(int(self.labels[-1]) + 1):
-            low, high = np.searchsorted(self.labels, [label, label + 1])
-            train = total - Gram.of(columns[:, low:high], target[low:high])
-            shifted = Gram(
-                train.normal, train.right - precision * offset, train.rss, train.rows, train.size
-            )
-            step = shifted.solve(everything, precision)
-            out[low:high] = target[low:high] - step @ columns[:, low:high]
-        return out
-
-    def _part(self, k: int) -> slice:
-        return self.parts[k]
+            [np.arange(self.frames), *(np.arange(self.parts[k].start, self.parts[k].stop)
+                                       for k in kept)]
+        ).astype(int)  # fmt: skip
+        mix = np.ones(self.targets.shape[0])
+        mix[[1 + k for k in kept]] = 0.0
+        target = mix @ self.targets
+        normal = self.normals[:, index][:, :, index]
+        right = self.rights[:, index] @ mix
+        factors, residual = [], target.copy()
+        if index.size:
+            total, total_right = normal.sum(axis=0), right.sum(axis=0)
+            for b in range(normal.shape[0]):
+                system = total - normal[b] + np.diag(self.precision[index])
+                size = np.sqrt(np.maximum(np.diag(system), 1e-300))
+                scaled = system / np.outer(size, size)
+                scaled[np.diag_indices_from(scaled)] += 1e-11
+                factor = cho_factor(scaled)
+                wanted = (total_right - right[b] - self.pull[index]) / size
+                step = cho_solve(factor, wanted) / size
+                low, high = np.searchsorted(self.labels, [b, b + 1])
+                residual[low:high] -= step @ self.columns[index, low:high]
+                factors.append((factor, size))
+        return Base(self, index, target, factors, residual)
 
     def squares(self, residual: Array) -> Array:
         """Return the squared position error of every trusted sample, shape (samples,) [m^2]."""
@@ -152,8 +154,60 @@ class Unseen:
         return np.concatenate(out)
 
 
-TRUSTED = 0.2
-"""A sample of less weight is an outlier: reported, and left out of every quoted RMS."""
+@dataclass(frozen=True, eq=False)
+class Base:
+    """A model fitted with each stretch left out in turn, ready to be given further columns."""
+
+    unseen: Unseen
+    index: Array
+    target: Array
+    factors: list[tuple[tuple[Array, bool], Array]]
+    residual: Array
+
+    def extended(self, extra: Array, ridges: Sequence[float]) -> list[Array]:
+        """
+        Return the unseen residual with further columns, one array (rows,) for every ridge.
+
+        Parameters
+        ----------
+        extra : array, shape (E, rows)
+        ridges : sequence of float
+            Prior precision of the further columns.
+
+        """
+        labels, own = self.unseen.labels, self.unseen.columns[self.index]
+        cross_all, square_all = own @ extra.T, extra @ extra.T
+        pull_all = extra @ self.target
+        right_all = own @ self.target
+        outs = [self.target.copy() for _ in ridges]
+        for b in range(int(labels[-1]) + 1):
+            low, high = np.searchsorted(labels, [b, b + 1])
+            here, mine, aim = extra[:, low:high], own[:, low:high], self.target[low:high]
+            cross, square = cross_all - mine @ here.T, square_all - here @ here.T
+            pull, right = pull_all - here @ aim, right_all - mine @ aim
+            right = right - self.unseen.pull[self.index]
+            if self.index.size:
+                factor, size = self.factors[b]
+                solved = cho_solve(factor, np.column_stack([cross, right]) / size[:, None])
+                solved /= size[:, None]
+                square = square - cross.T @ solved[:, :-1]
+                pull = pull - cross.T @ solved[:, -1]
+            for out, ridge in zip(outs, ridges, strict=True):
+                more = np.linalg.solve(square + (ridge + 1e-9) * np.eye(here.shape[0]), pull)
+                out[low:high] -= more @ here
+                if self.index.size:
+                    out[low:high] -= (solved[:, -1] - solved[:, :-1] @ more) @ mine
+        return outs
+
+
+def _tether(model: Model) -> Array:
+    """
+    Return a weak prior precision, shape (K,), that keeps what a few stretches cannot show.
+
+    A vibration that only the first stretch excites has no frequency in the others.
+    """
+    sizes = [np.maximum(np.abs(e.coordinates()), e.coordinate_scales()) for e in model.found]
+    return 1.0 / (TETHER * np.concatenate([np.zeros(0), *sizes])) ** 2
 
 
 def _without(model: Model, k: int) -> Model:

@@ -90,7 +90,7 @@ class Library:
 def families(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]]:
     """Return the families that may be a cause, in the order of their stages."""
     out = set(exclude) | {NUISANCE[frame] for frame in align}
-    kinds = [k for k in REGISTRY.values() if k.stage != Stage.NOISE and k.name not in out]
+    kinds = [k for k in REGISTRY.values() if k.cause and k.name not in out]
     return sorted(kinds, key=lambda kind: (kind.stage, kind.name))
 
 

@@ -5,16 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Array
 from .fit import Fit, fit, robust_fit, robust_scale
+from .heldout import Unseen
 from .library import Library, build
 from .problem import Model, Problem, Scale
 from .score import effective_share
-from .select import Workspace, backward, forward
+from .select import Workspace, backward, forward, without_negligible
 from .small_errors import many_small
 
 SEARCH_ROWS = 9000
@@ -23,6 +24,12 @@ FIT_ROWS = 30000
 ROUNDS = 3
 MANY = 8
 """So many units found one by one on stations mean many small errors acting together."""
+SEVERAL = 4
+"""From this many on, the many are tried, and taken if they predict unseen stations better."""
+BETTER = 0.95
+MISFIT = 0.012
+"""Real edges are soft, springs harden, lags have a second pole: the model errs by this share."""
+MISFIT_DIRECTIONS = 30.0
 Progress = Callable[[str], None]
 
 
@@ -44,6 +51,8 @@ class Search:
         The library that rivals are drawn from.
     small : Fit
         The final fit on the workspace's measurements.
+    bare_rss : float
+        Sum of squares on the workspace's measurements without any found effect.
     dense : bool
         Whether many small errors were fitted together.
 
@@ -56,6 +65,7 @@ class Search:
     precision: Array
     work: Workspace
     small: Fit
+    bare_rss: float
     dense: bool
 
     @property
@@ -65,13 +75,21 @@ class Search:
 
     def effective(self, found: Fit) -> float:
         """Return the number of independent rows of a fit on the workspace's measurements."""
-        return effective_rows(self.work.problem, found)
+        return effective_rows(self.work.problem, found, self.bare_rss)
 
 
-def effective_rows(problem: Problem, found: Fit) -> float:
-    """Return the number of independent rows of a fit's residual."""
+def effective_rows(problem: Problem, found: Fit, bare_rss: float) -> float:
+    """
+    Return the number of independent rows that a fit's evidence may count.
+
+    Two things make a residual less telling than its count: autocorrelation, and physics richer
+    than the model. An explained sum of squares E leaves about `MISFIT`^2 E of misfit in some
+    `MISFIT_DIRECTIONS` directions, and any further column may pick that up by chance.
+    """
     share = effective_share(found.residual, problem.rows, problem.samples)
-    return share * found.residual.size
+    count = share * found.residual.size
+    explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
+    return count / (1.0 + MISFIT**2 * explained / MISFIT_DIRECTIONS)
 
 
 def search(
@@ -83,23 +101,36 @@ def search(
     progress('baseline fitted')
     small = problem.thinned(SEARCH_ROWS)
     model, dense = baseline.model, False
-    work, now = _workspace(small, model, exclude)
+    work, now, bare = _workspace(small, model, exclude)
     for _ in range(ROUNDS):
         before = names(model)
-        steps = forward(work, now, lambda f: effective_rows(small, f), MANY, progress)
-        if steps:
-            now = backward(work, steps[-1].fit, lambda f: effective_rows(small, f))
+
+        def effective(found: Fit, bare: float = bare) -> float:
+            return effective_rows(small, found, bare)
+
+        steps = forward(work, now, effective, MANY, progress)
+        if steps and len(steps) < MANY:
+            now = without_negligible(work, backward(work, steps[-1].fit, effective))
+        elif steps:
+            now = steps[-1].fit
         model = now.model
-        dense = small.recordings[0].joints.static and len(model.found) >= MANY
+        dense = small.recordings[0].joints.static and len(steps) >= MANY
         if dense or names(model) == before:
             break
-        work, now = _workspace(small, model, exclude)
-    if dense:
-        progress('many small errors at once: fitting them together')
-        final, scale, precision = many_small(full, model, exclude, progress)
-        return Search(full, scale, baseline, final, precision, work, now, True)
+        work, now, bare = _workspace(small, model, exclude)
     final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
-    return Search(full, scale, baseline, final, np.zeros(0), work, now, False)
+    sparse = Search(full, scale, baseline, final, np.zeros(0), work, now, bare, False)
+    if not (small.recordings[0].joints.static and len(model.found) >= SEVERAL):
+        return sparse
+    progress('many small errors at once: fitting them together')
+    final, scale, precision = many_small(full, model, exclude, progress)
+    together = replace(sparse, scale=scale, final=final, precision=precision, dense=True)
+    return together if dense or _unseen_rms(together) < BETTER * _unseen_rms(sparse) else sparse
+
+
+def _unseen_rms(found: Search) -> float:
+    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
+    return unseen.rms(unseen.predict(range(len(found.final.model.found))))
 
 
 def names(model: Model) -> list[tuple[str, str | None, int]]:
@@ -110,7 +141,11 @@ def names(model: Model) -> list[tuple[str, str | None, int]]:
     )
 
 
-def _workspace(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple[Workspace, Fit]:
+def _workspace(
+    problem: Problem, model: Model, exclude: Sequence[str]
+) -> tuple[Workspace, Fit, float]:
+    """Return what selection works on, the fit it starts from, and the bare sum of squares."""
     scale = robust_scale(problem, problem.residuals(model))
     now = fit(problem, model, scale, None, 4)
-    return Workspace.of(problem, scale, build(problem, now.model, scale, exclude)), now
+    bare = fit(problem, now.model.with_found(()), scale, None, 4).rss
+    return Workspace.of(problem, scale, build(problem, now.model, scale, exclude)), now, bare

@@ -20,15 +20,20 @@ from ..effects import REGISTRY
 from ..effects.base import Effect, Stage
 from ..features import Features, sites
 from .fit import Fit, robust_scale
+from .gram import Gram
 from .library import families
 from .problem import Model, Problem, Scale
 from .shrinkage import shrunk_fit
 
+ONE_BY_ONE = ('quantization', 'payload', 'drift', 'measurement_scale')
+"""Families kept only where the search has found them: not small errors of the arm's making."""
 DENSE_ORDERS = 60
 HIGHEST_ORDER = 420
 LINE = 25.0
 """Chi-square of two degrees of freedom that a single line must reach: one false in 1e5 looks."""
 LINES = 40
+SETUP = 60.0
+"""Chi-square of six degrees of freedom that a motion of the set-up must reach, over 40 looks."""
 RANGE = 1.0
 """A joint must travel this far [rad] for its ripple to be told from its neighbours' orders."""
 
@@ -47,6 +52,9 @@ def many_small(
         progress('lines of high order looked for')
     else:
         lined = result.model
+    if 'base' in problem.align:
+        lined = with_setup(problem, lined, scale)
+        progress('motion of the set-up looked for')
     result, precision = shrunk_fit(problem, lined, scale, passes=1)
     scale = robust_scale(problem, problem.residuals(result.model))
     result, precision = shrunk_fit(problem, result.model, scale, passes=1)
@@ -59,7 +67,7 @@ def _everything(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple
     have = {effect.key: effect for effect in model.found}
     out: list[Effect] = []
     for kind in families(exclude, problem.align):
-        if kind.stage in (Stage.SERVO, Stage.CLOCK) or kind.name in ('quantization', 'payload'):
+        if kind.stage in (Stage.SERVO, Stage.CLOCK) or kind.name in ONE_BY_ONE:
             out += [e for e in model.found if e.name == kind.name]
             continue
         for joint in sites(kind, model.robot.joint_names):
@@ -83,6 +91,31 @@ def _dense_ripple(maker: Features, joint: str) -> list[Effect]:
     orders = np.arange(1.0, DENSE_ORDERS + 1.0)
     zero = np.zeros(orders.size)
     return [REGISTRY['transmission_ripple'](joint, zero, orders, zero)]  # type: ignore[call-arg]
+
+
+def with_setup(problem: Problem, model: Model, scale: Scale) -> Model:
+    """
+    Return the model with the set-up's own creep and step in time, where they show.
+
+    Both are nuisance: they are part of where the frames were, not of the robot.
+    """
+    for name in ('setup_settling', 'setup_step'):
+        kind = REGISTRY[name]
+        features = problem.features(model)
+        residual = problem.whitened(problem.residuals(model), scale)
+        frames = problem.whitened(problem.frame_columns(features)[0], scale)
+        best: tuple[float, Effect] | None = None
+        for seed in features[0].seeds(kind, None)[0]:
+            own = problem.whitened(problem.effect_columns(features, seed), scale)
+            gram = Gram.of(np.concatenate([frames, own]), residual)
+            index = np.arange(frames.shape[0], frames.shape[0] + own.shape[0])
+            gram = gram.without(np.arange(frames.shape[0]))
+            chi = gram.gain(index)
+            if best is None or chi > best[0]:
+                best = (chi, seed.from_atoms(gram.solve(index)))
+        if best is not None and best[0] > SETUP:
+            model = model.with_found((*model.found, best[1]))
+    return model
 
 
 def with_lines(problem: Problem, model: Model, scale: Scale) -> Model:

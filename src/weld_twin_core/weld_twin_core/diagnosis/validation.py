@@ -16,6 +16,7 @@ from .problem import Model, Problem, usable
 from .result import Shrink
 from .search import Search
 
+LARGE = 300
 MOVED = 5.0
 """A held-out bag whose frame is this many times better refitted stems from another set-up."""
 
@@ -52,6 +53,12 @@ def _waterfall(
     steps: list[tuple[str, float]] = []
     kept: list[int] = []
     rest = dict(members)
+    if unseen.columns.shape[0] > LARGE:
+        # Trying every family at every step costs too much here; how far each gets alone orders.
+        for name in sorted(members, key=lambda n: alone[n]):
+            kept += members[name]
+            steps.append((name, unseen.rms(unseen.predict(kept))))
+        return tuple(steps), tuple(alone.items())
     while rest:
         trials = {n: unseen.rms(unseen.predict(kept + index)) for n, index in rest.items()}
         best = min(trials, key=lambda n: trials[n])

@@ -7,7 +7,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
-from ..effects import REGISTRY
 from ..features import Features
 from .heldout import Unseen
 from .problem import Model, Problem
@@ -51,28 +50,40 @@ def locate(problem: Problem, baseline: Unseen, start: Model, final: Unseen, foun
 
 def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str, float]]:
     """Return how much of the unseen squared gap the effects of every joint and regime explain."""
-    everything = list(range(len(found.found)))
+    everything = range(len(found.found))
     total = final.squares(final.predict([])).mean()
     after = final.squares(final.predict(everything)).mean()
-    joints = dict.fromkeys(found.robot.joint_names, 0.0)
-    regimes = dict.fromkeys(REGIMES, 0.0)
-    falls = []
-    for k in everything:
-        less = final.squares(final.predict([j for j in everything if j != k])).mean()
-        falls.append(max(less - after, 0.0))
-    scale = max(total - after, 0.0) / max(sum(falls), 1e-300) / max(total, 1e-300)
-    for effect, fall in zip(found.found, falls, strict=True):
-        if effect.site is not None:
-            joints[effect.site] += fall * scale
-        regimes[REGISTRY[effect.name].regime] += fall * scale
-    return joints, regimes
+
+    def fall(members: list[int]) -> float:
+        if not members:
+            return 0.0
+        less = final.predict([k for k in everything if k not in members])
+        return max(float(final.squares(less).mean() - after), 0.0)
+
+    at = {name: [k for k in everything if found.found[k].site == name]
+          for name in found.robot.joint_names}  # fmt: skip
+    under = {name: [k for k in everything if found.found[k].regime == name] for name in REGIMES}
+    free = [k for k in everything if found.found[k].site is None]
+    return (
+        _shares({name: fall(members) for name, members in at.items()}, fall(free), total, after),
+        _shares({name: fall(members) for name, members in under.items()}, 0.0, total, after),
+    )
+
+
+def _shares(
+    falls: dict[str, float], rest: float, total: float, after: float
+) -> dict[str, float]:
+    """Return each fall's part of the share of the squared gap that the model explains."""
+    explained = max(total - after, 0.0) / max(total, 1e-300)
+    scale = explained / max(sum(falls.values()) + rest, 1e-300)
+    return {name: value * scale for name, value in falls.items()}
 
 
 def _map(problem: Problem, baseline: Unseen, model: Model) -> Array:
     """Return the share of unseen squared gap that each joint x regressor explains, (n, R)."""
     features = problem.features(model)
-    kept = list(range(len(baseline.parts)))
-    before = baseline.squares(baseline.predict(kept)).mean()
+    base = baseline.base(range(len(baseline.parts)))
+    before = baseline.squares(base.residual).mean()
     out = np.zeros((model.robot.n, len(REGRESSORS)))
     for i in range(model.robot.n):
         for r, name in enumerate(REGRESSORS):
@@ -85,7 +96,7 @@ def _map(problem: Problem, baseline: Unseen, model: Model) -> Array:
             size = np.sqrt((block**2).mean(axis=1))
             block = block[size > 1e-12] / size[size > 1e-12, None]
             if block.shape[0]:
-                after = baseline.squares(baseline.predict(kept, block, 1.0)).mean()
+                after = baseline.squares(base.extended(block, [1.0])[0]).mean()
                 out[i, r] = max(0.0, 1.0 - float(after / max(before, 1e-300)))
     return out
 

@@ -44,6 +44,8 @@ class Effect(Parametric, ABC):
     stage: ClassVar[Stage]
     needs: ClassVar[frozenset[str]] = frozenset()
     """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
+    cause: ClassVar[bool] = True
+    """Whether a diagnosis may name it; noise and the set-up's own motion are nuisance."""
     regime: ClassVar[str] = 'static'
     """What brings it out: 'static', 'reversal', 'speed', 'acceleration', 'load', 'temperature' or
     'time'."""

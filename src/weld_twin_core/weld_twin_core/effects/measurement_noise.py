@@ -26,6 +26,7 @@ class MeasurementNoise(Effect):
     name = 'measurement_noise'
     of = 'robot'
     stage = Stage.NOISE
+    cause = False
     parameters = (Parameter('sigma', 'm', typical=2e-5, lower=0.0, differentiable=False),)
 
     def displace(self, view: View) -> Shift:

@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a base frame that changes with time would explain, beyond everything that does not.
+
+Residuals of an arm follow its pose, and poses follow time, so any motion looks a little like a
+change of the frame. Constant frames and a first-order model of the whole arm (geometry, springs,
+play, lag of every joint) are therefore projected out before a change in time is tried.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
+from ...features import Features
+from ..fit import robust_scale
+from ..problem import Model, Problem, Scale
+from ..score import effective_share
+
+GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
+LOOSE = (3e-3, 1e-2)
+"""Prior spread of the arm's own errors [m, rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class BaseChange:
+    """
+    The base's motion columns of every sample, and the residual, with the arm projected out.
+
+    Attributes
+    ----------
+    residual : array, shape (M, c) in units of noise, frames and arm fitted
+    columns : array, shape (M, c, 6)
+        What the base does to every sample, whitened.
+    basis : array, shape (M, c, P)
+        Orthonormal over all rows: what frames and arm can explain.
+    recording : array of int, shape (M,)
+    share : float
+        Share of rows that count as independent.
+    positions : array, shape (M, 3, 6)
+        The same columns in metres, for the size of a change.
+
+    """
+
+    residual: Array
+    columns: Array
+    basis: Array
+    recording: NDArray[np.int_]
+    share: float
+    positions: Array
+
+    def without(self, shape: Array) -> BaseChange:
+        """Return the same with a change of the base in this shape of time, (M,), fitted too."""
+        rows = self.columns * shape[:, None, None]
+        flat = _projected(rows.reshape(-1, 6), self.basis.reshape(-1, self.basis.shape[2]))
+        more = _orthonormal(flat).reshape(*rows.shape[:2], -1)
+        strength = np.einsum('mcp,mc', more, self.residual)
+        left = self.residual - np.einsum('mcp,p->mc', more, strength)
+        basis = np.concatenate([self.basis, more], axis=2)
+        return BaseChange(left, self.columns, basis, self.recording, self.share, self.positions)
+
+    def gain(self, shape: Array) -> float:
+        """Return the sum of squares that a change in this shape of time, (M,), explains."""
+        rows = self.columns * shape[:, None, None]
+        right = np.einsum('mci,mc', rows, self.residual)
+        overlap = np.einsum('mcp,mci->pi', self.basis, rows)
+        normal = np.einsum('mci,mcj', rows, rows) - overlap.T @ overlap
+        return float(right @ _solve(normal, right))
+
+    def step_gains(self, k: int) -> Array:
+        """Return the gain of a step before every sample of recording k, shape (M_k,)."""
+        mine = self.recording == k
+        rows, left, basis = self.columns[mine], self.residual[mine], self.basis[mine]
+        right = _after(np.einsum('mci,mc->mi', rows, left))
+        overlap = _after(np.einsum('mcp,mci->mpi', basis, rows))
+        normal = _after(np.einsum('mci,mcj->mij', rows, rows))
+        normal -= np.einsum('mpi,mpj->mij', overlap, overlap)
+        return np.array([float(r @ _solve(n, r)) for n, r in zip(normal, right, strict=True)])
+
+    def size(self, shape: Array) -> float:
+        """Return the RMS motion [m] of the measured points for the fitted change."""
+        rows = self.columns * shape[:, None, None]
+        right = np.einsum('mci,mc', rows, self.residual)
+        overlap = np.einsum('mcp,mci->pi', self.basis, rows)
+        normal = np.einsum('mci,mcj', rows, rows) - overlap.T @ overlap
+        moved = self.positions @ _solve(normal, right)
+        active = np.abs(shape) > 0.05 * np.abs(shape).max()
+        return float(np.sqrt((moved[active] ** 2).sum(axis=1).mean()))
+
+    def nats(self, gain: float) -> float:
+        """Return the evidence of a gain with six freedoms, for as many rows as are independent."""
+        total = float((self.residual**2).sum())
+        rows = max(self.share * self.residual.size, 12.0)
+        left = max(total - gain, 1e-12 * total)
+        return 0.5 * rows * float(np.log(total / left)) - 3.0 * float(np.log(rows))
+
+
+def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChange:
+    """
+    Return the residual ready to be searched for changes of the base.
+
+    Parameters
+    ----------
+    parts : list of array, shape (c, M)
+        Residuals of the model, one per recording.
+    problem, model
+        As `Problem.residuals` took them.
+
+    """
+    scale = robust_scale(problem, parts)
+    features = problem.features(model)
+    rows = [3 if r == 3 else 6 for r in problem.rows]
+    blocks, columns, positions = [], [], []
+    for k, maker in enumerate(features):
+        base = np.stack([maker.column(('base', j)) for j in range(6)])[:, : rows[k]]
+        positions.append(base[:, :3].transpose(2, 1, 0))
+        columns.append(_white(base, scale, k))
+        blocks.append(_white(_arm(maker, rows[k]), scale, k))
+    frames, _ = problem.frame_columns(features)
+    whites = [_white(part, scale, k) for k, part in enumerate(frames)]
+    residual = [_white(part[None], scale, k)[..., 0] for k, part in enumerate(parts)]
+    return _assembled(residual, columns, blocks, whites, positions, problem)
+
+
+def _assembled(
+    residual: list[Array], columns: list[Array], arm: list[Array], frames: list[Array],
+    positions: list[Array], problem: Problem,
+) -> BaseChange:  # fmt: skip
+    most = max(problem.rows)
+    number = np.repeat(np.arange(len(residual)), problem.samples)
+    pad = [((0, 0), (0, most - c)) for c in problem.rows]
+    left = np.concatenate([np.pad(r, p) for r, p in zip(residual, pad, strict=True)])
+    blocks = [
+        np.concatenate([np.pad(b, (*p, (0, 0))) for b, p in zip(each, pad, strict=True)])
+        for each in (columns, arm, frames)
+    ]
+    basis = _basis(blocks[1].reshape(left.size, -1), blocks[2].reshape(left.size, -1))
+    flat = _projected(left.reshape(-1, 1), basis)[:, 0]
+    left = flat.reshape(left.shape)
+    own = [left[number == k][:, :c].ravel() for k, c in enumerate(problem.rows)]
+    share = effective_share(np.concatenate(own), problem.rows, problem.samples)
+    return BaseChange(
+        left, blocks[0], basis.reshape(*left.shape, -1), number, share, np.concatenate(positions)
+    )
+
+
+def _arm(maker: Features, rows: int) -> Array:
+    """Return columns of everything an arm does by itself, to first order, shape (P, rows, M)."""
+    view, robot = maker.view, maker.twin.robot
+    out = []
+    for i in range(robot.n):
+        joint = maker.column(('q', i))[:rows] * LOOSE[0 if robot.prismatic[i] else 1]
+        out += [maker.column((key, i))[:rows] * LOOSE[0 if key in ('d', 'a') else 1]
+                for key in GEOMETRY]  # fmt: skip
+        signals = [np.sin(view.q[:, i]), np.cos(view.q[:, i]), view.q[:, i]]
+        signals += [view.shift[('tau', i)], view.qd[:, i], np.sign(view.qd[:, i])]
+        if view.static:
+            signals.append(np.sign(np.gradient(view.q[:, i])))
+        for signal in signals:
+            spread = float(np.abs(signal).max())
+            if spread > 1e-9:
+                out.append(joint * (signal / spread))
+    return np.stack(out)
+
+
+def _white(part: Array, scale: Scale, k: int) -> Array:
+    """Return (P, c, M) columns whitened as (M, c, P)."""
+    unit = np.full(part.shape[1], 1.0 / scale.position)
+    unit[3:] = 1.0 / scale.orientation
+    white = part * unit[:, None] * np.sqrt(scale.weights[k])
+    return np.asarray(white.transpose(2, 1, 0))
+
+
+def _basis(arm: Array, frames: Array) -> Array:
+    """Return an orthonormal basis of frames and of all arm errors strong enough to be seen."""
+    frames = _orthonormal(frames)
+    rest = _projected(arm, frames)
+    strength, vectors = np.linalg.eigh(rest.T @ rest)
+    seen = strength > 1.0
+    return np.concatenate([frames, rest @ vectors[:, seen] / np.sqrt(strength[seen])], axis=1)
+
+
+def _orthonormal(columns: Array) -> Array:
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns[:, size > 0.0] / size[size > 0.0]
+    if columns.shape[1] == 0:
+        return columns
+    strength, vectors = np.linalg.eigh(columns.T @ columns)
+    seen = strength > 1e-9
+    return np.asarray(columns @ vectors[:, seen] / np.sqrt(strength[seen]))
+
+
+def _projected(columns: Array, basis: Array) -> Array:
+    return np.asarray(columns - basis @ (basis.T @ columns))
+
+
+def _after(terms: Array) -> Array:
+    """Return sums over each sample and all later ones."""
+    return np.asarray(np.cumsum(terms[::-1], axis=0)[::-1])
+
+
+def _solve(normal: Array, right: Array) -> Array:
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scaled = normal / np.outer(size, size) + 1e-6 * np.eye(len(size))
+    return np.asarray(np.linalg.solve(scaled, right / size) / size)

@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What every check looks at: the recordings, the aligned model, and what it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ...errors import DataError
+from ...recording import Measurements, Recording
+from ..problem import Model, Problem
+from .snapshot import Snapshot, snapshot
+
+LARGE = 5e-3
+"""Median gap [m] above which the data may be mixed up; what wears in an arm is smaller."""
+
+
+class Finding(NamedTuple):
+    """What a check found: 'note' or 'warning', and a sentence for people."""
+
+    level: str
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """The problem, the model after alignment, and what several checks need, computed once."""
+
+    problem: Problem
+    model: Model
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """Return the recordings."""
+        return self.problem.recordings
+
+    @cached_property
+    def residuals(self) -> list[Array]:
+        """Return measured minus twin, one array (3 or 6, M) per recording."""
+        return self.problem.residuals(self.model)
+
+    @cached_property
+    def gap(self) -> float:
+        """Return the median distance between measured and twin [m]."""
+        return float(np.median(np.concatenate([distance(part) for part in self.residuals])))
+
+    @cached_property
+    def motions(self) -> list[Array]:
+        """Return joint positions at the measurements, one array (M, n) per recording."""
+        return [r.joints.at(measured(r).t)[0] for r in self.recordings]
+
+    @cached_property
+    def snapshot(self) -> Snapshot:
+        """Return a few samples of every recording as stations, for trials."""
+        return snapshot(self.problem, self.model, self.motions)
+
+
+Checker = Callable[[Case], Sequence[Finding]]
+
+
+def measured(recording: Recording) -> Measurements:
+    """
+    Return what was measured.
+
+    Raises
+    ------
+    DataError
+        Nothing was.
+
+    """
+    if recording.measured is None:
+        raise DataError(f'{recording.name} holds no measured poses or points')
+    return recording.measured
+
+
+def distance(part: Array) -> Array:
+    """Return the length of the position part of a residual, shape (M,) [m]."""
+    return np.asarray(np.linalg.norm(part[:3], axis=0))
+
+
+def length(value: float) -> str:
+    """Return a length [m] as people read it."""
+    if value >= 1.0:
+        return f'{value:.3g} m'
+    return f'{value * 1e3:.3g} mm' if value >= 1e-4 else f'{value * 1e6:.3g} um'
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list in a sentence."""
+    return ' and '.join([', '.join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Is a large gap a mix-up of units, signs, joints, robots or frames?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from .case import LARGE, Case, Finding, length
+from .snapshot import Snapshot, gap
+from .suspicions import Suspicion, doubles, suspicions
+
+EXPLAINED = 5.0
+"""The gap must fall by this factor for a mix-up to be named."""
+SMALL_TURN = 0.09
+"""Joint offsets [rad] up to which a large gap is bad mastering and not a mix-up."""
+MOST = 3
+"""So many mix-ups at once are looked for."""
+WORTH = 0.7
+"""A further mix-up must bring the gap below this share of what it was."""
+SHORTLIST = 5
+FAR = 0.05
+"""Frames that are off by this [m] are an instrument's own, not an error of set-up."""
+
+
+def mixups(case: Case) -> Sequence[Finding]:
+    """Return what a gap of centimetres and more comes from, if not from the arm."""
+    if case.gap < LARGE:
+        return ()
+    shot = case.snapshot
+    model = shot.framed()
+    left = gap(shot.problem, model)
+    if left < LARGE or left < case.gap / EXPLAINED:
+        return _frames(case, left)
+    offset = shot.offset()
+    turns = [abs(float(effect.vector()[0])) for effect in offset.found]
+    if max(turns) < SMALL_TURN and gap(shot.problem, offset) < left / EXPLAINED:
+        return ()
+    found, rest = _unravelled(shot, left)
+    if not found:
+        return (Finding('warning', _unexplained(case, left)),)
+    words = '; '.join(s.words for s in found)
+    rest_words = f'undone, the gap falls from {length(left)} to {length(rest)}'
+    return (Finding('warning', f'{words[0].upper()}{words[1:]} ({rest_words}).'),)
+
+
+def _frames(case: Case, left: float) -> Sequence[Finding]:
+    """The given frames are to blame alone; name the one that was not to be fitted."""
+    open_frames = sorted({'base', 'tool'} - case.problem.align)
+    if not open_frames:
+        return ()
+    names = ' and '.join(open_frames)
+    level = 'warning' if case.gap > FAR else 'note'
+    return (
+        Finding(
+            level,
+            f'A gap of {length(case.gap)} is almost only one of frames: with base and tool fitted '
+            f'{length(left)} remain; if the instrument has its own frame or the tool centre '
+            f'point was not measured, have {names} aligned.',
+        ),
+    )
+
+
+def _unexplained(case: Case, left: float) -> str:
+    return (
+        f'No base and tool frame brings the gap below {length(left)} (median), and no mix-up of '
+        'units, signs, joint order, zero positions or bundled robots explains it; check that '
+        f'{case.model.robot.name!r} is the robot that was measured.'
+    )
+
+
+def _unravelled(shot: Snapshot, start: float) -> tuple[list[Suspicion], float]:
+    """Return the fewest mix-ups that explain the gap, and the gap without them."""
+    for first in (suspicions, doubles):
+        found: list[Suspicion] = []
+        left, trial, look = start, shot, first
+        while left > LARGE and len(found) < MOST:
+            best, undone, rest = _best(trial, look(trial))
+            if best is None or rest > WORTH * left:
+                break
+            found.append(best)
+            trial, left, look = undone, rest, suspicions
+        if left < start / EXPLAINED:
+            return found, left
+    return [], start
+
+
+def _best(
+    shot: Snapshot, tries: Iterable[Suspicion]
+) -> tuple[Suspicion | None, Snapshot, float]:
+    """Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best."""
+    tried = [(suspicion, suspicion.undo(shot)) for suspicion in tries]
+    rough = np.array([trial.rough_gap() for _, trial in tried])
+    best: tuple[Suspicion | None, Snapshot, float] = (None, shot, np.inf)
+    for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
+        suspicion, trial = tried[k]
+        left = gap(trial.problem, trial.framed())
+        if left < WORTH * best[2]:
+            best = (suspicion, trial, left)
+    return best

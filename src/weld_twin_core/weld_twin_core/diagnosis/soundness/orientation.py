@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Do measured orientations turn as the joints say?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ...arrays import Array
+from ...rotation import matrix_from_quaternion, quaternion_from_matrix
+from ..problem import Model
+from .case import LARGE, Case, Finding
+from .snapshot import Snapshot, gap
+
+WRONG = 0.05
+"""Median angle [rad] from which orientations do not belong to the joints."""
+Undo = Callable[[Array], Array]
+
+
+def orientation(case: Case) -> Sequence[Finding]:
+    """Return what is wrong with orientations while positions are right."""
+    if all(rows == 3 for rows in case.problem.rows):
+        return ()
+    angle = np.median(np.concatenate([_angle(p) for p in case.residuals if len(p) > 3]))
+    if angle < WRONG:
+        return ()
+    shot = case.snapshot
+    turned = _turn(shot, shot.framed())
+    points = shot.with_turns([None] * len(shot.recordings))
+    if turned < WRONG or gap(points.problem, points.framed()) > LARGE:
+        return ()
+    for words, undo in _ways().items():
+        trial = shot.with_turns(_changed(shot, undo))
+        if _turn(trial, trial.framed()) < 0.2 * turned:
+            return (Finding('warning', f'{words}; undone, they agree with the joints.'),)
+    return (
+        Finding(
+            'warning',
+            f'Measured orientations disagree with the joints by {np.degrees(turned):.3g} degrees '
+            '(median) though positions agree; check their convention, or give positions only.',
+        ),
+    )
+
+
+def _ways() -> dict[str, Undo]:
+    return {
+        'Measured orientations are those of the instrument seen from the tool (inverted)':
+            lambda turn: np.swapaxes(turn, -1, -2),
+        'Quaternions were written w first and read x first': _rolled(-1),
+        'Quaternions were written x first and read w first': _rolled(1),
+    }  # fmt: skip
+
+
+def _rolled(places: int) -> Undo:
+    return lambda turn: matrix_from_quaternion(
+        np.roll(quaternion_from_matrix(turn), places, axis=-1)
+    )
+
+
+def _changed(shot: Snapshot, undo: Undo) -> list[Array | None]:
+    out: list[Array | None] = []
+    for recording in shot.recordings:
+        turn = None if recording.measured is None else recording.measured.rotation
+        out.append(None if turn is None else undo(turn))
+    return out
+
+
+def _turn(shot: Snapshot, model: Model) -> float:
+    parts = [p for p in shot.problem.residuals(model) if len(p) > 3]
+    return float(np.median(np.concatenate([_angle(p) for p in parts])))
+
+
+def _angle(part: Array) -> Array:
+    return np.asarray(np.linalg.norm(part[3:], axis=0))

@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Are there measurements that lie far off the rest?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from ...arrays import Array
+from .case import Case, Finding, distance, length, measured
+
+WINDOW = 7
+"""Neighbours in time that a sample is compared with."""
+FAR = 10.0
+"""Robust deviations from which a sample is an outlier."""
+STATION_FAR = 8.0
+"""Median gaps from which a station is an outlier."""
+MANY = 0.1
+
+
+def outliers(case: Case) -> Sequence[Finding]:
+    """Return how many measurements are far off, and the worst of them."""
+    out = []
+    for recording, part in zip(case.recordings, case.residuals, strict=True):
+        off = _stations(part) if recording.joints.static else _samples(part)
+        bad = off > 0.0
+        if not bad.any():
+            continue
+        worst = int(off.argmax())
+        at = measured(recording).t[worst]
+        where = f'station {worst}' if recording.joints.static else f't = {at:.3f} s'
+        out.append(
+            Finding(
+                'warning' if bad.mean() > MANY else 'note',
+                f'{int(bad.sum())} of {off.size} measurements of {recording.name} lie far off '
+                f'their neighbours, the worst by {length(float(off[worst]))} at {where}; they '
+                'lose their weight in every fit.',
+            )
+        )
+    return out
+
+
+def _samples(part: Array) -> Array:
+    """Return how far samples are off a running median where that is too far, else 0, (M,) [m]."""
+    smooth = median_filter(part[:3], size=(1, WINDOW), mode='nearest')
+    off = np.linalg.norm(part[:3] - smooth, axis=0)
+    # Vibration comes and goes: what one sample in ten does is no outlier.
+    limit = max(FAR * float(np.median(off)), 4.0 * float(np.quantile(off, 0.9)))
+    return np.where(off > max(limit, 1e-9), off, 0.0)
+
+
+def _stations(part: Array) -> Array:
+    off = distance(part - np.median(part, axis=1, keepdims=True))
+    limit = STATION_FAR * float(np.median(off))
+    return np.where(off > max(limit, 1e-9), off, 0.0)

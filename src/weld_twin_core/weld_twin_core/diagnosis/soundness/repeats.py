@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Was anything recorded twice, or a stream frozen?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from ...arrays import Array
+from .case import Case, Finding, measured
+
+FROZEN = 0.02
+"""Share of measurements that repeat the one before, from which it is said."""
+
+
+def repeats(case: Case) -> Sequence[Finding]:
+    """Return recordings given twice, samples given twice, and frozen measurements."""
+    return [*_recordings(case), *_samples(case)]
+
+
+def _recordings(case: Case) -> Iterator[Finding]:
+    seen = [measured(r).position for r in case.recordings]
+    for i, k in combinations(range(len(seen)), 2):
+        same = _common(seen[i], seen[k])
+        if same > 0.5 * min(len(seen[i]), len(seen[k])):
+            yield Finding(
+                'warning',
+                f'{case.recordings[i].name} and {case.recordings[k].name} hold the same '
+                f'measurements ({same} of {min(len(seen[i]), len(seen[k]))}); give each '
+                'recording once.',
+            )
+
+
+def _samples(case: Case) -> Iterator[Finding]:
+    for recording, q in zip(case.recordings, case.motions, strict=True):
+        position = measured(recording).position
+        still = (np.diff(position, axis=0) == 0.0).all(axis=1)
+        moving = np.abs(np.diff(q, axis=0)).max(axis=1) > 1e-6
+        frozen = int((still & moving).sum())
+        if frozen > FROZEN * len(position):
+            yield Finding(
+                'warning' if frozen > 0.2 * len(position) else 'note',
+                f'{frozen} of {len(position)} measurements of {recording.name} repeat the one '
+                'before to the last digit while the arm moves; the instrument is slower than its '
+                'stream, or lost the target.',
+            )
+        both = np.concatenate([position, q], axis=1)
+        twice = len(both) - len(np.unique(both, axis=0))
+        if recording.joints.static and twice > 0:
+            yield Finding(
+                'warning',
+                f'{twice} station(s) of {recording.name} are there twice, equal to the last '
+                'digit; a station measured again never is.',
+            )
+
+
+def _common(first: Array, second: Array) -> int:
+    """Return how many rows of one are in the other too, to the last digit."""
+    rows = {row.tobytes() for row in np.ascontiguousarray(first)}
+    return sum(row.tobytes() in rows for row in np.ascontiguousarray(second))

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Did the set-up move: a step of the base at one time, or a slow settling?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ..problem import Model, Problem
+from .base_change import BaseChange, base_change
+from .case import Case, Finding, length, measured
+
+SURE = 12.0
+"""Nats by which a change must beat no change, and a step every smooth change."""
+MOST = 3
+MOST_ROWS = 18000
+EDGE = 0.02
+"""A step nearer to either end of a recording, as a share of it, is not looked for."""
+CONSTANTS = np.geomspace(0.02, 0.7, 9)
+"""Time constants of settling, as shares of the recording."""
+
+
+class Step(NamedTuple):
+    """A step of the base: where, when [s], RMS motion [m] of the points, evidence in nats."""
+
+    recording: str
+    time: float
+    size: float
+    significance: float
+
+
+class Settling(NamedTuple):
+    """A settling of the base: where, time constant [s], RMS motion [m] at its start, nats."""
+
+    recording: str
+    time_constant: float
+    size: float
+    significance: float
+
+
+def setup(case: Case) -> Sequence[Finding]:
+    """Return steps and settling of the set-up in what the aligned model leaves."""
+    out = [
+        Finding(
+            'warning',
+            f'The set-up of {step.recording} moved by {length(step.size)} at {_when(case, step)}; '
+            'split the recording there and have the base aligned, so that each part gets its own.',
+        )
+        for step in moved_setup(case.residuals, case.problem, case.model)
+    ]
+    out += [
+        Finding(
+            'note',
+            f'The set-up of {found.recording} settles by {length(found.size)} with a time '
+            f'constant of {found.time_constant:.3g} {_unit(case, found.recording)}, as in '
+            'warming up.',
+        )
+        for found in settling(case.residuals, case.problem, case.model)
+    ]
+    return out
+
+
+def moved_setup(parts: list[Array], problem: Problem, model: Model) -> list[Step]:
+    """
+    Return steps of the base frame that explain much more than any smooth change.
+
+    Parameters
+    ----------
+    parts : list of array, shape (c, M)
+        Residuals of the model, one per recording; of the baseline or of any later model.
+    problem : Problem
+    model : Model
+
+    """
+    problem, parts = _thinned(problem, parts)
+    change = base_change(parts, problem, model)
+    out: list[Step] = []
+    for _ in range(MOST):
+        found = _best_step(change, problem)
+        if found is None:
+            break
+        step, shape = found
+        out.append(step)
+        change = change.without(shape)
+    return out
+
+
+def settling(parts: list[Array], problem: Problem, model: Model) -> list[Settling]:
+    """Return exponential settlings of the base, one per recording at most; see `moved_setup`."""
+    problem, parts = _thinned(problem, parts)
+    change = base_change(parts, problem, model)
+    out = []
+    for k, recording in enumerate(problem.recordings):
+        mine = change.recording == k
+        age = _age(problem, k)
+        shapes = [_placed(np.exp(-age / c), mine) for c in CONSTANTS]
+        gains = [change.gain(shape) for shape in shapes]
+        best = int(np.argmax(gains))
+        nats = change.nats(gains[best])
+        others = [change.gain(_placed(age**power, mine)) for power in (1, 2)]
+        others.append(float(change.step_gains(k).max()))
+        if nats > SURE and nats > change.nats(max(others)) + SURE:
+            span = float(np.ptp(measured(recording).t))
+            size = change.size(shapes[best])
+            out.append(Settling(recording.name, float(CONSTANTS[best]) * span, size, nats))
+    return out
+
+
+def _best_step(change: BaseChange, problem: Problem) -> tuple[Step, Array] | None:
+    best: tuple[Step, Array] | None = None
+    for k, recording in enumerate(problem.recordings):
+        mine = change.recording == k
+        gains = change.step_gains(k)
+        whole = k > 0 and 'base' not in problem.align
+        edge = max(3, int(EDGE * gains.size))
+        allowed = np.zeros(gains.size, dtype=bool)
+        allowed[edge:-edge] = True
+        allowed[0] = whole
+        if not allowed.any():
+            continue
+        at = int(np.where(allowed, gains, -np.inf).argmax())
+        nats = change.nats(float(gains[at]))
+        if nats < SURE or nats < change.nats(_smooth(change, problem, k)) + SURE:
+            continue
+        shape = _placed((np.arange(gains.size) >= at).astype(float), mine)
+        step = Step(recording.name, float(measured(recording).t[at]), change.size(shape), nats)
+        if best is None or step.significance > best[0].significance:
+            best = step, shape
+    return best
+
+
+def _smooth(change: BaseChange, problem: Problem, k: int) -> float:
+    """Return the most that a smooth change of recording k's base explains."""
+    mine, age = change.recording == k, _age(problem, k)
+    shapes = [age, age**2, *(np.exp(-age / c) for c in CONSTANTS)]
+    shapes += [np.exp(-(1.0 - age) / c) for c in CONSTANTS]
+    shapes += [np.sin(n * np.pi * age) for n in (1, 2)] + [np.cos(n * np.pi * age) for n in (1, 2)]
+    return max(change.gain(_placed(shape, mine)) for shape in shapes)
+
+
+def _age(problem: Problem, k: int) -> Array:
+    """Return time in the recording as a share of it, shape (M,)."""
+    t = measured(problem.recordings[k]).t
+    return np.asarray((t - t[0]) / max(float(np.ptp(t)), 1e-9))
+
+
+def _placed(shape: Array, mine: Array) -> Array:
+    out = np.zeros(mine.size)
+    out[mine] = shape
+    return out
+
+
+def _thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]:
+    few = problem.thinned(MOST_ROWS)
+    out = []
+    for whole, thin, part in zip(problem.recordings, few.recordings, parts, strict=True):
+        out.append(part[:, np.isin(measured(whole).t, measured(thin).t)])
+    return few, out
+
+
+def _when(case: Case, step: Step) -> str:
+    return f'{_unit(case, step.recording)} {step.time:.4g}' if _static(case, step.recording) else (
+        f't = {step.time:.4g} s')  # fmt: skip
+
+
+def _unit(case: Case, name: str) -> str:
+    return 'station' if _static(case, name) else 's'
+
+
+def _static(case: Case, name: str) -> bool:
+    return any(r.name == name and r.joints.static for r in case.recordings)

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Set-up settling: base or instrument creeps to its place while the cell warms up.
+
+Belongs to a set-up, not to the robot: it is part of the frames that an alignment fits, and it is
+not carried over to another recording beyond its settled state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import Channel, Shift
+from .base import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View, single
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class SetupSettling(Effect):
+    """Displacement and turn of the base at ``start`` [s], gone with ``time_constant`` [s]."""
+
+    xyz: Value = (0.0, 0.0, 0.0)
+    rotvec: Value = (0.0, 0.0, 0.0)
+    time_constant: float = 600.0
+    start: float = 0.0
+
+    name = 'setup_settling'
+    of = 'robot'
+    stage = Stage.LINK
+    cause = False
+    regime = 'time'
+    parameters = (
+        Parameter('xyz', 'm', size=3, typical=1e-4),
+        Parameter('rotvec', 'rad', size=3, typical=1e-4),
+    )
+    options = ('time_constant', 'start')
+    needs = frozenset({'time'})
+
+    def _left(self, view: View) -> Array:
+        """Return the share still to go, shape (N,)."""
+        return np.exp(-np.maximum(view.t - self.start, 0.0) / self.time_constant)
+
+    def displace(self, view: View) -> Shift:
+        """Return what is left of the displacement on the base."""
+        left = self._left(view)
+        out: dict[Channel, Array] = {}
+        for k in range(3):
+            out |= single(('base', k), self.number('xyz', k) * left, view)
+            out |= single(('base', k + 3), self.number('rotvec', k) * left, view)
+        return out
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the share still to go, for each component."""
+        return [{('base', k): self._left(view)} for k in range(6)]
+
+    @classmethod
+    def seeds(
+        cls, view: View, joint: str | None, pull: Array | None = None
+    ) -> Iterable[Effect]:
+        """Yield time constants from a twentieth to half of the recording."""
+        span = float(view.elapsed[-1])
+        if span > 0.0:
+            for share in (0.05, 0.12, 0.25, 0.5):
+                yield cls(time_constant=share * span, start=float(view.t[0]))

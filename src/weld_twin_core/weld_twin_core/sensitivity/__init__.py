@@ -15,7 +15,7 @@ from .advice import (
 from .distribution import Distribution
 from .evaluate import Model, draws_at, exact_deviations, model
 from .local import LocalSensitivity, Posture, arc_weights, local_sensitivity, posture
-from .morris import Screening, morris_screening
+from .morris import MorrisDesign, Screening, morris_screening
 from .outcome import Outcomes, outcomes
 from .scenario import Sizes, cumulative, scenario_deviations
 from .sobol import SobolDesign, SobolIndices, sobol_indices
@@ -32,8 +32,8 @@ from .tolerance import (
 )
 
 __all__ = [
-    'FAMILIES', 'POINTS', 'Distribution', 'LocalSensitivity', 'Model', 'Outcomes', 'Placement',
-    'PlacementResult', 'Posture', 'Probability', 'ProfileResult', 'Room', 'Screening', 'Sizes',
+    'FAMILIES', 'POINTS', 'Distribution', 'LocalSensitivity', 'Model', 'MorrisDesign', 'Outcomes',
+    'Placement', 'PlacementResult', 'Posture', 'Probability', 'ProfileResult', 'Room', 'Screening', 'Sizes',
     'SobolDesign', 'SobolIndices', 'Study', 'Sweep', 'Tolerance', 'ToleranceStack',
     'WeldTolerance', 'advise', 'arc_weights', 'compare_profiles', 'cumulative',
     'default_tolerances', 'default_values', 'draws_at', 'end_of_linearity', 'exact_deviations',

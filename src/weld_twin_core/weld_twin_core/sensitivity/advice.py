@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Trajectory advice: which time law, torch rotation and place of the base keep the deviation small.
+Trajectory advice: which time law, torch rotation and base keep the deviation small.
 
-The measure is the expected deviation to first order: exact enough to compare, and it needs no runs.
+The measure is the expected deviation to first order: exact enough to compare, without any runs.
 """
 
 from __future__ import annotations

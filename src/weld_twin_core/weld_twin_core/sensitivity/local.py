@@ -3,9 +3,9 @@
 r"""
 The paper's local study: what one small error does, by the analytic derivative and by differences.
 
-The paper's coefficient is :math:`S_p = \partial D / \partial p` with :math:`D = \|\Delta x\|` (V.i).
-Without errors D is the tip of a cone and has no derivative, only a slope to either side, equal to
-:math:`\|\partial x / \partial p\|`; that slope is what ``analytic`` and ``forward`` compare. At an
+The paper's coefficient is :math:`S_p = \partial D / \partial p` with :math:`D = \|\Delta x\|`
+(V.i). Without errors D is the tip of a cone and has no derivative, only a slope to either side,
+equal to :math:`\|\partial x / \partial p\|`; that slope is what ``analytic`` and ``forward`` compare. At an
 error of typical size D is smooth, and its two-sided derivative is compared there as well.
 """
 
@@ -85,7 +85,7 @@ class LocalSensitivity:
 
     @property
     def rms(self) -> Array:
-        """Return the root mean square of the slope over the arc length, shape (P,) [m per unit]."""
+        """Return the rms of the slope over the arc length, shape (P,) [m per unit]."""
         return np.sqrt((self.analytic**2 * self.weights).sum(axis=1))
 
     @property

@@ -68,6 +68,69 @@ class Screening:
         }  # fmt: skip
 
 
+@dataclass(frozen=True)
+class MorrisDesign:
+    """
+    Which runs Morris screening needs.
+
+    Attributes
+    ----------
+    names : tuple of str, length P
+    trajectories : int
+        Every one costs P + 1 runs.
+    seed : int
+
+    """
+
+    names: tuple[str, ...]
+    trajectories: int = 50
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.trajectories < 2:
+            raise DataError(
+                f'Morris screening needs at least 2 trajectories, got {self.trajectories}'
+            )
+        if self.seed < 0:
+            raise DataError(f'a seed must not be negative, got {self.seed}')
+
+    def _problem(self) -> dict[str, Any]:
+        bounds = [[MARGIN, 1.0 - MARGIN]] * len(self.names)
+        return {'num_vars': len(self.names), 'names': list(self.names), 'bounds': bounds}
+
+    def samples(self) -> Array:
+        """Return probabilities of every input, shape (trajectories (P + 1), P)."""
+        from SALib.sample import morris
+
+        values: Array = morris.sample(
+            self._problem(), self.trajectories, num_levels=LEVELS,
+            seed=np.random.default_rng([self.seed, 0]),
+        )  # fmt: skip
+        return values
+
+    def screening(self, results: Array) -> Screening:
+        """
+        Return the measures of model results in the order of `samples`.
+
+        Raises
+        ------
+        DataError
+            A result is not a number.
+
+        """
+        from SALib.analyze import morris
+
+        values = np.asarray(results, dtype=np.float64)
+        refuse_unfinite(values, 'Morris screening')
+        found = morris.analyze(
+            self._problem(), self.samples(), values, num_levels=LEVELS,
+            seed=np.random.default_rng([self.seed, 1]),
+        )  # fmt: skip
+        keys = ('mu_star', 'mu_star_conf', 'sigma')
+        measures = (np.asarray(found[key], dtype=np.float64) for key in keys)
+        return Screening(self.names, *measures, self.trajectories, values.size, self.seed)
+
+
 def morris_screening(
     function: Function, names: Sequence[str], trajectories: int = 50, *, seed: int = 0
 ) -> Screening:
@@ -78,10 +141,8 @@ def morris_screening(
     ----------
     function : callable
         Probabilities of every input, shape (D, P), to results, shape (D,).
-    names : sequence of str
-    trajectories : int
-        Every one costs P + 1 runs.
-    seed : int
+    names, trajectories, seed
+        See `MorrisDesign`.
 
     Raises
     ------
@@ -89,20 +150,5 @@ def morris_screening(
         A result is not a number, or fewer than two trajectories.
 
     """
-    from SALib.analyze import morris as analysis  # noqa: PLC0415 - SALib brings pandas along
-    from SALib.sample import morris as sampling  # noqa: PLC0415
-
-    if trajectories < 2:
-        raise DataError(f'Morris screening needs at least 2 trajectories, got {trajectories}')
-    bounds = [[MARGIN, 1.0 - MARGIN]] * len(names)
-    problem = {'num_vars': len(names), 'names': list(names), 'bounds': bounds}
-    samples = sampling.sample(
-        problem, trajectories, num_levels=LEVELS, seed=np.random.default_rng([seed, 0])
-    )
-    results = np.asarray(function(samples), dtype=np.float64)
-    refuse_unfinite(results, 'Morris screening')
-    found = analysis.analyze(
-        problem, samples, results, num_levels=LEVELS, seed=np.random.default_rng([seed, 1])
-    )
-    measures = (np.asarray(found[k], dtype=np.float64) for k in ('mu_star', 'mu_star_conf', 'sigma'))
-    return Screening(tuple(names), *measures, trajectories, len(samples), seed)
+    design = MorrisDesign(tuple(names), trajectories, seed)
+    return design.screening(function(design.samples()))

@@ -117,7 +117,9 @@ class SobolDesign:
         if len(set(self.names)) != len(self.names):
             raise DataError('two inputs of a sensitivity study have the same name')
         if self.groups is not None and len(self.groups) != len(self.names):
-            raise DataError(f'{len(self.names)} inputs need as many groups, got {len(self.groups)}')
+            raise DataError(
+                f'{len(self.names)} inputs need as many groups, got {len(self.groups)}'
+            )
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -133,7 +135,7 @@ class SobolDesign:
 
     def samples(self) -> Array:
         """Return probabilities of every input, shape (N (G + 2), P)."""
-        from SALib.sample import sobol  # noqa: PLC0415 - SALib brings pandas along
+        from SALib.sample import sobol
 
         values: Array = sobol.sample(
             self._problem(), self.base_samples, calc_second_order=False, seed=self.seed
@@ -170,7 +172,7 @@ class SobolDesign:
         )  # fmt: skip
 
     def _analyse(self, values: Array) -> dict[str, Array]:
-        from SALib.analyze import sobol  # noqa: PLC0415 - SALib brings pandas along
+        from SALib.analyze import sobol
 
         # SALib takes the seed 0 for no seed; a generator it takes for what it is.
         rng = np.random.default_rng(self.seed)

@@ -75,7 +75,7 @@ Measure = Callable[[Case], dict[str, float]]
 
 def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
     """Return everything the claims need to know about a robot on a seam."""
-    from . import combining, geometry, motion  # noqa: PLC0415 - they need Case
+    from . import combining, geometry, motion
 
     case = Case(robot, path, seed)
     out: dict[str, float] = {}

@@ -118,7 +118,7 @@ def judge(cases: Mapping[CaseName, Measured]) -> tuple[Claim, ...]:
         There are no cases.
 
     """
-    from .rules import RULES  # noqa: PLC0415 - the rules are made of this module's classes
+    from .rules import RULES
 
     if not cases:
         raise DataError('the claims need at least one robot on one seam')

@@ -70,8 +70,8 @@ RULES: tuple[Rule, ...] = (
     Rule(
         'backlash_local', 'Backlash deviates only locally, at reversals', 'IV.iv',
         lambda m: m['local_share_play'] > 0.9,
-        lambda r: f'{r["local_share_play"] * 100.0:.0f} % of the squared deviation of play lies at '
-        f'the {r["local_share_of_points"] * 100.0:.0f} % of points near a reversal: half the gap '
+        lambda r: f'{r["local_share_play"] * 100.0:.0f} % of the squared deviation of play lies '
+        f'at the {r["local_share_of_points"] * 100.0:.0f} % of points near a reversal: half the gap '
         f'stays until the next one; as written it is {r["local_share_written"] * 100.0:.0f} %',
         ('local_share_play', 'local_share_of_points', 'local_share_written'),
         'backlash is the paper\'s one-sample formula, not play',
@@ -81,8 +81,8 @@ RULES: tuple[Rule, ...] = (
         'backlash_reversals', 'Frequent reversals make backlash accumulate', 'IV.iv, V.iv',
         lambda m: m['more_reversals_mean_play'] > 1.1,
         lambda r: f'from 2 to 20 reversals the mean deviation of play changes by the factor '
-        f'{r["more_reversals_mean_play"]:.2f}; as written by {r["more_reversals_mean_written"]:.1f}'
-        f', but then twice the sample rate makes it {r["finer_mean_written"]:.2f} of itself',
+        f'{r["more_reversals_mean_play"]:.2f}; as written by '
+        f'{r["more_reversals_mean_written"]:.1f}, but then twice the sample rate makes it {r["finer_mean_written"]:.2f} of itself',
         ('more_reversals_mean_play', 'more_reversals_mean_written', 'finer_mean_written'),
         'backlash is the paper\'s one-sample formula, not play',
         lambda m: m['more_reversals_mean_written'] > 1.1,
@@ -132,8 +132,8 @@ RULES: tuple[Rule, ...] = (
         'angle_above_length', 'S_theta is larger than S_a', 'V.iii',
         lambda m: m['S_theta_least_m'] > m['S_a_max'],
         lambda r: f'in m/rad against m/m {r["S_theta_max_m"]:.2f} at most against '
-        f'{r["S_a_max"]:.2f}; per degree and mm {(r["S_theta_max_m"] * _DEGREE_IN_MM):.1f} against '
-        f'{r["S_a_max"]:.2f}: the unit decides, joints near the tool stay below in either',
+        f'{r["S_a_max"]:.2f}; per degree and mm {(r["S_theta_max_m"] * _DEGREE_IN_MM):.1f} '
+        f'against {r["S_a_max"]:.2f}: the unit decides, joints near the tool stay below in either',
         ('S_theta_max_m', 'S_theta_mean_m', 'S_theta_least_m', 'S_a_max'),
         'the joint has leverage and it is taken per degree against per mm',
         lambda m: m['S_theta_max_m'] * _DEGREE_IN_MM > m['S_a_max'],
@@ -153,7 +153,8 @@ RULES: tuple[Rule, ...] = (
         ('S_a_min', 'S_a_max'),
     ),
     Rule(
-        'condition', 'A high condition number of J means high sensitivity to joint errors', 'II.ii',
+        'condition',
+        'A high condition number of J means high sensitivity to joint errors', 'II.ii',
         lambda m: m['condition_rank'] > 0.5 and m['condition_rank_anywhere'] > 0.5,
         lambda r: f'rank correlation of condition number and gain: along these seams '
         f'{r["condition_rank"]:.2f}, as both grow while the arm stretches; over random postures '
@@ -175,25 +176,26 @@ RULES: tuple[Rule, ...] = (
     Rule(
         'drift_linear', 'Cumulative drift of angular errors is linear in the path length', 'V.vi',
         lambda m: abs(m['drift_exponent_angular'] - 1.0) < 0.05,
-        lambda r: f'D_cum grows with the power {r["drift_exponent_angular"]:.2f} of the path: it is '
-        f'a sum of deviations that differ along the seam by '
+        lambda r: f'D_cum grows with the power {r["drift_exponent_angular"]:.2f} of the path: it '
+        f'is a sum of deviations that differ along the seam by '
         f'{r["drift_spread_angular"] * 100.0:.0f} %, not an accumulation',
         ('drift_exponent_angular', 'drift_spread_angular'),
         'the lever arms change little along the seam',
-        lambda m: abs(m['drift_exponent_angular'] - 1.0) < 0.05 or m['drift_spread_angular'] > 0.05,
+        lambda m: abs(m['drift_exponent_angular'] - 1.0) < 0.05
+        or m['drift_spread_angular'] > 0.05,
     ),
     Rule(
         'drift_superlinear', 'Combined errors make the drift grow faster than the path', 'V.vi',
         lambda m: m['drift_exponent_combined'] > 1.05,
-        lambda r: f'power of the path length: combined {r["drift_exponent_combined"]:.2f}, angular '
-        f'{r["drift_exponent_angular"]:.2f}, initialization {r["drift_exponent_init"]:.2f}',
+        lambda r: f'power of the path length: combined {r["drift_exponent_combined"]:.2f}, '
+        f'angular {r["drift_exponent_angular"]:.2f}, initialization {r["drift_exponent_init"]:.2f}',
         ('drift_exponent_combined', 'drift_exponent_angular', 'drift_exponent_init'),
     ),
     Rule(
         'ranking', 'Angular errors > backlash > link length > initialization', 'V.vii',
         lambda m: bool(m['rank_holds']),
-        lambda r: f'total indices on the stated tolerances: angular {r["ST_angular"]:.2f}, backlash '
-        f'{r["ST_backlash"]:.2f}, length {r["ST_length"]:.2f}, initialization '
+        lambda r: f'total indices on the stated tolerances: angular {r["ST_angular"]:.2f}, '
+        f'backlash {r["ST_backlash"]:.2f}, length {r["ST_length"]:.2f}, initialization '
         f'{r["ST_initial"]:.2f}; tolerances changed by up to 3 leave the order in '
         f'{r["rank_share"] * 100.0:.0f} % of cases; per degree and mm it is '
         f'{r["unit_angular"]:.1f} > {r["unit_backlash"]:.1f} > {r["unit_length"]:.0f} = '

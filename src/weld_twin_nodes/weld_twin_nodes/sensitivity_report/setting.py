@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a sensitivity study is asked: robot, seam or recording, tolerances, how much to run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.effects import Effect
+from weld_twin_core.paths import Path, Torch
+from weld_twin_core.recording import Recording
+from weld_twin_core.robot import Robot
+from weld_twin_core.sensitivity import (
+    POINTS,
+    Study,
+    Tolerance,
+    WeldTolerance,
+    planned_study,
+    recorded_study,
+)
+
+PROFILES = ('smooth', 'aggressive')
+RECORDED = 'recorded'
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much a study runs: Sobol base samples, Monte Carlo runs, Morris trajectories."""
+
+    samples: int = 1024
+    runs: int = 20_000
+    trajectories: int = 50
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """
+    The question.
+
+    Attributes
+    ----------
+    robot : Robot
+    tolerances : tuple of Tolerance
+    seam : str
+        What the seam or the bag is called.
+    path : Path or None
+        None where a recording is studied.
+    recording : Recording or None
+    torch : Torch
+    points : int
+    known : tuple of Effect
+    normal : array, shape (3,), optional
+        Out of the work, for a recording.
+    weld : WeldTolerance
+    effort : Effort
+
+    """
+
+    robot: Robot
+    tolerances: tuple[Tolerance, ...]
+    seam: str
+    path: Path | None = None
+    recording: Recording | None = None
+    torch: Torch = field(default_factory=Torch)
+    points: int = POINTS
+    known: tuple[Effect, ...] = ()
+    normal: Array | None = None
+    weld: WeldTolerance = field(default_factory=WeldTolerance)
+    effort: Effort = field(default_factory=Effort)
+
+    @cached_property
+    def studies(self) -> dict[str, Study]:
+        """Return the motions studied by name: the profiles, or the one recorded."""
+        if self.recording is not None:
+            study = recorded_study(
+                self.robot, self.recording, points=self.points, normal=self.normal,
+                known=self.known,
+            )  # fmt: skip
+            return {RECORDED: study}
+        return {profile: self.planned(profile) for profile in PROFILES}
+
+    def planned(self, profile: str, points: int | None = None) -> Study:
+        """Return the study of the seam travelled by a time law."""
+        assert self.path is not None
+        return planned_study(
+            self.robot, self.path, profile, points=points or self.points, torch=self.torch,
+            known=self.known,
+        )  # fmt: skip
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the study was asked, as plain data."""
+        first = next(iter(self.studies.values()))
+        return {
+            'robot': self.robot.name, 'seam': self.seam, 'length_m': first.length,
+            'path_points': first.samples, 'profiles': list(self.studies),
+            'samples': self.effort.samples, 'runs': self.effort.runs,
+            'trajectories': self.effort.trajectories, 'seed': self.effort.seed,
+            'across_m': self.weld.across_m, 'stickout_m': self.weld.stickout_m,
+            'known': [effect.to_mapping() for effect in self.known],
+            'tolerances': [tolerance.to_mapping() for tolerance in self.tolerances],
+        }  # fmt: skip
+
+
+def recorded_deviations(study: Study) -> Array | None:
+    """Return measured minus nominal position in seam axes, shape (N, 3) [m], where measured."""
+    measured = study.recording.measured
+    if measured is None:
+        return None
+    index = np.searchsorted(measured.t, study.t)
+    return study.on_seam(measured.position[index] - study.nominal.position)

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole study: local, global, stack and advice, as one tree of plain data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core import sensitivity
+from weld_twin_core.arrays import Array
+from weld_twin_core.metrics import root_mean_square
+from weld_twin_core.sensitivity import MorrisDesign, Outcomes, SobolDesign, Study, Tolerance
+
+from ..tasks import Runner, Task
+from . import work
+from .setting import RECORDED, Setting, recorded_deviations
+
+SCHEMA = 'weld_twin/sensitivity/1'
+OUTPUTS = ('d_norm', 'across_m', 'stickout_m')
+"""What Sobol indices are given of."""
+
+
+def run_study(setting: Setting, runner: Runner) -> dict[str, Any]:
+    """Return everything the study finds."""
+    out: dict[str, Any] = {'schema': SCHEMA, 'setting': setting.describe(), 'motions': {}}
+    pieces = _pieces(setting, runner)
+    designs = {name: _Designs(setting, name) for name in setting.studies}
+    jobs = {k: v for name, d in designs.items() for k, v in d.jobs(setting.studies[name]).items()}
+    found = work.run_all(runner, jobs)
+    for name, design in designs.items():
+        out['motions'][name] = {
+            'local': pieces[name, 'local'], 'sweeps': pieces[name, 'sweeps'],
+            'global': design.results(found),
+        }  # fmt: skip
+    if setting.path is not None:
+        out['advice'] = {
+            'profiles': pieces['', 'profiles'], 'placement': pieces['', 'placement'],
+        }  # fmt: skip
+    if RECORDED in setting.studies:
+        out['recorded'] = _recorded(setting, out['motions'][RECORDED])
+    return out
+
+
+def _pieces(setting: Setting, runner: Runner) -> dict[tuple[str, str], Any]:
+    """Return the results of the tasks that are one piece each."""
+    tasks: dict[tuple[str, str], Task] = {}
+    tolerances = setting.tolerances
+    for name, study in setting.studies.items():
+        tasks[name, 'local'] = Task(work.local, (study, tolerances), f'{name}: local')
+        tasks[name, 'sweeps'] = Task(work.sweeps, (study, tolerances), f'{name}: sweeps')
+    if setting.path is not None:
+        seam = setting.robot, setting.path, tolerances
+        tasks['', 'placement'] = Task(
+            work.placement, (*seam, setting.torch, setting.effort.seed), 'placement'
+        )
+        tasks['', 'profiles'] = Task(work.profiles, seam, 'profiles')
+    return dict(zip(tasks, runner.run(list(tasks.values())), strict=True))
+
+
+class _Designs:
+    """The runs of one motion: Sobol by parameter, effect and joint, Morris, the stack."""
+
+    def __init__(self, setting: Setting, motion: str) -> None:
+        self._setting, self._motion = setting, motion
+        effort, tolerances = setting.effort, setting.tolerances
+        names = tuple(t.name for t in tolerances)
+        groupings = {
+            'parameter': None, 'effect': tuple(t.effect for t in tolerances),
+            'joint': tuple(t.site for t in tolerances),
+        }  # fmt: skip
+        self._sobol = {
+            by: SobolDesign(names, effort.samples, groups, effort.seed)
+            for by, groups in groupings.items()
+            if groups is None or len(set(groups)) > 1
+        }
+        self._morris = MorrisDesign(names, effort.trajectories, effort.seed)
+
+    def _label(self, what: str) -> str:
+        return f'{self._motion}: {what}'
+
+    def jobs(self, study: Study) -> dict[str, tuple[Study, tuple[Tolerance, ...], Array]]:
+        """Return probabilities to run, by label."""
+        effort, tolerances = self._setting.effort, self._setting.tolerances
+        units = {f'Sobol by {by}': design.samples() for by, design in self._sobol.items()}
+        units['Morris'] = self._morris.samples()
+        units['stack'] = sensitivity.probabilities(effort.runs, len(tolerances), effort.seed)
+        return {self._label(what): (study, tolerances, unit) for what, unit in units.items()}
+
+    def results(self, found: dict[str, tuple[Outcomes, float]]) -> dict[str, Any]:
+        """Return indices, measures and percentiles."""
+        sobol = {
+            by: _indices(design, found[self._label(f'Sobol by {by}')][0])
+            for by, design in self._sobol.items()
+        }
+        screened = self._morris.screening(found[self._label('Morris')][0].d_norm)
+        stacked, error = found[self._label('stack')]
+        setting = self._setting
+        stack = sensitivity.tolerance_stack(stacked, setting.weld, seed=setting.effort.seed)
+        return {
+            'model_error': error, 'sobol': sobol, 'morris': screened.as_dict(),
+            'stack': stack.as_dict(),
+            'stack_runs': {'max_m': stacked.max_m, 'rms_m': stacked.rms_m},
+        }  # fmt: skip
+
+
+def _indices(design: SobolDesign, found: Outcomes) -> dict[str, Any]:
+    out = {}
+    for key in OUTPUTS:
+        values = getattr(found, key)
+        # An error may leave a direction alone altogether, as a purely planar one does.
+        if np.ptp(values) > 1e-15:
+            out[key] = design.indices(values).as_dict()
+    return out
+
+
+def _recorded(setting: Setting, motion: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the deviations that were measured, beside those the tolerances lead to expect."""
+    study = setting.studies[RECORDED]
+    off = recorded_deviations(study)
+    if off is None:
+        return None
+    size = np.linalg.norm(off, axis=1)
+    runs = motion['global']['stack_runs']
+    across, stickout = np.abs(off[:, 1]).max(), np.abs(off[:, 2]).max()
+    return {
+        't_s': study.t, 's_m': study.s, 'deviation_m': off,
+        'max_m': size.max(), 'rms_m': root_mean_square(size), 'd_norm': size.max() / study.length,
+        'across_m': across, 'stickout_m': stickout,
+        'inside': {
+            'across': bool(across <= setting.weld.across_m),
+            'stickout': bool(stickout <= setting.weld.stickout_m),
+        },
+        'share_of_runs_below': {
+            'max': float((np.asarray(runs['max_m']) < size.max()).mean()),
+            'rms': float((np.asarray(runs['rms_m']) < root_mean_square(size)).mean()),
+        },
+    }  # fmt: skip

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The tasks of a sensitivity study; each a function of plain arguments to plain data."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core import sensitivity
+from weld_twin_core.arrays import Array
+from weld_twin_core.paths import Path, Torch, default_seam
+from weld_twin_core.robot import Robot
+from weld_twin_core.sensitivity import Model, Outcomes, Study, Tolerance
+from weld_twin_core.sensitivity.claims import measure_case
+
+from ..digest import digest
+from ..tasks import Runner, Task
+
+BLOCK = 8192
+"""Runs of one task."""
+
+
+_models: dict[str, Model] = {}
+"""What a worker made last, by content: it sees the same study many times."""
+
+
+def _model(study: Study, tolerances: tuple[Tolerance, ...]) -> Model:
+    key = digest(study, tolerances)
+    if key not in _models:
+        _models.clear()
+        _models[key] = sensitivity.model(study, tolerances)
+    return _models[key]
+
+
+def run_block(study: Study, tolerances: tuple[Tolerance, ...], unit: Array) -> dict[str, Any]:
+    """Return what the runs at probabilities (D, P) come to, and how exact the model is."""
+    model = _model(study, tolerances)
+    found = model.at_probabilities(unit)
+    return {'model_error': model.error, **found._asdict()}
+
+
+def local(study: Study, tolerances: tuple[Tolerance, ...]) -> dict[str, Any]:
+    """Return the local sensitivities, and how the arm stands."""
+    found = sensitivity.local_sensitivity(study, tolerances)
+    stand = sensitivity.posture(study)
+    return {
+        **found.as_dict(),
+        'posture': {'s_m': study.s, **asdict(stand)},
+        'expected_m': sensitivity.expected_deviation(study, tolerances),
+    }
+
+
+def sweeps(study: Study, tolerances: tuple[Tolerance, ...]) -> list[dict[str, Any]]:
+    """Return the deviation over the size of every error, and where it stops being linear."""
+    out = []
+    for tolerance in tolerances:
+        found = sensitivity.sweep(study, tolerance, sensitivity.default_values(tolerance))
+        end = None
+        if tolerance.unit == 'rad' and tolerance.effect != 'backlash':
+            end = sensitivity.end_of_linearity(study, tolerance)
+        out.append({**found.as_dict(), 'linear_up_to': end})
+    return out
+
+
+def profiles(robot: Robot, path: Path, tolerances: tuple[Tolerance, ...]) -> list[dict[str, Any]]:
+    """Return what the time laws do to the seam, with a lag of every joint besides."""
+    lag = sensitivity.default_tolerances(robot, ('servo_lag',))
+    wanted = {t.name: t for t in (*lag, *tolerances)}
+    found = sensitivity.compare_profiles(robot, path, tuple(wanted.values()))
+    still = sensitivity.compare_profiles(robot, path, tolerances)
+    return [
+        {**asdict(a), 'expected_without_lag_m': b.expected_m}
+        for a, b in zip(found, still, strict=True)
+    ]
+
+
+def placement(
+    robot: Robot, path: Path, tolerances: tuple[Tolerance, ...], torch: Torch, seed: int
+) -> list[dict[str, Any]]:
+    """Return the best torch rotation and base placement."""
+    found = sensitivity.advise(robot, path, tolerances, torch=torch, seed=seed)
+    return [result.as_dict() for result in found]
+
+
+def claim_case(robot: Robot, seam: str, seed: int) -> dict[str, float]:
+    """Return the measurements of a robot on a bundled seam that decide the claims."""
+    return measure_case(robot, default_seam(robot, seam), seed)
+
+
+def run_all(
+    runner: Runner, jobs: dict[str, tuple[Study, tuple[Tolerance, ...], Array]]
+) -> dict[str, tuple[Outcomes, float]]:
+    """
+    Return what the runs of every job come to, and the largest error of its model.
+
+    Parameters
+    ----------
+    runner : Runner
+    jobs : mapping
+        From a label to a study, its tolerances and the probabilities (D, P) of its runs.
+
+    """
+    tasks, owners = [], []
+    for label, (study, tolerances, unit) in jobs.items():
+        for start in range(0, len(unit), BLOCK):
+            block = unit[start : start + BLOCK]
+            text = f'{label}: runs {start} to {start + len(block)}'
+            tasks.append(Task(run_block, (study, tolerances, block), text))
+            owners.append(label)
+    parts: dict[str, list[dict[str, Any]]] = {label: [] for label in jobs}
+    for label, result in zip(owners, runner.run(tasks), strict=True):
+        parts[label].append(result)
+    return {label: (_joined(found), found[0]['model_error']) for label, found in parts.items()}
+
+
+def _joined(parts: list[dict[str, Any]]) -> Outcomes:
+    columns = ([np.asarray(part[name]) for part in parts] for name in Outcomes._fields)
+    return Outcomes(*(np.concatenate(column) for column in columns))

@@ -18,7 +18,7 @@ import numpy as np
 
 from .arrays import Array
 from .chain import frames
-from .effects.base import Effect, Stage
+from .effects.base import Effect, MemoryEffect, Stage
 from .inverse.newton import chain_jacobian, least_step
 from .poses import Poses
 from .recording import JointMotion, Recording
@@ -26,7 +26,10 @@ from .robot import Robot
 from .rotation import angle_between
 from .twin import Twin
 
-BEYOND_COMMANDS = frozenset({'measurement_scale', 'measurement_noise', 'time_delay', 'drift'})
+BEYOND_COMMANDS = frozenset({
+    'measurement_scale', 'measurement_noise', 'time_delay', 'drift', 'setup_step',
+    'setup_settling',
+})  # fmt: skip
 """Effects of the measurement, or new in every run: no joint command mends them."""
 _CLOSED = 1e-12
 _LEAST_SHARE = 1e-3
@@ -83,18 +86,22 @@ def compensate(
     real, nominal = Twin(robot, acting), Twin(robot)
     wanted = nominal.poses(recording)
     motion = recording.joints
-    q, share = motion.q, 1.0
+    coupled = any(isinstance(effect, MemoryEffect) for effect in acting)
+    q, share = motion.q, np.ones((motion.t.size, 1))
     error = before = _missing(wanted, real.poses(recording))
     for _ in range(rounds):
-        if np.abs(error).max(initial=0.0) < _CLOSED or share < _LEAST_SHARE:
+        live = (np.abs(error).max(axis=1, keepdims=True) > _CLOSED) & (share > _LEAST_SHARE)
+        if not live.any():
             break
         step = least_step(chain_jacobian(robot, frames(robot, q)), error, _SINGULAR)
         trial = replace(recording, joints=_commands(motion, q + share * step))
         left = _missing(wanted, real.poses(trial))
-        if _rms(left) < _rms(error):
-            q, error = trial.joints.q, left
-        else:
-            share *= 0.5
+        helps = np.linalg.norm(left, axis=1) < np.linalg.norm(error, axis=1)
+        if coupled:
+            helps[:] = _rms(left) < _rms(error)
+        q = np.where(helps[:, None], trial.joints.q, q)
+        error = np.where(helps[:, None], left, error)
+        share = np.where(helps[:, None], share, 0.5 * share)
     left_out = tuple(e for e in effects if not _commandable(e))
     return Compensation(_commands(motion, q), -before, -error, left_out)
 

@@ -43,7 +43,7 @@ def read_diagnosis(path: Path | str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise ModelError(f"diagnosis '{path}' is not JSON: {error}") from None
     schema = data.get('schema') if isinstance(data, dict) else None
-    if not str(schema).startswith(SCHEMA_PREFIX):
+    if not isinstance(data, dict) or not str(schema).startswith(SCHEMA_PREFIX):
         raise ModelError(
             f"'{path}' is no diagnosis: its schema is {schema!r}, expected {SCHEMA_PREFIX}1; give "
             'the diagnosis.json that weld-twin diagnose wrote'

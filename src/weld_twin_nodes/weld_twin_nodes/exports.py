@@ -17,7 +17,7 @@ from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
 from weld_twin_msgs_py.yaml_file import yaml_text
 
 _EVERYTHING = '# Every effect of the twin; goes with the nominal robot.\n'
-_LEFT_OVER = '# What the corrected robot.yaml cannot hold; goes with it, not with the nominal one.\n'
+_LEFT_OVER = '# What the corrected robot.yaml cannot hold; goes with that, not with the nominal.\n'
 
 
 def write_yaml(path: Path, model: Model) -> None:
@@ -33,7 +33,7 @@ def write_model_urdf(path: Path, model: Model) -> None:
 def write_offsets(path: Path, model: Model) -> None:
     """Write how much further each joint really stands than its reading [rad, or m]."""
     robot = model.robot
-    offsets = joint_offsets(robot, model.known + model.found)
+    offsets = joint_offsets(robot, _causes(model))
     rows = ['joint,offset,unit']
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         rows.append(f'{name},{float(offset)!r},{"m" if slides else "rad"}')
@@ -42,7 +42,7 @@ def write_offsets(path: Path, model: Model) -> None:
 
 def write_effects(path: Path, model: Model) -> None:
     """Write every effect, known and found, for use with the nominal robot."""
-    _write_effects(path, _EVERYTHING, model.known + model.found)
+    _write_effects(path, _EVERYTHING, _causes(model))
 
 
 def write_left_over(path: Path, model: Model) -> None:
@@ -68,9 +68,14 @@ def write_all(directory: Path, model: Model) -> None:
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     based = model.robot.with_frames(base=model.bases[0])
-    robot, left = corrected(based, model.known + model.found)
+    robot, left = corrected(based, _causes(model))
     source = f'{robot.source}; corrected by a diagnosis' if robot.source else 'diagnosis'
     return replace(robot, source=source), left
+
+
+def _causes(model: Model) -> tuple[Effect, ...]:
+    """Return the effects of robot and cell; how a set-up moved is of no use elsewhere."""
+    return tuple(effect for effect in model.known + model.found if effect.cause)
 
 
 def _write_effects(path: Path, comment: str, effects: Sequence[Effect]) -> None:

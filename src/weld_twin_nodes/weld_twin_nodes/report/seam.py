@@ -36,7 +36,7 @@ def seam_data(diagnosis: Diagnosis) -> dict[str, Any]:
     return {'runs': runs, 'top': round(1e6 * top, 1), 'stretch': _stretch(traces.measured, top)}
 
 
-def thinned(before: Array, after: Array, most: int) -> Array:
+def thinned(before: Array, after: Array, most: int) -> np.ndarray:
     """Return an index of at most so many samples, the largest deviations among them."""
     count = before.size
     if count <= most:
@@ -47,7 +47,7 @@ def thinned(before: Array, after: Array, most: int) -> Array:
 
 
 def _micrometres(points: Array) -> list[float]:
-    return np.round(1e6 * points, 1).ravel().tolist()
+    return [round(float(value), 1) for value in (1e6 * points).ravel()]
 
 
 def _large(parts: tuple[Array, ...]) -> float:

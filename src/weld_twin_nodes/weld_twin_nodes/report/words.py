@@ -21,7 +21,8 @@ CAUSES = {
     'cartesian_compliance': 'compliance at the tool', 'payload': 'wrong payload',
     'servo_lag': 'servo lag', 'time_delay': 'clock delay', 'thermal_growth': 'thermal growth',
     'drift': 'drift of the frame', 'vibration': 'vibration', 'quantization': 'encoder resolution',
-    'measurement_scale': 'scale error of the instrument',
+    'measurement_scale': 'scale error of the instrument', 'setup_step': 'moved set-up',
+    'setup_settling': 'settling set-up',
 }  # fmt: skip
 STATUS = {
     'identified': 'Identified', 'ambiguous': 'Ambiguous', 'unknown': 'Unknown cause',

@@ -113,38 +113,37 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
     """
     scale = robust_scale(problem, parts)
     features = problem.features(model)
-    rows = [3 if r == 3 else 6 for r in problem.rows]
-    blocks, columns, positions = [], [], []
-    for k, maker in enumerate(features):
-        base = np.stack([maker.column(('base', j)) for j in range(6)])[:, : rows[k]]
-        positions.append(base[:, :3].transpose(2, 1, 0))
-        columns.append(_white(base, scale, k))
-        blocks.append(_white(_arm(maker, rows[k]), scale, k))
-    frames, _ = problem.frame_columns(features)
-    whites = [_white(part, scale, k) for k, part in enumerate(frames)]
-    residual = [_white(part[None], scale, k)[..., 0] for k, part in enumerate(parts)]
-    return _assembled(residual, columns, blocks, whites, positions, problem)
-
-
-def _assembled(
-    residual: list[Array], columns: list[Array], arm: list[Array], frames: list[Array],
-    positions: list[Array], problem: Problem,
-) -> BaseChange:  # fmt: skip
-    most = max(problem.rows)
-    number = np.repeat(np.arange(len(residual)), problem.samples)
-    pad = [((0, 0), (0, most - c)) for c in problem.rows]
-    left = np.concatenate([np.pad(r, p) for r, p in zip(residual, pad, strict=True)])
-    blocks = [
-        np.concatenate([np.pad(b, (*p, (0, 0))) for b, p in zip(each, pad, strict=True)])
-        for each in (columns, arm, frames)
-    ]
-    basis = _basis(blocks[1].reshape(left.size, -1), blocks[2].reshape(left.size, -1))
-    flat = _projected(left.reshape(-1, 1), basis)[:, 0]
-    left = flat.reshape(left.shape)
-    own = [left[number == k][:, :c].ravel() for k, c in enumerate(problem.rows)]
+    rows = problem.rows
+    frames = [_frame(maker, 'base', rows[k]) for k, maker in enumerate(features)]
+    tools = [_frame(maker, 'tool', rows[k]) for k, maker in enumerate(features)]
+    arms = [_arm(maker, rows[k]) for k, maker in enumerate(features)]
+    left, base, tool, arm = (
+        _stacked([_white(part, scale, k) for k, part in enumerate(each)])
+        for each in ([part[None] for part in parts], frames, tools, arms)
+    )
+    number = np.repeat(np.arange(len(parts)), problem.samples)
+    bases = [base]
+    if 'base' in problem.align:
+        bases = [base * (number == k)[:, None, None] for k in range(len(parts))]
+    size = left.size
+    constant = np.concatenate([*bases, tool], axis=2)
+    basis = _basis(arm.reshape(size, -1), constant.reshape(size, -1))
+    left = _projected(left.reshape(-1, 1), basis).reshape(left.shape[:2])
+    own = [left[number == k][:, :c].ravel() for k, c in enumerate(rows)]
     share = effective_share(np.concatenate(own), problem.rows, problem.samples)
-    return BaseChange(
-        left, blocks[0], basis.reshape(*left.shape, -1), number, share, np.concatenate(positions)
+    positions = np.concatenate([frame[:, :3].transpose(2, 1, 0) for frame in frames])
+    return BaseChange(left, base, basis.reshape(*left.shape, -1), number, share, positions)
+
+
+def _frame(maker: Features, name: str, rows: int) -> Array:
+    return np.stack([maker.column((name, j)) for j in range(6)])[:, :rows]
+
+
+def _stacked(parts: list[Array]) -> Array:
+    """Return (M_k, c_k, P) parts as one array, points filled up with empty rows."""
+    most = max(part.shape[1] for part in parts)
+    return np.concatenate(
+        [np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in parts]
     )
 
 

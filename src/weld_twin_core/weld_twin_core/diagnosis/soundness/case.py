@@ -15,10 +15,13 @@ from ...arrays import Array
 from ...errors import DataError
 from ...recording import Measurements, Recording
 from ..problem import Model, Problem
+from .lag import lag
 from .snapshot import Snapshot, snapshot
 
 LARGE = 5e-3
 """Median gap [m] above which the data may be mixed up; what wears in an arm is smaller."""
+ENOUGH = 30
+"""Joint states from which a motion has a shape in time."""
 
 
 class Finding(NamedTuple):
@@ -51,9 +54,29 @@ class Case:
         return float(np.median(np.concatenate([distance(part) for part in self.residuals])))
 
     @cached_property
+    def paths(self) -> list[Array]:
+        """Return the twin's path at the joint stamps, one array (N, 3) per recording."""
+        return [
+            self.model.twin(k).poses(r, r.joints.t).position for k, r in enumerate(self.recordings)
+        ]
+
+    @cached_property
+    def lags(self) -> list[float | None]:
+        """Return how late the measurements are [s]; None where no lag explains the gap."""
+        out: list[float | None] = []
+        for recording, path in zip(self.recordings, self.paths, strict=True):
+            seen = measured(recording)
+            moving = not recording.joints.static and path.shape[0] >= ENOUGH
+            out.append(lag(recording.joints.t, path, seen.t, seen.position) if moving else None)
+        return out
+
+    @cached_property
     def motions(self) -> list[Array]:
-        """Return joint positions at the measurements, one array (M, n) per recording."""
-        return [r.joints.at(measured(r).t)[0] for r in self.recordings]
+        """Return joint positions at the measurements, lag undone, (M, n) per recording."""
+        return [
+            r.joints.at(measured(r).t - (late or 0.0))[0]
+            for r, late in zip(self.recordings, self.lags, strict=True)
+        ]
 
     @cached_property
     def snapshot(self) -> Snapshot:

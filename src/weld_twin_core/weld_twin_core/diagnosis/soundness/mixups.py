@@ -14,6 +14,8 @@ from .suspicions import Suspicion, doubles, suspicions
 
 EXPLAINED = 5.0
 """The gap must fall by this factor for a mix-up to be named."""
+UNEXPLAINED = 0.01
+"""Median gap [m] from which it is worth a warning that nothing explains it."""
 SMALL_TURN = 0.09
 """Joint offsets [rad] up to which a large gap is bad mastering and not a mix-up."""
 MOST = 3
@@ -40,10 +42,11 @@ def mixups(case: Case) -> Sequence[Finding]:
         return ()
     found, rest = _unravelled(shot, left)
     if not found:
-        return (Finding('warning', _unexplained(case, left)),)
+        return (Finding('warning', _unexplained(case, left)),) if left > UNEXPLAINED else ()
     words = '; '.join(s.words for s in found)
-    rest_words = f'undone, the gap falls from {length(left)} to {length(rest)}'
-    return (Finding('warning', f'{words[0].upper()}{words[1:]} ({rest_words}).'),)
+    words += f' (undone, the gap falls from {length(left)} to {length(rest)}'
+    words += '; something else is wrong too)' if rest > LARGE else ')'
+    return (Finding('warning', f'{words[0].upper()}{words[1:]}.'),)
 
 
 def _frames(case: Case, left: float) -> Sequence[Finding]:

@@ -16,6 +16,8 @@ WINDOW = 7
 """Neighbours in time that a sample is compared with."""
 FAR = 10.0
 """Robust deviations from which a sample is an outlier."""
+SMALL = 0.25
+"""Share of the median gap below which nothing matters."""
 STATION_FAR = 8.0
 """Median gaps from which a station is an outlier."""
 MANY = 0.1
@@ -49,7 +51,8 @@ def _samples(part: Array) -> Array:
     off = np.linalg.norm(part[:3] - smooth, axis=0)
     # Vibration comes and goes: what one sample in ten does is no outlier.
     limit = max(FAR * float(np.median(off)), 4.0 * float(np.quantile(off, 0.9)))
-    return np.where(off > max(limit, 1e-9), off, 0.0)
+    limit = max(limit, SMALL * float(np.median(distance(part))), 1e-9)
+    return np.where(off > limit, off, 0.0)
 
 
 def _stations(part: Array) -> Array:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import signal
 import sqlite3
 from contextlib import closing, suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from rosgraph_msgs.msg import Clock
 
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py import convert
+from weld_twin_msgs_py.bags import BagReader
 from weld_twin_nodes.harness import Cell, CellTimeout
 from weld_twin_nodes.harness.process import MODULES
 
@@ -161,3 +163,17 @@ def test_topics_can_be_remapped(cell, robot):
 
     cell.wait(told, 'a pose on the new topic')
     assert convert.stamp_ns(poses.last) > 0
+
+
+def test_a_bag_is_played_into_the_cell(cell, robot):
+    bag = Path(__file__).parents[2] / 'bags/elbow_play'
+    cell.start('deviation_analyzer', reliable_inputs=True)
+    deviations = cell.collect('/deviation')
+    with BagReader(bag) as reader:
+        recorded = [m for _, _, _, m in reader.messages(['/deviation'])]
+    cell.play(bag, ['/measured/tool_pose', '/twin/tool_pose'], speed=8.0)
+    cell.wait(lambda: len(deviations) == len(recorded), 'every deviation')
+    np.testing.assert_allclose(
+        [convert.vector3(m) for m in deviations.messages],
+        [convert.vector3(m) for m in recorded], rtol=0.0, atol=1e-15,
+    )  # fmt: skip

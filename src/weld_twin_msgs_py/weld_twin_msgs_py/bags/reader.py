@@ -105,13 +105,26 @@ class BagReader:
 
         """
         with clear_errors(self.path):
+            for topic, kind, log_ns, data in self.raw(topics):
+                yield BagMessage(topic, kind, log_ns, decode(data, kind))
+
+    def raw(self, topics: Collection[str]) -> Iterator[tuple[str, str, int, bytes]]:
+        """
+        Yield topic, type, time of recording [ns] and serialised message of some topics.
+
+        Raises
+        ------
+        DataError
+            The bag turns out to be damaged on the way.
+
+        """
+        with clear_errors(self.path):
             for reader in self._readers:
                 wanted = [c for c in reader.connections if c.topic in topics]
                 if not wanted:
                     continue
                 for connection, log_ns, data in reader.messages(wanted):
-                    message = decode(data, connection.msgtype)
-                    yield BagMessage(connection.topic, connection.msgtype, log_ns, message)
+                    yield connection.topic, connection.msgtype, log_ns, data
 
     def stamps(self) -> Iterator[tuple[str, int, bool]]:
         """

@@ -12,6 +12,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.client import Client
@@ -24,6 +25,7 @@ from std_srvs.srv import Trigger
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py import convert
+from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import ros_messages
 from weld_twin_msgs_py.topics import BY_NAME, JOINT_STATES, Topic
 
@@ -227,6 +229,26 @@ class Cell:
             return pump.done
 
         self.wait(send, 'the motion to be taken', limit=LIMIT + 0.01 * motion.t.size)
+
+    def play(self, bag: Path | str, topics: Sequence[str], *, speed: float = 1.0) -> None:
+        """
+        Publish topics of a bag as they were recorded, so many times as fast.
+
+        Each topic needs a subscriber; the type comes from this project's table.
+        """
+        with BagReader(bag) as reader:
+            messages = list(reader.raw(topics))
+        publish = {topic: self.publisher(BY_NAME[topic]).publish for topic in topics}
+        marks = np.array([log_ns for _, _, log_ns, _ in messages])
+        pump = Pump(marks, playback=speed, window=BURST, answered=False)
+
+        def send() -> bool:
+            for k in pump.due(time.monotonic_ns(), BURST):
+                publish[messages[k][0]](bytes(messages[k][3]))
+            return pump.done
+
+        whole = (int(marks[-1]) - int(marks[0])) * 1e-9 / speed if messages else 0.0
+        self.wait(send, f"'{bag}' to be played", limit=LIMIT + whole)
 
     def wait_recorded(self, counts: Mapping[str, int]) -> None:
         """Wait until the recorder holds at least so many messages of each topic."""

@@ -151,8 +151,8 @@ def ambiguous():
     return diagnosis(
         'ambiguous', robot, true, true, [moving(robot, 'line', 'smooth')], confidence=0.93,
         indistinguishable=(pair,),
-        reasons=(f'Turning the base about the axis of {first} and offsetting {first} move the '
-                 'tool alike at every sample.',),
+        reasons=(f'joint_offset of {first}, base_pose move the tool alike on these data: their '
+                 'fits differ by less than the noise',),
         next_experiment={'why': 'Only the base can be surveyed apart from the arm.',
                          'measure': 'three reference points on the pedestal', 'stations': 3},
         actions=(f'Survey the base, then re-master {first} if it is not at fault.',),
@@ -167,8 +167,7 @@ def unknown():
     return diagnosis(
         'unknown', robot, true, [], [moving(robot, 'polyline')], confidence=0.9,
         unexplained=Unexplained(4e-4, True, (
-            f'it follows the acceleration of {j[0]} and its direction of motion',
-            'it is the same in both passes')),
+            f'the speed and acceleration of {j[0]}', 'the place in the workspace')),
     )  # fmt: skip
 
 

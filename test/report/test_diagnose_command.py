@@ -83,11 +83,21 @@ def test_inputs_are_told_with_their_hashes(cell, found):
 
 
 def test_the_verdict_is_printed(cell, tmp_path, capsys):
-    code = run('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known',
-               cell / 'true.yaml', '--out', tmp_path / 'rest')  # fmt: skip
+    code = run('diagnose', cell / 'first', '--robot', 'ur5', '--out', tmp_path / 'd')
     out, err = capsys.readouterr()
     assert code == 0 and err == ''
-    assert 'No gap' in out and 'report.html' in out
+    assert 'comes from backlash of elbow_joint' in ' '.join(out.split())
+    assert str(tmp_path / 'd' / 'report.html') in out.replace('\n', '')
+
+
+def test_what_is_known_is_in_the_twin_from_the_start(cell, tmp_path):
+    run('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known', cell / 'true.yaml',
+        '--out', tmp_path / 'rest')  # fmt: skip
+    data = json.loads((tmp_path / 'rest' / 'diagnosis.json').read_text())
+    assert data['gap']['rms_m'] < 1.1 * np.sqrt(3) * 2e-5
+    assert data['model']['known'][0] == {
+        'effect': 'backlash', 'joint': 'elbow_joint', 'width': WIDTH,
+    }  # fmt: skip
 
 
 def test_an_excluded_family_is_never_named(cell, tmp_path):

@@ -20,7 +20,7 @@ from weld_twin_nodes.report.quantities import (
     percent,
     uncertain,
 )
-from weld_twin_nodes.report.words import CAUSES, cause, listed, verdict
+from weld_twin_nodes.report.words import CAUSES, cause, in_words, listed, verdict
 
 
 def plain(text):
@@ -92,7 +92,19 @@ def test_what_is_settled_beside_an_open_question_is_told_apart():
 def test_an_unknown_cause_is_told_by_what_it_depends_on():
     first, second = map(plain, verdict(diagnoses.unknown()))
     assert first == 'No effect in the library explains the gap of 0.693 mm.'
-    assert second.startswith('What remains: it follows the acceleration of joint_1')
+    assert second == (
+        'What remains depends on the speed and acceleration of joint_1 and the place in the '
+        'workspace.'
+    )
+
+
+def test_reasons_are_told_in_words():
+    sites = [Site('backlash', 'j1'), Site('backlash', 'j10')]
+    told = in_words('backlash of j10, backlash of j1 differ by nothing', sites)
+    assert told == 'Backlash of j10, backlash of j1 differ by nothing.'
+    assert in_words('base_pose is the same', [Site('base_pose', None)]) == (
+        'Base pose error is the same.'
+    )
 
 
 def test_no_gap_is_told_against_the_noise():

@@ -14,6 +14,12 @@ from .problem import Model, Problem, Scale
 
 HUBER = 3.0
 """A sample this many robust deviations off starts to lose weight."""
+LEAST_TURN = 0.5
+"""
+Least noise of orientation per noise of position [rad/m]: no probe is wider than some metres.
+
+Exact orientations, as a simulated cell gives, would otherwise drown every position.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +191,8 @@ def robust_scale(problem: Problem, residuals: list[Array], least: Scale | None =
     sigma_turn = _spread(turn) if turn.size else 1.0
     if least is not None:
         sigma, sigma_turn = max(sigma, least.position), max(sigma_turn, least.orientation)
-    sigma, sigma_turn = max(sigma, 1e-9), max(sigma_turn, 1e-9)
+    sigma = max(sigma, 1e-9)
+    sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
     weights = []
     for part in residuals:
         off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma

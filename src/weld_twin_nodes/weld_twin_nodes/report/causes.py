@@ -8,7 +8,7 @@ from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, millimetres, odds, parameter_rows, percent
-from .words import found_name, listed, site_name
+from .words import found_name, in_words, listed, site_name
 
 _CANDIDATES = 10
 
@@ -63,15 +63,19 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
 def _sets(diagnosis: Diagnosis) -> Html:
     sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
     title = tag('h3', 'What these data cannot tell apart')
-    if not sets and not diagnosis.reasons:
+    if not sets:
         return joined([title, tag('p', 'Nothing: every effect named stands alone.')])
     items = [
-        tag('li', f'{listed([site_name(site) for site in group], "or")} '
-            'move the tool alike here; naming one of them would be a guess.')
+        tag('li', f'{listed([site_name(site) for site in group], "or")}: '
+            'naming one of them would be a guess.')
         for group in sets
     ]  # fmt: skip
-    items += [tag('li', reason) for reason in diagnosis.reasons]
-    return joined([title, tag('ul', *items, class_='sentences')])
+    every = {site for group in sets for site in group}
+    reasons = [tag('li', in_words(reason, every)) for reason in diagnosis.reasons]
+    return joined([
+        title, tag('ul', *items, class_='sentences'),
+        tag('p', 'Why:') if reasons else None, tag('ul', *reasons, class_='sentences'),
+    ])  # fmt: skip
 
 
 def _absent(diagnosis: Diagnosis) -> Html | None:

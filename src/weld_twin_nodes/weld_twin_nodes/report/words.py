@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
@@ -50,6 +50,13 @@ def found_name(found: Found) -> str:
 def site_name(site: Site) -> str:
     """Return a site as people say it."""
     return cause(site.effect, site.joint)
+
+
+def in_words(reason: str, sites: Iterable[Site]) -> str:
+    """Return a sentence about sites with their names as people say them."""
+    for site in sorted(sites, key=lambda s: -len(str(s))):
+        reason = reason.replace(str(site), site_name(site))
+    return f'{reason[:1].upper()}{reason[1:].rstrip(".")}.'
 
 
 def listed(names: Sequence[str], word: str = 'and') -> str:
@@ -128,7 +135,7 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
     structure = diagnosis.unexplained.structure
     if not structure:
         return first, 'What remains is above the noise, but shows no simple dependence.'
-    return first, f'What remains: {structure[0].rstrip(".")}.'
+    return first, f'What remains depends on {listed(structure[:_NAMED])}.'
 
 
 def _none(diagnosis: Diagnosis) -> tuple[str, str]:

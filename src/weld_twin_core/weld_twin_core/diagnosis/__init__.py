@@ -32,7 +32,7 @@ from .result import (
     Unexplained,
     Where,
 )
-from .rivals import Rival, rivals
+from .rivals import Rival
 from .search import Search, search
 from .soundness import check
 from .validation import held_out_shrink
@@ -96,7 +96,7 @@ def diagnose(
     loose = structure(unseen, found.final.model, kept)
     progress('looked for what is left')
     before, after = unseen.predict([]), unseen.predict(kept)
-    slots = () if found.dense else _slots(found, progress)
+    slots = found.slots
     evidence = Evidence(slots, loose, unseen.rms(before), unseen.rms(after), float(floor))
     verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
     baseline = Unseen.of(found.problem, found.scale, found.baseline, np.zeros(0))
@@ -114,14 +114,6 @@ def diagnose(
         model=found.final.model, traces=_traces(found), absent=found.library.absent,
         recordings=found.problem.recordings,
     )  # fmt: skip
-
-
-def _slots(found: Search, progress: Progress) -> tuple[tuple[Rival, ...], ...]:
-    out = []
-    for k in range(len(found.small.model.found)):
-        out.append(rivals(found.work, found.small, k, found.effective))
-        progress(f'rivals of {out[-1][0].site} weighed')
-    return tuple(out)
 
 
 def _gap(found: Search, floor: float) -> Gap:

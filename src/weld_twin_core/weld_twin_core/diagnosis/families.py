@@ -11,8 +11,8 @@ from .result import Site
 from .search import Search
 from .verdict import CALIBRATION, STRUCTURE, Evidence, Verdict
 
-WORTH = 0.002
-"""A family that brings less than this share of the squared gap on unseen data is not named."""
+WORTH = 0.03
+"""A family whose absence raises the squared error on unseen data by less than this is not named."""
 CERTAIN = 2.0
 
 
@@ -24,7 +24,6 @@ def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict
         if effect.cause:
             members.setdefault(effect.name, []).append(k)
     everything = list(range(len(model.found)))
-    total = unseen.squares(unseen.predict([])).mean()
     full = unseen.squares(unseen.predict(everything))
     labels = unseen.trusted_labels()
     named: list[tuple[float, str]] = []
@@ -32,7 +31,7 @@ def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict
         less = unseen.squares(unseen.predict([k for k in everything if k not in index]))
         falls = np.array([(less - full)[labels == b].mean() for b in np.unique(labels)])
         error = falls.std(ddof=1) / np.sqrt(falls.size) if falls.size > 1 else np.inf
-        if falls.mean() > max(WORTH * total, CERTAIN * error):
+        if falls.mean() > max(WORTH * full.mean(), CERTAIN * error):
             named.append((float(falls.mean()), name))
     sets = tuple(
         (Site(effect.name, effect.site),)

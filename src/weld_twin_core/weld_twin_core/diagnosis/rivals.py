@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects.base import Effect
 from .fit import Fit, fit
 from .gram import Gram
 from .result import Site
@@ -55,26 +56,32 @@ def rivals(
     """
     effect = now.model.found[k]
     rest = fit(work.problem, without(now.model, k), work.scale, None, 4)
-    out = [Rival(Site(effect.name, effect.site), _nats(rest, now, effective(now), 1.0), now)]
     gram = work.conditioned(rest.model, rest.residual)
     choices = ranking(gram, work.library.units, effective(now))
     taken = {(e.name, e.site) for e in now.model.found}
     choices = [c for c in choices if c.unit.site not in taken and c.nats > 0.0]
-    if choices:
-        reach = max(15.0, 0.35 * choices[0].nats)
-        close = [c for c in choices if c.nats > choices[0].nats - reach]
-        for choice in close[:SHORTLIST]:
-            other = fitted_with(work, rest.model, choice.effect(gram))
-            nats = _nats(rest, other, effective(other), choice.unit.trials)
-            # Unused components of a vector effect buy nothing and cost nothing.
-            spare = other.coordinates.size - rest.coordinates.size - choice.columns.size
-            if spare > 0 and choice.columns.size < choice.unit.columns[choice.seed].size:
-                nats += 0.5 * spare * float(np.log(max(effective(other), 3.0)))
-            out.append(Rival(Site(*choice.unit.site), nats, other))
+    reach = max(15.0, 0.35 * choices[0].nats) if choices else 0.0
+    close = [c for c in choices if c.nats > choices[0].nats - reach][:SHORTLIST]
+    fits = [fitted_with(work, rest.model, c.effect(gram)) for c in close]
+    # One count for all rivals: see `select`.
+    count = effective(min([now, *fits], key=lambda f: f.rss))
+    out = [Rival(Site(effect.name, effect.site), _nats(rest, now, count, _trials(work, effect)), now)]
+    for choice, other in zip(close, fits, strict=True):
+        nats = _nats(rest, other, count, choice.unit.trials)
+        # Unused components of a vector effect buy nothing and cost nothing.
+        spare = choice.unit.columns[choice.seed].size - choice.columns.size
+        if spare > 0:
+            nats += 0.5 * spare * float(np.log(max(count, 3.0)))
+        out.append(Rival(Site(*choice.unit.site), nats, other))
     weights = np.exp((np.array([r.nats for r in out]) - max(r.nats for r in out)) / TEMPERATURE)
     weights /= weights.sum()
     ranked = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
     return tuple(sorted(ranked, key=lambda r: -r.probability))
+
+
+def _trials(work: Workspace, effect: Effect) -> float:
+    unit = work.library.unit(effect.name, effect.site)
+    return 1.0 if unit is None else unit.trials
 
 
 def _nats(rest: Fit, full: Fit, count: float, trials: float) -> float:

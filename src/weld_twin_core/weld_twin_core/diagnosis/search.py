@@ -14,8 +14,10 @@ from .fit import Fit, fit, robust_fit, robust_scale
 from .heldout import Unseen
 from .library import Library, build
 from .problem import Model, Problem, Scale
+from .result import Site
+from .rivals import Rival, rivals
 from .score import effective_share
-from .select import Workspace, backward, forward, without_negligible
+from .select import Workspace, backward, consolidated, forward, without_negligible
 from .small_errors import many_small
 
 SEARCH_ROWS = 9000
@@ -27,6 +29,7 @@ MANY = 8
 SEVERAL = 4
 """From this many on, the many are tried, and taken if they predict unseen stations better."""
 BETTER = 0.95
+SWAPS = 3
 MISFIT = 0.012
 """Real edges are soft, springs harden, lags have a second pole: the model errs by this share."""
 MISFIT_DIRECTIONS = 30.0
@@ -53,6 +56,8 @@ class Search:
         The final fit on the workspace's measurements.
     bare_rss : float
         Sum of squares on the workspace's measurements without any found effect.
+    slots : tuple of tuple of Rival
+        For every found effect itself and its rivals; empty when many were fitted together.
     dense : bool
         Whether many small errors were fitted together.
 
@@ -66,6 +71,7 @@ class Search:
     work: Workspace
     small: Fit
     bare_rss: float
+    slots: tuple[tuple[Rival, ...], ...]
     dense: bool
 
     @property
@@ -110,7 +116,8 @@ def search(
 
         steps = forward(work, now, effective, MANY, progress)
         if steps and len(steps) < MANY:
-            now = without_negligible(work, backward(work, steps[-1].fit, effective))
+            now = backward(work, steps[-1].fit, effective)
+            now = without_negligible(work, consolidated(work, now, effective))
         elif steps:
             now = steps[-1].fit
         model = now.model
@@ -118,14 +125,36 @@ def search(
         if dense or names(model) == before:
             break
         work, now, bare = _workspace(small, model, exclude)
+    slots: tuple[tuple[Rival, ...], ...] = ()
+    if not dense:
+        now, slots = settled(work, now, lambda f: effective_rows(small, f, bare), progress)
+        model = now.model
     final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
-    sparse = Search(full, scale, baseline, final, np.zeros(0), work, now, bare, False)
+    sparse = Search(full, scale, baseline, final, np.zeros(0), work, now, bare, slots, False)
     if not (small.recordings[0].joints.static and len(model.found) >= SEVERAL):
         return sparse
     progress('many small errors at once: fitting them together')
     final, scale, precision = many_small(full, model, exclude, progress)
-    together = replace(sparse, scale=scale, final=final, precision=precision, dense=True)
+    together = replace(sparse, scale=scale, final=final, precision=precision, slots=(), dense=True)
     return together if dense or _unseen_rms(together) < BETTER * _unseen_rms(sparse) else sparse
+
+
+def settled(
+    work: Workspace, now: Fit, effective: Callable[[Fit], float], progress: Progress
+) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
+    """Return the fit in which every effect is the best in its place, and its rivals."""
+    for attempt in range(SWAPS + 1):
+        slots = []
+        for k, effect in enumerate(now.model.found):
+            slots.append(rivals(work, now, k, effective))
+            progress(f'rivals of {Site(effect.name, effect.site)} weighed')
+            leader = slots[-1][0]
+            if leader.fit is not now and attempt < SWAPS:
+                now = backward(work, leader.fit, effective)
+                break
+        else:
+            break
+    return now, tuple(slots)
 
 
 def _unseen_rms(found: Search) -> float:

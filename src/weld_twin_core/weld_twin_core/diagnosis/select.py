@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -21,6 +22,7 @@ ENTER = 6.0
 """Nats a unit must be worth to enter: odds of about 400 to 1, for a hundred or so candidates."""
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
+CONSOLIDATE_SLACK = 0.3
 NEGLIGIBLE = 0.25
 """RMS in units of noise below which an effect is not told from a larger one's misfit."""
 SLACK = 0.15
@@ -132,13 +134,16 @@ def _refined(
 ) -> Step | None:
     """Return the best of the leading choices after a nonlinear fit of each."""
     close = [c for c in ranked if c.nats > ranked[0].nats - max(8.0, SLACK * ranked[0].nats)]
+    tried = [(c, fitted_with(work, now.model, c.effect(gram))) for c in close[:SHORTLIST]]
+    # One count for all, that of the fit which leaves least: a worse model explains less and would
+    # otherwise be allowed more rows.
+    count = effective(min((f for _, f in tried), key=lambda f: f.rss))
+    before = replace(gram, rss=now.rss)
     best: Step | None = None
-    for choice in close[:SHORTLIST]:
-        result = fitted_with(work, now.model, choice.effect(gram))
-        gain = now.rss - result.rss
+    for choice, result in tried:
         freedom = result.coordinates.size - now.coordinates.size
-        tried = float(np.log(choice.unit.trials))
-        nats = evidence(replace(gram, rss=now.rss), gain, freedom, effective(result)) - tried
+        nats = evidence(before, now.rss - result.rss, freedom, count)
+        nats -= float(np.log(choice.unit.trials))
         if nats > ENTER and (best is None or nats > best.nats):
             best = Step(choice.unit, nats, result)
     return best
@@ -201,3 +206,43 @@ def without_negligible(work: Workspace, now: Fit) -> Fit:
             break
         now = fit(work.problem, without(now.model, least), work.scale, None, 4)
     return now
+
+
+def consolidated(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
+    """
+    Return the fit with two effects replaced by one wherever one explains as much.
+
+    Selection one at a time can enter through a neighbour of the cause and then mend the rest
+    with a second effect.
+    """
+    improved = True
+    while improved and len(now.model.found) > 1:
+        improved = False
+        for a, b in combinations(range(len(now.model.found)), 2):
+            one = _one_for_two(work, now, a, b, effective)
+            if one is not None:
+                now, improved = one, True
+                break
+    return now
+
+
+def _one_for_two(
+    work: Workspace, now: Fit, a: int, b: int, effective: Callable[[Fit], float]
+) -> Fit | None:
+    rest = fit(work.problem, without(without(now.model, b), a), work.scale, None, 4)
+    gram = work.conditioned(rest.model, rest.residual)
+    count = effective(now)
+    ranked = ranking(gram, work.library.units, count)
+    taken = {(e.name, e.site) for e in rest.model.found}
+    pair = replace(gram, rss=rest.rss)
+    freedom = now.coordinates.size - rest.coordinates.size
+    wanted = evidence(pair, rest.rss - now.rss, freedom, count)
+    for choice in [c for c in ranked if c.unit.site not in taken][:SHORTLIST]:
+        if choice.nats < wanted - CONSOLIDATE_SLACK * abs(wanted):
+            break
+        one = fitted_with(work, rest.model, choice.effect(gram))
+        free = one.coordinates.size - rest.coordinates.size
+        nats = evidence(pair, rest.rss - one.rss, free, count) - float(np.log(choice.unit.trials))
+        if nats >= wanted:
+            return one
+    return None

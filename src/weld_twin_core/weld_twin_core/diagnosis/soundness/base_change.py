@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...features import Features
-from ..fit import robust_scale
+from ..fit import HUBER
 from ..problem import Model, Problem, Scale
 from ..score import effective_share
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
+WIDE = 0.9
 LOOSE = (3e-3, 1e-2)
 """Prior spread of the arm's own errors [m, rad]."""
 
@@ -111,7 +112,7 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
         As `Problem.residuals` took them.
 
     """
-    scale = robust_scale(problem, parts)
+    scale = _scale(parts)
     features = problem.features(model)
     rows = problem.rows
     frames = [_frame(maker, 'base', rows[k]) for k, maker in enumerate(features)]
@@ -133,6 +134,23 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
     share = effective_share(np.concatenate(own), problem.rows, problem.samples)
     positions = np.concatenate([frame[:, :3].transpose(2, 1, 0) for frame in frames])
     return BaseChange(left, base, basis.reshape(*left.shape, -1), number, share, positions)
+
+
+def _scale(parts: list[Array]) -> Scale:
+    """
+    Return a scale wide enough to keep both sides of a step.
+
+    A robust fit sides with the longer part, and a median with it; nine samples in ten do not.
+    """
+    size = [
+        float(np.quantile(np.abs(np.concatenate([p[rows].ravel() for p in parts])), WIDE)) / 1.645
+        if any(p[rows].size for p in parts) else 1.0
+        for rows in (slice(0, 3), slice(3, 6))
+    ]  # fmt: skip
+    position, turn = (max(s, 1e-9) for s in size)
+    off = [np.linalg.norm(p[:3], axis=0) / (np.sqrt(3.0) * position) for p in parts]
+    weights = tuple(np.minimum(1.0, (HUBER / np.maximum(o, 1e-12)) ** 2) for o in off)
+    return Scale(position, turn, weights)
 
 
 def _frame(maker: Features, name: str, rows: int) -> Array:

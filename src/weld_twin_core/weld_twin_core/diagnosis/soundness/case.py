@@ -15,7 +15,7 @@ from ...arrays import Array
 from ...errors import DataError
 from ...recording import Measurements, Recording
 from ..problem import Model, Problem
-from .lag import lag
+from .lag import Lag, lag
 from .snapshot import Snapshot, snapshot
 
 LARGE = 5e-3
@@ -61,9 +61,9 @@ class Case:
         ]
 
     @cached_property
-    def lags(self) -> list[float | None]:
-        """Return how late the measurements are [s]; None where no lag explains the gap."""
-        out: list[float | None] = []
+    def lags(self) -> list[Lag | None]:
+        """Return how late the measurements are; None where no lag explains the gap."""
+        out: list[Lag | None] = []
         for recording, path in zip(self.recordings, self.paths, strict=True):
             seen = measured(recording)
             moving = not recording.joints.static and path.shape[0] >= ENOUGH
@@ -73,10 +73,11 @@ class Case:
     @cached_property
     def motions(self) -> list[Array]:
         """Return joint positions at the measurements, lag undone, (M, n) per recording."""
-        return [
-            r.joints.at(measured(r).t - (late or 0.0))[0]
-            for r, late in zip(self.recordings, self.lags, strict=True)
-        ]
+        out = []
+        for recording, late in zip(self.recordings, self.lags, strict=True):
+            t = measured(recording).t
+            out.append(recording.joints.at(t if late is None else t - late.at(t))[0])
+        return out
 
     @cached_property
     def snapshot(self) -> Snapshot:

@@ -4,22 +4,39 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...arrays import Array
 from ..alignment import nearest_rotation
 
 MOST_LAG = 2.0
-"""Lags up to this [s] are looked at, and up to a quarter of the recording."""
-COARSE, FINE = 0.01, 0.001
-SAMPLES = 200
+"""Lags up to this [s] are looked at, and up to a tenth of the recording."""
+COARSE = 0.01
+SAMPLES = 300
+ROUNDS = 6
 EXPLAINED = 0.35
 """What the gap must fall to for a lag to be believed."""
+KEPT = 0.8
+"""Share of the samples that count: the worst may be outliers."""
 
 
-def lag(joints: Array, path: Array, t: Array, position: Array) -> float | None:
+class Lag(NamedTuple):
+    """How late measurements are [s] at an instant [s], and how much later with every second."""
+
+    late: float
+    rate: float
+    middle: float
+
+    def at(self, t: Array) -> Array:
+        """Return the lag at stamps of the measurements, shape (M,) [s]."""
+        return self.late + self.rate * (t - self.middle)
+
+
+def lag(joints: Array, path: Array, t: Array, position: Array) -> Lag | None:
     """
-    Return how late measurements are against a path [s]; None when no lag explains much.
+    Return how late measurements are against a path; None when no lag explains much.
 
     Whatever lag, the path may be turned and shifted, so no base frame is needed.
 
@@ -29,40 +46,69 @@ def lag(joints: Array, path: Array, t: Array, position: Array) -> float | None:
     t, position : array, shape (M,) [s] and (M, 3) [m]
 
     """
-    most = min(MOST_LAG, 0.25 * (t[-1] - t[0]))
-    inside = (t > joints[0] + most) & (t < joints[-1] - most)
-    index = np.flatnonzero(inside)
+    most = min(MOST_LAG, 0.1 * float(np.ptp(t)))
+    index = np.flatnonzero((t > joints[0] + most) & (t < joints[-1] - most))
     if index.size < 20:
         return None
     index = index[np.linspace(0, index.size - 1, min(SAMPLES, index.size)).round().astype(int)]
-    chosen, points = t[index], position[index]
+    stamps, seen = t[index], position[index]
+    middle = float(stamps.mean())
+    grid = np.arange(-most, most + COARSE, COARSE)
+    costs = [_misfit(seen, _along(path, joints, stamps - late)) for late in grid]
+    start = Lag(_nearest(grid, np.array(costs)), 0.0, middle)
+    constant = _polished(start, joints, path, stamps, seen, free=1)
+    drifting = _polished(constant, joints, path, stamps, seen, free=2)
+    left = [
+        _misfit(seen, _along(path, joints, stamps - trial.at(stamps)))
+        for trial in (Lag(0.0, 0.0, middle), constant, drifting)
+    ]
+    best = drifting if left[2] < EXPLAINED * left[1] else constant
+    return best if min(left[1:]) < EXPLAINED * left[0] else None
 
-    def left(late: float) -> float:
-        shifted = np.stack([np.interp(chosen - late, joints, p) for p in path.T], axis=1)
-        return _misfit(points, shifted)
 
-    coarse = np.arange(-most, most + COARSE, COARSE)
-    costs = np.array([left(late) for late in coarse])
-    centre = _nearest(coarse, costs)
-    fine = centre + np.arange(-COARSE, COARSE + FINE, FINE)
-    best = float(fine[np.argmin([left(late) for late in fine])])
-    return best if left(best) < EXPLAINED * left(0.0) else None
+def _along(path: Array, joints: Array, t: Array) -> Array:
+    return np.stack([np.interp(t, joints, p) for p in path.T], axis=1)
 
 
 def _nearest(lags: Array, costs: Array) -> float:
-    """Return the smallest lag among the best; a periodic motion has many."""
-    good = lags[costs < 1.2 * costs.min()]
+    """Return the smallest lag among the best minima; a periodic motion has many."""
+    padded = np.pad(costs, 1, constant_values=np.inf)
+    lowest = (costs <= padded[:-2]) & (costs <= padded[2:]) & (costs < 1.3 * costs.min())
+    good = lags[lowest]
     return float(good[np.abs(good).argmin()])
 
 
+def _polished(start: Lag, joints: Array, path: Array, t: Array, seen: Array, free: int) -> Lag:
+    """Return the lag after Gauss-Newton steps of its first one or two numbers."""
+    now = start
+    for _ in range(ROUNDS):
+        here = _along(path, joints, t - now.at(t))
+        turn, keep = _aligned(seen, here)
+        speed = (_along(path, joints, t - now.at(t) + COARSE) - here) @ turn.T / -COARSE
+        columns = [speed, speed * (t - now.middle)[:, None]][:free]
+        system = np.stack([_centred(c, keep)[keep].ravel() for c in columns], axis=1)
+        gap = _centred(seen, keep) - _centred(here, keep) @ turn.T
+        step = np.linalg.lstsq(system, gap[keep].ravel(), rcond=None)[0]
+        now = now._replace(late=now.late + step[0], rate=now.rate + (step[1] if free > 1 else 0.0))
+    return now
+
+
 def _misfit(seen: Array, path: Array) -> float:
-    """Return the RMS gap after the best turn and shift, without the worst fifth."""
+    """Return the RMS gap after the best turn and shift, without the worst samples."""
+    turn, keep = _aligned(seen, path)
+    off = _centred(seen, keep) - _centred(path, keep) @ turn.T
+    return float(np.sqrt((off[keep] ** 2).sum(axis=1).mean()))
+
+
+def _aligned(seen: Array, path: Array) -> tuple[Array, Array]:
+    """Return the turn from path to measurements, and which samples agree with it best."""
     keep = np.ones(len(seen), dtype=bool)
     for _ in range(2):
-        a, b = seen[keep] - seen[keep].mean(axis=0), path[keep] - path[keep].mean(axis=0)
-        turn = nearest_rotation(a.T @ b)
-        off = np.linalg.norm(
-            seen - seen[keep].mean(axis=0) - (path - path[keep].mean(axis=0)) @ turn.T, axis=1
-        )
-        keep = off <= np.quantile(off, 0.8)
-    return float(np.sqrt((off[keep] ** 2).mean()))
+        turn = nearest_rotation(_centred(seen, keep)[keep].T @ _centred(path, keep)[keep])
+        off = np.linalg.norm(_centred(seen, keep) - _centred(path, keep) @ turn.T, axis=1)
+        keep = off <= np.quantile(off, KEPT)
+    return turn, keep
+
+
+def _centred(points: Array, keep: Array) -> Array:
+    return np.asarray(points - points[keep].mean(axis=0))

@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from ..alignment import initial_frames, refined
 from .case import LARGE, Case, Finding, length
 from .snapshot import Snapshot, gap
 from .suspicions import Suspicion, doubles, suspicions
@@ -35,7 +37,7 @@ def mixups(case: Case) -> Sequence[Finding]:
     model = shot.framed()
     left = gap(shot.problem, model)
     if left < LARGE or left < case.gap / EXPLAINED:
-        return _frames(case, left)
+        return _frames(case)
     offset = shot.offset()
     turns = [abs(float(effect.vector()[0])) for effect in offset.found]
     if max(turns) < SMALL_TURN and gap(shot.problem, offset) < left / EXPLAINED:
@@ -49,21 +51,25 @@ def mixups(case: Case) -> Sequence[Finding]:
     return (Finding('warning', f'{words[0].upper()}{words[1:]}.'),)
 
 
-def _frames(case: Case, left: float) -> Sequence[Finding]:
-    """The given frames are to blame alone; name the one that was not to be fitted."""
-    open_frames = sorted({'base', 'tool'} - case.problem.align)
-    if not open_frames:
-        return ()
-    names = ' and '.join(open_frames)
-    level = 'warning' if case.gap > FAR else 'note'
-    return (
-        Finding(
-            level,
-            f'A gap of {length(case.gap)} is almost only one of frames: with base and tool fitted '
-            f'{length(left)} remain; if the instrument has its own frame or the tool centre '
-            f'point was not measured, have {names} aligned.',
-        ),
-    )
+def _frames(case: Case) -> Sequence[Finding]:
+    """The given frames alone are to blame; name those that were not to be fitted."""
+    given = case.problem.align
+    for more in ({'base'}, {'tool'}, {'base', 'tool'}):
+        if not more - given:
+            continue
+        problem = replace(case.snapshot.problem, align=given | more)
+        left = gap(problem, refined(problem, initial_frames(problem, case.snapshot.model)))
+        if left < max(LARGE, case.gap / EXPLAINED):
+            names = ' and '.join(sorted(more - given))
+            return (
+                Finding(
+                    'warning' if case.gap > FAR else 'note',
+                    f'The gap of {length(case.gap)} is almost only one of frames: with the {names} '
+                    f'fitted {length(left)} remain; have the {names} aligned if the instrument '
+                    'stands anywhere, or the tool centre point was never measured.',
+                ),
+            )
+    return ()
 
 
 def _unexplained(case: Case, left: float) -> str:

@@ -57,5 +57,7 @@ def _samples(part: Array) -> Array:
 
 def _stations(part: Array) -> Array:
     off = distance(part - np.median(part, axis=1, keepdims=True))
-    limit = STATION_FAR * float(np.median(off))
-    return np.where(off > max(limit, 1e-9), off, 0.0)
+    limit = max(STATION_FAR * float(np.median(off)), 1e-9)
+    # Far off together means that the set-up moved; an outlier is alone.
+    alone = distance(part[:3] - median_filter(part[:3], size=(1, WINDOW), mode='nearest'))
+    return np.where((off > limit) & (alone > 0.5 * off), off, 0.0)

@@ -45,11 +45,7 @@ class Settling(NamedTuple):
 def setup(case: Case) -> Sequence[Finding]:
     """Return steps and settling of the set-up in what the aligned model leaves."""
     out = [
-        Finding(
-            'warning',
-            f'The set-up of {step.recording} moved by {length(step.size)} at {_when(case, step)}; '
-            'split the recording there and have the base aligned, so that each part gets its own.',
-        )
+        Finding('warning', _moved(case, step))
         for step in moved_setup(case.residuals, case.problem, case.model)
     ]
     out += [
@@ -162,14 +158,21 @@ def _thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]
     return few, out
 
 
-def _when(case: Case, step: Step) -> str:
-    return f'{_unit(case, step.recording)} {step.time:.4g}' if _static(case, step.recording) else (
-        f't = {step.time:.4g} s')  # fmt: skip
+def _moved(case: Case, step: Step) -> str:
+    recording = next(r for r in case.recordings if r.name == step.recording)
+    if step.time == measured(recording).t[0]:
+        return (
+            f'The set-up moved by {length(step.size)} before {step.recording}; have the base '
+            'aligned, so that each recording gets its own.'
+        )
+    unit = _unit(case, step.recording)
+    when = f'station {step.time:.4g}' if unit == 'stations' else f't = {step.time:.4g} s'
+    return (
+        f'The set-up of {step.recording} moved by {length(step.size)} at {when}; split the '
+        'recording there and have the base aligned, so that each part gets its own.'
+    )
 
 
 def _unit(case: Case, name: str) -> str:
-    return 'station' if _static(case, name) else 's'
-
-
-def _static(case: Case, name: str) -> bool:
-    return any(r.name == name and r.joints.static for r in case.recordings)
+    static = any(r.name == name and r.joints.static for r in case.recordings)
+    return 'stations' if static else 's'

@@ -17,7 +17,7 @@ from .evaluate import Model, draws_at, exact_deviations, model
 from .local import LocalSensitivity, Posture, arc_weights, local_sensitivity, posture
 from .morris import MorrisDesign, Screening, morris_screening
 from .outcome import Outcomes, outcomes
-from .scenario import Sizes, cumulative, scenario_deviations
+from .scenario import Sizes, cumulative, scenario_deviations, spread_of_passes
 from .sobol import SobolDesign, SobolIndices, sobol_indices
 from .stack import Probability, ToleranceStack, WeldTolerance, probabilities, tolerance_stack
 from .study import POINTS, Study, planned_study, recorded_study, study_of_plan, with_known
@@ -39,6 +39,7 @@ __all__ = [
     'default_tolerances', 'default_values', 'draws_at', 'end_of_linearity', 'exact_deviations',
     'expected_deviation', 'expected_rms', 'local_sensitivity', 'model', 'morris_screening',
     'outcomes', 'planned_study', 'posture', 'probabilities', 'recorded_study', 'scaled',
-    'scenario_deviations', 'sobol_indices', 'study_of_plan', 'sweep', 'together',
+    'scenario_deviations', 'sobol_indices', 'spread_of_passes', 'study_of_plan', 'sweep',
+    'together',
     'tolerance_stack', 'tolerances_from_list', 'with_draws', 'with_known',
 ]  # fmt: skip

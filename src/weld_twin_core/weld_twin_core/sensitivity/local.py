@@ -5,8 +5,9 @@ The paper's local study: what one small error does, by the analytic derivative a
 
 The paper's coefficient is :math:`S_p = \partial D / \partial p` with :math:`D = \|\Delta x\|`
 (V.i). Without errors D is the tip of a cone and has no derivative, only a slope to either side,
-equal to :math:`\|\partial x / \partial p\|`; that slope is what ``analytic`` and ``forward`` compare. At an
-error of typical size D is smooth, and its two-sided derivative is compared there as well.
+equal to :math:`\|\partial x / \partial p\|`; that slope is what ``analytic`` and
+``forward`` compare. At an error of typical size D is smooth, and its two-sided derivative is
+compared there as well.
 """
 
 from __future__ import annotations

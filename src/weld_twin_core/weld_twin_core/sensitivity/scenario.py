@@ -60,6 +60,20 @@ def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, A
     return {**out, 'combined': study.deviations((*study.known, *every))}
 
 
+def spread_of_passes(study: Study, deviations: Array) -> Array:
+    """
+    Return how far apart the passes over one place of the seam are, shape (...) [m].
+
+    The median over twentieths of the seam, of deviations of shape (..., N, 3).
+    """
+    part = np.floor(study.s / study.length * 20.0).astype(int)
+    apart = [
+        np.linalg.norm(np.ptp(deviations[..., part == k, :], axis=-2), axis=-1)
+        for k in np.unique(part)
+    ]
+    return np.asarray(np.median(apart, axis=0))
+
+
 def cumulative(deviations: Array) -> Array:
     """Return D_cum up to every sample (paper, eq. III.iv), shape (N,) [m]."""
     return np.cumsum(np.linalg.norm(deviations, axis=-1))

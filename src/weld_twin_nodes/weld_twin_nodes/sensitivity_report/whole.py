@@ -11,7 +11,14 @@ import numpy as np
 from weld_twin_core import sensitivity
 from weld_twin_core.arrays import Array
 from weld_twin_core.metrics import root_mean_square
-from weld_twin_core.sensitivity import MorrisDesign, Outcomes, SobolDesign, Study, Tolerance
+from weld_twin_core.sensitivity import (
+    MorrisDesign,
+    Outcomes,
+    SobolDesign,
+    Study,
+    Tolerance,
+    ToleranceStack,
+)
 
 from ..tasks import Runner, Task
 from . import work
@@ -75,6 +82,7 @@ class _Designs:
             for by, groups in groupings.items()
             if groups is None or len(set(groups)) > 1
         }
+        self._effects = tuple(dict.fromkeys(t.effect for t in tolerances))
         self._morris = MorrisDesign(names, effort.trajectories, effort.seed)
 
     def _label(self, what: str) -> str:
@@ -85,8 +93,13 @@ class _Designs:
         effort, tolerances = self._setting.effort, self._setting.tolerances
         units = {f'Sobol by {by}': design.samples() for by, design in self._sobol.items()}
         units['Morris'] = self._morris.samples()
-        units['stack'] = sensitivity.probabilities(effort.runs, len(tolerances), effort.seed)
-        return {self._label(what): (study, tolerances, unit) for what, unit in units.items()}
+        stack = sensitivity.probabilities(effort.runs, len(tolerances), effort.seed)
+        units['stack'] = stack
+        out = {self._label(what): (study, tolerances, unit) for what, unit in units.items()}
+        for effect in self._effects:
+            halved = sensitivity.scaled(tolerances, {effect: 0.5})
+            out[self._label(f'{effect} halved')] = study, halved, stack
+        return out
 
     def results(self, found: dict[str, tuple[Outcomes, float]]) -> dict[str, Any]:
         """Return indices, measures and percentiles."""
@@ -96,13 +109,20 @@ class _Designs:
         }
         screened = self._morris.screening(found[self._label('Morris')][0].d_norm)
         stacked, error = found[self._label('stack')]
-        setting = self._setting
-        stack = sensitivity.tolerance_stack(stacked, setting.weld, seed=setting.effort.seed)
+        stack = self._stack(stacked)
+        halved = {
+            effect: self._stack(found[self._label(f'{effect} halved')][0]).as_dict()
+            for effect in self._effects
+        }
         return {
             'model_error': error, 'sobol': sobol, 'morris': screened.as_dict(),
-            'stack': stack.as_dict(),
+            'stack': stack.as_dict(), 'halved': halved,
             'stack_runs': {'max_m': stacked.max_m, 'rms_m': stacked.rms_m},
         }  # fmt: skip
+
+    def _stack(self, runs: Outcomes) -> ToleranceStack:
+        setting = self._setting
+        return sensitivity.tolerance_stack(runs, setting.weld, seed=setting.effort.seed)
 
 
 def _indices(design: SobolDesign, found: Outcomes) -> dict[str, Any]:

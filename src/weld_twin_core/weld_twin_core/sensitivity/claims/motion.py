@@ -15,6 +15,7 @@ from ...effects.joint_offset import JointOffset
 from ...effects.servo_lag import ServoLag
 from ..advice import compare_profiles
 from ..local import arc_weights
+from ..scenario import spread_of_passes
 from ..study import Study
 from ..sweep import DEGREE
 from ..tolerance import default_tolerances
@@ -56,8 +57,12 @@ def lag(case: Case) -> dict[str, float]:
 def play(case: Case) -> dict[str, float]:
     """Measure play of every joint: peak, rms and range on both motions."""
     effects = [Backlash(joint, _WIDTH) for joint in case.robot.joint_names]
-    smooth, aggressive = (_distance(s, effects) for s in (case.smooth, case.aggressive))
+    studies = (case.smooth, case.aggressive)
+    off = [study.deviations(tuple(effects)) for study in studies]
+    smooth, aggressive = (np.linalg.norm(each, axis=-1) for each in off)
+    spread = [float(spread_of_passes(s, each)) for s, each in zip(studies, off, strict=True)]
     return {
+        'play_spread_smooth_m': spread[0], 'play_spread_aggressive_m': spread[1],
         'play_peak_ratio': aggressive.max() / smooth.max(),
         'play_rms_ratio': _rms(case.aggressive, aggressive) / _rms(case.smooth, smooth),
         'play_smooth_m': smooth.max(), 'play_aggressive_m': aggressive.max(),

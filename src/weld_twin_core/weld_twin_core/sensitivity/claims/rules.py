@@ -91,8 +91,13 @@ RULES: tuple[Rule, ...] = (
         'backlash_profile', 'S of backlash is larger on aggressive than on smooth motion', 'V.iv',
         lambda m: m['play_peak_ratio'] > 1.01,
         lambda r: f'peak deviation of play, aggressive to smooth: {r["play_peak_ratio"]:.2f}; rms '
-        f'{r["play_rms_ratio"]:.2f}: half the gap on either motion, whichever way it came',
-        ('play_peak_ratio', 'play_rms_ratio', 'play_mean_ratio'),
+        f'{r["play_rms_ratio"]:.2f}: half the gap on either motion; but passes over one place lie '
+        f'{(r["play_spread_aggressive_m"] * 1e3):.2f} mm apart, smooth '
+        f'{(r["play_spread_smooth_m"] * 1e3):.3f} mm',
+        ('play_peak_ratio', 'play_rms_ratio', 'play_mean_ratio', 'play_spread_smooth_m',
+         'play_spread_aggressive_m'),
+        'the spread of passes over one place is meant, not peak or rms',
+        lambda m: m['play_spread_aggressive_m'] > 2.0 * m['play_spread_smooth_m'],
     ),
     Rule(
         'proportional', 'D_norm is proportional to |J| times the angular error', 'IV.v',

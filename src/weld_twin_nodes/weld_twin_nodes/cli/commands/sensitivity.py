@@ -1,0 +1,206 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which tolerance to tighten: the paper's sensitivity study and the global one.
+
+For a robot on a seam, or for the motion of a bag. Writes sensitivity.json, indices, figures with
+their data and a page to read (sensitivity.html) to the directory; run again, it continues where
+it was stopped. --figure draws one figure only; --claims measures the paper's claims on several
+robots and seams.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..options import add_robot, add_topics, robot_of, topics_of
+
+if TYPE_CHECKING:
+    from weld_twin_core.recording import Recording
+    from weld_twin_core.robot import Robot
+    from weld_twin_nodes.sensitivity_report import Setting
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('bag', nargs='?', metavar='BAG', help='study the motion recorded in a bag')
+    add_robot(parser, required=False)
+    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+    _add_question(parser.add_argument_group('what is studied'))
+    _add_effort(parser.add_argument_group('how much is run, and where'))
+    add_topics(parser)
+
+
+def _add_question(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add('--path', metavar='P', default='line',
+        help='path file, or a bundled seam: line, arc, circle, polyline, spline, weave')
+    add('--tolerances', metavar='FILE', help='tolerance file; left out, typical magnitudes of '
+        'joint_offset, link_length, link_twist, backlash and base_pose')
+    add('--effects-known', metavar='FILE', default='', help='effects file or diagnosis.json put '
+        'into the twin first')
+    add('--tool', type=float, nargs=6, metavar=('X', 'Y', 'Z', 'RX', 'RY', 'RZ'),
+        help='tool frame in the flange [m, rotation vector rad], instead of the model\'s')
+    add('--across', type=float, default=5e-4, metavar='M', help='weld tolerance across the seam '
+        '(default: 0.0005)')
+    add('--stickout', type=float, default=1e-3, metavar='M', help='weld tolerance of the '
+        'stick-out (default: 0.001)')
+    add('--normal', type=float, nargs=3, metavar=('X', 'Y', 'Z'), help='direction out of the work '
+        'of a recorded motion; left out, against the wire')
+    add('--points', type=int, default=200, metavar='N', help='path points (default: 200)')
+    add('--figure', action='append', default=[], metavar='K', help='draw figure 6 to 14, posture '
+        'or recorded, and nothing else; may be given again')
+    add('--claims', action='store_true', help='measure the claims of the paper')
+    add('--claims-robots', nargs='+', metavar='R', help='robots of the claims (default: all)')
+
+
+def _add_effort(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add('--samples', type=int, default=1024, metavar='N', help='Sobol base samples, a power of '
+        'two (default: 1024)')
+    add('--runs', type=int, default=20_000, metavar='N', help='of the tolerance stack')
+    add('--trajectories', type=int, default=50, metavar='N', help='of the Morris screening')
+    add('--seed', type=int, default=0)
+    add('--workers', type=int, default=0, metavar='N', help='processes (default: one a core)')
+    add('--scheduler', default='', metavar='ADDRESS', help='Dask scheduler to run on instead')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the study and say where the page is."""
+    from weld_twin_nodes.sensitivity_report import make_figures, make_study
+    from weld_twin_nodes.sensitivity_report.files import study_directory
+    from weld_twin_nodes.tasks import pool_of
+
+    setting = _setting(args)
+    if args.figure:
+        assert setting is not None
+        place = study_directory(args.out) / 'figures'
+        for drawing in make_figures(place, setting, args.figure):
+            print(f'{place / drawing.name}.svg: {drawing.caption}')
+        return 0
+    robots = _claims_robots(args)
+    with _progress() as tell:
+        page = make_study(
+            args.out, pool_of(args.scheduler, args.workers), setting, claims_on=robots,
+            tell=tell, seed=args.seed,
+        )  # fmt: skip
+    _print_summary(Path(args.out))
+    print(f'page: {page}')
+    return 0
+
+
+def _setting(args: argparse.Namespace) -> Setting | None:
+    from weld_twin_core.errors import DataError
+    from weld_twin_core.paths import KINDS, default_seam
+    from weld_twin_core.sensitivity import WeldTolerance
+    from weld_twin_nodes.models import build_twin
+    from weld_twin_nodes.path_file import read_path
+    from weld_twin_nodes.sensitivity_report import Effort, Setting
+
+    if not args.robot and not args.bag:
+        if args.claims and not args.figure:
+            return None
+        raise DataError('give --robot R or a BAG to study, or --claims')
+    twin = build_twin(_robot(args), args.effects_known)
+    common = {
+        'robot': twin.robot, 'tolerances': _tolerances(args, twin.robot), 'known': twin.effects,
+        'points': args.points, 'weld': WeldTolerance(args.across, args.stickout),
+        'effort': Effort(args.samples, args.runs, args.trajectories, args.seed),
+    }  # fmt: skip
+    if args.bag:
+        return Setting(
+            seam=Path(args.bag).name, recording=_recording(args, twin.robot), normal=args.normal,
+            **common,
+        )  # fmt: skip
+    if args.path in KINDS:
+        return Setting(seam=args.path, path=default_seam(twin.robot, args.path), **common)
+    path, torch = read_path(args.path)
+    return Setting(seam=Path(args.path).stem, path=path, torch=torch, **common)
+
+
+def _robot(args: argparse.Namespace) -> Robot:
+    import numpy as np
+
+    from weld_twin_core.errors import DataError
+    from weld_twin_core.robot import Robot
+    from weld_twin_core.rotation import rotation_matrix, transform
+    from weld_twin_msgs_py.bags import provenance
+
+    if args.robot:
+        robot = robot_of(args)
+    else:
+        model = provenance(args.bag).get('robot')
+        if not isinstance(model, dict):
+            raise DataError(f"bag '{args.bag}' holds no robot model; give --robot R")
+        robot = Robot.from_mapping(model)
+    if args.tool is None:
+        return robot
+    tool = transform(rotation_matrix(args.tool[3:]), np.array(args.tool[:3]))
+    return robot.with_frames(tool=tool)
+
+
+def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple:
+    from weld_twin_core.errors import ModelError
+    from weld_twin_core.sensitivity import default_tolerances, tolerances_from_list
+    from weld_twin_msgs_py.yaml_file import read_yaml
+
+    if not args.tolerances:
+        return default_tolerances(robot)
+    try:
+        return tolerances_from_list(read_yaml(args.tolerances, 'tolerance file'), robot)
+    except ModelError as error:
+        raise ModelError(f"tolerance file '{args.tolerances}': {error}") from None
+
+
+def _recording(args: argparse.Namespace, robot: Robot) -> Recording:
+    from weld_twin_msgs_py.bags import read_recording
+
+    return read_recording(args.bag, robot, topics_of(args))
+
+
+def _claims_robots(args: argparse.Namespace) -> list[Robot]:
+    from weld_twin_msgs_py.robots import load_robot
+    from weld_twin_nodes.sensitivity_report.claims import ROBOTS
+
+    return [load_robot(name) for name in args.claims_robots or ROBOTS] if args.claims else []
+
+
+def _print_summary(place: Path) -> None:
+    import json
+
+    from weld_twin_nodes.sensitivity_report.files import CLAIMS, RESULT
+
+    if (place / RESULT).is_file():
+        for motion, found in json.loads((place / RESULT).read_text())['motions'].items():
+            inside = found['global']['stack']['inside']['both']
+            rows = found['global']['sobol']['parameter']['d_norm']['indices']
+            best = sorted(rows, key=lambda row: -row['ST'])[:3]
+            print(f'{motion}: tighten first ' + ', '.join(
+                f'{row["name"]} (ST {row["ST"]:.2f})' for row in best
+            ))  # fmt: skip
+            print(
+                f'{motion}: inside the weld tolerance with probability {inside["value"]:.3f} '
+                f'({inside["low"]:.3f} to {inside["high"]:.3f})'
+            )
+    if (place / CLAIMS).is_file():
+        for claim in json.loads((place / CLAIMS).read_text())['claims']:
+            print(f'{claim["statement"]}: {claim["verdict"]}')
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[int, int, str], None]]:
+    """Yield where to tell progress; it shows on a terminal and leaves other streams alone."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
+               TimeElapsedColumn())  # fmt: skip
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task('starting', total=None)
+        yield lambda done, total, label: bar.update(
+            task, completed=done, total=total, description=label
+        )

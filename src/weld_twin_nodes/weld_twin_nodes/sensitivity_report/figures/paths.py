@@ -1,0 +1,206 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Figures 6, 7, 8 and 9: the path without errors, shifted, fast and slow, and with play."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.effects.backlash import Backlash
+from weld_twin_core.effects.base_pose import BasePose
+from weld_twin_core.effects.joint_offset import JointOffset
+from weld_twin_core.effects.servo_lag import ServoLag
+from weld_twin_core.plan import plan
+from weld_twin_core.profiles import Constant
+from weld_twin_core.sensitivity import Sizes, Study, study_of_plan
+from weld_twin_core.sensitivity.sweep import DEGREE
+
+from ..setting import RECORDED, Setting
+from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, svg
+
+_SIZES = Sizes()
+_TURN = 1e-3
+_LAG = 5e-3
+_EXAGGERATED = 50.0
+_POINTS = 600
+_AXES = ('along', 'across', 'normal to')
+_FORMS = {'play': 'play', 'reversal': 'written'}
+
+
+def _size(deviations: Array) -> Array:
+    return np.linalg.norm(deviations, axis=-1)
+
+
+def _plane(study: Study, positions: Array) -> Array:
+    """Return positions (N, 3) along, across and normal of the middle of the seam [m]."""
+    middle = study.samples // 2
+    return (positions - study.nominal.position[0]) @ study.axes[middle].T
+
+
+def baseline(setting: Setting) -> Drawing:
+    """Draw the path without errors."""
+    assert setting.path is not None
+    law = Constant()
+    rate = setting.points / (setting.path.length / law.speed)
+    planned = plan(setting.robot, setting.path, law, rate, torch=setting.torch, fit=True)
+    study = study_of_plan(setting.robot, planned)
+    off = _size(study.nominal.position - planned.poses[:, :3, 3])
+    plane, wanted = _plane(study, study.nominal.position), _plane(study, planned.poses[:, :3, 3])
+    table = {
+        's_m': planned.s, 'planned_along_m': wanted[:, 0], 'planned_across_m': wanted[:, 1],
+        'twin_along_m': plane[:, 0], 'twin_across_m': plane[:, 1], 'deviation_m': off,
+        'd_norm': off / planned.length,
+    }  # fmt: skip
+    figure, (left, right) = panels(2)
+    left.plot(1e3 * wanted[:, 0], 1e3 * wanted[:, 1], color='#c9ced6', lw=5, label='planned')
+    left.plot(1e3 * plane[:, 0], 1e3 * plane[:, 1], color=COLOURS[0], lw=1.3, label='twin')
+    left.set_aspect('equal', adjustable='datalim')
+    label(left, 'Path from above', 'along [mm]', 'across [mm]')
+    legend(left)
+    floor = np.maximum(off / planned.length, 1e-17)
+    right.semilogy(1e3 * planned.s, floor, color=COLOURS[0])
+    right.axhline(np.finfo(float).eps, color='#999999', lw=1, ls=':')
+    right.annotate('double precision', (0, np.finfo(float).eps), xytext=(2, 3),
+                   textcoords='offset points', color='#666666', fontsize=8)
+    right.set_ylim(1e-17, 1e-9)
+    label(right, 'D(t) over path length', 'arc length [mm]', 'D(t) / L')
+    caption = (
+        'Baseline: without errors the twin follows the plan; '
+        f'D_norm = {off.max() / study.length:.1e}.'
+    )
+    return Drawing('figure-06', caption, table, svg(figure))
+
+
+def initialization(setting: Setting) -> Drawing:
+    """Draw the path under a displaced and under a turned base."""
+    study = next(iter(setting.studies.values()))
+    known = setting.known
+    shift = BasePose(xyz=np.full(3, _SIZES.initial / np.sqrt(3.0)))
+    turn = BasePose(rotvec=[0.0, 0.0, _TURN])
+    moved = {name: study.deviations((*known, e)) for name, e in (('shift', shift), ('turn', turn))}
+    nominal = _plane(study, study.nominal.position)
+    table: dict[str, Array] = {
+        's_m': study.s, 'nominal_along_m': nominal[:, 0], 'nominal_across_m': nominal[:, 1],
+    }  # fmt: skip
+    figure, (left, right) = panels(2)
+    left.plot(1e3 * nominal[:, 0], 1e3 * nominal[:, 1], color='#444444', label='nominal')
+    names = {
+        'shift': f'base displaced by {1e3 * _SIZES.initial:.1f} mm',
+        'turn': f'base turned by {1e3 * _TURN:.0f} mrad',
+    }
+    for colour, (name, off) in zip(COLOURS, moved.items(), strict=False):
+        world = np.swapaxes(study.axes, -1, -2) @ off[..., None]
+        path = _plane(study, study.nominal.position + _EXAGGERATED * world[..., 0])
+        left.plot(1e3 * path[:, 0], 1e3 * path[:, 1], color=colour, label=names[name])
+        right.plot(1e3 * study.s, 1e3 * _size(off), color=colour, label=names[name])
+        table[f'{name}_along_m'], table[f'{name}_across_m'] = off[:, 0], off[:, 1]
+        table[f'{name}_deviation_m'] = _size(off)
+    left.set_aspect('equal', adjustable='datalim')
+    label(left, f'Path from above, deviation x {_EXAGGERATED:.0f}', 'along [mm]', 'across [mm]')
+    legend(left)
+    from_zero(right, 1.3)
+    label(right, 'Deviation', 'arc length [mm]', 'D [mm]')
+    legend(right)
+    caption = (
+        'Initialization error: a displaced base shifts the path by a constant; a turned base '
+        'by its lever arm, which changes along the seam.'
+    )
+    return Drawing('figure-07', caption, table, svg(figure))
+
+
+def profiles(setting: Setting) -> Drawing:
+    """Draw the deviation of a smooth and an aggressive motion over arc length."""
+    joints = setting.robot.joint_names
+    errors = {
+        'offset': tuple(JointOffset(joint, _SIZES.offset) for joint in joints),
+        'lag': tuple(ServoLag(joint, _LAG) for joint in joints),
+    }
+    studies = {name: setting.planned(name, _POINTS) for name in ('smooth', 'aggressive')}
+    figure, axes = panels(2)
+    rows: dict[str, list[Array]] = {}
+    for colour, (name, study) in zip(COLOURS, studies.items(), strict=False):
+        off = {k: _size(study.deviations((*setting.known, *e))) for k, e in errors.items()}
+        for axis, key in zip(axes, errors, strict=True):
+            style = {'lw': 4.0, 'alpha': 0.35} if name == 'aggressive' and key == 'offset' else {}
+            axis.plot(1e3 * study.s, 1e3 * off[key], color=colour, label=name, **style)
+        columns = {
+            'motion': np.full(study.samples, name), 't_s': study.t, 's_m': study.s,
+            **{f'{key}_deviation_m': value for key, value in off.items()},
+        }  # fmt: skip
+        for key, value in columns.items():
+            rows.setdefault(key, []).append(value)
+    titles = (
+        f'Every joint off by {_SIZES.offset / DEGREE:.2f} deg',
+        f'Every joint lags by {1e3 * _LAG:.0f} ms',
+    )
+    for axis, title in zip(axes, titles, strict=True):
+        from_zero(axis, 1.3)
+        label(axis, title, 'arc length [mm]', 'D [mm]')
+        legend(axis, ncols=2, loc='upper left')
+    caption = (
+        'Smooth against aggressive on the same seam: a constant offset deviates alike at equal arc '
+        'length, whatever the motion; a lag follows the speed.'
+    )
+    table = {key: np.concatenate(parts) for key, parts in rows.items()}
+    return Drawing('figure-08', caption, table, svg(figure))
+
+
+def play(setting: Setting) -> Drawing:
+    """Draw the deviation of play, and of the paper's formula, around reversals."""
+    name = RECORDED if RECORDED in setting.studies else 'aggressive'
+    study = setting.studies[name] if name == RECORDED else setting.planned(name, _POINTS)
+    joint = _reversing_joint(study)
+    stem = setting.robot.joint_names[joint]
+    motion = study.recording.joints
+    q = motion.q[:, joint] if study.at is None else motion.at(study.at)[0][:, joint]
+    vectors = {
+        form: study.deviations((*setting.known, Backlash(stem, _SIZES.width, form)))
+        for form in ('play', 'reversal')
+    }
+    axis = int(np.argmax((vectors['play'] ** 2).sum(axis=0)))
+    off = {form: vector[:, axis] for form, vector in vectors.items()}
+    turned = np.concatenate([[False], np.diff(np.sign(np.diff(q))) != 0.0, [False]])
+    table = {
+        't_s': study.t, 's_m': study.s, f'{stem}_rad': q, 'reversal': turned.astype(float),
+        **{f'{_FORMS[form]}_{_AXES[axis].split()[0]}_m': value for form, value in off.items()},
+        **{f'{_FORMS[form]}_deviation_m': _size(value) for form, value in vectors.items()},
+    }  # fmt: skip
+    picture = _play_picture(study, stem, q, off, turned, _AXES[axis])
+    caption = (
+        'Backlash of one joint: a gap shifts the tool by half of it, to the side the joint came '
+        'from, until the next reversal; the formula as written has one sample of deviation at each '
+        'reversal and none between.'
+    )
+    return Drawing('figure-09', caption, table, picture)
+
+
+def _play_picture(
+    study: Study, stem: str, q: Array, off: dict[str, Array], turned: Array, axis: str
+) -> str:
+    figure, (left, right) = panels(2)
+    t = study.t - study.t[0]
+    left.plot(t, (q - q[0]) / DEGREE, color='#444444')
+    left.plot(t[turned], ((q - q[0]) / DEGREE)[turned], 'o', ms=4, color=COLOURS[1])
+    label(left, f'{stem}, reversals marked', 'time [s]', 'angle from start [deg]')
+    names = {'play': 'play: a gap that is crossed', 'reversal': "the paper's formula"}
+    for colour, (form, value) in zip(COLOURS, off.items(), strict=False):
+        right.plot(t, 1e3 * value, color=colour, lw=1.2, label=names[form])
+    largest = 1e3 * max(float(np.abs(value).max()) for value in off.values())
+    right.set_ylim(-1.1 * largest, 1.5 * largest)
+    title = f'Backlash of {_SIZES.width / DEGREE:.2f} deg, deviation {axis} the seam'
+    label(right, title, 'time [s]', 'deviation [mm]')
+    legend(right, ncols=2, loc='upper left')
+    return svg(figure)
+
+
+def _reversing_joint(study: Study) -> int:
+    """Return the joint whose play moves the tool most while it reverses."""
+    q = study.recording.joints.q
+    turns = (np.diff(np.sign(np.diff(q, axis=0)), axis=0) != 0.0).any(axis=0)
+    names = study.robot.joint_names
+    moved = [
+        float(_size(study.deviations((*study.known, Backlash(name, _SIZES.width)))).mean())
+        for name in names
+    ]
+    return int(np.argmax(np.where(turns, moved, -1.0) if turns.any() else moved))

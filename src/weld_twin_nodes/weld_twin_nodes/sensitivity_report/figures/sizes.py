@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Figures 10, 12 and 13: the deviation over the size of one error."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.sensitivity import (
+    arc_weights,
+    default_tolerances,
+    default_values,
+    exact_deviations,
+    spread_of_passes,
+    sweep,
+    together,
+)
+from weld_twin_core.sensitivity.sweep import DEGREE
+
+from ..setting import Setting
+from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, svg
+
+
+def angles(setting: Setting) -> Drawing:
+    """Draw D_norm over the angle: measured, proportional, and the difference."""
+    study = next(iter(setting.studies.values()))
+    offsets = default_tolerances(setting.robot, ('joint_offset',))
+    values = default_values(offsets[0], 50)
+    single = [sweep(study, tolerance, values) for tolerance in offsets]
+    best = max(single, key=lambda found: float(found.max_m[-1]))
+    found = {best.name.split('.')[1]: best,
+             'all joints together': together(study, offsets, values, 'all')}  # fmt: skip
+    table: dict[str, Array] = {'angle_deg': values / DEGREE}
+    figure, (left, right) = panels(2)
+    for colour, (name, item) in zip(COLOURS, found.items(), strict=False):
+        key = name.replace(' ', '_')
+        table[f'{key}_d_norm'] = item.max_m / study.length
+        table[f'{key}_proportional_d_norm'] = item.linear_m / study.length
+        table[f'{key}_departure'] = item.departure
+        left.plot(values / DEGREE, 1e3 * item.max_m / study.length, color=colour, label=name)
+        left.plot(values / DEGREE, 1e3 * item.linear_m / study.length, color=colour, ls=':', lw=3)
+        right.plot(values / DEGREE, 1e6 * item.departure, color=colour, label=name)
+    label(left, 'D_norm (dotted: proportional to the angle)', 'angle of the error [deg]',
+          'D_norm [1/1000]')
+    label(right, 'Departure from proportional', 'angle of the error [deg]', 'parts per million')
+    right.set_yscale('symlog', linthresh=1.0)
+    legend(left)
+    legend(right)
+    caption = (
+        'Deviation over the angular error: proportional far beyond the range swept; one joint '
+        f'alone is {1e6 * best.departure[-1]:.1f} ppm off at 0.5 deg.'
+    )
+    return Drawing('figure-10', caption, table, svg(figure))
+
+
+def joints(setting: Setting) -> Drawing:
+    """Draw the deviation over the angle for every joint."""
+    study = next(iter(setting.studies.values()))
+    offsets = default_tolerances(setting.robot, ('joint_offset',))
+    values = default_values(offsets[0], 50)
+    table: dict[str, Array] = {'angle_deg': values / DEGREE}
+    figure, (left, right) = panels(2, width_ratios=(3, 2))
+    slopes = []
+    for colour, tolerance in zip(COLOURS, offsets, strict=False):
+        found = sweep(study, tolerance, values)
+        table[f'{tolerance.joint}_m'] = found.max_m
+        slopes.append(found.max_m[-1] / values[-1])
+        left.plot(values / DEGREE, 1e3 * found.max_m, color=colour, label=tolerance.joint)
+    label(left, 'Largest deviation', 'angle of the error [deg]', 'max D [mm]')
+    legend(left)
+    names = [str(t.joint) for t in offsets]
+    places = np.arange(len(names))
+    right.barh(places, slopes, color=COLOURS[: len(names)])
+    right.set_yticks(places, names)
+    right.invert_yaxis()
+    right.grid(False, axis='y')
+    label(right, 'Lever arm, first joint at the top', 'S [m/rad]', '')
+    caption = 'Deviation over the angular error of each joint: the lever arm to the tool decides.'
+    return Drawing('figure-12', caption, table, svg(figure))
+
+
+def widths(setting: Setting) -> Drawing:
+    """Draw the deviation over the width of play on every motion."""
+    gaps = default_tolerances(setting.robot, ('backlash',))
+    values = default_values(gaps[0], 26)
+    table: dict[str, Array] = {'width_deg': values / DEGREE}
+    figure, axes = panels(3)
+    for colour, (name, study) in zip(COLOURS, setting.studies.items(), strict=False):
+        draws = np.repeat(values[:, None], len(gaps), axis=1)
+        off = exact_deviations(study, gaps, draws)
+        distance = np.linalg.norm(off, axis=-1)
+        shown = {
+            'peak': distance.max(axis=1),
+            'rms': np.sqrt((distance**2 * arc_weights(study.s)).sum(axis=1)),
+            'range': spread_of_passes(study, off),
+        }
+        style = {'lw': 4.0, 'alpha': 0.35} if name == 'smooth' else {}
+        for axis, (key, value) in zip(axes, shown.items(), strict=True):
+            table[f'{name}_{key}_m'] = value
+            axis.plot(values / DEGREE, 1e3 * value, color=colour, label=name, **style)
+    titles = ('Peak', 'Rms over arc length', 'Spread at one place of the seam')
+    for axis, title in zip(axes, titles, strict=True):
+        label(axis, title, 'width of the gap, every joint [deg]', 'mm')
+        from_zero(axis)
+        legend(axis)
+    caption = (
+        'Deviation over backlash width: peak and rms hardly depend on the motion; what a motion '
+        'with reversals adds is that the same place of the seam is met from both sides.'
+    )
+    return Drawing('figure-13', caption, table, svg(figure))
+

@@ -19,13 +19,15 @@ from weld_twin_core.diagnosis.result import Check, Traces
 from weld_twin_nodes.report import InputFile, report_page
 from weld_twin_nodes.report.seam import seam_data
 
-WIDTH = """
-<title>?</title><iframe width="{width}" height="3000" srcdoc="{page}"></iframe>
+FRAME = '<iframe width="{width}" height="3000" srcdoc="{page}"></iframe>'
+MEASURE = """
+<title>?</title>
 <script>
-const frame = document.querySelector('iframe');
-frame.addEventListener('load', () => {{
-  document.title = 'wide ' + frame.contentDocument.documentElement.scrollWidth;
-}});
+addEventListener('load', () => {
+  const frames = [...document.querySelectorAll('iframe')];
+  const wide = frames.map((frame) => frame.contentDocument.documentElement.scrollWidth);
+  document.title = 'wide ' + Math.max(...wide);
+});
 </script>
 """
 
@@ -60,12 +62,12 @@ def test_both_seams_are_drawn_and_the_one_before_is_redder(browser):
     assert blue[:, half:].sum() > 200
 
 
-@pytest.mark.parametrize('width', [360, 390, 768])
+@pytest.mark.parametrize('width', [360, 768])
 def test_nothing_sticks_out_at_the_width_of_a_phone(browser, width):
-    for name in ('backlash', 'calibration'):
-        page = escape(report_page(diagnoses.ALL[name]()), quote=True)
-        seen = browser.look(WIDTH.format(width=width, page=page), width=900)
-        assert int(re.search(r'<title>wide (\d+)', seen.dom)[1]) <= width
+    pages = [report_page(diagnoses.ALL[name]()) for name in ('backlash', 'calibration')]
+    frames = [FRAME.format(width=width, page=escape(page, quote=True)) for page in pages]
+    seen = browser.look(MEASURE + ''.join(frames), width=900)
+    assert int(re.search(r'<title>wide (\d+)', seen.dom)[1]) == width
 
 
 def test_it_prints_on_a_few_pages(browser):

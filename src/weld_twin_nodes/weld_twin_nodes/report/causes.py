@@ -7,7 +7,7 @@ from __future__ import annotations
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
 from .html import Child, Html, bars, joined, section, table, tag
-from .quantities import MISSING, millimetres, odds, parameter_rows, percent
+from .quantities import MISSING, change, millimetres, odds, parameter_rows
 from .words import found_name, in_words, listed, site_name
 
 _CANDIDATES = 10
@@ -49,7 +49,7 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
     rows = [
         (site_name(c.site), c.probability,
          f'{odds(c.probability)} · leaves {millimetres(c.rms_after_m)} '
-         f'({percent(c.shrink)} less)')
+         f'({change(c.shrink)})')
         for c in shown
     ]  # fmt: skip
     more = len(diagnosis.candidates) - len(shown)

@@ -19,10 +19,12 @@ _ORDER = {'warning': 0, 'note': 1, 'ok': 2}
 def next_section(diagnosis: Diagnosis) -> Html:
     """Return the measurement that would decide, or that none is needed."""
     wanted = diagnosis.next_experiment
-    if wanted is None:
-        content: Html = tag('p', 'No further measurement is needed for this verdict.')
-    else:
+    if wanted is not None:
         content = tag('dl', *_entries(wanted), class_='pairs')
+    elif diagnosis.status in ('ambiguous', 'unknown'):
+        content = tag('p', 'No measurement that would decide has been found.')
+    else:
+        content = tag('p', 'No further measurement is needed for this verdict.')
     return section('What to measure next', content, id_='next')
 
 

@@ -50,10 +50,16 @@ def percent(share: float) -> str:
     return f'{value:.0f}{_GAP}%'
 
 
+def change(shrink: float) -> str:
+    """Return how much a gap shrinks, or grows."""
+    return f'{percent(abs(shrink))} {"less" if shrink >= 0.0 else "more"}'
+
+
 def interval(shrink: Shrink) -> str:
     """Return how sure the ratio of after to before is."""
-    low, high = shrink.ci95
-    return f'95{_GAP}% interval {100 * low:.0f} to {percent(high)}'
+    low, high = (100.0 * bound for bound in shrink.ci95)
+    places = 1 if high < 10.0 else 0
+    return f'95{_GAP}% interval {low:.{places}f} to {high:.{places}f}{_GAP}%'
 
 
 def odds(probability: float) -> str:

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from .quantities import millimetres, odds, parameter_rows, percent
+from .quantities import change, millimetres, odds, parameter_rows
 from .words import STATUS, found_name, listed, site_name, verdict
 
 _COLOURS = {'identified': 'green', 'ambiguous': 'yellow', 'unknown': 'red', 'none': 'cyan'}
@@ -51,12 +51,12 @@ def _effects(diagnosis: Diagnosis) -> Table:
 
 def _candidates(diagnosis: Diagnosis) -> Table:
     table = Table(box=None, title='candidates', title_justify='left', pad_edge=False)
-    for head in ('effect', 'probability', 'gap left', 'shrinks by'):
+    for head in ('effect', 'probability', 'gap left', 'change'):
         table.add_column(head, header_style='dim', overflow='fold')
     for item in diagnosis.candidates[:_MOST]:
         table.add_row(
             escape(site_name(item.site)), odds(item.probability), millimetres(item.rms_after_m),
-            percent(item.shrink),
+            change(item.shrink),
         )  # fmt: skip
     return table
 

@@ -14,7 +14,7 @@ from .quantities import millimetres, odds
 CAUSES = {
     'joint_offset': 'zero offset', 'link_length': 'link length error',
     'link_offset': 'link offset error', 'link_twist': 'link twist error',
-    'axis_parallelism': 'axis out of parallel', 'base_pose': 'base pose error',
+    'axis_parallelism': 'axis parallelism error', 'base_pose': 'base pose error',
     'tool_pose': 'tool pose error', 'gear_ratio': 'gear ratio error',
     'transmission_ripple': 'transmission ripple', 'joint_coupling': 'coupling',
     'backlash': 'backlash', 'joint_compliance': 'compliance',
@@ -94,14 +94,12 @@ def _families(diagnosis: Diagnosis) -> str:
 def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     size = millimetres(diagnosis.gap.rms_m)
     open_sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
-    settled = _settled(diagnosis)
-    if not open_sets:
-        what = f'{listed([found_name(f) for f in diagnosis.effects])} among others'
-    else:
-        what = '; and '.join(_either(group) for group in open_sets[:2])
-    start = f'Part of the gap of {size} comes from {listed(settled)}; the rest' if settled else (
-        f'The gap of {size}')  # fmt: skip
-    return f'{start} is explained equally well by {what}.', _gain(diagnosis, 'Either way')
+    choices = '; and from '.join(_either(group) for group in open_sets[:2])
+    settled = listed(_settled(diagnosis))
+    start = f'The gap of {size} comes '
+    if settled:
+        start += f'in part from {settled}, in part '
+    return f'{start}from {choices}: these data do not tell which.', _gain(diagnosis, 'Either way')
 
 
 def _either(group: Sequence[Site]) -> str:
@@ -127,7 +125,7 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
     if diagnosis.effects:
         names = listed([found_name(found) for found in diagnosis.effects[:_NAMED]])
         first = (
-            f'Of the gap of {size}, {names} explains a part, but {left} above the noise remains '
+            f'Part of the gap of {size} comes from {names}, but {left} above the noise remains '
             'that no effect in the library explains.'
         )
     else:

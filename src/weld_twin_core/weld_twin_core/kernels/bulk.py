@@ -1,0 +1,208 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Poses, Jacobians and derivatives by DH values of many joint positions.
+
+The chain is cut in two pieces. Each is a small matrix product of constant `weights` with products
+of sines and cosines; nine multiplications for each output vector put them together. All of it
+runs over blocks of poses that stay in the processor's cache, in memory that is used again.
+`chain` says the same in plain form, and the tests hold one against the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import Array
+from ..chain import Channel
+from ..robot import Robot
+from .buffers import aligned
+from .half_angle import HalfAngle
+from .weights import Piece, on_half_angles
+
+BLOCK = 1000
+"""Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
+
+
+class BulkKernel:
+    """
+    The chain of one robot, prepared for many joint positions.
+
+    Parameters
+    ----------
+    robot : Robot
+    channels : sequence of Channel
+        DH values whose screws `screws` gives, in the order of the rows: 'theta', 'alpha', 'beta'
+        and 'a' are turns about the axis that 'theta' and 'd', 'alpha', 'beta' and 'a' act on.
+    block : int
+        Poses worked on at once; a multiple of 8 is best.
+
+    Notes
+    -----
+    A kernel owns its working memory, so one kernel serves one thread at a time.
+
+    """
+
+    def __init__(
+        self, robot: Robot, channels: Sequence[Channel] = (), block: int = BLOCK
+    ) -> None:
+        self.robot = robot
+        self.channels = tuple(channels)
+        self.block = block
+        cut = (robot.n + 1) // 2
+        self.sizes = (cut, robot.n - cut)
+        near = Piece(robot, range(cut), robot.T_world_base, np.eye(4))
+        far = Piece(robot, range(cut, robot.n), np.eye(4), robot.T_flange_tool)
+        inner = [c for c in self.channels if c[1] < cut]
+        outer = [c for c in self.channels if c[1] >= cut]
+        if inner + outer != list(self.channels):
+            raise ValueError('channels must be in the order of the rows')
+        self.counts = (len(inner), len(outer))
+        self._weights = (
+            self._rows(_columns(near.poses()), *near.screws(inner), joints=cut),
+            self._rows(_columns(far.poses()), *far.velocities(outer), joints=robot.n - cut),
+        )
+        self._memory: dict[int, _Memory] = {}
+
+    @staticmethod
+    def _rows(*weights: Array, joints: int) -> Array:
+        """Return weights with one row for every output, shape (outputs, features)."""
+        flat = [w.reshape(len(w), w[0].size) for w in weights if w.size]
+        return np.ascontiguousarray(on_half_angles(np.concatenate(flat, axis=1), joints).T)
+
+    def poses(self, q: Array, out: Array | None = None) -> Array:
+        """
+        Return tool poses ``T_world_tool``, shape (N, 4, 4), of joint positions (N, n).
+
+        ``out`` is a contiguous array to write them to.
+        """
+        out = np.empty((len(q), 4, 4)) if out is None else out
+        for part in self._blocks(len(q)):
+            self._pose_block(q[part], out[part])
+        return out
+
+    def screws(
+        self, q: Array, poses: Array | None = None, out: Array | None = None
+    ) -> tuple[Array, Array]:
+        """
+        Return tool poses and how the tool turns with each channel, shape (6, channels, N).
+
+        Velocity of the tool point [m/rad] first, then the axis. A channel that slides moves the
+        tool point along the axis of its screw: what `chain.column` gives for 'd' is rows 3 to 5
+        of the screw of 'theta', and 'a' goes with 'alpha' likewise.
+        """
+        poses = np.empty((len(q), 4, 4)) if poses is None else poses
+        out = np.empty((6, len(self.channels), len(q))) if out is None else out
+        for part in self._blocks(len(q)):
+            memory = self._pose_block(q[part], poses[part])
+            self._screw_block(memory, out[:, :, part])
+        return poses, out
+
+    def _blocks(self, count: int) -> list[slice]:
+        """Return blocks of one length; the last overlaps the one before rather than be short."""
+        size = min(self.block, count)
+        starts = [*range(0, count - size + 1, size)] if count else []
+        if count % max(size, 1):
+            starts.append(count - size)
+        return [slice(start, start + size) for start in starts]
+
+    def _pose_block(self, q: Array, out: Array) -> _Memory:
+        n = len(q)
+        if n not in self._memory:
+            self._memory = {k: m for k, m in self._memory.items() if k == self.block}
+            self._memory[n] = _Memory(self, n)
+        memory = self._memory[n]
+        memory.fill(q, self.robot.prismatic)
+        for weights, features, piece in zip(
+            self._weights, memory.features, memory.pieces, strict=True
+        ):
+            np.matmul(weights, features, out=piece)
+        near, far = (piece[:12].reshape(4, 3, n) for piece in memory.pieces)
+        sums = memory.sums
+        np.multiply(far.swapaxes(0, 1)[:, :, None], near[:3, None], sums[:36].reshape(3, 4, 3, n))
+        sums[36:39] = near[3]
+        np.matmul(sums.T, _GATHER, out=out.reshape(n, 16))
+        return memory
+
+    def _screw_block(self, memory: _Memory, out: Array) -> None:
+        near, far = memory.pieces
+        inner, outer = self.counts
+        n = near.shape[1]
+        if inner:
+            tip = memory.sums[9:12] + memory.sums[21:24]
+            tip += memory.sums[33:39].reshape(2, 3, n).sum(axis=0)
+            moment, axis = near[12:].reshape(2, 3, inner, n)
+            _velocity(moment, axis, tip, out[:3, :inner])
+            out[3:, :inner] = axis
+        if outer:
+            vectors = far[12:].reshape(2, 3, outer, n)
+            turn = near[:9].reshape(3, 3, 1, n)
+            for vector, target in zip(vectors, (out[:3, inner:], out[3:, inner:]), strict=True):
+                total, part = memory.spare[:, :, :outer]
+                np.multiply(turn[0], vector[0], total)
+                np.multiply(turn[1], vector[1], part)
+                np.add(total, part, total)
+                np.multiply(turn[2], vector[2], part)
+                np.add(total, part, target)
+
+
+def _columns(poses: Array) -> Array:
+    """Return the columns x, y, z and origin of weights of poses, shape (features, 4, 3)."""
+    return poses[:, :3].swapaxes(1, 2)
+
+
+def _velocity(moment: Array, axis: Array, tip: Array, out: Array) -> None:
+    """Write moment + axis x tip; shapes (3, channels, N), tip (3, N)."""
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        moment[k] += axis[i] * tip[j]
+        np.subtract(moment[k], axis[j] * tip[i], out=out[k])
+
+
+def _gather() -> Array:
+    """Return the matrix that adds the products up to rows of a 4 x 4 matrix, shape (40, 16)."""
+    out = np.zeros((40, 4, 4))
+    for i in range(3):
+        for j in range(4):
+            out[[12 * k + 3 * j + i for k in range(3)], i, j] = 1.0
+        out[36 + i, i, 3] = 1.0
+    out[39, 3, 3] = 1.0
+    return out.reshape(40, 16)
+
+
+_GATHER = _gather()
+
+
+class _Memory:
+    """Working memory for blocks of one length."""
+
+    def __init__(self, kernel: BulkKernel, n: int) -> None:
+        self.half = HalfAngle(kernel.robot.n, n)
+        self.sizes = kernel.sizes
+        self.features = tuple(aligned(3**size, n) for size in kernel.sizes)
+        for features in self.features:
+            features[0] = 1.0
+        self.pieces = tuple(aligned(len(w), n) for w in kernel._weights)
+        self.sums = aligned(40, n)
+        self.sums[39] = 1.0
+        self.spare = aligned(2, 3, max(kernel.counts[1], 1), n)
+
+    def fill(self, q: Array, prismatic: Array) -> None:
+        """Compute the products of (1, u, v) of the joints of each piece."""
+        sine, cosine = self.half(q.T)
+        first = 0
+        for size, features in zip(self.sizes, self.features, strict=True):
+            width = 1
+            for i in range(first + size - 1, first - 1, -1):
+                own = features[width : 3 * width : width]
+                if prismatic[i]:
+                    own[0], own[1] = 0.5 * q[:, i], 0.0  # stands in for sin x = 2 u
+                else:
+                    np.multiply(cosine[i], sine[i], own[0])
+                    np.multiply(sine[i], sine[i], own[1])
+                wide = features[width : 3 * width].reshape(2, width, -1)
+                np.multiply(own[:, None], features[1:width], wide[:, 1:])
+                width *= 3
+            first += size

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnose cases from their recordings alone, and keep what was said."""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import weld_twin_core
+from weld_twin_core import __version__
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.robots import load_robot
+
+from ..models import build_twin
+from ..report.files import diagnosis_text
+from ..report.provenance import hashed
+from ..tasks import Runner, Task
+from . import layout, seal
+
+_KIB = 1024 if sys.platform != 'darwin' else 1
+"""What getrusage counts memory in [bytes]."""
+
+
+def diagnose_cases(
+    cases: Path, runner: Runner, *, allow_readable: bool = False, with_holdout: bool = True
+) -> dict[str, Any]:
+    """
+    Return the verdicts on all cases.
+
+    Parameters
+    ----------
+    cases : Path
+    runner : Runner
+        Its store makes the work resumable; verdicts of another engine or other cases are not
+        taken for these.
+    allow_readable : bool
+        Go on although truths lie within reach.
+    with_holdout : bool
+        Give the diagnosis the held-out recording to judge its shrink on; without, it judges on
+        stretches of the training recording.
+
+    Raises
+    ------
+    DataError
+        Truths lie within reach, or the directory holds no cases.
+
+    """
+    truths = seal.truths_within_reach(cases)
+    if truths is not None and not allow_readable:
+        raise DataError(
+            f"the truths in '{truths}' can be read from here, so this would not be blind; move "
+            'them away, or say --allow-readable'
+        )
+    listed = layout.read(cases / layout.CASES)
+    engine = engine_digest()
+    tasks = [
+        Task(diagnose_case, (str(cases / entry['name']), entry['case'], engine, with_holdout),
+             entry['name'])
+        for entry in listed['cases']
+    ]  # fmt: skip
+    verdicts = runner.run(tasks)
+    return {
+        'seal': listed['seal'], 'engine': engine, 'version': __version__,
+        'with_holdout': with_holdout, 'truths_readable': truths is not None,
+        'verdicts': verdicts,
+    }  # fmt: skip
+
+
+def engine_digest() -> str:
+    """Return the SHA-256 over the source of the core: another engine, another digest."""
+    place = Path(weld_twin_core.__file__).parent
+    whole = [hashed('source', file).sha256 for file in sorted(place.rglob('*.py'))]
+    return seal.text_digest('\n'.join(whole))
+
+
+def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> dict[str, Any]:
+    """
+    Return the diagnosis of one case, how long it took and the memory it needed.
+
+    A case that cannot be diagnosed says so in place of a verdict, so that one case does not stop
+    the others; the digests only tell this task from others.
+    """
+    directory = Path(place)
+    start = time.perf_counter()
+    try:
+        answer = {'diagnosis': _diagnosis(directory, with_holdout), 'error': None}
+    except Exception as error:
+        answer = {'diagnosis': None, 'error': f'{type(error).__name__}: {error}'}
+    return {
+        'name': directory.name, **answer, 'seconds': time.perf_counter() - start,
+        'memory_bytes': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _KIB,
+    }  # fmt: skip
+
+
+def _diagnosis(directory: Path, with_holdout: bool) -> dict[str, Any]:
+    case = layout.read(directory / layout.CASE)
+    known = directory / layout.KNOWN if case['known'] else ''
+    twin = build_twin(load_robot(str(directory / layout.ROBOT)), known)
+    holdout = [layout.HOLDOUT] if with_holdout else []
+    train, *held = (
+        read_recording(directory / use, twin.robot) for use in (layout.TRAIN, *holdout)
+    )
+    result = diagnose(
+        [train], twin.robot, align=frozenset(case['align']), known=twin.effects,
+        exclude=case['exclude'], holdout=held,
+    )  # fmt: skip
+    return dict(json.loads(diagnosis_text(result, ())))

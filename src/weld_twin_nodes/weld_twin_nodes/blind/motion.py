@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Motions to record: weld seams one after another, free motions of the joints, stations."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import PathError
+from weld_twin_core.paths import KINDS, Torch, default_seam
+from weld_twin_core.plan import plan
+from weld_twin_core.profiles import Aggressive, Profile, Smooth
+from weld_twin_core.robot import Robot
+
+RATE = 125.0
+"""Joint states a second."""
+STATION_PAUSE = 2.0
+AIR_SPEED = 0.5
+"""Mean joint speed [rad/s] from one seam to the next."""
+RAMP = 2.0
+"""Seconds in which a free motion sets in."""
+TRIES = 40
+LONGEST = 2.0
+"""How many times as long as wanted a seam may take where the joints are slow."""
+
+
+class Motion(NamedTuple):
+    """Stamps (N,) [s], joint positions (N, n), and whether each is a station at rest."""
+
+    t: Array
+    q: Array
+    static: bool = False
+
+
+def motion(kind: str, robot: Robot, span: float, rng: np.random.Generator) -> Motion:
+    """
+    Return a motion drawn at random.
+
+    Parameters
+    ----------
+    kind : str
+        'seams', 'free' or 'stations'.
+    robot : Robot
+    span : float [s]
+        About how long; two seconds for every station.
+    rng : Generator
+
+    """
+    return {'seams': _seams, 'free': _free, 'stations': _stations}[kind](robot, span, rng)
+
+
+def _seams(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
+    """Return seams at random places round the robot, with motion through the air between."""
+    pieces: list[Array] = []
+    while sum(map(len, pieces)) < 0.8 * span * RATE:
+        piece = _seam(robot, 0.35 * span, rng)
+        if pieces:
+            pieces.append(_air(pieces[-1][-1], piece[0]))
+        pieces.append(piece)
+    q = np.concatenate(pieces)
+    return Motion(np.arange(len(q)) / RATE, q)
+
+
+def _seam(robot: Robot, span: float, rng: np.random.Generator) -> Array:
+    """Return joint positions along one seam, smooth or aggressive, shape (N, n)."""
+    for _ in range(TRIES):
+        kind, turn = str(rng.choice(KINDS)), rng.uniform(-1.0, 1.0)
+        torch = Torch(work=rng.uniform(-0.3, 0.3), travel=rng.uniform(-0.3, 0.3))
+        hasty = rng.random() < 0.5
+        try:
+            seam = default_seam(robot, kind, torch)
+            speed = seam.length / span
+            law: Profile = Smooth(speed=speed)
+            if hasty:
+                law = Aggressive(speed=float(rng.uniform(0.05, 0.2)), reversals=6)
+            q = np.array(plan(robot, seam, law, RATE, torch=torch, fit=True).motion.q)
+        except PathError:
+            continue
+        # The same seam further round the first axis is as good a seam.
+        q[:, 0] += turn
+        if len(q) < LONGEST * span * RATE and _allowed(robot, q):
+            return q
+    raise PathError(f'none of {TRIES} seams drawn for {robot.name} is within its reach')
+
+
+def _air(start: Array, end: Array) -> Array:
+    """Return a quintic from rest to rest between two postures, without its ends, (N, n)."""
+    count = max(int(RATE * np.abs(end - start).max() / AIR_SPEED), 12)
+    s = np.arange(1, count) / count
+    return start + (end - start) * (s**3 * (10.0 - 15.0 * s + 6.0 * s * s))[:, None]
+
+
+def _middle(robot: Robot) -> Array:
+    """Return a posture that bends the arm and stays away from the limits, shape (n,)."""
+    seam = plan(robot, default_seam(robot, 'line'), 'smooth', 10.0, fit=True)
+    return np.array(seam.motion.q[len(seam.motion.q) // 2])
+
+
+def _free(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
+    """Return sums of slow sines about a working posture, every joint on its own."""
+    t = np.arange(0.0, span, 1.0 / RATE)
+    centre = _middle(robot)
+    ramp = np.clip(t / RAMP, 0.0, 1.0)
+    ramp = ramp * ramp * (3.0 - 2.0 * ramp)
+    waves = np.zeros((t.size, robot.n))
+    for i in range(robot.n):
+        for _ in range(3):
+            rate, size = rng.uniform(0.03, 0.35), rng.uniform(0.05, 0.25)
+            waves[:, i] += size * np.sin(2.0 * np.pi * rate * t + rng.uniform(0.0, 2.0 * np.pi))
+    q = centre + rng.uniform(-0.3, 0.3, robot.n) + waves * ramp[:, None]
+    return Motion(t, _inside(robot, q))
+
+
+def _stations(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
+    """Return stations scattered over the working space."""
+    count = max(int(2.5 * span), 40)
+    spread = np.minimum(0.4 * (robot.upper - robot.lower), 1.2)
+    q = _middle(robot) + rng.uniform(-1.0, 1.0, (count, robot.n)) * spread
+    return Motion(np.arange(count) * STATION_PAUSE, _inside(robot, q), static=True)
+
+
+def _inside(robot: Robot, q: Array) -> Array:
+    """Return the motion squeezed about its middle where it would leave a joint's range."""
+    low, high = q.min(axis=0), q.max(axis=0)
+    room = 0.95 * (robot.upper - robot.lower)
+    middle = 0.5 * (low + high)
+    squeeze = np.minimum(1.0, room / np.maximum(high - low, 1e-9))
+    reach = 0.5 * squeeze * (high - low)
+    edge = 0.02 * (robot.upper - robot.lower)
+    centre = np.clip(middle, robot.lower + reach + edge, robot.upper - reach - edge)
+    return np.asarray(centre + squeeze * (q - middle))
+
+
+def _allowed(robot: Robot, q: Array) -> bool:
+    return bool((q > robot.lower).all() and (q < robot.upper).all())

@@ -85,7 +85,13 @@ class Features:
 
     def columns(self, effect: Effect, atoms: bool = True) -> Array:
         """Return the effect's features as pose changes, shape (K, 6, M)."""
-        found = [self.pose_change(shift) for shift in self.shifts(effect, atoms)]
+        shifts = self.shifts(effect, atoms)
+        channels = list({channel for shift in shifts for channel in shift})
+        if len(channels) == 1 and channels[0][0] != 'tau':
+            # One joint's hundred ripple orders share its column.
+            sizes = [np.broadcast_to(s.get(channels[0], 0.0), self.at.shape) for s in shifts]
+            return np.stack(sizes)[:, None] * self.column(channels[0])
+        found = [self.pose_change(shift) for shift in shifts]
         return np.stack(found) if found else np.zeros((0, 6, self.at.size))
 
     def seeds(

@@ -24,7 +24,7 @@ class Picker:
 
     def __init__(self, motion: JointMotion, t: Array) -> None:
         if motion.static or motion.t.size < 2:
-            self._low = np.abs(t[..., None] - motion.t).argmin(axis=-1)
+            self._low = motion.nearest(t)
             self._high, self._weight = self._low, np.zeros(t.shape)
             self._rate = np.zeros(t.shape)
             return

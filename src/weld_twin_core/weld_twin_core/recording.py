@@ -64,6 +64,12 @@ class JointMotion:
         rates = np.gradient(self.q, self.t, axis=0, edge_order=edge)
         return readonly(rates, self.q.shape, 'joint velocities')
 
+    def nearest(self, t: Array) -> np.ndarray:
+        """Return the sample nearest in time to each of other times, shape t.shape."""
+        after = np.clip(np.searchsorted(self.t, t), 0, self.t.size - 1)
+        before = np.maximum(after - 1, 0)
+        return np.where(np.abs(t - self.t[before]) <= np.abs(self.t[after] - t), before, after)
+
     def at(self, t: Array) -> tuple[Array, Array]:
         """
         Return joint position and velocity at other times, shape t.shape + (n,).
@@ -73,7 +79,7 @@ class JointMotion:
         stream take its first or last position at rest.
         """
         if self.static or self.t.size < 2:
-            index = np.abs(np.asarray(t)[..., None] - self.t).argmin(axis=-1)
+            index = self.nearest(np.asarray(t))
             return self.q[index], np.zeros(np.shape(t) + self.q.shape[1:])
         inside = np.clip(t, self.t[0], self.t[-1])
         moving = (inside == t)[..., None]

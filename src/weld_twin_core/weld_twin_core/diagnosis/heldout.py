@@ -13,15 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
 
 from ..arrays import Array
 from .fit import Fit, design
 from .problem import Model, Problem, Scale
 
 BLOCKS = 8
+MANY = 200
+"""Columns from which on an inverse of all of them serves every choice of effects."""
 TRUSTED = 0.2
 """A sample of less weight is an outlier: reported, and left out of every quoted RMS."""
 TETHER = 0.3
@@ -99,34 +103,87 @@ class Unseen:
 
     def predict(self, kept: Sequence[int]) -> Array:
         """Return the residual on every stretch of the model fitted on the others, (rows,)."""
-        return self.base(kept).residual
+        if self.columns.shape[0] <= MANY:
+            return self.base(kept).residual
+        # With hundreds of columns an inverse per stretch serves every choice of effects.
+        index = self._index(kept)
+        gone = np.setdiff1d(np.arange(self.columns.shape[0]), index)
+        if gone.size > index.size:
+            return self.base(kept).residual
+        mix = np.ones(self.targets.shape[0])
+        mix[[1 + k for k in kept]] = 0.0
+        residual = mix @ self.targets
+        for b, (low, high) in enumerate(self._spans()):
+            inverse = self._inverses[b]
+            step = inverse @ self._right(b, mix)
+            if gone.size:
+                force = np.linalg.solve(inverse[np.ix_(gone, gone)], step[gone])
+                step = step - inverse[:, gone] @ force
+            residual[low:high] -= step @ self.columns[:, low:high]
+        return residual
+
+    @cached_property
+    def _inverses(self) -> list[Array]:
+        """Return the inverse normal matrix of all columns for every stretch left out."""
+        out, everything = [], np.arange(self.columns.shape[0])
+        for b in range(self.normals.shape[0]):
+            system = self._system(b, everything)
+            size = np.sqrt(np.maximum(np.diag(system), 1e-300))
+            system /= np.outer(size, size)
+            system[np.diag_indices_from(system)] += 1e-11
+            half, _ = dpotri(cho_factor(system, lower=True)[0], lower=1)
+            whole = np.tril(half) + np.tril(half, -1).T
+            out.append(whole / np.outer(size, size))
+        return out
 
     def base(self, kept: Sequence[int]) -> Base:
         """Return a model of some effects, fitted with each stretch left out in turn."""
-        index = np.concatenate(
-            [np.arange(self.frames), *(np.arange(self.parts[k].start, self.parts[k].stop)
-                                       for k in kept)]
-        ).astype(int)  # fmt: skip
+        index = self._index(kept)
         mix = np.ones(self.targets.shape[0])
         mix[[1 + k for k in kept]] = 0.0
         target = mix @ self.targets
-        normal = self.normals[:, index][:, :, index]
-        right = self.rights[:, index] @ mix
         factors, residual = [], target.copy()
-        if index.size:
-            total, total_right = normal.sum(axis=0), right.sum(axis=0)
-            for b in range(normal.shape[0]):
-                system = total - normal[b] + np.diag(self.precision[index])
-                size = np.sqrt(np.maximum(np.diag(system), 1e-300))
-                scaled = system / np.outer(size, size)
-                scaled[np.diag_indices_from(scaled)] += 1e-11
-                factor = cho_factor(scaled)
-                wanted = (total_right - right[b] - self.pull[index]) / size
-                step = cho_solve(factor, wanted) / size
-                low, high = np.searchsorted(self.labels, [b, b + 1])
-                residual[low:high] -= step @ self.columns[index, low:high]
-                factors.append((factor, size))
+        for b, (low, high) in enumerate(self._spans() if index.size else ()):
+            system = self._system(b, index)
+            size = np.sqrt(np.maximum(np.diag(system), 1e-300))
+            system /= np.outer(size, size)
+            system[np.diag_indices_from(system)] += 1e-11
+            factor = cho_factor(system, overwrite_a=True)
+            step = cho_solve(factor, self._right(b, mix)[index] / size) / size
+            residual[low:high] -= self._moved(step, index, low, high)
+            factors.append((factor, size))
         return Base(self, index, target, factors, residual)
+
+    def _index(self, kept: Sequence[int]) -> Array:
+        """Return the columns of the frames and of some effects."""
+        parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in kept]
+        return np.concatenate([np.arange(self.frames), *parts]).astype(int)
+
+    def _spans(self) -> list[tuple[int, int]]:
+        """Return first and last row of every stretch."""
+        bounds = np.searchsorted(self.labels, np.arange(self.normals.shape[0] + 1))
+        return list(zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))
+
+    @cached_property
+    def _total(self) -> Array:
+        return np.asarray(self.normals.sum(axis=0) + np.diag(self.precision))
+
+    def _system(self, b: int, index: Array) -> Array:
+        """Return the normal matrix of some columns on all stretches but one."""
+        if index.size == self.columns.shape[0]:
+            return np.asarray(self._total - self.normals[b])
+        at = np.ix_(index, index)
+        return np.asarray(self._total[at] - self.normals[b][at])
+
+    def _right(self, b: int, mix: Array) -> Array:
+        """Return the right-hand side of every column on all stretches but one."""
+        return np.asarray((self.rights.sum(axis=0) - self.rights[b]) @ mix - self.pull)
+
+    def _moved(self, step: Array, index: Array, low: int, high: int) -> Array:
+        """Return what a step of some columns takes off a stretch of rows, without a copy."""
+        whole = np.zeros(self.columns.shape[0])
+        whole[index] = step
+        return np.asarray(whole @ self.columns[:, low:high])
 
     def squares(self, residual: Array) -> Array:
         """Return the squared position error of every trusted sample, shape (samples,) [m^2]."""
@@ -175,29 +232,32 @@ class Base:
             Prior precision of the further columns.
 
         """
-        labels, own = self.unseen.labels, self.unseen.columns[self.index]
-        cross_all, square_all = own @ extra.T, extra @ extra.T
-        pull_all = extra @ self.target
-        right_all = own @ self.target
-        outs = [self.target.copy() for _ in ridges]
-        for b in range(int(labels[-1]) + 1):
-            low, high = np.searchsorted(labels, [b, b + 1])
-            here, mine, aim = extra[:, low:high], own[:, low:high], self.target[low:high]
-            cross, square = cross_all - mine @ here.T, square_all - here @ here.T
-            pull, right = pull_all - here @ aim, right_all - mine @ aim
-            right = right - self.unseen.pull[self.index]
+        own = self.unseen.columns
+        if self.index.size < own.shape[0]:
+            own = own[self.index]
+        spans = self.unseen._spans()
+        both = np.concatenate([extra, self.target[None]])
+        crosses = [own[:, a:b] @ both[:, a:b].T for a, b in spans]
+        squares = [extra[:, a:b] @ both[:, a:b].T for a, b in spans]
+        cross_all, square_all = sum(crosses), sum(squares)
+        outs = np.tile(self.target, (len(ridges), 1))
+        for b, (low, high) in enumerate(spans):
+            here, mine = extra[:, low:high], own[:, low:high]
+            cross, right = np.split(cross_all - crosses[b], [extra.shape[0]], axis=1)
+            square, pull = np.split(square_all - squares[b], [extra.shape[0]], axis=1)
+            right, pull = right[:, 0] - self.unseen.pull[self.index], pull[:, 0]
             if self.index.size:
                 factor, size = self.factors[b]
                 solved = cho_solve(factor, np.column_stack([cross, right]) / size[:, None])
                 solved /= size[:, None]
                 square = square - cross.T @ solved[:, :-1]
                 pull = pull - cross.T @ solved[:, -1]
-            for out, ridge in zip(outs, ridges, strict=True):
-                more = np.linalg.solve(square + (ridge + 1e-9) * np.eye(here.shape[0]), pull)
-                out[low:high] -= more @ here
-                if self.index.size:
-                    out[low:high] -= (solved[:, -1] - solved[:, :-1] @ more) @ mine
-        return outs
+            eye = np.eye(here.shape[0])
+            more = np.stack([np.linalg.solve(square + (r + 1e-9) * eye, pull) for r in ridges])
+            outs[:, low:high] -= more @ here
+            if self.index.size:
+                outs[:, low:high] -= (solved[:, -1] - more @ solved[:, :-1].T) @ mine
+        return list(outs)
 
 
 def _tether(model: Model) -> Array:
@@ -212,31 +272,3 @@ def _tether(model: Model) -> Array:
 
 def _without(model: Model, k: int) -> Model:
     return model.with_found(model.found[:k] + model.found[k + 1 :])
-
-
-def ratio_interval(before: Array, after: Array, labels: Array) -> tuple[float, tuple[float, float]]:
-    """
-    Return RMS after over before and its 95 % interval, by leaving out one stretch at a time.
-
-    Jackknife over stretches, so that neighbouring samples do not count as independent.
-
-    Parameters
-    ----------
-    before, after : array, shape (samples,)
-        Squared errors on unseen data.
-    labels : array of int, shape (samples,)
-
-    """
-    ratio = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
-    names = np.unique(labels)
-    if names.size < 3:
-        spread = ratio / np.sqrt(2.0 * max(before.size, 2))
-        return ratio, (max(ratio - 2.0 * spread, 0.0), ratio + 2.0 * spread)
-    logs = []
-    for name in names:
-        keep = labels != name
-        logs.append(0.5 * np.log(max(after[keep].mean(), 1e-300) / max(before[keep].mean(), 1e-300)))
-    k = names.size
-    error = float(np.sqrt((k - 1) / k * ((np.array(logs) - np.mean(logs)) ** 2).sum()))
-    reach = 2.36 * error  # Student t, 7 degrees of freedom
-    return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))

@@ -141,10 +141,11 @@ class Problem:
         for part, weight in zip(parts, scale.weights, strict=True):
             unit = np.full(part.shape[-2], 1.0 / scale.position)
             unit[3:] = 1.0 / scale.orientation
-            scaled = part * unit[:, None] * np.sqrt(weight)
-            rows = part.shape[-2] * part.shape[-1]
-            out.append(np.swapaxes(scaled, -1, -2).reshape(*part.shape[:-2], rows))
-        return np.concatenate(out, axis=-1)
+            turned = np.swapaxes(part, -1, -2)
+            scaled = np.empty(turned.shape)
+            np.multiply(turned, np.sqrt(weight)[:, None] * unit, out=scaled)
+            out.append(scaled.reshape(*part.shape[:-2], weight.size * unit.size))
+        return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
 
     def frame_columns(self, features: list[Features]) -> tuple[list[Array], list[str]]:
         """Return nuisance columns, one (P, c, M) array per recording, and their names."""

@@ -19,10 +19,11 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dtrtri
 
 from ..arrays import Array
 from ..effects.base import Effect
-from .fit import Fit, design, fit
+from .fit import Fit, coordinates, design, fit, solve_scaled, stepped
 from .problem import Model, Problem, Scale
 
 BANDS = (1, 2, 4, 8, 16, 24, 36, 54, 81, 121, 1000)
@@ -78,9 +79,10 @@ def learned_precision(
     for _ in range(ROUNDS):
         precision = np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 1e-9)
         system = normal / noise + np.diag(precision)
-        factor = cho_factor(system + 1e-12 * np.diag(np.diag(system)))
+        system[np.diag_indices_from(system)] *= 1.0 + 1e-12
+        factor = cho_factor(system, lower=True)
         mean = cho_solve(factor, right / noise)
-        spread = np.diag(cho_solve(factor, np.eye(right.size)))
+        spread = (np.tril(dtrtri(factor[0], lower=1)[0]) ** 2).sum(axis=0)
         determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
         left = rss - 2.0 * right @ mean + mean @ normal @ mean
         noise = max(left / max(rows - determined.sum(), 1.0), 1e-6)
@@ -94,30 +96,51 @@ def learned_precision(
     return precision * noise
 
 
-def shrunk_fit(problem: Problem, model: Model, scale: Scale, passes: int = 2) -> tuple[Fit, Array]:
+def shrunk_step(problem: Problem, model: Model, scale: Scale) -> Model:
+    """Return the model after one linear step with learned priors; enough to go on from."""
+    return _learned(problem, model, scale)[0]
+
+
+def shrunk_fit(problem: Problem, model: Model, scale: Scale) -> tuple[Fit, Array]:
     """Return the fit with learned priors, and their precision, shape (K,)."""
-    precision = np.zeros(0)
-    result: Fit | None = None
-    for _ in range(passes):
-        residual = problem.whitened(problem.residuals(model), scale)
-        columns, _ = design(problem, model, scale)
-        labels, scales = groups(model.found)
-        x = np.concatenate([e.coordinates() for e in model.found])
-        frames = columns.shape[0] - x.size
-        # The linear target: what the coordinates explain already, put back.
-        target = residual + x @ columns[frames:]
-        normal, right = columns @ columns.T, columns @ target
-        rss = float(target @ target)
-        if frames:
-            solved = np.linalg.lstsq(
-                normal[:frames, :frames],
-                np.column_stack([normal[:frames, frames:], right[:frames]]), rcond=1e-12,
-            )[0]  # fmt: skip
-            rss -= float(right[:frames] @ solved[:, -1])
-            right = right[frames:] - normal[frames:, :frames] @ solved[:, -1]
-            normal = normal[frames:, frames:] - normal[frames:, :frames] @ solved[:, :-1]
-        precision = learned_precision(normal, right, rss, residual.size, labels, scales)
-        result = fit(problem, model, scale, precision, iterations=2)
-        model = result.model
-    assert result is not None
-    return result, precision
+    model, precision = _learned(problem, model, scale)
+    return fit(problem, model, scale, precision, iterations=1), precision
+
+
+def _learned(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Array]:
+    """Return the model after one linear step, and the prior precision learned for it."""
+    residual = problem.whitened(problem.residuals(model), scale)
+    columns, _ = design(problem, model, scale)
+    normal, right = columns @ columns.T, columns @ residual
+    labels, scales = groups(model.found)
+    x = coordinates(model)
+    frames = right.size - x.size
+    target = _target(normal, right, float(residual @ residual), x)
+    precision = learned_precision(*_projected(*target, frames), residual.size, labels, scales)
+    ridge = np.concatenate([np.zeros(frames), precision])
+    pull = ridge * np.concatenate([np.zeros(frames), x])
+    step = solve_scaled(normal + np.diag(ridge), right - pull, 1e-9)
+    trial = stepped(problem, model, step)
+    moved, x_moved = problem.whitened(problem.residuals(trial), scale), coordinates(trial)
+    if moved @ moved + precision @ x_moved**2 > residual @ residual + precision @ x**2:
+        trial = fit(problem, model, scale, precision, iterations=2).model
+    return trial, precision
+
+
+def _target(normal: Array, right: Array, rss: float, x: Array) -> tuple[Array, Array, float]:
+    """Return the normal equations with what the coordinates explain already put back."""
+    now = np.concatenate([np.zeros(right.size - x.size), x])
+    shift = normal @ now
+    return normal, right + shift, rss + float(2.0 * now @ right + now @ shift)
+
+
+def _projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Array, Array, float]:
+    """Return the normal equations with the leading frame columns projected out."""
+    if not frames:
+        return normal, right, rss
+    cross = normal[:frames, frames:]
+    wanted = np.column_stack([cross, right[:frames]])
+    solved = np.linalg.lstsq(normal[:frames, :frames], wanted, rcond=1e-12)[0]
+    left = normal[frames:, frames:] - cross.T @ solved[:, :-1]
+    pull = right[frames:] - cross.T @ solved[:, -1]
+    return left, pull, rss - float(right[:frames] @ solved[:, -1])

@@ -11,7 +11,6 @@ lines above the dense orders are then looked for one by one.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -22,20 +21,14 @@ from ..features import Features, sites
 from .fit import Fit, robust_scale
 from .gram import Gram
 from .library import families
+from .lines import DENSE_ORDERS, RANGE, with_lines
 from .problem import Model, Problem, Scale
-from .shrinkage import shrunk_fit
+from .shrinkage import shrunk_fit, shrunk_step
 
 ONE_BY_ONE = ('quantization', 'payload', 'drift', 'measurement_scale')
 """Families kept only where the search has found them: not small errors of the arm's making."""
-DENSE_ORDERS = 60
-HIGHEST_ORDER = 420
-LINE = 25.0
-"""Chi-square of two degrees of freedom that a single line must reach: one false in 1e5 looks."""
-LINES = 40
 SETUP = 60.0
 """Chi-square of six degrees of freedom that a motion of the set-up must reach, over 40 looks."""
-RANGE = 1.0
-"""A joint must travel this far [rad] for its ripple to be told from its neighbours' orders."""
 
 
 def many_small(
@@ -44,20 +37,18 @@ def many_small(
     """Return the fit of all families together, its noise and its prior precision."""
     everything = model.with_found(_everything(problem, model, exclude))
     scale = robust_scale(problem, problem.residuals(model))
-    result, precision = shrunk_fit(problem, everything, scale, passes=1)
+    model = shrunk_step(problem, everything, scale)
     progress('families fitted together')
-    scale = robust_scale(problem, problem.residuals(result.model))
+    scale = robust_scale(problem, problem.residuals(model))
     if 'transmission_ripple' not in exclude:
-        lined = with_lines(problem, result.model, scale)
+        model = with_lines(problem, model, scale)
         progress('lines of high order looked for')
-    else:
-        lined = result.model
     if 'base' in problem.align:
-        lined = with_setup(problem, lined, scale)
+        model = with_setup(problem, model, scale)
         progress('motion of the set-up looked for')
-    result, precision = shrunk_fit(problem, lined, scale, passes=1)
-    scale = robust_scale(problem, problem.residuals(result.model))
-    result, precision = shrunk_fit(problem, result.model, scale, passes=1)
+    model = shrunk_step(problem, model, scale)
+    scale = robust_scale(problem, problem.residuals(model))
+    result, precision = shrunk_fit(problem, model, scale)
     return result, scale, precision
 
 
@@ -116,83 +107,3 @@ def with_setup(problem: Problem, model: Model, scale: Scale) -> Model:
         if best is not None and best[0] > SETUP:
             model = model.with_found((*model.found, best[1]))
     return model
-
-
-def with_lines(problem: Problem, model: Model, scale: Scale) -> Model:
-    """
-    Return the model with narrow ripple lines above its dense orders.
-
-    The score statistic of sine and cosine at every order costs one small product per joint; the
-    strongest lines that are local peaks enter, the residual they explain is taken off, and the
-    look is repeated.
-    """
-    residual = problem.residuals(model)
-    features = problem.features(model)
-    found = list(model.found)
-    orders = np.arange(DENSE_ORDERS + 1.0, HIGHEST_ORDER + 1.0)
-    for _ in range(LINES):
-        best = max(
-            (_peak(problem, features, residual, scale, i, orders, found)
-             for i in range(model.robot.n)), key=lambda item: item[0],
-        )  # fmt: skip
-        if best[0] < LINE:
-            break
-        _, i, order, (sine, cosine) = best
-        joint = model.robot.joint_names[i]
-        for r, maker in enumerate(features):
-            q = maker.view.q[:, i]
-            wave = sine * np.sin(order * q) + cosine * np.cos(order * q)
-            residual[r] = residual[r] - maker.column(('q', i))[: problem.rows[r]] * wave
-        found = _with_order(found, joint, order)
-    return model.with_found(tuple(found))
-
-
-def _peak(
-    problem: Problem, features: list[Features], residual: list[Array], scale: Scale, i: int,
-    orders: Array, found: list[Effect],
-) -> tuple[float, int, float, tuple[float, float]]:  # fmt: skip
-    """Return the strongest order of a joint not taken yet: chi-square, joint, order, sin, cos."""
-    right = np.zeros((orders.size, 2))
-    normal = np.zeros((orders.size, 2, 2))
-    low, high = np.inf, -np.inf
-    for r, maker in enumerate(features):
-        unit = np.full(problem.rows[r], scale.position**-2)
-        unit[3:] = scale.orientation**-2
-        column = maker.column(('q', i))[: problem.rows[r]]
-        pull = (column * residual[r] * unit[:, None]).sum(axis=0) * scale.weights[r]
-        mass = (column**2 * unit[:, None]).sum(axis=0) * scale.weights[r]
-        q = maker.view.q[:, i]
-        low, high = min(low, float(q.min())), max(high, float(q.max()))
-        sine, cosine = np.sin(orders[:, None] * q), np.cos(orders[:, None] * q)
-        right += np.stack([sine @ pull, cosine @ pull], axis=-1)
-        cross = (sine * cosine) @ mass
-        normal[:, 0, 0] += sine**2 @ mass
-        normal[:, 1, 1] += cosine**2 @ mass
-        normal[:, 0, 1] += cross
-        normal[:, 1, 0] += cross
-    if high - low < RANGE:
-        return 0.0, i, 0.0, (0.0, 0.0)
-    # Half the resolution that the range of motion allows separates one line from the next.
-    apart = np.ceil(np.pi / (high - low))
-    for effect in found:
-        if effect.name == 'transmission_ripple' and effect.site == features[0].twin.robot.joint_names[i]:
-            for order in np.atleast_1d(effect.order):
-                right[np.abs(orders - order) < apart] = 0.0
-    step = np.linalg.solve(normal + 1e-9 * np.eye(2) * np.trace(normal[0]), right[..., None])[..., 0]
-    chi = (right * step).sum(axis=-1)
-    k = int(np.argmax(chi))
-    return float(chi[k]), i, float(orders[k]), (float(step[k, 0]), float(step[k, 1]))
-
-
-def _with_order(found: list[Effect], joint: str, order: float) -> list[Effect]:
-    out = []
-    for effect in found:
-        if effect.name == 'transmission_ripple' and effect.site == joint:
-            effect = replace(
-                effect,
-                amplitude=np.append(effect.amplitude, 0.0),
-                order=np.append(effect.order, order),
-                phase=np.append(effect.phase, 0.0),
-            )
-        out.append(effect)
-    return out

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array
 from ..recording import Recording
 from .fit import fit
-from .heldout import Unseen, ratio_interval
+from .heldout import Unseen
 from .problem import Model, Problem, usable
 from .result import Shrink
 from .search import Search
@@ -100,3 +100,31 @@ def _for_bag(problem: Problem, model: Model) -> Model:
 
 def _size(problem: Problem, model: Model) -> float:
     return float(np.median(np.linalg.norm(problem.residuals(model)[0][:3], axis=0)))
+
+
+def ratio_interval(before: Array, after: Array, labels: Array) -> tuple[float, tuple[float, float]]:
+    """
+    Return RMS after over before and its 95 % interval, by leaving out one stretch at a time.
+
+    Jackknife over stretches, so that neighbouring samples do not count as independent.
+
+    Parameters
+    ----------
+    before, after : array, shape (samples,)
+        Squared errors on unseen data.
+    labels : array of int, shape (samples,)
+
+    """
+    ratio = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
+    names = np.unique(labels)
+    if names.size < 3:
+        spread = ratio / np.sqrt(2.0 * max(before.size, 2))
+        return ratio, (max(ratio - 2.0 * spread, 0.0), ratio + 2.0 * spread)
+    logs = []
+    for name in names:
+        keep = labels != name
+        logs.append(0.5 * np.log(max(after[keep].mean(), 1e-300) / max(before[keep].mean(), 1e-300)))
+    k = names.size
+    error = float(np.sqrt((k - 1) / k * ((np.array(logs) - np.mean(logs)) ** 2).sum()))
+    reach = 2.36 * error  # Student t, 7 degrees of freedom
+    return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))

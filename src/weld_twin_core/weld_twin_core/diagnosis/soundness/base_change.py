@@ -10,7 +10,8 @@ play, lag of every joint) are therefore projected out before a change in time is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,38 +40,60 @@ class BaseChange:
         What the base does to every sample, whitened.
     basis : array, shape (M, c, P)
         Orthonormal over all rows: what frames and arm can explain.
-    recording : array of int, shape (M,)
-    share : float
-        Share of rows that count as independent.
-    positions : array, shape (M, 3, 6)
-        The same columns in metres, for the size of a change.
+    joints : array, shape (M, c, n)
+        What the joints do to every sample, whitened.
+    metres : array, shape (M, 3, 6)
+        The columns of the positions, not whitened, for the size of a change.
+    rows, samples : tuple of int
+        Components and samples of every recording.
 
     """
 
     residual: Array
     columns: Array
     basis: Array
-    recording: NDArray[np.int_]
-    share: float
-    positions: Array
+    joints: Array
+    metres: Array
+    rows: tuple[int, ...]
+    samples: tuple[int, ...]
+
+    @cached_property
+    def recording(self) -> NDArray[np.int_]:
+        """Return the recording of every sample, shape (M,)."""
+        return np.repeat(np.arange(len(self.samples)), self.samples)
+
+    @cached_property
+    def share(self) -> float:
+        """Return the share of rows that count as independent."""
+        own = [self.residual[self.recording == k][:, :c].ravel() for k, c in enumerate(self.rows)]
+        return effective_share(np.concatenate(own), self.rows, self.samples)
+
+    @property
+    def of_joints(self) -> BaseChange:
+        """Return the same with joints that change in place of the base."""
+        return replace(self, columns=self.joints)
 
     def without(self, shape: Array) -> BaseChange:
         """Return the same with a change of the base in this shape of time, (M,), fitted too."""
         rows = self.columns * shape[:, None, None]
-        flat = _projected(rows.reshape(-1, 6), self.basis.reshape(-1, self.basis.shape[2]))
+        fixed = self.basis.reshape(-1, self.basis.shape[2])
+        flat = _projected(rows.reshape(fixed.shape[0], -1), fixed)
         more = _orthonormal(flat).reshape(*rows.shape[:2], -1)
         strength = np.einsum('mcp,mc', more, self.residual)
         left = self.residual - np.einsum('mcp,p->mc', more, strength)
-        basis = np.concatenate([self.basis, more], axis=2)
-        return BaseChange(left, self.columns, basis, self.recording, self.share, self.positions)
+        return replace(self, residual=left, basis=np.concatenate([self.basis, more], axis=2))
 
     def gain(self, shape: Array) -> float:
         """Return the sum of squares that a change in this shape of time, (M,), explains."""
+        right, motion = self._fitted(shape)
+        return float(right @ motion)
+
+    def _fitted(self, shape: Array) -> tuple[Array, Array]:
         rows = self.columns * shape[:, None, None]
         right = np.einsum('mci,mc', rows, self.residual)
         overlap = np.einsum('mcp,mci->pi', self.basis, rows)
         normal = np.einsum('mci,mcj', rows, rows) - overlap.T @ overlap
-        return float(right @ _solve(normal, right))
+        return right, _solve(normal, right)
 
     def step_gains(self, k: int) -> Array:
         """Return the gain of a step before every sample of recording k, shape (M_k,)."""
@@ -84,20 +107,26 @@ class BaseChange:
 
     def size(self, shape: Array) -> float:
         """Return the RMS motion [m] of the measured points for the fitted change."""
-        rows = self.columns * shape[:, None, None]
-        right = np.einsum('mci,mc', rows, self.residual)
-        overlap = np.einsum('mcp,mci->pi', self.basis, rows)
-        normal = np.einsum('mci,mcj', rows, rows) - overlap.T @ overlap
-        moved = self.positions @ _solve(normal, right)
         active = np.abs(shape) > 0.05 * np.abs(shape).max()
-        return float(np.sqrt((moved[active] ** 2).sum(axis=1).mean()))
+        moved = self.metres[active] @ self._fitted(shape)[1]
+        return float(np.sqrt((moved**2).sum(axis=1).mean()))
 
-    def nats(self, gain: float) -> float:
-        """Return the evidence of a gain with six freedoms, for as many rows as are independent."""
-        total = float((self.residual**2).sum())
-        rows = max(self.share * self.residual.size, 12.0)
-        left = max(total - gain, 1e-12 * total)
-        return 0.5 * rows * float(np.log(total / left)) - 3.0 * float(np.log(rows))
+    def nats(self, shape: Array) -> float:
+        """
+        Return the evidence for a change in this shape of time, (M,).
+
+        Noise of positions and of turns, and how many rows are independent, are those the change
+        leaves: a step by itself makes residuals that hang together.
+        """
+        after = self.without(shape)
+        total, fall = 0.0, 0.0
+        for part in (slice(0, 3), slice(3, 6)):
+            before, left = (float((c.residual[:, part] ** 2).sum()) for c in (self, after))
+            if before > 0.0:
+                count = max(after.share * after.residual[:, part].size, 12.0)
+                fall += 0.5 * count * float(np.log(before / max(left, 1e-12 * before)))
+                total += count
+        return fall - 0.5 * self.columns.shape[2] * float(np.log(total))
 
 
 def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChange:
@@ -115,25 +144,25 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
     scale = _scale(parts)
     features = problem.features(model)
     rows = problem.rows
-    frames = [_frame(maker, 'base', rows[k]) for k, maker in enumerate(features)]
-    tools = [_frame(maker, 'tool', rows[k]) for k, maker in enumerate(features)]
-    arms = [_arm(maker, rows[k]) for k, maker in enumerate(features)]
-    left, base, tool, arm = (
+    pairs = list(zip(features, rows, strict=True))
+    frames = [_moved(maker, 'base', 6, c) for maker, c in pairs]
+    tools = [_moved(maker, 'tool', 6, c) for maker, c in pairs]
+    joints = [_moved(maker, 'q', model.robot.n, c) for maker, c in pairs]
+    arms = [_arm(maker, c) for maker, c in pairs]
+    left, base, tool, joint, arm = (
         _stacked([_white(part, scale, k) for k, part in enumerate(each)])
-        for each in ([part[None] for part in parts], frames, tools, arms)
+        for each in ([part[None] for part in parts], frames, tools, joints, arms)
     )
-    number = np.repeat(np.arange(len(parts)), problem.samples)
     bases = [base]
     if 'base' in problem.align:
+        number = np.repeat(np.arange(len(parts)), problem.samples)
         bases = [base * (number == k)[:, None, None] for k in range(len(parts))]
-    size = left.size
     constant = np.concatenate([*bases, tool], axis=2)
-    basis = _basis(arm.reshape(size, -1), constant.reshape(size, -1))
+    basis = _basis(arm.reshape(left.size, -1), constant.reshape(left.size, -1))
+    metres = np.concatenate([frame[:, :3].transpose(2, 1, 0) for frame in frames])
     left = _projected(left.reshape(-1, 1), basis).reshape(left.shape[:2])
-    own = [left[number == k][:, :c].ravel() for k, c in enumerate(rows)]
-    share = effective_share(np.concatenate(own), problem.rows, problem.samples)
-    positions = np.concatenate([frame[:, :3].transpose(2, 1, 0) for frame in frames])
-    return BaseChange(left, base, basis.reshape(*left.shape, -1), number, share, positions)
+    basis = basis.reshape(*left.shape, -1)
+    return BaseChange(left, base, basis, joint, metres, problem.rows, problem.samples)
 
 
 def _scale(parts: list[Array]) -> Scale:
@@ -153,8 +182,8 @@ def _scale(parts: list[Array]) -> Scale:
     return Scale(position, turn, weights)
 
 
-def _frame(maker: Features, name: str, rows: int) -> Array:
-    return np.stack([maker.column((name, j)) for j in range(6)])[:, :rows]
+def _moved(maker: Features, name: str, count: int, rows: int) -> Array:
+    return np.stack([maker.column((name, j)) for j in range(count)])[:, :rows]
 
 
 def _stacked(parts: list[Array]) -> Array:

@@ -18,6 +18,8 @@ SAMPLES = 300
 ROUNDS = 6
 EXPLAINED = 0.35
 """What the gap must fall to for a lag to be believed."""
+APART = 0.6
+"""What clocks that run apart must leave of what a constant lag leaves."""
 KEPT = 0.8
 """Share of the samples that count: the worst may be outliers."""
 
@@ -62,7 +64,7 @@ def lag(joints: Array, path: Array, t: Array, position: Array) -> Lag | None:
         _misfit(seen, _along(path, joints, stamps - trial.at(stamps)))
         for trial in (Lag(0.0, 0.0, middle), constant, drifting)
     ]
-    best = drifting if left[2] < EXPLAINED * left[1] else constant
+    best = drifting if left[2] < APART * left[1] else constant
     return best if min(left[1:]) < EXPLAINED * left[0] else None
 
 

@@ -26,7 +26,7 @@ WORTH = 0.7
 """A further mix-up must bring the gap below this share of what it was."""
 SHORTLIST = 5
 FAR = 0.05
-"""Frames that are off by this [m] are an instrument's own, not an error of set-up."""
+"""A gap [m] from which wrong frames are an instrument's own, not an error of set-up."""
 
 
 def mixups(case: Case) -> Sequence[Finding]:
@@ -36,8 +36,9 @@ def mixups(case: Case) -> Sequence[Finding]:
     shot = case.snapshot
     model = shot.framed()
     left = gap(shot.problem, model)
-    if left < LARGE or left < case.gap / EXPLAINED:
-        return _frames(case)
+    given = gap(shot.problem, shot.model)
+    if left < LARGE or left < given / EXPLAINED:
+        return _frames(case, given) if given > FAR else ()
     offset = shot.offset()
     turns = [abs(float(effect.vector()[0])) for effect in offset.found]
     if max(turns) < SMALL_TURN and gap(shot.problem, offset) < left / EXPLAINED:
@@ -51,7 +52,7 @@ def mixups(case: Case) -> Sequence[Finding]:
     return (Finding('warning', f'{words[0].upper()}{words[1:]}.'),)
 
 
-def _frames(case: Case) -> Sequence[Finding]:
+def _frames(case: Case, before: float) -> Sequence[Finding]:
     """The given frames alone are to blame; name those that were not to be fitted."""
     given = case.problem.align
     for more in ({'base'}, {'tool'}, {'base', 'tool'}):
@@ -59,14 +60,14 @@ def _frames(case: Case) -> Sequence[Finding]:
             continue
         problem = replace(case.snapshot.problem, align=given | more)
         left = gap(problem, refined(problem, initial_frames(problem, case.snapshot.model)))
-        if left < max(LARGE, case.gap / EXPLAINED):
+        if left < max(LARGE, before / EXPLAINED):
             names = ' and '.join(sorted(more - given))
             return (
                 Finding(
-                    'warning' if case.gap > FAR else 'note',
-                    f'The gap of {length(case.gap)} is almost only one of frames: with the {names} '
-                    f'fitted {length(left)} remain; have the {names} aligned if the instrument '
-                    'stands anywhere, or the tool centre point was never measured.',
+                    'warning',
+                    f'The gap of {length(before)} is almost only one of frames: with the '
+                    f'{names} fitted {length(left)} remain; have the {names} aligned if the '
+                    'instrument stands anywhere, or the tool centre point was never measured.',
                 ),
             )
     return ()

@@ -5,20 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..problem import Model, Problem
 from .base_change import BaseChange, base_change
 from .case import Case, Finding, length, measured
 
-SURE = 12.0
-"""Nats by which a change must beat no change, and a step every smooth change."""
+SURE = 10.0
+"""Nats by which a change must beat no change, and a step every smooth change or step of joints."""
 MOST = 3
 MOST_ROWS = 18000
-EDGE = 0.02
+EDGE = 0.04
 """A step nearer to either end of a recording, as a share of it, is not looked for."""
 CONSTANTS = np.geomspace(0.02, 0.7, 9)
 """Time constants of settling, as shares of the recording."""
@@ -94,12 +95,13 @@ def settling(parts: list[Array], problem: Problem, model: Model) -> list[Settlin
         mine = change.recording == k
         age = _age(problem, k)
         shapes = [_placed(np.exp(-age / c), mine) for c in CONSTANTS]
-        gains = [change.gain(shape) for shape in shapes]
-        best = int(np.argmax(gains))
-        nats = change.nats(gains[best])
-        others = [change.gain(_placed(age**power, mine)) for power in (1, 2)]
-        others.append(float(change.step_gains(k).max()))
-        if nats > SURE and nats > change.nats(max(others)) + SURE:
+        best = int(np.argmax([change.gain(shape) for shape in shapes]))
+        nats = change.nats(shapes[best])
+        if nats < SURE:
+            continue
+        steps = change.step_gains(k)
+        others = [age, age**2, np.arange(steps.size) >= steps.argmax()]
+        if nats > max(change.nats(_placed(other, mine)) for other in others) + SURE:
             span = float(np.ptp(measured(recording).t))
             size = change.size(shapes[best])
             out.append(Settling(recording.name, float(CONSTANTS[best]) * span, size, nats))
@@ -119,23 +121,24 @@ def _best_step(change: BaseChange, problem: Problem) -> tuple[Step, Array] | Non
         if not allowed.any():
             continue
         at = int(np.where(allowed, gains, -np.inf).argmax())
-        nats = change.nats(float(gains[at]))
-        if nats < SURE or nats < change.nats(_smooth(change, problem, k)) + SURE:
+        shape = _placed(np.arange(gains.size) >= at, mine)
+        nats = change.nats(shape)
+        rivals = (change.nats(_smooth(change, problem, k)), change.of_joints.nats(shape))
+        if nats < SURE + max(0.0, *rivals):
             continue
-        shape = _placed((np.arange(gains.size) >= at).astype(float), mine)
         step = Step(recording.name, float(measured(recording).t[at]), change.size(shape), nats)
         if best is None or step.significance > best[0].significance:
             best = step, shape
     return best
 
 
-def _smooth(change: BaseChange, problem: Problem, k: int) -> float:
-    """Return the most that a smooth change of recording k's base explains."""
+def _smooth(change: BaseChange, problem: Problem, k: int) -> Array:
+    """Return the smooth change of recording k's base that explains most, shape (M,)."""
     mine, age = change.recording == k, _age(problem, k)
     shapes = [age, age**2, *(np.exp(-age / c) for c in CONSTANTS)]
     shapes += [np.exp(-(1.0 - age) / c) for c in CONSTANTS]
     shapes += [np.sin(n * np.pi * age) for n in (1, 2)] + [np.cos(n * np.pi * age) for n in (1, 2)]
-    return max(change.gain(_placed(shape, mine)) for shape in shapes)
+    return max((_placed(shape, mine) for shape in shapes), key=change.gain)
 
 
 def _age(problem: Problem, k: int) -> Array:
@@ -144,7 +147,7 @@ def _age(problem: Problem, k: int) -> Array:
     return np.asarray((t - t[0]) / max(float(np.ptp(t)), 1e-9))
 
 
-def _placed(shape: Array, mine: Array) -> Array:
+def _placed(shape: NDArray[Any], mine: NDArray[np.bool_]) -> Array:
     out = np.zeros(mine.size)
     out[mine] = shape
     return out

@@ -180,6 +180,7 @@ class _Memory:
 
     def __init__(self, kernel: BulkKernel, n: int) -> None:
         self.half = HalfAngle(kernel.robot.n, n)
+        self.own = aligned(2, kernel.robot.n, n)
         self.sizes = kernel.sizes
         self.features = tuple(aligned(3**size, n) for size in kernel.sizes)
         for features in self.features:
@@ -192,17 +193,16 @@ class _Memory:
     def fill(self, q: Array, prismatic: Array) -> None:
         """Compute the products of (1, u, v) of the joints of each piece."""
         sine, cosine = self.half(q.T)
+        np.multiply(cosine, sine, self.own[0])
+        np.multiply(sine, sine, self.own[1])
+        if prismatic.any():
+            self.own[0, prismatic] = 0.5 * q.T[prismatic]  # stands in for sin x = 2 u
+            self.own[1, prismatic] = 0.0
         first = 0
         for size, features in zip(self.sizes, self.features, strict=True):
             width = 1
             for i in range(first + size - 1, first - 1, -1):
-                own = features[width : 3 * width : width]
-                if prismatic[i]:
-                    own[0], own[1] = 0.5 * q[:, i], 0.0  # stands in for sin x = 2 u
-                else:
-                    np.multiply(cosine[i], sine[i], own[0])
-                    np.multiply(sine[i], sine[i], own[1])
                 wide = features[width : 3 * width].reshape(2, width, -1)
-                np.multiply(own[:, None], features[1:width], wide[:, 1:])
+                np.multiply(self.own[:, i, None], features[:width], wide)
                 width *= 3
             first += size

@@ -88,10 +88,10 @@ class HalfAngle:
 
 def sincos(angles: Array) -> tuple[Array, Array]:
     """Return sine and cosine of angles of any shape [rad]."""
-    half_sine, half_cosine = HalfAngle(*angles.shape)(angles)
-    half_cosine *= half_sine
-    half_sine *= half_sine
-    half_cosine *= 2.0
-    half_sine *= -2.0
-    half_sine += 1.0
-    return half_cosine, half_sine
+    sine, cosine = HalfAngle(*angles.shape)(angles)
+    cosine *= sine
+    sine *= sine
+    cosine *= 2.0
+    sine *= -2.0
+    sine += 1.0
+    return cosine, sine

@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How far very many draws of the DH values move the tool along one seam, exactly.
+
+A turn about the first axis keeps distances, so the first joint drops out. The rest is cut in two
+pieces whose weights (see `weights`) are built for all draws of a block at once; one matrix product
+each with the features of the points gives both, whatever the points are.
+
+Along a smooth seam the features themselves are nearly dependent: as functions of the sample they
+span a dozen dimensions to rounding. Positions of *any* draw are linear in them, hence known from
+as many samples by one more matrix product. Those samples and that matrix come from a pivoted QR
+factorisation of the features [1]_, whose remainder bounds the error.
+
+References
+----------
+.. [1] H. Cheng et al., "On the compression of low rank matrices", SIAM J. Sci. Comput. 26, 2005
+   (the interpolative decomposition).
+
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+from ..arrays import Array
+from ..robot import Robot
+from .half_angle import sincos
+
+ROUNDING = 1e-14
+"""Remainder of the features, relative to the strongest, that counts as none."""
+BLOCK = 1000
+"""Draws whose weights are built at once."""
+POINTS = 6000
+"""Draws times samples worked on at once; a few of such arrays fit the processor's cache."""
+SPLIT = 3
+"""Rows of the near piece, the first included, whose turn drops out."""
+
+
+class DhDraws(NamedTuple):
+    """Draws of the DH values of every row, shape (D, n) each [rad, m]."""
+
+    theta: Array
+    d: Array
+    a: Array
+    alpha: Array
+
+
+class SeamDraws:
+    """
+    A robot of revolute joints at the samples of a seam, prepared for draws of its DH values.
+
+    Parameters
+    ----------
+    robot : Robot
+        The nominal robot, 'standard' convention, without Hayati angles.
+    q : array, shape (N, n) [rad]
+    smooth : bool
+        Look for samples that determine the others; False works on all samples.
+
+    Attributes
+    ----------
+    samples : array
+        The samples at which draws are worked out.
+    remainder : float
+        What the other samples' features differ from those the samples determine, relative to
+        the largest; 0 when all samples are worked on.
+
+    """
+
+    def __init__(self, robot: Robot, q: Array, *, smooth: bool = True) -> None:
+        self.robot = robot
+        features = _features(q[:, 1:SPLIT]), _features(q[:, SPLIT:])
+        self.samples = np.arange(len(q))
+        self.spread: Array | None = None
+        self.remainder = 0.0
+        if smooth:
+            both = (features[0][:, None] * features[1][None]).reshape(-1, len(q))
+            found = _determining(both)
+            if 2 * len(found.samples) < len(q):
+                self.samples, self.spread, self.remainder = found
+        self._near, self._far = (np.ascontiguousarray(f[:, self.samples]) for f in features)
+        nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))
+        self._nominal = self._points(*self._pieces(nominal))
+
+    def largest(self, draws: DhDraws) -> Array:
+        """Return the largest distance from the nominal tool point along the seam, shape (D,)."""
+        out = np.empty(len(draws.theta))
+        for start in range(0, len(out), BLOCK):
+            part = slice(start, start + BLOCK)
+            pieces = self._pieces(DhDraws(*(v[part] for v in draws)))
+            self._largest(pieces, out[part])
+        return np.sqrt(out)
+
+    def distances(self, draws: DhDraws) -> Array:
+        """Return distances from the nominal tool point, shape (D, N) [m]."""
+        return np.sqrt(self._squares(*self._pieces(draws)))
+
+    def _largest(self, pieces: tuple[Array, Array, Array], out: Array) -> None:
+        step = max(1, POINTS // len(self.samples))
+        for start in range(0, len(out), step):
+            part = slice(start, start + step)
+            squares = self._squares(*(piece[..., part] for piece in pieces))
+            squares.max(axis=1, out=out[part])
+
+    def _squares(self, near: Array, far: Array, link: Array) -> Array:
+        away = self._points(near, far, link)
+        away -= self._nominal
+        if self.spread is not None:
+            away = away @ self.spread
+        away *= away
+        away[0] += away[1]
+        away[0] += away[2]
+        return away[0]
+
+    def _pieces(self, draws: DhDraws) -> tuple[Array, Array, Array]:
+        """
+        Return the weights of both pieces, shapes (F, 3, 4, D) and (F, 3, 1, D), and the first link.
+
+        The link is d, a, cos(alpha) and sin(alpha), shape (4, D).
+        """
+        count, n = draws.theta.shape
+        rows = _Rows(draws)
+        tool = self.robot.T_flange_tool[:3, 3]
+        point = np.broadcast_to(tool[:, None, None], (3, 1, count))[None]
+        far = rows.carried(point, range(n - 1, SPLIT - 1, -1))
+        start = np.zeros((1, 3, 4, count))
+        start[0, [0, 1, 2], [0, 1, 2]] = 1.0
+        near = rows.carried(start, range(SPLIT - 1, 0, -1))
+        link = np.stack([rows.d[0], rows.a[0], rows.alpha_cosine[0], rows.alpha_sine[0]])
+        return near, far, link
+
+    def _points(self, near: Array, far: Array, link: Array) -> Array:
+        """Return tool points after the first joint's turn was taken away, shape (3, D, S)."""
+        tip = _on_features(far, self._far)[:, 0]
+        frame = _on_features(near, self._near)
+        out = frame[:, 3]
+        for k in range(3):
+            frame[:, k] *= tip[k]
+            out += frame[:, k]
+        x, y, z = out
+        d, a, cosine, sine = link[..., None]
+        x += a
+        turned = cosine * y - sine * z
+        z *= cosine
+        z += sine * y
+        z += d
+        y[...] = turned
+        return out
+
+
+class _Rows:
+    """Builds the weights of pieces for all draws: vectors carried toward the base, row by row."""
+
+    def __init__(self, draws: DhDraws) -> None:
+        self.sine, self.cosine = sincos(draws.theta.T)
+        self.alpha_sine, self.alpha_cosine = sincos(draws.alpha.T)
+        self.d, self.a = draws.d.T, draws.a.T
+
+    def linked(self, vectors: Array, i: int) -> Array:
+        """
+        Apply Rz(theta) Tz(d) Tx(a) Rx(alpha) of row i, the joint at zero.
+
+        ``vectors`` are shape (features, 3, k, D); the last of the k is a point, the others are
+        directions.
+        """
+        x, y, z = (vectors[:, k] for k in range(3))
+        c, s = self.alpha_cosine[i], self.alpha_sine[i]
+        out = np.empty_like(vectors)
+        np.subtract(c * y, s * z, out=out[:, 1])
+        np.add(s * y, c * z, out=out[:, 2])
+        out[0, 2, -1] += self.d[i]
+        out[:, 0] = x
+        out[0, 0, -1] += self.a[i]
+        x, y = out[:, 0], out[:, 1]
+        c, s = self.cosine[i], self.sine[i]
+        turned = c * x - s * y
+        np.add(s * x, c * y, out=out[:, 1])
+        out[:, 0] = turned
+        return out
+
+    def carried(self, vectors: Array, rows: range) -> Array:
+        """Return vectors before some rows, on the features (1, c, s) of their joints."""
+        for i in rows:
+            fixed = self.linked(vectors, i)
+            vectors = np.zeros((3, *fixed.shape))
+            vectors[0, :, 2] = fixed[:, 2]
+            vectors[1, :, :2] = fixed[:, :2]
+            np.negative(fixed[:, 1], out=vectors[2, :, 0])
+            vectors[2, :, 1] = fixed[:, 0]
+            vectors = vectors.reshape(-1, *fixed.shape[1:])
+        return vectors
+
+
+class _Determining(NamedTuple):
+    samples: Array
+    spread: Array
+    remainder: float
+
+
+def _determining(features: Array) -> _Determining:
+    """Return samples, and the matrix (S, N) that turns values there into values everywhere."""
+    upper, order = qr(features, mode='r', pivoting=True, check_finite=False)
+    strength = np.abs(np.diagonal(upper))
+    rank = int((strength > ROUNDING * strength[0]).sum())
+    spread = np.empty((rank, features.shape[1]))
+    spread[:, order[:rank]] = np.eye(rank)
+    spread[:, order[rank:]] = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
+    left = np.abs(features[:, order[:rank]] @ spread - features).max()
+    return _Determining(order[:rank], spread, float(left / np.abs(features).max()))
+
+
+def _features(q: Array) -> Array:
+    """Return products of (1, c, s), shape (3^joints, N), the last joint varying fastest."""
+    out = np.ones((1, len(q)))
+    for angle in q.T[::-1]:
+        own = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
+        out = (own[:, None] * out[None]).reshape(-1, len(q))
+    return out
+
+
+def _on_features(weights: Array, features: Array) -> Array:
+    """Return weights (F, 3, k, D) applied to features (F, S), shape (3, k, D, S)."""
+    flat = weights.reshape(len(weights), -1)
+    return (flat.T @ features).reshape(*weights.shape[1:], -1)

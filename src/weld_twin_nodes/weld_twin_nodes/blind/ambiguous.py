@@ -16,7 +16,7 @@ import numpy as np
 from weld_twin_core.chain import frames
 from weld_twin_core.robot import Robot
 
-from .causes import Cause, draw, site
+from .causes import Cause, draw
 
 Site = tuple[str, str | None]
 PARALLEL = 1e-6

@@ -86,7 +86,7 @@ def draw_cell(
     return Cell(
         arm, _tracker(kind, rng), known,
         align=('base',) if rng.random() < 0.1 and 'base_pose' not in families else (),
-        loaded='cartesian_compliance' in families or bool(spring) and rng.random() < 0.5,
+        loaded='cartesian_compliance' in families or (bool(spring) and rng.random() < 0.5),
         warming='thermal_growth' in families or rng.random() < 0.2,
         richness=float(rng.uniform(*RICHNESS)),
     )  # fmt: skip

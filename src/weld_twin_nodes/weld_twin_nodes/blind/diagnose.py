@@ -16,6 +16,7 @@ from weld_twin_core import __version__
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.outputs import write_text
 from weld_twin_msgs_py.robots import load_robot
 
 from ..models import build_twin
@@ -29,14 +30,17 @@ _KIB = 1024 if sys.platform != 'darwin' else 1
 
 
 def diagnose_cases(
-    cases: Path, runner: Runner, *, allow_readable: bool = False, with_holdout: bool = True
-) -> dict[str, Any]:
+    cases: Path, out: Path, runner: Runner, *, allow_readable: bool = False,
+    with_holdout: bool = True,
+) -> list[dict[str, Any]]:  # fmt: skip
     """
-    Return the verdicts on all cases.
+    Diagnose all cases, write what was said, and return it case by case.
 
     Parameters
     ----------
     cases : Path
+    out : Path
+        Gets a diagnosis.json for every case, and the list of them.
     runner : Runner
         Its store makes the work resumable; verdicts of another engine or other cases are not
         taken for these.
@@ -66,11 +70,17 @@ def diagnose_cases(
         for entry in listed['cases']
     ]  # fmt: skip
     verdicts = runner.run(tasks)
-    return {
+    for verdict in verdicts:
+        content = verdict.pop('diagnosis')
+        if content is not None:
+            file = out / verdict['name'] / layout.DIAGNOSIS
+            write_text(file, json.dumps(content, indent=1) + '\n', overwrite=True)
+    layout.write(out / layout.VERDICTS, {
         'seal': listed['seal'], 'engine': engine, 'version': __version__,
         'with_holdout': with_holdout, 'truths_readable': truths is not None,
         'verdicts': verdicts,
-    }  # fmt: skip
+    }, overwrite=True)  # fmt: skip
+    return verdicts
 
 
 def engine_digest() -> str:

@@ -18,14 +18,16 @@ KNOWN = 'known.yaml'
 TRAIN, HOLDOUT, TEST = 'train', 'holdout', 'test'
 TRUTHS = 'truths.json'
 TRUTH = 'truth.json'
-VERDICTS = 'verdicts'
+VERDICTS = 'verdicts.json'
+DIAGNOSIS = 'diagnosis.json'
+DONE = 'done'
 SCORE = 'score.json'
 PAGE = 'score.html'
 
 SCHEMAS = {
     CASES: 'weld_twin/blind/cases/1', CASE: 'weld_twin/blind/case/1',
     TRUTHS: 'weld_twin/blind/truths/1', TRUTH: 'weld_twin/blind/truth/1',
-    SCORE: 'weld_twin/blind/score/1',
+    VERDICTS: 'weld_twin/blind/verdicts/1', SCORE: 'weld_twin/blind/score/1',
 }  # fmt: skip
 
 
@@ -60,8 +62,3 @@ def text(name: str, content: dict[str, Any]) -> str:
 def write(path: Path, content: dict[str, Any], *, overwrite: bool = False) -> None:
     """Write one of the JSON files above."""
     write_text(path, text(path.name, content), overwrite=overwrite)
-
-
-def case_names(cases: Path) -> list[str]:
-    """Return the names of the cases in a directory."""
-    return [str(entry['name']) for entry in read(cases / CASES)['cases']]

@@ -83,7 +83,7 @@ def make(
     spans: tuple[float, float] = SPANS,
 ) -> str:  # fmt: skip
     """
-    Make cases and truths, and return the seal.
+    Make cases and truths, and return the seal; what the same request made already stays.
 
     Parameters
     ----------
@@ -102,11 +102,14 @@ def make(
         The directories hold other cases, or the numbers make no sense.
 
     """
-    _refuse_other(cases, truths, seed)
-    _require_plant()
+    asked = {'seed': seed, 'count': count, 'kinds': list(kinds), 'seconds': list(spans)}
+    _refuse_other(cases, truths, asked)
+    if (cases / layout.CASES).exists():
+        return str(layout.read(cases / layout.CASES)['seal'])
+    require_plant()
     drawn = lots(seed, count, kinds, tuple(CONSTRUCTIONS))
     truths.mkdir(parents=True, exist_ok=True)
-    layout.write(truths / layout.TRUTHS, {'seed': seed, 'count': count}, overwrite=True)
+    layout.write(truths / layout.TRUTHS, asked, overwrite=True)
     tasks = [
         Task(make_case, (seed, k, lot, str(cases), str(truths), spans), f'case {k + 1}')
         for k, lot in enumerate(drawn)
@@ -118,18 +121,23 @@ def make(
     return sealed
 
 
-def _refuse_other(cases: Path, truths: Path, seed: int) -> None:
+def _refuse_other(cases: Path, truths: Path, asked: dict[str, Any]) -> None:
+    """Refuse to mix these cases with others."""
     if cases.resolve() == truths.resolve():
         raise DataError('cases and truths must go to different directories')
-    if (cases / layout.CASES).exists():
-        raise DataError(f"'{cases}' holds cases already; choose another place")
     if (truths / layout.TRUTHS).exists():
-        found = layout.read(truths / layout.TRUTHS)['seed']
-        if found != seed:
-            raise DataError(f"'{truths}' holds the truths of seed {found}; choose another place")
+        found = layout.read(truths / layout.TRUTHS)
+        if any(found.get(key) != value for key, value in asked.items()):
+            raise DataError(
+                f"'{truths}' holds the truths of other cases, of seed {found['seed']}; choose "
+                'another place'
+            )
+    elif (cases / layout.CASES).exists():
+        raise DataError(f"'{cases}' holds cases already; choose another place")
 
 
-def _require_plant() -> None:
+def require_plant() -> None:
+    """Refuse to go on without the simulator."""
     try:
         import mujoco  # noqa: F401
     except ImportError:

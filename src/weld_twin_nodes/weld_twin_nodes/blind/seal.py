@@ -41,7 +41,7 @@ def text_digest(text: str) -> str:
 
 def make_private(path: Path) -> None:
     """Let nobody but the owner read a directory and what is in it."""
-    for place, folders, files in os.walk(path):
+    for place, _, files in os.walk(path):
         os.chmod(place, PRIVATE_DIRECTORY)
         for name in files:
             os.chmod(Path(place) / name, PRIVATE_FILE)

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Shares and medians with their intervals, and how well a confidence is calibrated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+
+NORMAL_95 = 1.959963984540054
+DRAWS = 2000
+BINS = 10
+
+
+class Estimate(NamedTuple):
+    """A number, its 95 % interval, and how many cases it rests on."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+    count: int
+
+
+def share(hits: Sequence[bool]) -> Estimate:
+    """
+    Return a share with its Wilson score interval [1]_.
+
+    References
+    ----------
+    .. [1] E. B. Wilson, "Probable inference, the law of succession, and statistical inference",
+       J. American Statistical Association 22, 1927.
+
+    """
+    n = len(hits)
+    if n == 0:
+        return Estimate(None, None, None, 0)
+    p, z2 = sum(map(bool, hits)) / n, NORMAL_95**2
+    middle = (p + z2 / (2.0 * n)) / (1.0 + z2 / n)
+    half = NORMAL_95 * np.sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n)) / (1.0 + z2 / n)
+    return Estimate(p, max(float(middle - half), 0.0), min(float(middle + half), 1.0), n)
+
+
+def bootstrap(
+    values: Sequence[float] | Array, statistic: Callable[..., Array] = np.median
+) -> Estimate:
+    """
+    Return a statistic with its percentile bootstrap interval.
+
+    Parameters
+    ----------
+    values : sequence, or array of shape (N, k)
+        Rows are cases.
+    statistic : callable
+        Takes values and ``axis``.
+
+    """
+    rows = np.asarray(values, dtype=float)
+    n = rows.shape[0]
+    if n == 0:
+        return Estimate(None, None, None, 0)
+    picks = np.random.default_rng(0).integers(0, n, (DRAWS, n))
+    low, high = np.quantile(statistic(rows[picks], axis=1), [0.025, 0.975])
+    return Estimate(float(statistic(rows, axis=0)), float(low), float(high), n)
+
+
+def brier(confidence: Sequence[float], right: Sequence[bool]) -> Estimate:
+    """Return the Brier score, the mean squared error of the confidence."""
+    squares = (np.asarray(confidence, dtype=float) - np.asarray(right, dtype=float)) ** 2
+    return bootstrap(squares, np.mean)
+
+
+class Bin(NamedTuple):
+    """Cases of like confidence: its mean, and the share that was right."""
+
+    low: float
+    high: float
+    confidence: float
+    right: Estimate
+
+
+def reliability(confidence: Sequence[float], right: Sequence[bool]) -> list[Bin]:
+    """Return the bins of equal width that hold cases."""
+    sure, true = np.asarray(confidence, dtype=float), np.asarray(right, dtype=bool)
+    place = np.minimum((sure * BINS).astype(int), BINS - 1)
+    return [
+        Bin(k / BINS, (k + 1) / BINS, float(sure[inside].mean()), share(list(true[inside])))
+        for k, inside in ((k, place == k) for k in np.unique(place))
+    ]
+
+
+def calibration_error(confidence: Sequence[float], right: Sequence[bool]) -> Estimate:
+    """Return the expected calibration error over ten bins of equal width."""
+    pairs = np.array([confidence, right], dtype=float).T
+    return bootstrap(pairs, _calibration_error)
+
+
+def _calibration_error(pairs: Array, axis: int) -> Array:
+    """Return the error of every resample; pairs (..., N, 2), ``axis`` that of the cases."""
+    sure, true = pairs[..., 0], pairs[..., 1]
+    cases = axis if axis < 0 else axis - sure.ndim
+    place = np.minimum((sure * BINS).astype(int), BINS - 1)
+    off = [np.abs(((true - sure) * (place == k)).sum(axis=cases)) for k in range(BINS)]
+    return np.asarray(sum(off) / sure.shape[cases])

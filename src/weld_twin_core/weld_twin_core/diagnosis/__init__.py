@@ -92,19 +92,25 @@ def diagnose(
     found = search(problem, start, exclude, progress)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     kept = list(range(len(found.final.model.found)))
-    floor = noise_floor(found.problem, found.problem.residuals(found.final.model)) * np.sqrt(3.0)
+    sigma, independent = noise_floor(
+        found.problem, found.problem.residuals(found.final.model)
+    )
+    floor = sigma * float(np.sqrt(3.0))
     loose = structure(unseen, found.final.model, kept)
     progress('looked for what is left')
     before, after = unseen.predict([]), unseen.predict(kept)
     slots = found.slots
-    evidence = Evidence(slots, loose, unseen.rms(before), unseen.rms(after), float(floor))
+    evidence = Evidence(
+        slots, loose, unseen.rms(before), unseen.rms(after), floor, independent,
+        _cancelling(unseen),
+    )  # fmt: skip
     verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
     baseline = Unseen.of(found.problem, found.scale, found.baseline, np.zeros(0))
     where = locate(found.problem, baseline, found.baseline.model, unseen, found.final.model)
     progress('located')
     effects = _effects(found, unseen, verdict)
     return Diagnosis(
-        gap=_gap(found, float(floor)), where=where, status=verdict.status, effects=effects,
+        gap=_gap(found, floor), where=where, status=verdict.status, effects=effects,
         confidence=verdict.confidence, indistinguishable=verdict.sets, reasons=verdict.reasons,
         candidates=_candidates(found, slots, evidence, unseen),
         shrink=held_out_shrink(found, unseen, holdout),
@@ -188,18 +194,34 @@ def _candidates(
     """Return the hypotheses for every slot, those of the strongest effect first."""
     out = []
     for slot in slots:
-        least = slot[0].fit.rss
+        least = _position_rms(found, slot[0])
         for rival in slot:
-            rms = evidence.after * float(np.sqrt(rival.fit.rss / max(least, 1e-300)))
+            rms = evidence.after * _position_rms(found, rival) / max(least, 1e-300)
             shrink = 1.0 - rms / max(evidence.gap, 1e-300)
             out.append(Candidate(rival.site, rival.probability, rms, shrink))
     return tuple(out)
 
 
+def _cancelling(unseen: Unseen) -> float:
+    parts = unseen.targets[1:]
+    total = parts.sum(axis=0)
+    return float((parts**2).sum() / max(float(total @ total), 1e-300))
+
+
+def _position_rms(found: Search, rival: Rival) -> float:
+    """Return the RMS position residual of a rival's fit, weighted, [m]."""
+    at, total, count = 0, 0.0, 0
+    for c, m in zip(found.work.problem.rows, found.work.problem.samples, strict=True):
+        part = rival.fit.residual[at : at + c * m].reshape(m, c)[:, :3]
+        at += c * m
+        total += float((part**2).sum())
+        count += m
+    return found.work.scale.position * float(np.sqrt(total / max(count, 1)))
+
+
 def _unexplained(evidence: Evidence, unseen: Unseen, after: Array) -> Unexplained:
-    above = evidence.structured and evidence.after > 1.1 * evidence.floor
     names = evidence.structure.depends_on if evidence.structured else ()
-    return Unexplained(evidence.after, above, names)
+    return Unexplained(evidence.after, evidence.above_noise, names)
 
 
 def _next(

@@ -38,7 +38,7 @@ def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict
         for _, name in sorted(named, reverse=True)
         for effect in (model.found[k] for k in members[name])
     )
-    left = evidence.unexplained if evidence.structured else 0.0
+    left = evidence.left
     status = 'unknown' if left > STRUCTURE else 'identified'
     reasons = (
         'many small errors act together; members of one family are fitted jointly and only their '

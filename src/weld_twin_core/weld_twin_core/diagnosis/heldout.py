@@ -128,12 +128,12 @@ class Unseen:
         out, everything = [], np.arange(self.columns.shape[0])
         for b in range(self.normals.shape[0]):
             system = self._system(b, everything)
-            size = np.sqrt(np.maximum(np.diag(system), 1e-300))
-            system /= np.outer(size, size)
+            size = np.sqrt(np.maximum(np.diag(system), 0.0))
+            unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+            system *= np.outer(unit, unit)
             system[np.diag_indices_from(system)] += 1e-11
             half, _ = dpotri(cho_factor(system, lower=True)[0], lower=1)
-            whole = np.tril(half) + np.tril(half, -1).T
-            out.append(whole / np.outer(size, size))
+            out.append((np.tril(half) + np.tril(half, -1).T) * np.outer(unit, unit))
         return out
 
     def base(self, kept: Sequence[int]) -> Base:

@@ -14,9 +14,11 @@ SAME_STATION = 2e-3
 ENOUGH = 12
 
 
-def noise_floor(problem: Problem, residuals: list[Array]) -> float:
+def noise_floor(problem: Problem, residuals: list[Array]) -> tuple[float, bool]:
     """
-    Return the standard deviation of one measured coordinate, [m].
+    Return the standard deviation of one measured coordinate, [m], and whether it is independent.
+
+    Independent means that repeats or differences in time showed it, not what a model left.
 
     Parameters
     ----------
@@ -27,6 +29,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> float:
 
     """
     estimates = []
+    independent = True
     for recording, part in zip(problem.recordings, residuals, strict=True):
         position = part[:3]
         left = 1.4826 * float(np.median(np.abs(position)))
@@ -35,9 +38,10 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> float:
         if direct is None and recording.measured is not None:
             sigma = recording.measured.sigma
             direct = None if sigma is None else float(np.median(sigma))
+            independent = False
         estimates.append((left if direct is None else min(direct, left), part.shape[1]))
     values, counts = zip(*estimates, strict=True)
-    return float(np.average(values, weights=counts))
+    return float(np.average(values, weights=counts)), independent
 
 
 def _differences(position: Array) -> float | None:

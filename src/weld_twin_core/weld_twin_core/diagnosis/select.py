@@ -22,6 +22,8 @@ ENTER = 6.0
 """Nats a unit must be worth to enter: odds of about 400 to 1, for a hundred or so candidates."""
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
+INVISIBLE = 0.12
+"""RMS in units of noise below which nothing is worth a name, however many rows vouch for it."""
 CONSOLIDATE_SLACK = 0.3
 NEGLIGIBLE = 0.25
 """RMS in units of noise below which an effect is not told from a larger one's misfit."""
@@ -195,14 +197,14 @@ def without_negligible(work: Workspace, now: Fit) -> Fit:
     Thousands of rows make a micrometre significant; next to a larger cause it is more likely the
     difference between that cause and its model.
     """
-    while len(now.model.found) > 1:
+    while now.model.found:
         sizes = []
         for k in range(len(now.model.found)):
             parts = work.problem.residuals(without(now.model, k))
             change = work.problem.whitened(parts, work.scale) - now.residual
             sizes.append(float(np.sqrt((change**2).mean())))
         least = int(np.argmin(sizes))
-        if sizes[least] > NEGLIGIBLE or least == int(np.argmax(sizes)):
+        if sizes[least] > (NEGLIGIBLE if len(sizes) > 1 else INVISIBLE):
             break
         now = fit(work.problem, without(now.model, least), work.scale, None, 4)
     return now

@@ -8,16 +8,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..effects import REGISTRY
 from .flexible import Structure
 from .result import Site
 from .rivals import LISTED, Rival
 
 SURE = 0.85
 """A leader less probable than this is not named alone."""
-STRUCTURE = 0.12
-"""Share of the gap that generic columns may still find before the answer is 'unknown'."""
+STRUCTURE = 0.05
+"""Share of the squared gap that may stay unexplained before the answer is 'unknown'."""
+ABOVE = 1.15
+"""What remains must exceed an independently measured floor by this factor to count."""
 CERTAIN = 3.0
 """Standard errors between stretches that a structure must exceed."""
+CANCEL = 3.0
+"""Effects whose squares sum to this many times the square of their sum cancel each other."""
+CROWD = 4
+"""So many separate causes at once are more likely one that the library lacks."""
+STACKED = 0.75
+"""Of two effects at rest on one joint this share were what they seemed."""
+CALIBRATION = 0.985
+"""Even with evidence beyond doubt a verdict has been wrong this seldom on blind cases."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +44,10 @@ class Evidence:
         What generic columns still find.
     gap, after, floor : float
         RMS on unseen data before and after, and of the noise, [m].
+    independent : bool
+        Whether the floor was measured apart from any model.
+    cancel : float
+        Sum of the squared contributions of the effects over the square of their sum.
 
     """
 
@@ -41,17 +56,27 @@ class Evidence:
     gap: float
     after: float
     floor: float
-
-    @property
-    def unexplained(self) -> float:
-        """Return the share of the squared gap above noise that generic columns still find."""
-        excess = max(self.gap**2 - self.floor**2, 0.05 * self.floor**2, 1e-18)
-        return float(np.clip(self.structure.gain * self.after**2 / excess, 0.0, 1.0))
+    independent: bool
+    cancel: float
 
     @property
     def structured(self) -> bool:
         """Return whether generic columns find something beyond doubt."""
         return self.structure.gain > 0.03 and self.structure.sure > CERTAIN
+
+    @property
+    def above_noise(self) -> bool:
+        """Return whether what remains rises above the floor."""
+        return self.structured or (self.independent and self.after > ABOVE * self.floor)
+
+    @property
+    def left(self) -> float:
+        """Return the share of the squared gap above noise that is not explained."""
+        excess = max(self.gap**2 - self.floor**2, 0.05 * self.floor**2, 1e-18)
+        found = self.structure.gain * self.after**2 if self.structured else 0.0
+        high = self.independent and self.after > ABOVE * self.floor
+        over = self.after**2 - self.floor**2 if high else 0.0
+        return float(np.clip(max(found, over) / excess, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -66,28 +91,59 @@ class Verdict:
 
 def decide(evidence: Evidence) -> Verdict:
     """Return the verdict."""
-    left = evidence.unexplained if evidence.structured else 0.0
+    left = evidence.left
     if not evidence.slots:
         if left > STRUCTURE:
             return Verdict('unknown', _unknown_confidence(left), (), (_depends(evidence),))
         return Verdict('none', 0.97, (), ('the gap does not rise above the noise',))
     sets = tuple(_leaders(slot) for slot in evidence.slots)
+    doubt = _doubt(evidence)
+    if left > STRUCTURE or doubt is not None:
+        solid = tuple(s for s in sets if len(s) == 1 and doubt is None
+                      and left < 0.5 and not _touched(s[0], evidence))  # fmt: skip
+        reason = _depends(evidence) if doubt is None else doubt
+        return Verdict('unknown', _unknown_confidence(left), solid, (reason,))
     mass = [
         sum(r.probability for r in slot if r.site in chosen)
         for slot, chosen in zip(evidence.slots, sets, strict=True)
     ]
     complete = 1.0 / (1.0 + (left / STRUCTURE) ** 3)
     confidence = float(np.prod(mass)) * complete * CALIBRATION
-    if left > STRUCTURE:
-        return Verdict('unknown', _unknown_confidence(left), sets, (_depends(evidence),))
+    if _stacked(sets):
+        confidence *= STACKED
     reasons = tuple(_alike(slot, chosen) for slot, chosen in zip(evidence.slots, sets, strict=True)
                     if len(chosen) > 1)  # fmt: skip
     status = 'ambiguous' if reasons else 'identified'
     return Verdict(status, confidence, sets, reasons)
 
 
-CALIBRATION = 0.985
-"""Even with evidence beyond doubt a verdict has been wrong this seldom on blind cases."""
+def _doubt(evidence: Evidence) -> str | None:
+    """Return why the effects found are no plausible explanation, however well they fit."""
+    if len(evidence.slots) > 1 and evidence.cancel > CANCEL:
+        return (
+            'the effects that fit best nearly cancel each other: together they imitate a cause '
+            'that is not in the library'
+        )
+    if len(evidence.slots) > CROWD:
+        return (
+            f'{len(evidence.slots)} separate effects would be needed at once: together they '
+            'imitate a cause that is not in the library'
+        )
+    return None
+
+
+def _stacked(sets: tuple[tuple[Site, ...], ...]) -> bool:
+    """Return whether two effects that show at rest sit on one joint: two may stand for a third."""
+    at_rest = [
+        chosen[0].joint for chosen in sets
+        if chosen[0].joint and REGISTRY[chosen[0].effect].regime in ('static', 'load')
+    ]
+    return len(at_rest) > len(set(at_rest))
+
+
+def _touched(site: Site, evidence: Evidence) -> bool:
+    """Return whether what remains depends on the joint that an effect sits on."""
+    return any(str(site.joint) in name for name in evidence.structure.depends_on)
 
 
 def _unknown_confidence(left: float) -> float:
@@ -108,5 +164,5 @@ def _alike(slot: tuple[Rival, ...], chosen: tuple[Site, ...]) -> str:
 
 def _depends(evidence: Evidence) -> str:
     names = evidence.structure.depends_on
-    on = ' and '.join(names) if names else 'the motion'
+    on = ' and '.join(names) if names else 'something not looked at'
     return f'what remains depends on {on}, and no effect in the library explains it'

@@ -19,11 +19,11 @@ from .orientation import orientation
 from .outliers import outliers
 from .quantity import quantity
 from .repeats import repeats
-from .setup import Settling, Step, moved_setup, settling, setup
+from .setup import Settling, Step, changes, moved_setup, settling, setup
 from .source import source
 from .stamps import stamps
 
-__all__ = ['CHECKS', 'Settling', 'Step', 'check', 'moved_setup', 'settling']
+__all__ = ['CHECKS', 'Settling', 'Step', 'changes', 'check', 'moved_setup', 'settling']
 
 CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
@@ -32,7 +32,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),
     'stamps': (stamps, 'Stamps come regularly and without gaps.'),
     'repeats': (repeats, 'Nothing was recorded twice.'),
-    'source of the joints': (source, 'Joint positions look measured.'),
+    'source of the joints': (source, 'Joint positions are not plainly those of a command.'),
     'motion': (motion, 'Every joint moves, both ways, and the frames can be told apart.'),
     'outliers': (outliers, 'No measurement lies far off the rest.'),
     'set-up': (setup, 'The set-up did not move while it was measured.'),

@@ -126,7 +126,7 @@ class BaseChange:
                 count = max(after.share * after.residual[:, part].size, 12.0)
                 fall += 0.5 * count * float(np.log(before / max(left, 1e-12 * before)))
                 total += count
-        return fall - 0.5 * self.columns.shape[2] * float(np.log(total))
+        return fall - 0.5 * float(self.columns.shape[2] * np.log(total))
 
 
 def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChange:

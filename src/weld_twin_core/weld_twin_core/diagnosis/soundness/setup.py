@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,12 +17,13 @@ from .case import Case, Finding, length, measured
 
 SURE = 10.0
 """Nats by which a change must beat no change, and a step every smooth change or step of joints."""
-MOST = 3
+MOST = 4
 MOST_ROWS = 18000
 EDGE = 0.04
 """A step nearer to either end of a recording, as a share of it, is not looked for."""
-CONSTANTS = np.geomspace(0.02, 0.7, 9)
+CONSTANTS = np.geomspace(0.05, 0.7, 7)
 """Time constants of settling, as shares of the recording."""
+NEIGHBOURS = np.geomspace(0.8, 1.25, 7)
 
 
 class Step(NamedTuple):
@@ -45,25 +46,31 @@ class Settling(NamedTuple):
 
 def setup(case: Case) -> Sequence[Finding]:
     """Return steps and settling of the set-up in what the aligned model leaves."""
-    out = [
-        Finding('warning', _moved(case, step))
-        for step in moved_setup(case.residuals, case.problem, case.model)
-    ]
-    out += [
-        Finding(
-            'note',
-            f'The set-up of {found.recording} settles by {length(found.size)} with a time '
-            f'constant of {found.time_constant:.3g} {_unit(case, found.recording)}, as in '
-            'warming up.',
-        )
-        for found in settling(case.residuals, case.problem, case.model)
-    ]
-    return out
+    found = changes(case.residuals, case.problem, case.model)
+    return [
+        Finding('warning', _moved(case, each)) if isinstance(each, Step)
+        else Finding('note', _settled(case, each))
+        for each in found
+    ]  # fmt: skip
 
 
 def moved_setup(parts: list[Array], problem: Problem, model: Model) -> list[Step]:
+    """Return the steps of the base frame among its `changes`."""
+    return [each for each in changes(parts, problem, model) if isinstance(each, Step)]
+
+
+def settling(parts: list[Array], problem: Problem, model: Model) -> list[Settling]:
+    """Return the settlings of the base frame among its `changes`."""
+    return [each for each in changes(parts, problem, model) if isinstance(each, Settling)]
+
+
+def changes(parts: list[Array], problem: Problem, model: Model) -> list[Step | Settling]:
     """
-    Return steps of the base frame that explain much more than any smooth change.
+    Return steps and settlings of the base frame, strongest first.
+
+    A step is named only when it explains much more than any smooth change and than a step of
+    the joints, a settling only when a steady drift does not do as well; what is neither is taken
+    out before the next is looked for.
 
     Parameters
     ----------
@@ -75,70 +82,79 @@ def moved_setup(parts: list[Array], problem: Problem, model: Model) -> list[Step
     """
     problem, parts = _thinned(problem, parts)
     change = base_change(parts, problem, model)
-    out: list[Step] = []
+    out: list[Step | Settling] = []
+    calmed: set[int] = set()
     for _ in range(MOST):
-        found = _best_step(change, problem)
-        if found is None:
+        trials = [
+            trial for k in range(len(parts)) for trial in _trials(change, problem, k)
+            if trial.abrupt or k not in calmed
+        ]  # fmt: skip
+        best = max(trials, key=lambda trial: trial.nats, default=None)
+        if best is None or best.nats < SURE:
             break
-        step, shape = found
-        out.append(step)
-        change = change.without(shape)
+        if best.named is not None:
+            out.append(best.named)
+        if not best.abrupt:
+            calmed.add(best.recording)
+        change = change.without(best.shape)
     return out
 
 
-def settling(parts: list[Array], problem: Problem, model: Model) -> list[Settling]:
-    """Return exponential settlings of the base, one per recording at most; see `moved_setup`."""
-    problem, parts = _thinned(problem, parts)
-    change = base_change(parts, problem, model)
-    out = []
-    for k, recording in enumerate(problem.recordings):
-        mine = change.recording == k
-        age = _age(problem, k)
-        shapes = [_placed(np.exp(-age / c), mine) for c in CONSTANTS]
-        best = int(np.argmax([change.gain(shape) for shape in shapes]))
-        nats = change.nats(shapes[best])
-        if nats < SURE:
-            continue
-        steps = change.step_gains(k)
-        others = [age, age**2, np.arange(steps.size) >= steps.argmax()]
-        if nats > max(change.nats(_placed(other, mine)) for other in others) + SURE:
-            span = float(np.ptp(measured(recording).t))
-            size = change.size(shapes[best])
-            out.append(Settling(recording.name, float(CONSTANTS[best]) * span, size, nats))
-    return out
+class _Trial(NamedTuple):
+    """A shape in time, its evidence, and what it is called where it may be."""
+
+    recording: int
+    shape: Array
+    nats: float
+    abrupt: bool
+    named: Step | Settling | None
 
 
-def _best_step(change: BaseChange, problem: Problem) -> tuple[Step, Array] | None:
-    best: tuple[Step, Array] | None = None
-    for k, recording in enumerate(problem.recordings):
-        mine = change.recording == k
-        gains = change.step_gains(k)
-        whole = k > 0 and 'base' not in problem.align
-        edge = max(3, int(EDGE * gains.size))
-        allowed = np.zeros(gains.size, dtype=bool)
-        allowed[edge:-edge] = True
-        allowed[0] = whole
-        if not allowed.any():
-            continue
-        at = int(np.where(allowed, gains, -np.inf).argmax())
-        shape = _placed(np.arange(gains.size) >= at, mine)
-        nats = change.nats(shape)
-        rivals = (change.nats(_smooth(change, problem, k)), change.of_joints.nats(shape))
-        if nats < SURE + max(0.0, *rivals):
-            continue
-        step = Step(recording.name, float(measured(recording).t[at]), change.size(shape), nats)
-        if best is None or step.significance > best[0].significance:
-            best = step, shape
-    return best
+def _trials(change: BaseChange, problem: Problem, k: int) -> Iterator[_Trial]:
+    """Yield the best smooth change and the best step of recording k."""
+    name, mine = problem.recordings[k].name, change.recording == k
+    t, age = measured(problem.recordings[k]).t, _age(problem, k)
+    constant, others = _smooth(change, mine, age)
+    settled = _placed(np.exp(-age / constant), mine)
+    other = max((_placed(shape, mine) for shape in others), key=change.gain)
+    nats, plain = change.nats(settled), change.nats(other)
+    if nats > SURE + max(plain, change.of_joints.nats(settled)):
+        found = Settling(name, constant * float(np.ptp(t)), change.size(settled), nats)
+        yield _Trial(k, settled, nats, False, found)
+    else:
+        yield _Trial(k, other if plain > nats else settled, max(nats, plain), False, None)
+    at = _step(change, k, whole=k > 0 and 'base' not in problem.align)
+    if at is not None:
+        shape = _placed(np.arange(t.size) >= at, mine)
+        abrupt = change.nats(shape)
+        if abrupt > SURE + max(0.0, nats, plain, change.of_joints.nats(shape)):
+            step = Step(name, float(t[at]), change.size(shape), abrupt)
+            yield _Trial(k, shape, abrupt, True, step)
 
 
-def _smooth(change: BaseChange, problem: Problem, k: int) -> Array:
-    """Return the smooth change of recording k's base that explains most, shape (M,)."""
-    mine, age = change.recording == k, _age(problem, k)
-    shapes = [age, age**2, *(np.exp(-age / c) for c in CONSTANTS)]
-    shapes += [np.exp(-(1.0 - age) / c) for c in CONSTANTS]
-    shapes += [np.sin(n * np.pi * age) for n in (1, 2)] + [np.cos(n * np.pi * age) for n in (1, 2)]
-    return max((_placed(shape, mine) for shape in shapes), key=change.gain)
+def _step(change: BaseChange, k: int, *, whole: bool) -> int | None:
+    """Return the sample before which a step of recording k's base explains most."""
+    gains = change.step_gains(k)
+    edge = max(3, int(EDGE * gains.size))
+    allowed = np.zeros(gains.size, dtype=bool)
+    allowed[edge:-edge] = True
+    allowed[0] = whole
+    return int(np.where(allowed, gains, -np.inf).argmax()) if allowed.any() else None
+
+
+def _smooth(
+    change: BaseChange, mine: NDArray[np.bool_], age: Array
+) -> tuple[float, list[Array]]:
+    """Return the best time constant of a settling, and other smooth shapes of a recording."""
+
+    def gain(constant: float) -> float:
+        return change.gain(_placed(np.exp(-age / constant), mine))
+
+    rough = max(CONSTANTS, key=gain)
+    best = max(rough * NEIGHBOURS, key=gain)
+    waves = [wave(n * np.pi * age) for n in (1, 2) for wave in (np.sin, np.cos)]
+    late = [np.exp(-(1.0 - age) / c) for c in CONSTANTS]
+    return float(best), [age, age**2, *late, *waves]
 
 
 def _age(problem: Problem, k: int) -> Array:
@@ -173,6 +189,13 @@ def _moved(case: Case, step: Step) -> str:
     return (
         f'The set-up of {step.recording} moved by {length(step.size)} at {when}; split the '
         'recording there and have the base aligned, so that each part gets its own.'
+    )
+
+
+def _settled(case: Case, found: Settling) -> str:
+    return (
+        f'The set-up of {found.recording} settles by {length(found.size)} with a time constant of '
+        f'{found.time_constant:.3g} {_unit(case, found.recording)}, as in warming up.'
     )
 
 

@@ -26,6 +26,8 @@ Channel = tuple[str, int]
 Shift = Mapping[Channel, Array]
 ROW_CHANNELS = ('theta', 'd', 'a', 'alpha', 'beta')
 NO_SHIFT: Shift = {}
+MANY = 5000
+"""Joint positions from which `forward` leaves the work to `kernels.bulk`."""
 
 
 class RowAxes(NamedTuple):
@@ -165,6 +167,9 @@ def forward(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
 
     The product of the paper's eq. for T_i^{i-1} over the rows, between base and tool frame.
     """
+    if q.ndim == 2 and len(q) >= MANY and not shift:
+        from .kernels.bulk import BulkKernel  # which imports this module
+        return BulkKernel(robot).poses(q)
     chain = frames(robot, q, shift)
     return transform(chain.rotation, chain.position)
 

@@ -13,6 +13,7 @@ import numpy as np
 from .arrays import Array
 from .effects.base import View
 from .errors import DataError
+from .kernels.single import SinglePose
 from .memory import added, in_series
 from .poses import Poses
 
@@ -30,14 +31,14 @@ class LiveTwin:
 
     def __init__(self, twin: Twin) -> None:
         self.twin = twin
+        self._single = SinglePose(twin.robot)
         self._states: dict[tuple[Any, ...], Any] = {}
-        self._start: float | None = None
+        self._start = 0.0
         self._last = -np.inf
 
     def reset(self) -> None:
         """Forget the motion so far, as after a jump back in time."""
         self._states.clear()
-        self._start = None
         self._last = -np.inf
 
     def step(
@@ -66,6 +67,9 @@ class LiveTwin:
             The stamp goes back, or there is not one position for each joint.
 
         """
+        q = self._checked(t, q)
+        if not self.twin.effects:
+            return q.copy(), self._nominal(q)
         view = self._remembered(self._view(t, q, qd, wrench, temperature, wrench_frame))
         run = self.twin.pointwise(view)
         joints = view.q[0].copy()
@@ -73,6 +77,28 @@ class LiveTwin:
             if name == 'q':
                 joints[i] += np.ravel(value)[0]
         return joints, Poses(run.poses.position[0], run.poses.rotation[0])
+
+    def _checked(self, t: float, q: Array) -> Array:
+        robot = self.twin.robot
+        q = np.asarray(q, dtype=np.float64)
+        if q.shape != (robot.n,):
+            raise DataError(f'robot {robot.name!r} needs {robot.n} joint positions, got {q.shape}')
+        if t < self._last:
+            raise DataError(
+                f'the joint state at {t:.6f} s is {self._last - t:.6g} s before the one already '
+                'seen; reset the twin after a jump back in time'
+            )
+        if np.isinf(self._last):
+            self._start = t
+        self._last = t
+        return q
+
+    def _nominal(self, q: Array) -> Poses:
+        """Return the pose without effects, at a tenth of what the stages cost."""
+        if self._single.robot is not self.twin.robot:
+            self._single = SinglePose(self.twin.robot)
+        pose = self._single(q)
+        return Poses(pose[:3, 3], pose[:3, :3])
 
     def _view(
         self,
@@ -83,21 +109,9 @@ class LiveTwin:
         temperature: float | None,
         wrench_frame: str,
     ) -> View:
-        robot = self.twin.robot
-        q = np.asarray(q, dtype=np.float64)
-        if q.shape != (robot.n,):
-            raise DataError(f'robot {robot.name!r} needs {robot.n} joint positions, got {q.shape}')
-        if t < self._last:
-            raise DataError(
-                f'the joint state at {t:.6f} s is {self._last - t:.6g} s before the one already '
-                'seen; reset the twin after a jump back in time'
-            )
-        self._last = t
-        if self._start is None:
-            self._start = t
         stamp = np.array([t])
         return View(
-            robot, stamp, stamp - self._start, q[None],
+            self.twin.robot, stamp, stamp - self._start, q[None],
             np.zeros_like(q)[None] if qd is None else np.asarray(qd)[None], False,
             None if wrench is None else np.asarray(wrench)[None], wrench_frame,
             None if temperature is None else np.array([temperature]),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array
-from .chain import Channel, Frames, Shift, column
+from .chain import Channel, Frames, Shift, column, forward
 from .dynamics import chain_gravity_torque, wrench_torque
 from .effects.base import Effect, Parameter, Stage, View
 from .errors import ModelError
@@ -93,6 +93,10 @@ class Twin:
             Stamps of the measurement clock; left out, the instants of the joint stamps.
 
         """
+        if not self.effects:
+            motion = recording.joints
+            poses = forward(self.robot, motion.q if at is None else motion.at(at)[0])
+            return Poses(poses[..., :3, 3], poses[..., :3, :3])
         return self._full(self._evaluate(recording, at, False))
 
     def joints(self, recording: Recording, at: Array | None = None) -> Array:

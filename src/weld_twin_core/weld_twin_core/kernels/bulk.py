@@ -6,7 +6,7 @@ Poses, Jacobians and derivatives by DH values of many joint positions.
 The chain is cut in two pieces. Each is a small matrix product of constant `weights` with products
 of sines and cosines; nine multiplications for each output vector put them together. All of it
 runs over blocks of poses that stay in the processor's cache, in memory that is used again.
-`chain` says the same in plain form, and the tests hold one against the other.
+`chain` says the same in plain form.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..chain import Channel
+from ..errors import ModelError
 from ..robot import Robot
 from .buffers import aligned
 from .half_angle import HalfAngle
@@ -39,15 +41,18 @@ class BulkKernel:
     block : int
         Poses worked on at once; a multiple of 8 is best.
 
+    Raises
+    ------
+    ModelError
+        The channels are not in the order of the rows.
+
     Notes
     -----
     A kernel owns its working memory, so one kernel serves one thread at a time.
 
     """
 
-    def __init__(
-        self, robot: Robot, channels: Sequence[Channel] = (), block: int = BLOCK
-    ) -> None:
+    def __init__(self, robot: Robot, channels: Sequence[Channel] = (), block: int = BLOCK) -> None:
         self.robot = robot
         self.channels = tuple(channels)
         self.block = block
@@ -58,7 +63,7 @@ class BulkKernel:
         inner = [c for c in self.channels if c[1] < cut]
         outer = [c for c in self.channels if c[1] >= cut]
         if inner + outer != list(self.channels):
-            raise ValueError('channels must be in the order of the rows')
+            raise ModelError(f'channels must be in the order of the rows, got {self.channels}')
         self.counts = (len(inner), len(outer))
         self._weights = (
             self._rows(_columns(near.poses()), *near.screws(inner), joints=cut),
@@ -150,7 +155,8 @@ class BulkKernel:
 
 def _columns(poses: Array) -> Array:
     """Return the columns x, y, z and origin of weights of poses, shape (features, 4, 3)."""
-    return poses[:, :3].swapaxes(1, 2)
+    columns: Array = poses[:, :3].swapaxes(1, 2)
+    return columns
 
 
 def _velocity(moment: Array, axis: Array, tip: Array, out: Array) -> None:
@@ -163,7 +169,7 @@ def _velocity(moment: Array, axis: Array, tip: Array, out: Array) -> None:
 
 def _gather() -> Array:
     """Return the matrix that adds the products up to rows of a 4 x 4 matrix, shape (40, 16)."""
-    out = np.zeros((40, 4, 4))
+    out: Array = np.zeros((40, 4, 4))
     for i in range(3):
         for j in range(4):
             out[[12 * k + 3 * j + i for k in range(3)], i, j] = 1.0
@@ -190,7 +196,7 @@ class _Memory:
         self.sums[39] = 1.0
         self.spare = aligned(2, 3, max(kernel.counts[1], 1), n)
 
-    def fill(self, q: Array, prismatic: Array) -> None:
+    def fill(self, q: Array, prismatic: NDArray[np.bool_]) -> None:
         """Compute the products of (1, u, v) of the joints of each piece."""
         sine, cosine = self.half(q.T)
         np.multiply(cosine, sine, self.own[0])

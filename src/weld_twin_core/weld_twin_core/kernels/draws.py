@@ -24,15 +24,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
 from ..arrays import Array
+from ..errors import ModelError
 from ..robot import Robot
 from .half_angle import sincos
 
 ROUNDING = 1e-14
 """Remainder of the features, relative to the strongest, that counts as none."""
-BLOCK = 1000
+BLOCK = 504
 """Draws whose weights are built at once."""
 POINTS = 6000
 """Draws times samples worked on at once; a few of such arrays fit the processor's cache."""
@@ -61,6 +63,11 @@ class SeamDraws:
     smooth : bool
         Look for samples that determine the others; False works on all samples.
 
+    Raises
+    ------
+    ModelError
+        The robot has modified rows, Hayati angles or joints that slide.
+
     Attributes
     ----------
     samples : array
@@ -72,9 +79,14 @@ class SeamDraws:
     """
 
     def __init__(self, robot: Robot, q: Array, *, smooth: bool = True) -> None:
+        if robot.convention != 'standard' or robot.prismatic.any() or robot.beta.any():
+            raise ModelError(
+                f'robot {robot.name!r} must have standard rows, revolute joints and no beta for '
+                'fast draws of its DH values; the twin runs draws of any robot'
+            )
         self.robot = robot
         features = _features(q[:, 1:SPLIT]), _features(q[:, SPLIT:])
-        self.samples = np.arange(len(q))
+        self.samples: NDArray[np.int_] = np.arange(len(q))
         self.spread: Array | None = None
         self.remainder = 0.0
         if smooth:
@@ -114,13 +126,15 @@ class SeamDraws:
         away *= away
         away[0] += away[1]
         away[0] += away[2]
-        return away[0]
+        squares: Array = away[0]
+        return squares
 
     def _pieces(self, draws: DhDraws) -> tuple[Array, Array, Array]:
         """
-        Return the weights of both pieces, shapes (F, 3, 4, D) and (F, 3, 1, D), and the first link.
+        Return the weights of both pieces and the first link.
 
-        The link is d, a, cos(alpha) and sin(alpha), shape (4, D).
+        The near piece is (F, 3, 4, D), the far one (F, 3, 1, D); the link, shape (6, D),
+        is d, a, and the cosine and sine of alpha and of theta.
         """
         count, n = draws.theta.shape
         rows = _Rows(draws)
@@ -130,8 +144,8 @@ class SeamDraws:
         start = np.zeros((1, 3, 4, count))
         start[0, [0, 1, 2], [0, 1, 2]] = 1.0
         near = rows.carried(start, range(SPLIT - 1, 0, -1))
-        link = np.stack([rows.d[0], rows.a[0], rows.alpha_cosine[0], rows.alpha_sine[0]])
-        return near, far, link
+        turns = rows.alpha_cosine[0], rows.alpha_sine[0], rows.cosine[0], rows.sine[0]
+        return near, far, np.stack([rows.d[0], rows.a[0], *turns])
 
     def _points(self, near: Array, far: Array, link: Array) -> Array:
         """Return tool points after the first joint's turn was taken away, shape (3, D, S)."""
@@ -141,15 +155,22 @@ class SeamDraws:
         for k in range(3):
             frame[:, k] *= tip[k]
             out += frame[:, k]
-        x, y, z = out
-        d, a, cosine, sine = link[..., None]
-        x += a
-        turned = cosine * y - sine * z
-        z *= cosine
-        z += sine * y
-        z += d
-        y[...] = turned
+        d, a, alpha_cosine, alpha_sine, cosine, sine = link[..., None]
+        out[0] += a
+        _turn(out[1], out[2], alpha_cosine, alpha_sine)
+        out[2] += d
+        _turn(out[0], out[1], cosine, sine)
         return out
+
+
+def _turn(first: Array, second: Array, cosine: Array, sine: Array) -> None:
+    """Turn two components in their plane, in place."""
+    turned = cosine * first
+    turned -= sine * second
+    second *= cosine
+    first *= sine
+    second += first
+    first[...] = turned
 
 
 class _Rows:
@@ -175,11 +196,7 @@ class _Rows:
         out[0, 2, -1] += self.d[i]
         out[:, 0] = x
         out[0, 0, -1] += self.a[i]
-        x, y = out[:, 0], out[:, 1]
-        c, s = self.cosine[i], self.sine[i]
-        turned = c * x - s * y
-        np.add(s * x, c * y, out=out[:, 1])
-        out[:, 0] = turned
+        _turn(out[:, 0], out[:, 1], self.cosine[i], self.sine[i])
         return out
 
     def carried(self, vectors: Array, rows: range) -> Array:
@@ -196,7 +213,7 @@ class _Rows:
 
 
 class _Determining(NamedTuple):
-    samples: Array
+    samples: NDArray[np.int_]
     spread: Array
     remainder: float
 
@@ -225,4 +242,5 @@ def _features(q: Array) -> Array:
 def _on_features(weights: Array, features: Array) -> Array:
     """Return weights (F, 3, k, D) applied to features (F, S), shape (3, k, D, S)."""
     flat = weights.reshape(len(weights), -1)
-    return (flat.T @ features).reshape(*weights.shape[1:], -1)
+    found: Array = flat.T @ features
+    return found.reshape(*weights.shape[1:], -1)

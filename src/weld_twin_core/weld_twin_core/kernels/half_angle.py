@@ -5,8 +5,8 @@ Sine and cosine from multiplications and one small matrix product.
 
 numpy takes sine and cosine of doubles one by one. Here an angle is counted in turns, reduced to
 r in [-1/2, 1/2], and sin(pi r) = r S(r^2) and cos(pi r) = C(r^2), the sine and cosine of *half*
-the angle, are polynomials of degree 7 and 8: a Chebyshev series cut where its next term is below
-2e-16, written in powers. Products of the two give the angle itself::
+the angle, are polynomials of degree 8: Chebyshev series, cut where what is left is below the last
+digit, written in powers. Products of the two give the angle itself::
 
     u = sin(x/2) cos(x/2),  v = sin(x/2)^2,  sin x = 2 u,  cos x = 1 - 2 v
 
@@ -22,14 +22,15 @@ from ..arrays import Array
 from .buffers import aligned
 
 SINE = (
-    3.1415926535897927,
-    -5.167712780049786,
-    2.550164039861884,
-    -0.5992645288256148,
-    0.08214587882077493,
-    -0.007370364352718201,
-    0.0004659870919775173,
-    -2.1133714397960184e-05,
+    3.141592653589793,
+    -5.167712780049969,
+    2.5501640398773007,
+    -0.599264529318946,
+    0.08214588657312355,
+    -0.007370430506093225,
+    0.00046629981702308817,
+    -2.1903499125519212e-05,
+    7.697847275590284e-07,
 )
 COSINE = (
     1.0,
@@ -43,9 +44,7 @@ COSINE = (
     4.149578027057121e-06,
 )
 DEGREE = len(COSINE) - 1
-_POLYNOMIALS = np.zeros((2, DEGREE + 1))
-_POLYNOMIALS[0, : len(SINE)] = SINE
-_POLYNOMIALS[1] = COSINE
+_POLYNOMIALS = np.array([SINE, COSINE])
 
 
 class HalfAngle:

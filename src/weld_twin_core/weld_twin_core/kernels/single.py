@@ -43,6 +43,7 @@ class SinglePose:
     """
 
     def __init__(self, robot: Robot) -> None:
+        self.robot = robot
         self._rows = tuple(reversed(_rows(robot)))
         columns = [robot.T_flange_tool[:3, k].tolist() for k in (0, 2, 3)]
         self._tool = tuple(value for column in columns for value in column)

@@ -11,6 +11,7 @@ generator of a turn put at its place among the factors, the derivative by any DH
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -71,12 +72,10 @@ def factors(robot: Robot, i: int) -> list[Factor]:
     return [twist, turn, Factor(('a',), 0, _slide(0, robot.a[i])[None]), joint]
 
 
-def product(matrices: list[Array]) -> Array:
-    """Return the product of factors, shape (features, 4, 4), the last joint varying fastest."""
-    out = np.eye(4)[None]
-    for matrix in matrices:
-        out = np.einsum('aij,bjk->abik', out, matrix).reshape(-1, *matrix.shape[1:])
-    return out
+def product(first: Array, second: Array) -> Array:
+    """Return the product of two stacks of matrices, every one with every one, the last fastest."""
+    out: Array = first[:, None] @ second[None]
+    return out.reshape(-1, *out.shape[2:])
 
 
 def generator(axis: int) -> Array:
@@ -111,48 +110,61 @@ class Piece:
     """
 
     def __init__(self, robot: Robot, rows: range, before: Array, after: Array) -> None:
-        fixed = [Factor((), 0, before[None])]
-        moving = [(i, factor) for i in rows for factor in factors(robot, i)]
-        self.factors = [(-1, fixed[0]), *moving, (-1, Factor((), 0, after[None]))]
-
-    def _place(self, channel: Channel) -> int:
-        kind, row = channel
-        return next(k for k, (i, f) in enumerate(self.factors) if i == row and kind in f.kinds)
+        self._factors = [(i, factor) for i in rows for factor in factors(robot, i)]
+        self._before = before[None]
+        self._upto = [self._before]
+        for _, factor in self._factors:
+            self._upto.append(product(self._upto[-1], factor.matrices))
+        self._onward = [after[None]]
+        for _, factor in reversed(self._factors):
+            self._onward.append(product(factor.matrices, self._onward[-1]))
+        self._onward.reverse()
 
     def poses(self) -> Array:
         """Return the weights of the pose, shape (features, 4, 4)."""
-        return product([factor.matrices for _, factor in self.factors])
+        return product(self._upto[-1], self._onward[-1])
 
-    def velocities(self, channels: list[Channel]) -> tuple[Array, Array]:
-        """Return weights of the tip's velocity and of the axis, in the frame before the piece.
+    def velocities(self, channels: Sequence[Channel]) -> tuple[Array, Array]:
+        """
+        Return weights of the tip's velocity and of the axis, in the frame before the piece.
 
         Shape (features, 3, channels) both.
         """
         moved, axes = [], []
         for channel in channels:
-            k = self._place(channel)
-            matrices = [factor.matrices for _, factor in self.factors]
-            axis = self.factors[k][1].axis
-            moved.append(product([*matrices[:k], generator(axis)[None], *matrices[k:]])[:, :3, 3])
-            axes.append(self._screw(k)[:, 3:])
+            k, axis = self._place(channel)
+            turned = self._upto[k] @ generator(axis)
+            moved.append(product(turned, self._onward[k][:, :, 3:])[:, :3, 0])
+            axes.append(self._axis(k, axis))
         return _stack(moved), _stack(axes)
 
-    def screws(self, channels: list[Channel]) -> tuple[Array, Array]:
+    def screws(self, channels: Sequence[Channel]) -> tuple[Array, Array]:
         """Return weights of the moment about the origin and of the axis; shapes as above."""
-        found = [self._screw(self._place(channel)) for channel in channels]
-        return _stack([screw[:, :3] for screw in found]), _stack([s[:, 3:] for s in found])
+        acting = [adjoint(self._before)]
+        for _, factor in self._factors:
+            acting.append(product(acting[-1], adjoint(factor.matrices)))
+        moments, axes = [], []
+        for channel in channels:
+            k, axis = self._place(channel)
+            moments.append(self._all_features(acting[k][:, :3, 3 + axis]))
+            axes.append(self._axis(k, axis))
+        return _stack(moments), _stack(axes)
 
-    def _screw(self, place: int) -> Array:
-        """Return the weights of the screw of a factor, shape (features, 6)."""
-        unit = np.zeros((1, 6, 1))
-        unit[0, 3 + self.factors[place][1].axis] = 1.0
-        out = unit
-        for k in range(len(self.factors) - 1, -1, -1):
-            matrix = adjoint(self.factors[k][1].matrices)
-            if k >= place:
-                matrix = np.eye(6)[None] * (np.arange(len(matrix)) == 0)[:, None, None]
-            out = np.einsum('aij,bjk->abik', matrix, out).reshape(-1, 6, 1)
-        return out[..., 0]
+    def _place(self, channel: Channel) -> tuple[int, int]:
+        """Return before which factor a channel acts, and about which axis."""
+        kind, row = channel
+        return next(
+            (k, f.axis) for k, (i, f) in enumerate(self._factors) if i == row and kind in f.kinds
+        )
+
+    def _axis(self, place: int, axis: int) -> Array:
+        return self._all_features(self._upto[place][:, :3, axis])
+
+    def _all_features(self, weights: Array) -> Array:
+        """Return weights on the features of all joints: the joints not yet met are left at 1."""
+        out = np.zeros((len(weights), len(self._upto[-1]) // len(weights), weights.shape[1]))
+        out[:, 0] = weights
+        return out.reshape(-1, weights.shape[1])
 
 
 def _stack(parts: list[Array]) -> Array:

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-STALLED = 0.5
-"""Seconds without an answer after which the window is taken to be too small."""
+STALLED = 5.0
+"""Seconds without an answer after which the window is taken to be too small: a loaded machine may
+starve a listener for a second or two, and a wider window would then overflow its queue."""
 
 
 class Pump:

@@ -10,7 +10,7 @@ from weld_twin_msgs_py.yaml_file import yaml_text
 from ..harness import Cell, Tap
 from .job import Job, Progress
 
-LIMIT = 45.0
+LIMIT = 120.0
 """Seconds the run may take on a slow machine."""
 
 

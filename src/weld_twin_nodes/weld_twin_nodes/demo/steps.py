@@ -24,7 +24,9 @@ from .analysis import analyse
 from .job import Job, Step
 from .live import run_live
 from .picture import draw
+from .ranking import rank
 from .table import MARK, write_table
+from .verdict import find_causes
 
 ROBOT = 'ur5'
 SEAM = 'polyline'
@@ -46,8 +48,10 @@ STEPS = (
     Step('plan the seam', plan_seam),
     Step('weld it with five live nodes and record', run_live),
     Step('compare the bag with the twin', analyse),
-    Step('write the table', write_table),
+    Step('rank what matters on this seam', rank),
     Step('draw the seam', draw),
+    Step('find what the twin does not know', find_causes),
+    Step('write the table', write_table),
 )
 
 

@@ -25,7 +25,7 @@ def write_table(job: Job, _: object) -> None:
     np.savetxt(
         job.folder / 'deviation.csv', rows, delimiter=',', header=COLUMNS, comments='', fmt='%.9g'
     )
-    job.lines += _summary(job)
+    job.lines = _summary(job) + job.lines
     write_text(job.folder / MARK, '\n'.join(job.lines) + '\n')
 
 

@@ -22,6 +22,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.outputs import write_text
 
@@ -45,7 +46,7 @@ class Task:
     @property
     def key(self) -> str:
         """Return the name of its result."""
-        return digest(self.function, *self.arguments)
+        return digest(__version__, self.function, *self.arguments)
 
 
 class Pool(Protocol):

@@ -53,7 +53,7 @@ def expected_deviation(study: Study, tolerances: Sequence[Tolerance]) -> Array:
     columns = [place[t.effect, t.joint, t.parameter, t.index] for t in tolerances]
     bias = poses.position - study.nominal.position
     scatter = (change[:, :3, columns] * std) ** 2
-    return np.sqrt((bias**2).sum(axis=-1) + scatter.sum(axis=(1, 2)))
+    return np.asarray(np.sqrt((bias**2).sum(axis=-1) + scatter.sum(axis=(1, 2))))
 
 
 def expected_rms(study: Study, tolerances: Sequence[Tolerance]) -> float:
@@ -242,7 +242,7 @@ class _Search:
         known = np.array([p.rotation, p.x, p.y, p.yaw])
 
         def full(part: Array) -> Array:
-            values = known.copy()
+            values: Array = known.copy()
             values[free] = part
             return values
 
@@ -259,7 +259,7 @@ class _Search:
         simplex = first + np.vstack([np.zeros(len(free)), np.diag(-0.1 * self.span[free])
                                      * np.sign(first + 1e-12)])  # fmt: skip
         found = minimize(bounded, first, method='Nelder-Mead', options={
-            'initial_simplex': simplex, 'maxfev': 30 * len(free), 'xatol': 1e-4, 'fatol': 1e-9,
+            'initial_simplex': simplex, 'maxfev': tries * len(free), 'xatol': 1e-4, 'fatol': 1e-9,
         })  # fmt: skip
         values = full(found.x) if found.fun < min(costs) else full(first)
         return self.result(label, values)

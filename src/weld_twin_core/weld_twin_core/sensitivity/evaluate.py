@@ -53,7 +53,7 @@ class Model:
         parts = []
         for start in range(0, len(wanted), rows):
             off = exact_deviations(self.study, self.tolerances, wanted[start : start + rows])
-            parts.append(outcomes(*np.moveaxis(off, -1, 0), self.study.length))
+            parts.append(outcomes(np.moveaxis(off, -1, 0), self.study.length))
         return joined(parts)
 
     def at_probabilities(self, unit: Array) -> Outcomes:

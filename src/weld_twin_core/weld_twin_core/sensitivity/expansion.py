@@ -17,18 +17,20 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..chain import jacobian
 from ..effects import REGISTRY, Stage
 from ..twin import Twin
 from .outcome import Outcomes, joined, outcomes
-from .remembered import MEMORY, Remembered, Rest, remembered
+from .remembered import MEMORY, Remembered, remembered
 from .study import Study
 from .tolerance import Tolerance, with_draws
 
 CHUNK = 60_000
 """Runs times path points worked on at once; a few of such arrays fit the processor's cache."""
+Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
 _BLOCK = 8192
 """Runs whose play and lag are worked out together."""
 _RANK = 1e-7
@@ -61,7 +63,7 @@ class Expansion:
     study: Study
     tolerances: tuple[Tolerance, ...]
     scale: Array
-    products: tuple[Array, Array]
+    products: Pairs
     weights: Array
     shapes: Array
     memory: tuple[Remembered, ...]
@@ -69,7 +71,8 @@ class Expansion:
 
     def deviations(self, draws: Array) -> Array:
         """Return deviations along, across and normal, shape (3, D, N) [m], of draws (D, P)."""
-        return self._deviations(draws, self._rests(draws), slice(None))
+        left = self._left(draws)
+        return self._deviations(draws, left, slice(None))[:, :, np.argsort(left.order)]
 
     def outcomes(self, draws: Array) -> Outcomes:
         """Return what runs come to, in chunks of bounded memory."""
@@ -77,27 +80,48 @@ class Expansion:
         parts = []
         for start in range(0, len(draws), _BLOCK):
             block = draws[start : start + _BLOCK]
-            rests = self._rests(block)
+            left = self._left(block)
             for k in range(0, len(block), rows):
                 chunk = slice(k, k + rows)
-                off = self._deviations(block[chunk], rests, chunk)
-                parts.append(outcomes(*off, self.study.length))
+                off = self._deviations(block[chunk], left, chunk)
+                parts.append(outcomes(off, self.study.length))
         return joined(parts)
 
-    def _rests(self, draws: Array) -> list[Rest]:
-        return [part.rest(self.study, draws) for part in self.memory]
+    def _left(self, draws: Array) -> _Left:
+        """Return what the slopes leave, the path points where any joint has something put last."""
+        rests = [part.rest(self.study, draws) for part in self.memory]
+        where = np.zeros(self.study.samples, dtype=bool)
+        for rest in rests:
+            where |= rest.where
+        joints = [
+            (rest.table[:, None, where] * moved[:, where], rest.row)
+            for rest, moved in zip(rests, self.moved, strict=True)
+        ]
+        order = np.argsort(where, kind='stable')
+        return _Left(order, np.ascontiguousarray(self.shapes[:, :, order]), joints)
 
-    def _deviations(self, draws: Array, rests: list[Rest], chunk: slice) -> Array:
-        x = draws / self.scale
+    def _deviations(self, draws: Array, left: _Left, chunk: slice) -> Array:
+        x = np.ascontiguousarray((draws / self.scale).T)
         first, second = self.products
-        features = np.concatenate([x, x[:, first] * x[:, second]], axis=1)
-        out: Array = (features @ self.weights) @ self.shapes
-        for rest, moved in zip(rests, self.moved, strict=True):
-            if rest.span.stop > rest.span.start:
-                values = rest.table[rest.row[chunk]]
-                for axis in range(3):
-                    out[axis, :, rest.span] += moved[axis, rest.span] * values
+        features = np.concatenate([x, x[first] * x[second]])
+        out: Array = (features.T @ self.weights) @ left.shapes
+        for table, row in left.joints:
+            touched = out[:, :, out.shape[2] - table.shape[2] :]
+            touched += table[row[chunk]].swapaxes(0, 1)
         return out
+
+
+class _Left(NamedTuple):
+    """
+    What the slopes leave of some draws.
+
+    ``order`` of the path points (N,) puts those where anything is left last, K of them;
+    ``shapes`` are in it. ``joints`` are deviations (U, 3, K) there, and which a draw has (D,).
+    """
+
+    order: NDArray[np.intp]
+    shapes: Array
+    joints: list[tuple[Array, NDArray[np.intp]]]
 
 
 def expandable(tolerances: Sequence[Tolerance]) -> bool:
@@ -121,7 +145,7 @@ def expand(study: Study, tolerances: Sequence[Tolerance]) -> Expansion:
     scale = np.array([abs(t.distribution.mean) + t.distribution.std for t in tolerances])
     memory = remembered(study, tolerances, scale)
     products = np.triu_indices(len(tolerances))
-    columns = _columns(_Runs(study, tolerances, scale, memory), *products)
+    columns = _columns(_Runs(study, tolerances, scale, memory), products)
     flat = columns.reshape(len(columns), -1)
     strength, left = np.linalg.eigh(flat @ flat.T)
     left = left[:, strength > _RANK**2 * strength[-1]]
@@ -165,11 +189,12 @@ class _Runs(NamedTuple):
         position = twin.pointwise(view).poses.position
         deviation = study.on_seam(position - study.nominal.position)
         wide = np.broadcast_to(deviation, (len(draws), *deviation.shape[-2:]))
-        return wide.swapaxes(-1, -2)
+        return np.asarray(wide.swapaxes(-1, -2))
 
 
-def _columns(runs: _Runs, first: Array, second: Array) -> Array:
+def _columns(runs: _Runs, pairs: Pairs) -> Array:
     """Return first and second derivatives by scaled errors, shape (P + F, 3, N)."""
+    first, second = pairs
     unit = np.eye(len(runs.tolerances))
     off = first != second
     up, down = runs.deviations(unit), runs.deviations(-unit)

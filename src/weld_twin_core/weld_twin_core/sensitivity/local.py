@@ -72,12 +72,12 @@ class LocalSensitivity:
     @property
     def analytic(self) -> Array:
         """Return the slope of D at no error, shape (P, N) [m per unit]."""
-        return np.linalg.norm(self.vectors, axis=-1)
+        return np.asarray(np.linalg.norm(self.vectors, axis=-1))
 
     @property
     def peak(self) -> Array:
         """Return the slope of the largest D of the seam, shape (P,) [m per unit]."""
-        return self.analytic.max(axis=1)
+        return np.asarray(self.analytic.max(axis=1))
 
     @property
     def normalized(self) -> Array:
@@ -87,7 +87,7 @@ class LocalSensitivity:
     @property
     def rms(self) -> Array:
         """Return the rms of the slope over the arc length, shape (P,) [m per unit]."""
-        return np.sqrt((self.analytic**2 * self.weights).sum(axis=1))
+        return np.asarray(np.sqrt((self.analytic**2 * self.weights).sum(axis=1)))
 
     @property
     def disagreement(self) -> Array:
@@ -104,7 +104,7 @@ class LocalSensitivity:
         """Return the rms deviation that the scatter of each parameter makes, shape (P,) [m]."""
         size = np.array([np.hypot(t.distribution.mean, t.distribution.std)
                          for t in self.tolerances])  # fmt: skip
-        return self.rms * size
+        return np.asarray(self.rms * size)
 
     def groups(self, by: str = 'effect') -> dict[str, float]:
         """Return contributions by 'effect' or 'site', root sum of squares, largest first [m]."""
@@ -141,7 +141,7 @@ class LocalSensitivity:
 
 def _relative(difference: Array, scale: Array) -> Array:
     # A joint whose axis runs through the tool point does not move it; rounding is no slope.
-    return np.nanmax(np.abs(difference), axis=1) / np.maximum(scale, 1e-9)
+    return np.asarray(np.nanmax(np.abs(difference), axis=1) / np.maximum(scale, 1e-9))
 
 
 def arc_weights(s: Array) -> Array:
@@ -152,7 +152,7 @@ def arc_weights(s: Array) -> Array:
     each = np.zeros(len(s))
     each[:-1] += 0.5 * steps
     each[1:] += 0.5 * steps
-    return each / each.sum()
+    return np.asarray(each / each.sum())
 
 
 def local_sensitivity(study: Study, tolerances: Sequence[Tolerance]) -> LocalSensitivity:
@@ -199,9 +199,9 @@ def _at_tolerance(
         for k in (0.0, 1.0, -1.0)
     )
     slopes = np.zeros(distance.shape)
-    for k, row in enumerate(at):
-        vectors, _ = _linearised(study, tolerances, row)
-        along = (vectors[k] * here[k]).sum(axis=-1)
+    for k, tolerance in enumerate(tolerances):
+        vectors, _ = _linearised(study, (tolerance,), size[k : k + 1])
+        along = (vectors[0] * here[k]).sum(axis=-1)
         np.divide(along, distance[k], out=slopes[k], where=distance[k] > 0.0)
     after, before = (high - distance) / step[:, None], (distance - low) / step[:, None]
     largest = np.abs(slopes).max(axis=1, keepdims=True)
@@ -229,4 +229,5 @@ def posture(study: Study) -> Posture:
     q = motion.q if study.at is None else motion.at(study.at)[0]
     strength = np.linalg.svd(jacobian(study.robot, q)[..., :3, :], compute_uv=False)
     smallest = np.maximum(strength[..., -1], np.finfo(float).tiny)
-    return Posture(strength[..., 0] / smallest, strength.prod(axis=-1), strength[..., 0])
+    gain = np.asarray(strength[..., 0], dtype=np.float64)
+    return Posture(gain / smallest, strength.prod(axis=-1), gain)

@@ -126,9 +126,13 @@ class MorrisDesign:
             self._problem(), self.samples(), values, num_levels=LEVELS,
             seed=np.random.default_rng([self.seed, 1]),
         )  # fmt: skip
-        keys = ('mu_star', 'mu_star_conf', 'sigma')
-        measures = (np.asarray(found[key], dtype=np.float64) for key in keys)
-        return Screening(self.names, *measures, self.trajectories, values.size, self.seed)
+        mean, half, scatter = (
+            np.asarray(found[key], dtype=np.float64)
+            for key in ('mu_star', 'mu_star_conf', 'sigma')
+        )
+        return Screening(
+            self.names, mean, half, scatter, self.trajectories, values.size, self.seed
+        )
 
 
 def morris_screening(

@@ -11,8 +11,6 @@ import numpy as np
 from ..arrays import Array
 from ..errors import DataError
 
-ALONG, ACROSS, NORMAL = range(3)
-
 
 class Outcomes(NamedTuple):
     """
@@ -30,8 +28,9 @@ class Outcomes(NamedTuple):
     stickout_m: Array
 
 
-def outcomes(along: Array, across: Array, normal: Array, length: float) -> Outcomes:
-    """Return the numbers of runs from their deviations, shape (D, N) [m] each."""
+def outcomes(off: Array, length: float) -> Outcomes:
+    """Return the numbers of runs from deviations along, across and normal, shape (3, D, N) [m]."""
+    along, across, normal = off
     square = along * along
     square += across * across
     square += normal * normal

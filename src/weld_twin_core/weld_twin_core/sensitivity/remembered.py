@@ -26,14 +26,19 @@ _NOTHING = 1e-15
 
 class Rest(NamedTuple):
     """
-    What the slopes leave: displacements of every different draw, shape (U, K), and where they go.
+    What the slope leaves: displacements of every different draw, shape (U, N).
 
-    ``row`` says which of them a draw has, shape (D,); ``span`` is the K path points.
+    ``row`` says which of them a draw has, shape (D,).
     """
 
     table: Array
     row: NDArray[np.intp]
-    span: slice
+
+    @property
+    def where(self) -> NDArray[np.bool_]:
+        """Return at which path points anything is left, shape (N,)."""
+        found: NDArray[np.bool_] = np.abs(self.table).max(axis=0) > _NOTHING
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +65,18 @@ class Remembered:
 
     def rest(self, study: Study, draws: Array) -> Rest:
         """Return what the slope leaves of the displacements by draws, shape (D, P)."""
-        # Sobol's design repeats every value many times.
-        own, row = np.unique(draws[:, self.columns], axis=0, return_inverse=True)
+        own, row = _different(draws[:, self.columns])
         left = displacement(study, self.joint, self.tolerances, own) - own @ self.slope
-        where = np.flatnonzero(np.abs(left).max(axis=0) > _NOTHING)
-        span = slice(int(where[0]), int(where[-1]) + 1) if where.size else slice(0, 0)
-        return Rest(np.ascontiguousarray(left[:, span]), row.ravel(), span)
+        return Rest(left, row)
+
+
+def _different(draws: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the rows that differ and which of them each is; Sobol's design repeats them often."""
+    if draws.shape[1] == 1:  # sorting numbers is several times faster than sorting rows
+        values, row = np.unique(draws[:, 0], return_inverse=True)
+        return values[:, None], row
+    values, row = np.unique(draws, axis=0, return_inverse=True)
+    return values, row.ravel()
 
 
 def remembered(

@@ -3,8 +3,8 @@
 """
 Sobol indices: which error the scatter of the deviation comes from, alone and with the others.
 
-SALib draws the design and estimates the indices. Its seeds and its silence about results that are
-not numbers are taken care of here.
+SALib estimates the indices. Its seeds and its silence about results that are not numbers are taken
+care of here.
 
 References
 ----------
@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import qmc
 
 from ..arrays import Array
 from ..errors import DataError
@@ -28,7 +29,7 @@ from .outcome import refuse_unfinite
 
 CONFIDENCE = 0.95
 SETTLED = 0.05
-"""Half-width of the interval of a total index below which a study counts as converged."""
+"""Half-width and change of a total index below which a study counts as converged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +46,13 @@ class SobolIndices:
     base_samples, runs : int
     mean, std : float
         Of the result over the runs.
-    halves : array, shape (K, 2)
-        For K growing parts of the base samples: how many, and the largest half-width of a total
+    halves : array, shape (2, 2)
+        For half and all of the base samples: how many, and the largest half-width of a total
         index with them.
+    change : float
+        Largest change of a total index from half to all of the base samples.
     converged : bool
-        Whether the last of these is below `SETTLED`.
+        Whether the last half-width and the change are below `SETTLED`.
     seed : int
 
     """
@@ -64,6 +67,7 @@ class SobolIndices:
     mean: float
     std: float
     halves: Array
+    change: float
     converged: bool
     seed: int
 
@@ -80,9 +84,10 @@ class SobolIndices:
             'base_samples': self.base_samples, 'runs': self.runs, 'seed': self.seed,
             'confidence': CONFIDENCE, 'mean': self.mean, 'std': self.std,
             'sum_S1': float(self.first.sum()), 'converged': self.converged,
-            'convergence': [
-                {'base_samples': int(n), 'largest_ST_half': float(h)} for n, h in self.halves
-            ],
+            'convergence': {
+                'widest_ST_half': {int(n): float(h) for n, h in self.halves},
+                'largest_ST_change': self.change,
+            },
             'indices': rows,
         }  # fmt: skip
 
@@ -135,12 +140,13 @@ class SobolDesign:
 
     def samples(self) -> Array:
         """Return probabilities of every input, shape (N (G + 2), P)."""
-        from SALib.sample import sobol
-
-        values: Array = sobol.sample(
-            self._problem(), self.base_samples, calc_second_order=False, seed=self.seed
-        )
-        return values
+        inputs = len(self.names)
+        # The layout SALib's estimator expects; its own sampler fills it one number at a time.
+        base = qmc.Sobol(2 * inputs, seed=self.seed).random(self.base_samples)
+        one, other = base[:, :inputs], base[:, inputs:]
+        groups = np.array(self.groups or self.names)
+        blocks = [one, *(np.where(groups == g, other, one) for g in self.labels), other]
+        return np.stack(blocks, axis=1).reshape(-1, inputs)
 
     def indices(self, results: Array) -> SobolIndices:
         """
@@ -161,14 +167,15 @@ class SobolDesign:
         refuse_unfinite(values, 'Sobol indices')
         if np.ptp(values) == 0.0:
             raise DataError('the result is the same in all runs; there is no scatter to share out')
-        parts = [self.base_samples // 4, self.base_samples // 2, self.base_samples]
+        parts = [self.base_samples // 2, self.base_samples]
         found = [self._analyse(values[: n * block]) for n in parts]
         halves = np.array([[n, f['ST_conf'].max()] for n, f in zip(parts, found, strict=True)])
-        last = found[-1]
+        before, last = found
+        change = float(np.abs(last['ST'] - before['ST']).max())
         return SobolIndices(
             self.labels, last['S1'], last['S1_conf'], last['ST'], last['ST_conf'],
             self.base_samples, values.size, float(values.mean()), float(values.std()), halves,
-            bool(halves[-1, 1] < SETTLED), self.seed,
+            change, bool(max(halves[-1, 1], change) < SETTLED), self.seed,
         )  # fmt: skip
 
     def _analyse(self, values: Array) -> dict[str, Array]:

@@ -66,7 +66,7 @@ def claims_markdown(result: dict[str, Any]) -> str:
         '|---|---|---|---|---|',
     ]  # fmt: skip
     lines += [
-        f'| {c["statement"]} | {c["where"]} | {c["held"]} of {c["cases"]} | **{c["verdict"]}** '
+        f'| {c["statement"].replace("|J|", "‖J‖")} | {c["where"]} | {c["held"]} of {c["cases"]} | **{c["verdict"]}** '
         f'| {c["reason"].replace("|J|", "‖J‖")} |'
         for c in result['claims']
     ]

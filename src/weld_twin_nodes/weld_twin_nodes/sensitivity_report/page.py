@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
@@ -13,9 +14,9 @@ from weld_twin_core import __version__
 from ..report.html import Html, bars, joined, section, table, tag
 from .figures import Drawing
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 _STYLE = """
-figure { margin: 0 0 1.5rem; } figure svg { width: 100%; height: auto; background: #fff; }
+figure { margin: 0 0 1.5rem; } figure img { width: 100%; height: auto; background: #fff; }
 .claims td:nth-child(4) { font-weight: 600; min-width: 9rem; }
 .claims { font-size: .85rem; } table { margin-bottom: 1rem; }
 """
@@ -67,13 +68,14 @@ def _answer(motion: str, found: dict[str, Any]) -> Html:
     settled = 'converged' if indices['converged'] else 'not converged yet'
     return section(
         'Which tolerance to tighten',
-        tag('p', f'{best["name"]} first: its total index is {_index(best)} on the {motion} motion.',
-            class_='second'),
+        tag('p', f'{best["name"]} first: its total index is {_index(best)} on the {motion} '
+            'motion.', class_='second'),
         _bars(rows[:_SHOWN]),
         tag('p', f'Total Sobol indices of the largest deviation with 95 % intervals; '
             f'N = {indices["base_samples"]}, {indices["runs"]} runs, seed {indices["seed"]}, '
             f'{settled} (widest half-width '
-            f'{indices["convergence"][-1]["largest_ST_half"]:.3f}); sum of first-order indices '
+            f'{max(row["ST_half"] for row in rows):.3f}, change from half of N '
+            f'{indices["convergence"]["largest_ST_change"]:.3f}); sum of first-order indices '
             f'{indices["sum_S1"]:.2f}. The fast model is within {found["model_error"]:.0e} of the '
             'exact twin.', class_='note'),
         id_='answer',
@@ -192,7 +194,10 @@ def _recorded(recorded: dict[str, Any]) -> Html:
 
 
 def _figure(drawing: Drawing) -> Html:
-    return tag('figure', Html(drawing.svg), tag('figcaption', drawing.caption))
+    # As an image, neither the page's style nor another figure's glyphs can get into it.
+    data = b64encode(drawing.svg.encode()).decode()
+    picture = tag('img', src=f'data:image/svg+xml;base64,{data}', alt=drawing.caption)
+    return tag('figure', picture, tag('figcaption', drawing.caption))
 
 
 def _claims(claims: dict[str, Any]) -> Html:
@@ -202,7 +207,8 @@ def _claims(claims: dict[str, Any]) -> Html:
     ]
     heads = ('claim', 'in the paper', 'holds as written', 'verdict', 'why, as measured')
     lead = f'Measured on {", ".join(claims["robots"])}; seams {", ".join(claims["seams"])}.'
-    return section('The claims of the paper', table(heads, rows, 'claims'), id_='claims', lead=lead)
+    content = table(heads, rows, 'claims')
+    return section('The claims of the paper', content, id_='claims', lead=lead)
 
 
 def _setting(setting: dict[str, Any]) -> Html:

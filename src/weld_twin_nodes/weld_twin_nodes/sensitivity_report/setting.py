@@ -30,11 +30,12 @@ RECORDED = 'recorded'
 
 @dataclass(frozen=True)
 class Effort:
-    """How much a study runs: Sobol base samples, Monte Carlo runs, Morris trajectories."""
+    """How much is run: Sobol base samples, Monte Carlo runs, Morris trajectories, placements."""
 
     samples: int = 1024
     runs: int = 20_000
     trajectories: int = 50
+    placements: int = 32
     seed: int = 0
 
 
@@ -100,7 +101,8 @@ class Setting:
             'robot': self.robot.name, 'seam': self.seam, 'length_m': first.length,
             'path_points': first.samples, 'profiles': list(self.studies),
             'samples': self.effort.samples, 'runs': self.effort.runs,
-            'trajectories': self.effort.trajectories, 'seed': self.effort.seed,
+            'trajectories': self.effort.trajectories,
+            'placements': self.effort.placements, 'seed': self.effort.seed,
             'across_m': self.weld.across_m, 'stickout_m': self.weld.stickout_m,
             'known': [effect.to_mapping() for effect in self.known],
             'tolerances': [tolerance.to_mapping() for tolerance in self.tolerances],

@@ -32,8 +32,8 @@ OUTPUTS = ('d_norm', 'across_m', 'stickout_m')
 def run_study(setting: Setting, runner: Runner) -> dict[str, Any]:
     """Return everything the study finds."""
     out: dict[str, Any] = {'schema': SCHEMA, 'setting': setting.describe(), 'motions': {}}
-    pieces = _pieces(setting, runner)
     designs = {name: _Designs(setting, name) for name in setting.studies}
+    pieces = _pieces(setting, runner)
     jobs = {k: v for name, d in designs.items() for k, v in d.jobs(setting.studies[name]).items()}
     found = work.run_all(runner, jobs)
     for name, design in designs.items():
@@ -60,7 +60,8 @@ def _pieces(setting: Setting, runner: Runner) -> dict[tuple[str, str], Any]:
     if setting.path is not None:
         seam = setting.robot, setting.path, tolerances
         tasks['', 'placement'] = Task(
-            work.placement, (*seam, setting.torch, setting.effort.seed), 'placement'
+            work.placement,
+            (*seam, setting.torch, setting.effort.placements, setting.effort.seed), 'placement',
         )
         tasks['', 'profiles'] = Task(work.profiles, seam, 'profiles')
     return dict(zip(tasks, runner.run(list(tasks.values())), strict=True))

@@ -78,10 +78,11 @@ def profiles(robot: Robot, path: Path, tolerances: tuple[Tolerance, ...]) -> lis
 
 
 def placement(
-    robot: Robot, path: Path, tolerances: tuple[Tolerance, ...], torch: Torch, seed: int
+    robot: Robot, path: Path, tolerances: tuple[Tolerance, ...], torch: Torch, tries: int,
+    seed: int,
 ) -> list[dict[str, Any]]:
     """Return the best torch rotation and base placement."""
-    found = sensitivity.advise(robot, path, tolerances, torch=torch, seed=seed)
+    found = sensitivity.advise(robot, path, tolerances, torch=torch, tries=tries, seed=seed)
     return [result.as_dict() for result in found]
 
 

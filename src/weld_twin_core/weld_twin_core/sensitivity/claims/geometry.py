@@ -50,7 +50,7 @@ def initialization(case: Case) -> dict[str, float]:
 
 
 def _distance(case: Case, *effects: Effect) -> Array:
-    return np.linalg.norm(case.smooth.deviations(effects), axis=-1)
+    return np.asarray(np.linalg.norm(case.smooth.deviations(effects), axis=-1))
 
 
 def linearity(case: Case) -> dict[str, float]:
@@ -119,7 +119,8 @@ def _anywhere(case: Case) -> tuple[Array, Array]:
     rng = np.random.default_rng(case.seed)
     q = low + (high - low) * rng.random((_POSTURES, robot.n))
     strength = np.linalg.svd(jacobian(robot, q)[..., :3, :], compute_uv=False)
-    return strength[:, 0] / np.maximum(strength[:, -1], 1e-12), strength[:, 0]
+    gain = np.asarray(strength[:, 0], dtype=np.float64)
+    return gain / np.maximum(strength[:, -1], 1e-12), gain
 
 
 def bound(case: Case) -> dict[str, float]:

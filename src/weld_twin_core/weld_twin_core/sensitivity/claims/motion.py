@@ -28,7 +28,7 @@ _NEAR = 2
 
 
 def _distance(study: Study, effects: Sequence[Effect]) -> Array:
-    return np.linalg.norm(study.deviations(tuple(effects)), axis=-1)
+    return np.asarray(np.linalg.norm(study.deviations(tuple(effects)), axis=-1))
 
 
 def _rms(study: Study, distance: Array) -> float:
@@ -93,7 +93,7 @@ def locality(case: Case) -> dict[str, float]:
 def frequency(case: Case) -> dict[str, float]:
     """Measure what more reversals do to the mean and the peak, as play and as written."""
     few, many = case.reversing(2), case.reversing(20)
-    out = {}
+    out: dict[str, float] = {}
     for form, label in (('play', 'play'), ('reversal', 'written')):
         effects = [Backlash(joint, _WIDTH, form) for joint in case.robot.joint_names]
         a, b = (_distance(s, effects) for s in (few, many))
@@ -110,7 +110,7 @@ def frequency(case: Case) -> dict[str, float]:
 def planning(case: Case) -> dict[str, float]:
     """Measure the expected deviation by time law, geometry alone and with lag and play."""
     profiles = ('constant', 's-curve', 'smooth', 'aggressive')
-    out = {}
+    out: dict[str, float] = {}
     for label, families in (
         ('geometry', ('joint_offset', 'link_length', 'link_twist', 'base_pose')),
         ('lag', ('joint_offset', 'link_length', 'link_twist', 'backlash', 'servo_lag')),

@@ -71,10 +71,11 @@ RULES: tuple[Rule, ...] = (
         'backlash_local', 'Backlash deviates only locally, at reversals', 'IV.iv',
         lambda m: m['local_share_play'] > 0.9,
         lambda r: f'{r["local_share_play"] * 100.0:.0f} % of the squared deviation of play lies '
-        f'at the {r["local_share_of_points"] * 100.0:.0f} % of points near a reversal: half the gap '
-        f'stays until the next one; as written it is {r["local_share_written"] * 100.0:.0f} %',
+        f'at the {r["local_share_of_points"] * 100.0:.0f} % of points near a reversal, as half '
+        f'the gap stays until the next one; as written it is '
+        f'{r["local_share_written"] * 100.0:.0f} %',
         ('local_share_play', 'local_share_of_points', 'local_share_written'),
-        'backlash is the paper\'s one-sample formula, not play',
+        "backlash is the paper's one-sample formula, not play",
         lambda m: m['local_share_written'] > 0.9,
     ),
     Rule(
@@ -82,9 +83,10 @@ RULES: tuple[Rule, ...] = (
         lambda m: m['more_reversals_mean_play'] > 1.1,
         lambda r: f'from 2 to 20 reversals the mean deviation of play changes by the factor '
         f'{r["more_reversals_mean_play"]:.2f}; as written by '
-        f'{r["more_reversals_mean_written"]:.1f}, but then twice the sample rate makes it {r["finer_mean_written"]:.2f} of itself',
+        f'{r["more_reversals_mean_written"]:.1f}, but then twice the sample rate makes '
+        f'it {r["finer_mean_written"]:.2f} of itself',
         ('more_reversals_mean_play', 'more_reversals_mean_written', 'finer_mean_written'),
-        'backlash is the paper\'s one-sample formula, not play',
+        "backlash is the paper's one-sample formula, not play",
         lambda m: m['more_reversals_mean_written'] > 1.1,
     ),
     Rule(
@@ -193,7 +195,8 @@ RULES: tuple[Rule, ...] = (
         'drift_superlinear', 'Combined errors make the drift grow faster than the path', 'V.vi',
         lambda m: m['drift_exponent_combined'] > 1.05,
         lambda r: f'power of the path length: combined {r["drift_exponent_combined"]:.2f}, '
-        f'angular {r["drift_exponent_angular"]:.2f}, initialization {r["drift_exponent_init"]:.2f}',
+        f'angular {r["drift_exponent_angular"]:.2f}, '
+        f'initialization {r["drift_exponent_init"]:.2f}',
         ('drift_exponent_combined', 'drift_exponent_angular', 'drift_exponent_init'),
     ),
     Rule(

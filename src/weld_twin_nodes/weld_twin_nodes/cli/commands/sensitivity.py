@@ -63,6 +63,7 @@ def _add_effort(group: argparse._ArgumentGroup) -> None:
         'two (default: 1024)')
     add('--runs', type=int, default=20_000, metavar='N', help='of the tolerance stack')
     add('--trajectories', type=int, default=50, metavar='N', help='of the Morris screening')
+    add('--placements', type=int, default=32, metavar='N', help='tried for the advice')
     add('--seed', type=int, default=0)
     add('--workers', type=int, default=0, metavar='N', help='processes (default: one a core)')
     add('--scheduler', default='', metavar='ADDRESS', help='Dask scheduler to run on instead')
@@ -108,7 +109,9 @@ def _setting(args: argparse.Namespace) -> Setting | None:
     common = {
         'robot': twin.robot, 'tolerances': _tolerances(args, twin.robot), 'known': twin.effects,
         'points': args.points, 'weld': WeldTolerance(args.across, args.stickout),
-        'effort': Effort(args.samples, args.runs, args.trajectories, args.seed),
+        'effort': Effort(
+            args.samples, args.runs, args.trajectories, args.placements, args.seed
+        ),
     }  # fmt: skip
     if args.bag:
         return Setting(
@@ -194,11 +197,10 @@ def _print_summary(place: Path) -> None:
 def _progress() -> Iterator[Callable[[int, int, str], None]]:
     """Yield where to tell progress; it shows on a terminal and leaves other streams alone."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
 
     console = Console(stderr=True)
-    columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
-               TimeElapsedColumn())  # fmt: skip
+    columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task('starting', total=None)
         yield lambda done, total, label: bar.update(

@@ -139,8 +139,8 @@ def profiles(setting: Setting) -> Drawing:
         label(axis, title, 'arc length [mm]', 'D [mm]')
         legend(axis, ncols=2, loc='upper left')
     caption = (
-        'Smooth against aggressive on the same seam: a constant offset deviates alike at equal arc '
-        'length, whatever the motion; a lag follows the speed.'
+        'Smooth against aggressive on the same seam: a constant offset deviates alike at equal '
+        'arc length, whatever the motion; a lag follows the speed.'
     )
     table = {key: np.concatenate(parts) for key, parts in rows.items()}
     return Drawing('figure-08', caption, table, svg(figure))
@@ -169,8 +169,8 @@ def play(setting: Setting) -> Drawing:
     picture = _play_picture(study, stem, q, off, turned, _AXES[axis])
     caption = (
         'Backlash of one joint: a gap shifts the tool by half of it, to the side the joint came '
-        'from, until the next reversal; the formula as written has one sample of deviation at each '
-        'reversal and none between.'
+        'from, until the next reversal; the formula as written has one sample of deviation at '
+        'each reversal and none between.'
     )
     return Drawing('figure-09', caption, table, picture)
 

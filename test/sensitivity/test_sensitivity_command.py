@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The command: files it writes, how it fails, a recorded motion, and how fast it is."""
+
+import csv
+import json
+import time
+
+import numpy as np
+import pytest
+
+from weld_twin_core import catalog
+from weld_twin_core.paths import default_seam
+from weld_twin_core.sensitivity import default_tolerances, model, planned_study, sobol_indices
+from weld_twin_nodes.cli import main
+
+SMALL = ['--samples', '32', '--runs', '200', '--trajectories', '2', '--placements', '2',
+         '--points', '40', '--workers', '1']  # fmt: skip
+
+
+@pytest.fixture
+def two_effects(tmp_path):
+    """Return the path of a tolerance file."""
+    path = tmp_path / 'tolerances.yaml'
+    path.write_text('- {effect: joint_offset, std: 3e-4}\n- {effect: link_length, std: 1e-4}\n')
+    return str(path)
+
+
+@pytest.mark.slow
+def test_a_recorded_motion_is_studied_with_its_deviations_beside(tmp_path, two_effects, capsys):
+    effects = tmp_path / 'effects.yaml'
+    effects.write_text('- {effect: joint_offset, joint: elbow_joint, offset: 1e-3}\n')
+    bag, out = str(tmp_path / 'bag'), tmp_path / 'out'
+    assert main(['simulate', '--robot', 'ur5', '--effects', str(effects), '--out', bag]) == 0
+    # The bag holds the robot's model, so that it need not be named.
+    assert main(['sensitivity', bag, '--out', str(out), '--tolerances', two_effects, *SMALL]) == 0
+    result = json.loads((out / 'sensitivity.json').read_text())
+    assert list(result['motions']) == ['recorded']
+    lever = result['motions']['recorded']['local']['parameters']
+    peak = next(r for r in lever if r['name'] == 'joint_offset.elbow_joint.offset')
+    assert result['recorded']['max_m'] == pytest.approx(1e-3 * peak['S_analytic_peak_m'], rel=1e-3)
+    page = (out / 'sensitivity.html').read_text()
+    assert 'What was recorded' in page
+    assert 'https://' not in page and 'src="http' not in page
+    with (out / 'figures' / 'figure-recorded.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    assert max(float(r['recorded_m']) for r in rows) == result['recorded']['max_m']
+
+
+@pytest.mark.slow
+def test_one_command_writes_figures_indices_and_a_page(tmp_path, two_effects, capsys):
+    out = tmp_path / 'out'
+    words = ['sensitivity', '--robot', 'ur5', '--out', str(out), '--tolerances', two_effects]
+    assert main([*words, *SMALL]) == 0
+    assert 'tighten first' in capsys.readouterr().out
+    for number in range(6, 15):
+        assert (out / 'figures' / f'figure-{number:02}.svg').read_text().startswith('<svg')
+        assert len((out / 'figures' / f'figure-{number:02}.csv').read_text().splitlines()) > 20
+    result = json.loads((out / 'sensitivity.json').read_text())
+    assert set(result['motions']) == {'smooth', 'aggressive'}
+    assert {row['motion'] for row in csv.DictReader((out / 'indices.csv').open())} == {
+        'smooth', 'aggressive',
+    }  # fmt: skip
+    before = (out / 'sensitivity.json').read_bytes()
+    assert main([*words, *SMALL]) == 0
+    assert (out / 'sensitivity.json').read_bytes() == before
+
+
+def test_one_figure_is_drawn_alone_and_alike_every_time(tmp_path):
+    texts = []
+    for name in ('a', 'b'):
+        out = tmp_path / name
+        assert main(['sensitivity', '--robot', 'ur5', '--figure', '12', '--out', str(out)]) == 0
+        assert sorted(p.name for p in (out / 'figures').iterdir()) == [
+            'figure-12.csv', 'figure-12.svg',
+        ]  # fmt: skip
+        texts.append((out / 'figures' / 'figure-12.svg').read_text())
+    assert texts[0] == texts[1]
+
+
+@pytest.mark.parametrize(('words', 'message'), [
+    ([], 'give --robot R or a BAG'),
+    (['--robot', 'ur5', '--samples', '100'], 'power of two'),
+    (['--robot', 'ur5', '--figure', '3'], "no figure is called '3'"),
+    (['--robot', 'ur5', '--figure', 'recorded'], 'cannot be drawn of a planned seam'),
+    (['--robot', 'ur5', '--across', '0'], 'weld tolerances must be positive'),
+    (['--robot', 'ur5', '--points', '1'], 'at least 2 path points'),
+    (['--robot', 'ur5', '--tolerances', 'nowhere.yaml'], 'nowhere.yaml'),
+])  # fmt: skip
+def test_a_wrong_question_is_one_line_and_code_two(tmp_path, capsys, words, message):
+    assert main(['sensitivity', *words, '--out', str(tmp_path / 'out')]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count('\n') == 1
+
+
+def test_a_directory_of_something_else_is_left_alone(tmp_path, capsys):
+    (tmp_path / 'thesis.tex').write_text('')
+    assert main(['sensitivity', '--robot', 'ur5', '--out', str(tmp_path)]) == 2
+    assert 'holds something else' in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ['thesis.tex']
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('fourth', ['base_pose', 'backlash'])
+def test_a_study_of_24_parameters_takes_less_than_three_times_what_salib_takes(fourth):
+    from SALib.analyze import sobol as analysis
+    from SALib.sample import sobol as sampling
+
+    robot = catalog.load('ur5')
+    study = planned_study(robot, default_seam(robot), 'aggressive', points=200)
+    tolerances = default_tolerances(robot, ('joint_offset', 'link_length', 'link_twist', fourth))
+    names = [t.name for t in tolerances]
+    problem = {'num_vars': 24, 'names': names, 'bounds': [[0.0, 1.0]] * 24}
+    weights = np.arange(24.0)
+
+    def salib():
+        unit = sampling.sample(problem, 1024, calc_second_order=False, seed=1)
+        assert len(unit) == 26_624
+        return analysis.analyze(problem, unit @ weights, calc_second_order=False, seed=1)
+
+    def ours():
+        fast = model(study, tolerances)
+        return sobol_indices(lambda unit: fast.at_probabilities(unit).d_norm, names, 1024)
+
+    def seconds(work):
+        start = time.process_time()
+        work()
+        return time.process_time() - start
+
+    salib()
+    assert min(seconds(ours) for _ in range(3)) < 3.0 * min(seconds(salib) for _ in range(3))

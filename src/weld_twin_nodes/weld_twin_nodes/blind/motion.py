@@ -9,11 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.errors import PathError
-from weld_twin_core.paths import KINDS, Torch, default_seam
-from weld_twin_core.plan import plan
-from weld_twin_core.profiles import Aggressive, Profile, Smooth
 from weld_twin_core.robot import Robot
+
+from .seams import seam_motion, working_posture
 
 RATE = 125.0
 """Joint states a second."""
@@ -22,9 +20,6 @@ AIR_SPEED = 0.5
 """Mean joint speed [rad/s] from one seam to the next."""
 RAMP = 2.0
 """Seconds in which a free motion sets in."""
-TRIES = 40
-LONGEST = 2.0
-"""How many times as long as wanted a seam may take where the joints are slow."""
 
 
 class Motion(NamedTuple):
@@ -53,37 +48,15 @@ def motion(kind: str, robot: Robot, span: float, rng: np.random.Generator) -> Mo
 
 
 def _seams(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
-    """Return seams at random places round the robot, with motion through the air between."""
+    """Return seams at random places, with motion through the air between them."""
     pieces: list[Array] = []
     while sum(map(len, pieces)) < 0.8 * span * RATE:
-        piece = _seam(robot, 0.35 * span, rng)
+        piece = seam_motion(robot, 0.35 * span, RATE, rng)
         if pieces:
             pieces.append(_air(pieces[-1][-1], piece[0]))
         pieces.append(piece)
     q = np.concatenate(pieces)
     return Motion(np.arange(len(q)) / RATE, q)
-
-
-def _seam(robot: Robot, span: float, rng: np.random.Generator) -> Array:
-    """Return joint positions along one seam, smooth or aggressive, shape (N, n)."""
-    for _ in range(TRIES):
-        kind, turn = str(rng.choice(KINDS)), rng.uniform(-1.0, 1.0)
-        torch = Torch(work=rng.uniform(-0.3, 0.3), travel=rng.uniform(-0.3, 0.3))
-        hasty = rng.random() < 0.5
-        try:
-            seam = default_seam(robot, kind, torch)
-            speed = seam.length / span
-            law: Profile = Smooth(speed=speed)
-            if hasty:
-                law = Aggressive(speed=float(rng.uniform(0.05, 0.2)), reversals=6)
-            q = np.array(plan(robot, seam, law, RATE, torch=torch, fit=True).motion.q)
-        except PathError:
-            continue
-        # The same seam further round the first axis is as good a seam.
-        q[:, 0] += turn
-        if len(q) < LONGEST * span * RATE and _allowed(robot, q):
-            return q
-    raise PathError(f'none of {TRIES} seams drawn for {robot.name} is within its reach')
 
 
 def _air(start: Array, end: Array) -> Array:
@@ -93,16 +66,10 @@ def _air(start: Array, end: Array) -> Array:
     return start + (end - start) * (s**3 * (10.0 - 15.0 * s + 6.0 * s * s))[:, None]
 
 
-def _middle(robot: Robot) -> Array:
-    """Return a posture that bends the arm and stays away from the limits, shape (n,)."""
-    seam = plan(robot, default_seam(robot, 'line'), 'smooth', 10.0, fit=True)
-    return np.array(seam.motion.q[len(seam.motion.q) // 2])
-
-
 def _free(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
     """Return sums of slow sines about a working posture, every joint on its own."""
     t = np.arange(0.0, span, 1.0 / RATE)
-    centre = _middle(robot)
+    centre = working_posture(robot)
     ramp = np.clip(t / RAMP, 0.0, 1.0)
     ramp = ramp * ramp * (3.0 - 2.0 * ramp)
     waves = np.zeros((t.size, robot.n))
@@ -118,7 +85,7 @@ def _stations(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
     """Return stations scattered over the working space."""
     count = max(int(2.5 * span), 40)
     spread = np.minimum(0.4 * (robot.upper - robot.lower), 1.2)
-    q = _middle(robot) + rng.uniform(-1.0, 1.0, (count, robot.n)) * spread
+    q = working_posture(robot) + rng.uniform(-1.0, 1.0, (count, robot.n)) * spread
     return Motion(np.arange(count) * STATION_PAUSE, _inside(robot, q), static=True)
 
 
@@ -132,7 +99,3 @@ def _inside(robot: Robot, q: Array) -> Array:
     edge = 0.02 * (robot.upper - robot.lower)
     centre = np.clip(middle, robot.lower + reach + edge, robot.upper - reach - edge)
     return np.asarray(centre + squeeze * (q - middle))
-
-
-def _allowed(robot: Robot, q: Array) -> bool:
-    return bool((q > robot.lower).all() and (q < robot.upper).all())

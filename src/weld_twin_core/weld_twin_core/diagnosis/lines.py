@@ -13,7 +13,8 @@ from ..effects.base import Effect
 from ..features import Features
 from .problem import Model, Problem, Scale
 
-DENSE_ORDERS = 60
+DENSE_ORDERS = 100
+"""One per tooth of a 100:1 gear, the highest order that a search takes one by one."""
 HIGHEST_ORDER = 420
 LINE = 25.0
 """Chi-square of two degrees of freedom that a single line must reach: one false in 1e5 looks."""

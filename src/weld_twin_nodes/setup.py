@@ -18,7 +18,7 @@ setup(
         ('share/' + NAME + '/config', glob('config/*.yaml')),
     ],
     install_requires=['setuptools', 'numpy', 'PyYAML', 'rich', 'matplotlib'],
-    extras_require={'test': ['pytest']},
+    extras_require={'cluster': ['distributed'], 'test': ['pytest']},
     zip_safe=False,
     maintainer='weld_twin contributors',
     maintainer_email='maintainers@example.org',

@@ -120,5 +120,5 @@ def test_a_pool_follows_the_options():
 @pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_an_error_of_one_line():
     pytest.importorskip('distributed', reason='Dask is an extra')
-    with pytest.raises(DataError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
+    with pytest.raises(DataError, match='no Dask scheduler answers'):
         Cluster('tcp://127.0.0.1:9')

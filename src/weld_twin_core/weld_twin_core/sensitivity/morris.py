@@ -24,6 +24,7 @@ from ..arrays import Array
 from ..errors import DataError
 from .evaluate import Function
 from .outcome import refuse_unfinite
+from .salib import salib
 
 LEVELS = 8
 MARGIN = 0.02
@@ -100,9 +101,7 @@ class MorrisDesign:
 
     def samples(self) -> Array:
         """Return probabilities of every input, shape (trajectories (P + 1), P)."""
-        from SALib.sample import morris
-
-        values: Array = morris.sample(
+        values: Array = salib('sample.morris').sample(
             self._problem(), self.trajectories, num_levels=LEVELS,
             seed=np.random.default_rng([self.seed, 0]),
         )  # fmt: skip
@@ -118,11 +117,9 @@ class MorrisDesign:
             A result is not a number.
 
         """
-        from SALib.analyze import morris
-
         values = np.asarray(results, dtype=np.float64)
         refuse_unfinite(values, 'Morris screening')
-        found = morris.analyze(
+        found = salib('analyze.morris').analyze(
             self._problem(), self.samples(), values, num_levels=LEVELS,
             seed=np.random.default_rng([self.seed, 1]),
         )  # fmt: skip

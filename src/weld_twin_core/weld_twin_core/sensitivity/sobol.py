@@ -26,6 +26,7 @@ from ..arrays import Array
 from ..errors import DataError
 from .evaluate import Function
 from .outcome import refuse_unfinite
+from .salib import salib
 
 CONFIDENCE = 0.95
 SETTLED = 0.05
@@ -179,11 +180,9 @@ class SobolDesign:
         )  # fmt: skip
 
     def _analyse(self, values: Array) -> dict[str, Array]:
-        from SALib.analyze import sobol
-
         # SALib takes the seed 0 for no seed; a generator it takes for what it is.
         rng = np.random.default_rng(self.seed)
-        found = sobol.analyze(
+        found = salib('analyze.sobol').analyze(
             self._problem(), values, calc_second_order=False, conf_level=CONFIDENCE, seed=rng
         )
         return {key: np.asarray(value) for key, value in found.items()}

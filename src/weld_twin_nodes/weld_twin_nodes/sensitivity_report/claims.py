@@ -65,9 +65,9 @@ def claims_markdown(result: dict[str, Any]) -> str:
         '| Claim | In the paper | Holds as written | Verdict | Why, as measured |',
         '|---|---|---|---|---|',
     ]  # fmt: skip
-    lines += [
-        f'| {c["statement"].replace("|J|", "‖J‖")} | {c["where"]} | {c["held"]} of {c["cases"]} | **{c["verdict"]}** '
-        f'| {c["reason"].replace("|J|", "‖J‖")} |'
-        for c in result['claims']
-    ]
+    for c in result['claims']:
+        held = f'{c["held"]} of {c["cases"]}'
+        cells = (c['statement'], c['where'], held, f'**{c["verdict"]}**', c['reason'])
+        # The bars of a norm would end a cell.
+        lines.append('| ' + ' | '.join(cell.replace('|', '‖') for cell in cells) + ' |')
     return '\n'.join(lines) + '\n'

@@ -46,7 +46,8 @@ def run_study(setting: Setting, runner: Runner) -> dict[str, Any]:
             'profiles': pieces['', 'profiles'], 'placement': pieces['', 'placement'],
         }  # fmt: skip
     if RECORDED in setting.studies:
-        out['recorded'] = _recorded(setting, out['motions'][RECORDED])
+        stacked = found[designs[RECORDED].stack_label][0]
+        out['recorded'] = _recorded(setting, stacked)
     return out
 
 
@@ -86,6 +87,11 @@ class _Designs:
         self._effects = tuple(dict.fromkeys(t.effect for t in tolerances))
         self._morris = MorrisDesign(names, effort.trajectories, effort.seed)
 
+    @property
+    def stack_label(self) -> str:
+        """Return the label of the runs of the tolerance stack."""
+        return self._label('stack')
+
     def _label(self, what: str) -> str:
         return f'{self._motion}: {what}'
 
@@ -109,7 +115,7 @@ class _Designs:
             for by, design in self._sobol.items()
         }
         screened = self._morris.screening(found[self._label('Morris')][0].d_norm)
-        stacked, error = found[self._label('stack')]
+        stacked, error = found[self.stack_label]
         stack = self._stack(stacked)
         halved = {
             effect: self._stack(found[self._label(f'{effect} halved')][0]).as_dict()
@@ -118,7 +124,6 @@ class _Designs:
         return {
             'model_error': error, 'sobol': sobol, 'morris': screened.as_dict(),
             'stack': stack.as_dict(), 'halved': halved,
-            'stack_runs': {'max_m': stacked.max_m, 'rms_m': stacked.rms_m},
         }  # fmt: skip
 
     def _stack(self, runs: Outcomes) -> ToleranceStack:
@@ -136,14 +141,13 @@ def _indices(design: SobolDesign, found: Outcomes) -> dict[str, Any]:
     return out
 
 
-def _recorded(setting: Setting, motion: dict[str, Any]) -> dict[str, Any] | None:
+def _recorded(setting: Setting, stacked: Outcomes) -> dict[str, Any] | None:
     """Return the deviations that were measured, beside those the tolerances lead to expect."""
     study = setting.studies[RECORDED]
     off = recorded_deviations(study)
     if off is None:
         return None
     size = np.linalg.norm(off, axis=1)
-    runs = motion['global']['stack_runs']
     across, stickout = np.abs(off[:, 1]).max(), np.abs(off[:, 2]).max()
     return {
         't_s': study.t, 's_m': study.s, 'deviation_m': off,
@@ -154,7 +158,7 @@ def _recorded(setting: Setting, motion: dict[str, Any]) -> dict[str, Any] | None
             'stickout': bool(stickout <= setting.weld.stickout_m),
         },
         'share_of_runs_below': {
-            'max': float((np.asarray(runs['max_m']) < size.max()).mean()),
-            'rms': float((np.asarray(runs['rms_m']) < root_mean_square(size)).mean()),
+            'max': float((stacked.max_m < size.max()).mean()),
+            'rms': float((stacked.rms_m < root_mean_square(size)).mean()),
         },
     }  # fmt: skip

@@ -98,10 +98,11 @@ def diagnose(
     floor = sigma * float(np.sqrt(3.0))
     loose = structure(unseen, found.final.model, kept)
     progress('looked for what is left')
-    before, after = unseen.predict([]), unseen.predict(kept)
+    after = unseen.predict(kept)
+    shrink = held_out_shrink(found, unseen, holdout)
     slots = found.slots
     evidence = Evidence(
-        slots, loose, unseen.rms(before), unseen.rms(after), floor, independent,
+        slots, loose, shrink.rms_before_m, shrink.rms_after_m, floor, independent,
         _cancelling(unseen),
     )  # fmt: skip
     verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
@@ -113,7 +114,7 @@ def diagnose(
         gap=_gap(found, floor), where=where, status=verdict.status, effects=effects,
         confidence=verdict.confidence, indistinguishable=verdict.sets, reasons=verdict.reasons,
         candidates=_candidates(found, slots, evidence, unseen),
-        shrink=held_out_shrink(found, unseen, holdout),
+        shrink=shrink,
         unexplained=_unexplained(evidence, unseen, after),
         next_experiment=_next(found, slots, verdict),
         actions=actions([f.effect for f in effects], robot), checks=checks,

@@ -30,6 +30,7 @@ SEVERAL = 4
 """From this many on, the many are tried, and taken if they predict unseen stations better."""
 BETTER = 0.95
 SWAPS = 3
+HOPE = 0.3
 MISFIT = 0.012
 """Real edges are soft, springs harden, lags have a second pole: the model errs by this share."""
 MISFIT_DIRECTIONS = 30.0
@@ -84,15 +85,20 @@ class Search:
         return effective_rows(self.work.problem, found, self.bare_rss)
 
 
-def effective_rows(problem: Problem, found: Fit, bare_rss: float) -> float:
+def effective_rows(
+    problem: Problem, found: Fit, bare_rss: float, trust: float = 1.0
+) -> float:
     """
     Return the number of independent rows that a fit's evidence may count.
 
     Two things make a residual less telling than its count: autocorrelation, and physics richer
     than the model. An explained sum of squares E leaves about `MISFIT`^2 E of misfit in some
     `MISFIT_DIRECTIONS` directions, and any further column may pick that up by chance.
+
+    ``trust`` is how far to believe the autocorrelation, as its exponent: while causes are still
+    missing from the model, it is theirs.
     """
-    share = effective_share(found.residual, problem.rows, problem.samples)
+    share = effective_share(found.residual, problem.rows, problem.samples) ** trust
     count = share * found.residual.size
     explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
     return count / (1.0 + MISFIT**2 * explained / MISFIT_DIRECTIONS)
@@ -114,14 +120,17 @@ def search(
         def effective(found: Fit, bare: float = bare) -> float:
             return effective_rows(small, found, bare)
 
-        steps = forward(work, now, effective, MANY, progress)
-        if steps and len(steps) < MANY:
-            now = backward(work, steps[-1].fit, effective)
-            now = without_negligible(work, consolidated(work, now, effective))
-        elif steps:
-            now = steps[-1].fit
-        model = now.model
+        def hopeful(found: Fit, bare: float = bare) -> float:
+            return effective_rows(small, found, bare, HOPE)
+
+        steps = forward(work, now, hopeful, MANY, progress)
         dense = small.recordings[0].joints.static and len(steps) >= MANY
+        if steps:
+            now = steps[-1].fit
+        if steps and not dense:
+            now = backward(work, now, effective)
+            now = without_negligible(work, consolidated(work, now, effective))
+        model = now.model
         if dense or names(model) == before:
             break
         work, now, bare = _workspace(small, model, exclude)

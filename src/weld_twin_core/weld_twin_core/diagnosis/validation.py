@@ -9,9 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Array
+from ..effects.setup_motion import of_the_robot, seen_from
 from ..recording import Recording
-from .fit import fit
-from .heldout import Unseen
+from .fit import fit, robust_scale
+from .heldout import TRUSTED, Unseen
 from .problem import Model, Problem, usable
 from .result import Shrink
 from .search import Search
@@ -72,11 +73,12 @@ def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array,
     before, after, labels = [], [], []
     for recording in holdout:
         problem = Problem((usable(recording),), frozenset({'base'}) & found.problem.align)
-        pair = []
+        pair, good = [], np.ones(problem.samples[0], dtype=bool)
         for model in (found.baseline.model, found.final.model):
-            parts = problem.residuals(_for_bag(problem, model))
+            parts = problem.residuals(_for_bag(problem, model, found.problem.recordings))
             pair.append((parts[0][:3] ** 2).sum(axis=0))
-        good = pair[0] < 100.0 * np.median(pair[0])
+            # What is an outlier shows best against the better model, which comes last.
+            good = robust_scale(problem, parts).weights[0] >= TRUSTED
         before.append(pair[0][good])
         after.append(pair[1][good])
         stretch = np.arange(good.sum()) * 8 // max(int(good.sum()), 1)
@@ -84,15 +86,20 @@ def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array,
     return np.concatenate(before), np.concatenate(after), np.concatenate(labels)
 
 
-def _for_bag(problem: Problem, model: Model) -> Model:
+def _for_bag(problem: Problem, model: Model, recordings: Sequence[Recording]) -> Model:
     """Return the model with the base of the recording that the bag's set-up matches, or its own."""
-    choices = [Model(model.robot, (base,), model.known, model.found) for base in model.bases]
+    recording = problem.recordings[0]
+    choices = [
+        Model(model.robot, (base,), model.known,
+              seen_from(model.found, own.epoch_ns, own.span_ns, recording))
+        for base, own in zip(model.bases, recordings, strict=True)
+    ]  # fmt: skip
     sizes = [_size(problem, choice) for choice in choices]
     best = choices[int(np.argmin(sizes))]
     if 'base' in problem.align:
         bare = best.with_found(())
         frames = fit(problem, bare, problem.unit_scale()).model
-        own = Model(model.robot, frames.bases, model.known, model.found)
+        own = Model(model.robot, frames.bases, model.known, of_the_robot(model.found))
         if min(sizes) > MOVED * _size(problem, own):
             return own
     return best

@@ -23,8 +23,11 @@ CERTAIN = 3.0
 """Standard errors between stretches that a structure must exceed."""
 CANCEL = 3.0
 """Effects whose squares sum to this many times the square of their sum cancel each other."""
-CROWD = 4
-"""So many separate causes at once are more likely one that the library lacks."""
+CROWD = 3
+"""More separate causes than this at once are more likely one that the library lacks."""
+FAR_ABOVE = 1.5
+INCOMPLETE = 0.7
+"""Of verdicts that left this much above the floor, this share were right and complete."""
 STACKED = 0.75
 """Of two effects at rest on one joint this share were what they seemed."""
 CALIBRATION = 0.985
@@ -111,6 +114,8 @@ def decide(evidence: Evidence) -> Verdict:
     confidence = float(np.prod(mass)) * complete * CALIBRATION
     if _stacked(sets):
         confidence *= STACKED
+    if evidence.independent and evidence.after > FAR_ABOVE * evidence.floor:
+        confidence *= INCOMPLETE
     reasons = tuple(_alike(slot, chosen) for slot, chosen in zip(evidence.slots, sets, strict=True)
                     if len(chosen) > 1)  # fmt: skip
     status = 'ambiguous' if reasons else 'identified'

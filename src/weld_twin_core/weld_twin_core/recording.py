@@ -199,6 +199,13 @@ class Recording:
                     f'got {signal.value.shape}'
                 )
 
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """Return first and last joint stamp [ns]."""
+        ends = (round(float(self.joints.t[k]) * 1e9) for k in (0, -1))
+        first, last = (self.epoch_ns + end for end in ends)
+        return first, last
+
     def with_measured(self, measured: Measurements | None) -> Recording:
         """Return the recording with other measurements beside the same motion."""
         return replace(self, measured=measured)

@@ -13,7 +13,9 @@ import numpy as np
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.diagnosis.problem import Model
 from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects.setup_motion import of_the_robot, seen_from
 from weld_twin_core.errors import DataError, ModelError
+from weld_twin_core.recording import Recording
 from weld_twin_core.robot import Robot
 from weld_twin_core.twin import Twin
 
@@ -104,6 +106,23 @@ def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:
             f"diagnosis '{path}' has {len(model.bases)} set-up(s), there is no number {setup + 1}"
         )
     return model.twin(setup)
+
+
+def timed(path: Path | str, model: Model, setup: int, recording: Recording) -> Twin:
+    """
+    Return the twin of one set-up of a diagnosis file, for a recording at its time.
+
+    How the set-up itself moved is applied where the recording overlaps with the one diagnosed,
+    and left out elsewhere.
+    """
+    stored = read_diagnosis(path)['model']
+    twin = model.twin(setup)
+    try:
+        epoch, span = int(stored['epochs_ns'][setup]), stored['spans_ns'][setup]
+        effects = seen_from(twin.effects, epoch, (int(span[0]), int(span[1])), recording)
+    except (KeyError, IndexError, TypeError, ValueError):
+        effects = of_the_robot(twin.effects)
+    return Twin(twin.robot, effects)
 
 
 def one_base(model: Model) -> bool:

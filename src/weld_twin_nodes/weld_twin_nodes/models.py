@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.errors import ModelError
 from weld_twin_core.robot import Robot
 from weld_twin_core.twin import Twin
@@ -25,7 +26,8 @@ def build_twin(robot: Robot, model: Path | str = '', effects: str = '') -> Twin:
     ----------
     robot : Robot
     model : Path or str
-        An effects file, or a diagnosis (``.json``) with what it found; empty for none.
+        An effects file, or a diagnosis (``.json``) with what it found of the robot, how one
+        set-up moved left out; empty for none.
     effects : str
         More effects, in the form of an effects file.
 
@@ -41,7 +43,7 @@ def build_twin(robot: Robot, model: Path | str = '', effects: str = '') -> Twin:
     if Path(model).suffix.lower() != '.json':
         return Twin(robot, read_effects(model, robot) + more)
     known = _diagnosed(robot, model)
-    return Twin(known.robot, known.effects + more)
+    return Twin(known.robot, of_the_robot(known.effects) + more)
 
 
 def _diagnosed(robot: Robot, path: Path | str) -> Twin:

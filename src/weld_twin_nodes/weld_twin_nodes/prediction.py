@@ -15,15 +15,16 @@ from weld_twin_core.recording import Recording
 from weld_twin_core.robot import Robot
 from weld_twin_core.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
-from weld_twin_msgs_py.models import load_model, one_base, read_diagnosis, read_model
+from weld_twin_msgs_py.models import load_model, one_base, read_diagnosis, read_model, timed
 
 from .models import build_twin
 from .report.provenance import hashed
 
 
 def prediction_twin(
-    robot: Robot, path: Path | str, bag: Path | str, setup: int | None = None
-) -> Twin:
+    robot: Robot, path: Path | str, bag: Path | str, recording: Recording,
+    setup: int | None = None,
+) -> Twin:  # fmt: skip
     """
     Return the twin of a model file for a bag.
 
@@ -34,6 +35,8 @@ def prediction_twin(
         diagnosis.json or an effects file.
     bag : Path or str
         Where the diagnosis fitted a base frame per recording, its hash tells which is meant.
+    recording : Recording
+        What the bag holds; its stamps tell whether the set-up's own motion applies.
     setup : int, optional
         Which recording's base frame, counted from 1; overrides the bag.
 
@@ -45,22 +48,25 @@ def prediction_twin(
     """
     if Path(path).suffix.lower() != '.json' or 'model' not in read_diagnosis(path):
         return build_twin(robot, path)
-    if setup is not None:
-        return load_model(robot, path, setup - 1)
     model = read_model(robot, path)
-    if one_base(model):
-        return model.twin(0)
+    if setup is not None:
+        load_model(robot, path, setup - 1)
+        return timed(path, model, setup - 1, recording)
+    if len(model.bases) == 1:
+        return timed(path, model, 0, recording)
     known = [
         item['sha256'] for item in read_diagnosis(path).get('inputs', [])
         if item['use'] == 'recording'
     ]  # fmt: skip
     own = hashed('recording', bag).sha256
     if own not in known:
+        if one_base(model):
+            return timed(path, model, 0, recording)
         raise ModelError(
             f"diagnosis '{path}' has a base frame for each of its {len(model.bases)} recordings "
             f"and '{bag}' is none of them; choose one with --setup 1 to {len(model.bases)}"
         )
-    return model.twin(known.index(own))
+    return timed(path, model, known.index(own), recording)
 
 
 def write_prediction(

@@ -33,8 +33,8 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_nodes.prediction import prediction_twin, write_prediction
 
     robot = robot_of(args)
-    twin = prediction_twin(robot, args.model, args.bag, args.setup)
     recording = read_recording(args.bag, robot, topics_of(args))
+    twin = prediction_twin(robot, args.model, args.bag, recording, args.setup)
     made = {'model': str(args.model)}
     left = write_prediction(args.out, twin, recording, storage=args.storage, provenance=made)
     line = f'{args.out}: {recording.joints.t.size} poses with {len(twin.effects)} effects'

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A set-up's own motion seen from another recording: carried along in time, or left behind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..recording import Recording
+from .base import Effect
+from .setup_settling import SetupSettling
+from .setup_step import SetupStep
+
+
+def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the effects without those of one set-up."""
+    return tuple(e for e in effects if not isinstance(e, SetupSettling | SetupStep))
+
+
+def seen_from(
+    effects: Sequence[Effect], epoch_ns: int, span_ns: tuple[int, int], other: Recording
+) -> tuple[Effect, ...]:
+    """
+    Return effects for another recording: the set-up's motion at its right time, or left out.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    epoch_ns, span_ns : int, tuple of int
+        What the stamps of the recording whose set-up moved count from; its first and last stamp.
+    other : Recording
+        Where it does not overlap in time it is taken for another set-up.
+
+    """
+    first, last = other.span_ns
+    if last < span_ns[0] or first > span_ns[1]:
+        return of_the_robot(effects)
+    later = (other.epoch_ns - epoch_ns) * 1e-9
+    return tuple(_recounted(effect, later) for effect in effects)
+
+
+def _recounted(effect: Effect, later: float) -> Effect:
+    if isinstance(effect, SetupSettling):
+        return replace(effect, start=effect.start - later)
+    if isinstance(effect, SetupStep):
+        return replace(effect, time=effect.time - later)
+    return effect

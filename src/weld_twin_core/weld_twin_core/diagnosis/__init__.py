@@ -98,7 +98,6 @@ def diagnose(
     floor = sigma * float(np.sqrt(3.0))
     loose = structure(unseen, found.final.model, kept)
     progress('looked for what is left')
-    after = unseen.predict(kept)
     shrink = held_out_shrink(found, unseen, holdout)
     slots = found.slots
     evidence = Evidence(
@@ -113,9 +112,9 @@ def diagnose(
     return Diagnosis(
         gap=_gap(found, floor), where=where, status=verdict.status, effects=effects,
         confidence=verdict.confidence, indistinguishable=verdict.sets, reasons=verdict.reasons,
-        candidates=_candidates(found, slots, evidence, unseen),
+        candidates=_candidates(found, slots, evidence),
         shrink=shrink,
-        unexplained=_unexplained(evidence, unseen, after),
+        unexplained=_unexplained(evidence),
         next_experiment=_next(found, slots, verdict),
         actions=actions([f.effect for f in effects], robot), checks=checks,
         model=found.final.model, traces=_traces(found), absent=found.library.absent,
@@ -190,7 +189,7 @@ def _std(effect: Effect, variance: Array) -> dict[str, object]:
 
 
 def _candidates(
-    found: Search, slots: tuple[tuple[Rival, ...], ...], evidence: Evidence, unseen: Unseen
+    found: Search, slots: tuple[tuple[Rival, ...], ...], evidence: Evidence
 ) -> tuple[Candidate, ...]:
     """Return the hypotheses for every slot, those of the strongest effect first."""
     out = []
@@ -220,7 +219,7 @@ def _position_rms(found: Search, rival: Rival) -> float:
     return found.work.scale.position * float(np.sqrt(total / max(count, 1)))
 
 
-def _unexplained(evidence: Evidence, unseen: Unseen, after: Array) -> Unexplained:
+def _unexplained(evidence: Evidence) -> Unexplained:
     names = evidence.structure.depends_on if evidence.structured else ()
     return Unexplained(evidence.after, evidence.above_noise, names)
 

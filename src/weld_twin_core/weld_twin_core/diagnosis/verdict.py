@@ -27,11 +27,11 @@ CROWD = 3
 """More separate causes than this at once are more likely one that the library lacks."""
 FAR_ABOVE = 1.5
 INCOMPLETE = 0.7
-"""Of verdicts that left this much above the floor, this share were right and complete."""
+"""Belief left in a verdict whose remainder stands that far above the floor; a judgement."""
 STACKED = 0.75
-"""Of two effects at rest on one joint this share were what they seemed."""
+"""Belief left when two effects at rest sit on one joint; a judgement."""
 CALIBRATION = 0.985
-"""Even with evidence beyond doubt a verdict has been wrong this seldom on blind cases."""
+"""Belief left where all evidence agrees: no model is the robot; a judgement."""
 
 
 @dataclass(frozen=True, eq=False)

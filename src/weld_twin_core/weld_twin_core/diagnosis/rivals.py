@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.base import Effect
 from .fit import Fit, fit
 from .gram import Gram
 from .result import Site
-from .score import evidence
+from .score import Choice, evidence
 from .select import Workspace, fitted_with, ranking, without
 
 TEMPERATURE = 2.0
@@ -57,34 +56,31 @@ def rivals(
     effect = now.model.found[k]
     rest = fit(work.problem, without(now.model, k), work.scale, None, 4)
     gram = work.conditioned(rest.model, rest.residual)
-    choices = ranking(gram, work.library.units, effective(now))
+    ranked = ranking(gram, work.library.units, effective(now))
+    own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
     taken = {(e.name, e.site) for e in now.model.found}
-    choices = [c for c in choices if c.unit.site not in taken and c.nats > 0.0]
+    choices = [c for c in ranked if c.unit.site not in taken and c.nats > 0.0]
     reach = max(15.0, 0.35 * choices[0].nats) if choices else 0.0
     close = [c for c in choices if c.nats > choices[0].nats - reach][:SHORTLIST]
     fits = [fitted_with(work, rest.model, c.effect(gram)) for c in close]
     # One count for all rivals: see `select`.
     count = effective(min([now, *fits], key=lambda f: f.rss))
-    out = [Rival(Site(effect.name, effect.site), _nats(rest, now, count, _trials(work, effect)), now)]
+    out = [Rival(Site(effect.name, effect.site), _nats(rest, now, count, own), now)]
     for choice, other in zip(close, fits, strict=True):
-        nats = _nats(rest, other, count, choice.unit.trials)
-        # Unused components of a vector effect buy nothing and cost nothing.
-        spare = choice.unit.columns[choice.seed].size - choice.columns.size
-        if spare > 0:
-            nats += 0.5 * spare * float(np.log(max(count, 3.0)))
-        out.append(Rival(Site(*choice.unit.site), nats, other))
+        out.append(Rival(Site(*choice.unit.site), _nats(rest, other, count, choice), other))
     weights = np.exp((np.array([r.nats for r in out]) - max(r.nats for r in out)) / TEMPERATURE)
     weights /= weights.sum()
-    ranked = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
-    return tuple(sorted(ranked, key=lambda r: -r.probability))
+    weighed = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
+    return tuple(sorted(weighed, key=lambda r: -r.probability))
 
 
-def _trials(work: Workspace, effect: Effect) -> float:
-    unit = work.library.unit(effect.name, effect.site)
-    return 1.0 if unit is None else unit.trials
-
-
-def _nats(rest: Fit, full: Fit, count: float, trials: float) -> float:
+def _nats(rest: Fit, full: Fit, count: float, choice: Choice | None) -> float:
+    """Return the evidence of a fit in the place of an effect, by the rule that holds for all."""
     gram = Gram(np.zeros((0, 0)), np.zeros(0), rest.rss, rest.residual.size, np.zeros(0))
-    freedom = full.coordinates.size - rest.coordinates.size
-    return evidence(gram, rest.rss - full.rss, freedom, count) - float(np.log(max(trials, 1.0)))
+    freedom = float(full.coordinates.size - rest.coordinates.size)
+    trials = 1.0
+    if choice is not None:
+        # Unused components of a vector effect buy nothing and cost nothing.
+        freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
+        trials = max(choice.unit.trials, 1.0)
+    return evidence(gram, rest.rss - full.rss, freedom, count) - float(np.log(trials))

@@ -14,14 +14,14 @@ from weld_twin_core import catalog
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.blind.ambiguous import CONSTRUCTIONS, construct
 from weld_twin_nodes.blind.causes import FAMILIES, OUTSIDE, SIZES, draw, scaled
-from weld_twin_nodes.blind.cell import Cell, Take, deviation, floor, record, rigid, rms
 from weld_twin_nodes.blind.deck import KINDS, STRATA, Lot, lots
-from weld_twin_nodes.blind.make import draw_case
+from weld_twin_nodes.blind.displacement import correlation, rigid, rms
 from weld_twin_nodes.blind.motion import motion
-from weld_twin_nodes.blind.sizing import correlation
 
 pytest.importorskip('mujoco')
 
+from weld_twin_nodes.blind.cell import Cell, Take, deviation, floor, record
+from weld_twin_nodes.blind.make import draw_case
 from weld_twin_nodes.plant import KNOWN, Command, Tracker
 
 SIGMA = 2e-5

@@ -19,7 +19,7 @@ from weld_twin_msgs_py.models import read_model
 from weld_twin_msgs_py.robots import load_robot
 
 from . import layout
-from .cell import rigid, rms
+from .displacement import rigid, rms
 
 TO_90 = 1.6448536269514722 / 1.959963984540054
 """Half-width of a normal 90 % interval over that of a 95 % one."""

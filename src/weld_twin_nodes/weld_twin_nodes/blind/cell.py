@@ -20,6 +20,7 @@ from weld_twin_core.rotation import matrix_from_quaternion
 
 from ..plant import Command, PlantRecording, Tracker, run
 from .causes import Cause
+from .displacement import rigid, rms
 from .motion import Motion, motion
 
 SPANS = (20.0, 60.0)
@@ -198,22 +199,6 @@ def at_stamps(made: PlantRecording, t: Array) -> Array:
     if made.static:
         return made.position
     return np.asarray(CubicSpline(made.t_measured, made.position)(t))
-
-
-def rigid(points: Array, off: Array) -> Array:
-    """Return the part of a displacement (M, 3) that a moved base explains."""
-    centred = points - points.mean(axis=0)
-    turn = [np.cross(axis, centred) for axis in np.eye(3)]
-    columns = [column.ravel() for column in turn]
-    columns += [np.tile(axis, len(points)) for axis in np.eye(3)]
-    design = np.stack(columns, axis=1)
-    fitted, *_ = np.linalg.lstsq(design, off.ravel(), rcond=None)
-    return np.asarray((design @ fitted).reshape(off.shape))
-
-
-def rms(off: Array) -> float:
-    """Return the RMS length of vectors (M, 3)."""
-    return float(np.sqrt((off**2).sum(axis=1).mean()))
 
 
 def floor(cell: Cell, causes: Sequence[Cause], taken: Take) -> tuple[float, list[int]]:

@@ -33,10 +33,10 @@ from .cell import (
     draw_cell,
     floor,
     record,
-    rms,
     take,
 )
 from .deck import STRATA, Lot, lots
+from .displacement import rms
 from .sizing import Unseen, draw_causes, sized_together
 
 TRIES = 30
@@ -106,7 +106,6 @@ def make(
     _refuse_other(cases, truths, asked)
     if (cases / layout.CASES).exists():
         return str(layout.read(cases / layout.CASES)['seal'])
-    require_plant()
     drawn = lots(seed, count, kinds, tuple(CONSTRUCTIONS))
     truths.mkdir(parents=True, exist_ok=True)
     layout.write(truths / layout.TRUTHS, asked, overwrite=True)
@@ -134,16 +133,6 @@ def _refuse_other(cases: Path, truths: Path, asked: dict[str, Any]) -> None:
             )
     elif (cases / layout.CASES).exists():
         raise DataError(f"'{cases}' holds cases already; choose another place")
-
-
-def require_plant() -> None:
-    """Refuse to go on without the simulator."""
-    try:
-        import mujoco  # noqa: F401
-    except ImportError:
-        raise DataError(
-            "cases are simulated with MuJoCo; install it with: pip install 'weld-twin[bench]'"
-        ) from None
 
 
 def make_case(

@@ -34,10 +34,10 @@ from ..plant import Command, PlantRecording, Tracker
 from ..tasks import Runner, Task
 from . import layout, seal
 from .causes import FAMILIES, MOVING, Cause, draw, scaled, site
-from .cell import Cell, Take, at_stamps, record, rms
+from .cell import Cell, Take, at_stamps, record
 from .deck import STRATA, Deck
+from .displacement import rms
 from .judge import AS_IT_IS, SEMI_REAL
-from .make import require_plant
 
 RATE = 125.0
 TRAINING = 0.7
@@ -80,7 +80,6 @@ def make_semi_real(
         A bag cannot be used.
 
     """
-    require_plant()
     if (truths / layout.TRUTHS).exists() or (cases / layout.CASES).exists():
         raise DataError(f"'{cases}' or '{truths}' holds cases already; choose another place")
     layout.write(truths / layout.TRUTHS, {'seed': seed, 'count': count})

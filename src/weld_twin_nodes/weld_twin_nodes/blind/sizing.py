@@ -11,8 +11,9 @@ import numpy as np
 from weld_twin_core.arrays import Array
 
 from .causes import MOVING, SPREAD, Cause, draw, scaled
-from .cell import Cell, Take, deviation, rms
+from .cell import Cell, Take, deviation
 from .deck import STRATA
+from .displacement import correlation, rms
 
 TRIES = 6
 ALIKE = 0.95
@@ -89,12 +90,6 @@ def _one(
             return cause, off
         reason = Unseen(f'{family} moves the tool as another cause does')
     raise reason
-
-
-def correlation(a: Array, b: Array) -> float:
-    """Return the absolute correlation of two deviations, shape (M, 3) each."""
-    size = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return abs(float((a * b).sum())) / max(size, 1e-300)
 
 
 def sized_together(

@@ -26,6 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Make the cases and print the seal."""
+    from weld_twin_nodes.blind.simulator import require_simulator
+
+    require_simulator()
     from weld_twin_nodes.blind import layout
     from weld_twin_nodes.blind.make import make
 

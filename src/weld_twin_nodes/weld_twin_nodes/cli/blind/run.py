@@ -25,6 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run what is not done yet, and print the measures."""
+    from weld_twin_nodes.blind.simulator import require_simulator
+
+    require_simulator()
     from weld_twin_nodes.blind import layout
     from weld_twin_nodes.blind.diagnose import diagnose_cases
     from weld_twin_nodes.blind.files import read_reasons, write_score

@@ -8,6 +8,7 @@ import io
 from pathlib import Path
 
 import numpy as np
+
 from weld_twin_core.arrays import Array
 from weld_twin_core.metrics import deviation
 from weld_twin_core.recording import Recording
@@ -36,10 +37,10 @@ def write_table(path: Path | str, recording: Recording, off: Array) -> None:
 
 def draw(path: Path | str, recording: Recording, off: Array) -> None:
     """Draw where the stations are off and how often by how much."""
-    import matplotlib  # noqa: PLC0415 - a second of import that other commands do without
+    import matplotlib
 
     matplotlib.use('Agg')
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.figure import Figure
 
     measured = recording.measured
     assert measured is not None

@@ -118,7 +118,7 @@ def diagnose(
         next_experiment=_next(found, slots, verdict),
         actions=actions([f.effect for f in effects], robot), checks=checks,
         model=found.final.model, traces=_traces(found), absent=found.library.absent,
-        recordings=found.problem.recordings,
+        recordings=found.problem.recordings, families=verdict.families,
     )  # fmt: skip
 
 

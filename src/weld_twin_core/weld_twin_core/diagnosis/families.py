@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from .heldout import Unseen
-from .result import Site
+from .result import Family, Site
 from .search import Search
 from .verdict import CALIBRATION, STRUCTURE, Evidence, Verdict
 
@@ -18,6 +18,20 @@ CERTAIN = 2.0
 
 def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict:
     """Return the families that earn their place on unseen data, each with its members."""
+    families = weighed(found, unseen)
+    sets = tuple((site,) for family in families if family.named for site, _ in family.members)
+    left = evidence.left
+    status = 'unknown' if left > STRUCTURE else 'identified'
+    reasons = (
+        'many small errors act together; members of one family are fitted jointly and only their '
+        'sum is certain',
+    )
+    sure = CALIBRATION / (1.0 + (left / STRUCTURE) ** 3)
+    return Verdict(status, sure, sets, reasons, families)
+
+
+def weighed(found: Search, unseen: Unseen) -> tuple[Family, ...]:
+    """Return every family with what it accounts for on unseen data, largest first."""
     model = found.final.model
     members: dict[str, list[int]] = {}
     for k, effect in enumerate(model.found):
@@ -26,22 +40,15 @@ def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict
     everything = list(range(len(model.found)))
     full = unseen.squares(unseen.predict(everything))
     labels = unseen.trusted_labels()
-    named: list[tuple[float, str]] = []
+    out = []
     for name, index in members.items():
         less = unseen.squares(unseen.predict([k for k in everything if k not in index]))
         falls = np.array([(less - full)[labels == b].mean() for b in np.unique(labels)])
         error = falls.std(ddof=1) / np.sqrt(falls.size) if falls.size > 1 else np.inf
-        if falls.mean() > max(WORTH * full.mean(), CERTAIN * error):
-            named.append((float(falls.mean()), name))
-    sets = tuple(
-        (Site(effect.name, effect.site),)
-        for _, name in sorted(named, reverse=True)
-        for effect in (model.found[k] for k in members[name])
-    )
-    left = evidence.left
-    status = 'unknown' if left > STRUCTURE else 'identified'
-    reasons = (
-        'many small errors act together; members of one family are fitted jointly and only their '
-        'sum is certain',
-    )
-    return Verdict(status, CALIBRATION / (1.0 + (left / STRUCTURE) ** 3), sets, reasons)
+        named = bool(falls.mean() > max(WORTH * full.mean(), CERTAIN * error))
+        size = float(np.sqrt(max(falls.mean(), 0.0)))
+        sites = [(Site(name, model.found[k].site), unseen.rms(unseen.targets[1 + k]))
+                 for k in index]  # fmt: skip
+        sites.sort(key=lambda item: -item[1])
+        out.append(Family(name, named, size, tuple(sites)))
+    return tuple(sorted(out, key=lambda family: -family.rms_m))

@@ -85,6 +85,37 @@ class Site:
 
 
 @dataclass(frozen=True)
+class Family:
+    """
+    Many small errors of one kind, fitted together.
+
+    Attributes
+    ----------
+    effect : str
+    named : bool
+        Whether unseen data get clearly worse without it; one that is not is exchangeable here.
+    rms_m : float
+        What it accounts for at the tool on unseen data: the root of how much the squared error
+        grows without it, the rest staying as it is, [m].
+    members : tuple of (Site, float)
+        Its members and how far each moves the tool, RMS [m], largest first.
+
+    """
+
+    effect: str
+    named: bool
+    rms_m: float
+    members: tuple[tuple[Site, float], ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of ``verdict.families``."""
+        return {
+            'effect': self.effect, 'named': self.named, 'rms_m': self.rms_m,
+            'members': [{'joint': site.joint, 'rms_m': size} for site, size in self.members],
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A hypothesis for the leading effect, with its probability and what it would bring."""
 
@@ -151,6 +182,8 @@ class Diagnosis:
     traces: Traces
     absent: dict[str, str] = field(default_factory=dict)
     recordings: tuple[Recording, ...] = ()
+    families: tuple[Family, ...] = ()
+    """Where many small errors act together: what each kind accounts for, largest first."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
@@ -167,6 +200,7 @@ class Diagnosis:
                     for group in self.indistinguishable
                 ],
                 'reasons': list(self.reasons),
+                'families': [family.as_dict() for family in self.families],
                 'actions': list(self.actions),
             },
             'candidates': [

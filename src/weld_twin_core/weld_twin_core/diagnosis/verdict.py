@@ -10,7 +10,7 @@ import numpy as np
 
 from ..effects import REGISTRY
 from .flexible import Structure
-from .result import Site
+from .result import Family, Site
 from .rivals import LISTED, Rival
 
 SURE = 0.85
@@ -84,12 +84,13 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Status, confidence, and one set of sites per named effect."""
+    """Status, confidence, one set of sites per named effect, families of many small ones."""
 
     status: str
     confidence: float
     sets: tuple[tuple[Site, ...], ...]
     reasons: tuple[str, ...]
+    families: tuple[Family, ...] = ()
 
 
 def decide(evidence: Evidence) -> Verdict:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
+from .families import families_table
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, change, millimetres, odds, parameter_rows
 from .words import found_name, in_words, listed, site_name
@@ -24,6 +25,8 @@ def causes_section(diagnosis: Diagnosis) -> Html:
 def _found(diagnosis: Diagnosis) -> Html:
     if not diagnosis.effects:
         return tag('p', 'No effect was put into the twin.')
+    if diagnosis.families:
+        return families_table(diagnosis)
     heads = ['Effect', 'Parameter', 'Value ± standard error']
     alone = [_alone(diagnosis, found) for found in diagnosis.effects]
     told = any(left is not None for left in alone)

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
+from .families import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
 from .quantities import change, millimetres, odds, parameter_rows
 from .words import STATUS, found_name, listed, site_name, verdict
 
@@ -24,7 +25,9 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     colour = _COLOURS[diagnosis.status]
     console.print(f'[bold {colour}]{STATUS[diagnosis.status]}[/]  {escape(first)}')
     console.print(Padding(escape(second), (0, 0, 1, 0)))
-    if diagnosis.effects:
+    if diagnosis.families:
+        _print_families(diagnosis, console)
+    elif diagnosis.effects:
         console.print(_effects(diagnosis))
     if len(diagnosis.candidates) > 1:
         console.print(_candidates(diagnosis))
@@ -34,6 +37,19 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
             console.print(f'[yellow]data:[/] {escape(check.sentence)}')
     for action in diagnosis.actions:
         console.print(f'[bold]do:[/] {escape(action)}')
+
+
+def _print_families(diagnosis: Diagnosis, console: Console) -> None:
+    parts = [('errors found, by kind', FAMILY_HEADS, family_rows(diagnosis.families)),
+             ('transmission ripple by joint', RIPPLE_HEADS, ripple_rows(diagnosis))]  # fmt: skip
+    for title, heads, rows in parts:
+        if rows:
+            table = Table(box=None, title=title, title_justify='left', pad_edge=False)
+            for head in heads:
+                table.add_column(head.lower(), header_style='dim', overflow='fold')
+            for row in rows:
+                table.add_row(*(escape(cell) for cell in row))
+            console.print(table)
 
 
 def _effects(diagnosis: Diagnosis) -> Table:

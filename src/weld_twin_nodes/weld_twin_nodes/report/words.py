@@ -77,6 +77,16 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
     size = millimetres(diagnosis.gap.rms_m)
     names = [found_name(found) for found in diagnosis.effects]
     sure = odds(diagnosis.confidence)
+    if diagnosis.families:
+        kinds = [
+            f'{cause(f.effect, None)} ({millimetres(f.rms_m)})'
+            for f in diagnosis.families if f.named
+        ]  # fmt: skip
+        first = (
+            f'The gap of {size} comes from many small errors together ({sure} sure), mostly '
+            f'{listed(kinds[:_NAMED])}.'
+        )
+        return first, _gain(diagnosis)
     if len(names) <= _NAMED:
         return f'The gap of {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
     first = (

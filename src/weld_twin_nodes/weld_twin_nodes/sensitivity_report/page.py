@@ -218,10 +218,18 @@ def _setting(setting: dict[str, Any]) -> Html:
          ', '.join(f'{k} {v:g}' for k, v in t.items() if isinstance(v, float))]
         for t in setting['tolerances']
     ]  # fmt: skip
-    plain = [[k.replace('_', ' '), str(v)] for k, v in setting.items() if k != 'tolerances']
+    plain = [[k.replace('_', ' '), _plain(v)] for k, v in setting.items() if k != 'tolerances']
     return section(
         'What was asked', table(('', ''), plain),
         tag('details', tag('summary', f'{len(tolerances)} tolerances'),
             table(('effect', 'parameter', 'distribution', 'numbers [SI]'), tolerances)),
         id_='setting',
     )  # fmt: skip
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, dict):
+        return '; '.join(f'{key} {_plain(item)}' for key, item in value.items())
+    if isinstance(value, list):
+        return ', '.join(map(_plain, value)) or 'none'
+    return f'{value:.6g}' if isinstance(value, float) else str(value)

@@ -21,7 +21,7 @@ from ..chain import Channel
 from ..errors import ModelError
 from ..robot import Robot
 from .buffers import aligned
-from .half_angle import HalfAngle
+from .half_angle import DEGREE, HalfAngle
 from .weights import Piece, on_half_angles
 
 BLOCK = 1000
@@ -99,7 +99,7 @@ class BulkKernel:
         of the screw of 'theta', and 'a' goes with 'alpha' likewise.
         """
         poses = np.empty((len(q), 4, 4)) if poses is None else poses
-        out = np.empty((6, len(self.channels), len(q))) if out is None else out
+        out = aligned(6, len(self.channels), len(q)) if out is None else out
         for part in self._blocks(len(q)):
             memory = self._pose_block(q[part], poses[part])
             self._screw_block(memory, out[:, :, part])
@@ -128,6 +128,7 @@ class BulkKernel:
         sums = memory.sums
         np.multiply(far.swapaxes(0, 1)[:, :, None], near[:3, None], sums[:36].reshape(3, 4, 3, n))
         sums[36:39] = near[3]
+        sums[39] = 1.0
         np.matmul(sums.T, _GATHER, out=out.reshape(n, 16))
         return memory
 
@@ -137,15 +138,16 @@ class BulkKernel:
         n = near.shape[1]
         if inner:
             tip = memory.sums[9:12] + memory.sums[21:24]
-            tip += memory.sums[33:39].reshape(2, 3, n).sum(axis=0)
+            tip += memory.sums[33:36]
+            tip += memory.sums[36:39]
             moment, axis = near[12:].reshape(2, 3, inner, n)
-            _velocity(moment, axis, tip, out[:3, :inner])
+            _velocity(moment, axis, tip, out[:3, :inner], memory.spares(inner, n))
             out[3:, :inner] = axis
         if outer:
-            vectors = far[12:].reshape(2, 3, outer, n)
             turn = near[:9].reshape(3, 3, 1, n)
+            total, part = memory.spares(3 * outer, n).reshape(2, 3, outer, n)
+            vectors = far[12:].reshape(2, 3, outer, n)
             for vector, target in zip(vectors, (out[:3, inner:], out[3:, inner:]), strict=True):
-                total, part = memory.spare[:, :, :outer]
                 np.multiply(turn[0], vector[0], total)
                 np.multiply(turn[1], vector[1], part)
                 np.add(total, part, total)
@@ -159,12 +161,15 @@ def _columns(poses: Array) -> Array:
     return columns
 
 
-def _velocity(moment: Array, axis: Array, tip: Array, out: Array) -> None:
-    """Write moment + axis x tip; shapes (3, channels, N), tip (3, N)."""
+def _velocity(moment: Array, axis: Array, tip: Array, out: Array, spare: Array) -> None:
+    """Write moment + axis x tip; shapes (3, channels, N), tip (3, N), spare (2, channels, N)."""
+    plus, minus = spare
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        moment[k] += axis[i] * tip[j]
-        np.subtract(moment[k], axis[j] * tip[i], out=out[k])
+        np.multiply(axis[i], tip[j], plus)
+        np.multiply(axis[j], tip[i], minus)
+        np.subtract(plus, minus, plus)
+        np.add(moment[k], plus, out[k])
 
 
 def _gather() -> Array:
@@ -182,19 +187,31 @@ _GATHER = _gather()
 
 
 class _Memory:
-    """Working memory for blocks of one length."""
+    """
+    Working memory for blocks of one length.
+
+    The powers of the angles, the features made of them and the products of the pieces are needed
+    one after the other, so they share the same memory: what fits the cache counts for more than
+    what is computed.
+    """
 
     def __init__(self, kernel: BulkKernel, n: int) -> None:
-        self.half = HalfAngle(kernel.robot.n, n)
-        self.own = aligned(2, kernel.robot.n, n)
+        joints = kernel.robot.n
         self.sizes = kernel.sizes
-        self.features = tuple(aligned(3**size, n) for size in kernel.sizes)
-        for features in self.features:
-            features[0] = 1.0
+        rows = [3**size for size in kernel.sizes]
+        spare = 6 * max(kernel.counts)
+        shared = aligned(max((DEGREE + 1) * joints, sum(rows), 40, spare), n)
+        powers = shared[: (DEGREE + 1) * joints].reshape(DEGREE + 1, joints * n)
+        self.half = HalfAngle(joints, n, powers=powers)
+        self.own = aligned(2, joints, n)
+        self.features = (shared[: rows[0]], shared[rows[0] : sum(rows)])
         self.pieces = tuple(aligned(len(w), n) for w in kernel._weights)
-        self.sums = aligned(40, n)
-        self.sums[39] = 1.0
-        self.spare = aligned(2, 3, max(kernel.counts[1], 1), n)
+        self.sums = shared[:40]
+        self._shared = shared
+
+    def spares(self, rows: int, n: int) -> Array:
+        """Return shared memory as two arrays of some rows, shape (2, rows, n)."""
+        return self._shared[: 2 * rows].reshape(2, rows, n)
 
     def fill(self, q: Array, prismatic: NDArray[np.bool_]) -> None:
         """Compute the products of (1, u, v) of the joints of each piece."""
@@ -206,6 +223,7 @@ class _Memory:
             self.own[1, prismatic] = 0.0
         first = 0
         for size, features in zip(self.sizes, self.features, strict=True):
+            features[0] = 1.0
             width = 1
             for i in range(first + size - 1, first - 1, -1):
                 wide = features[width : 3 * width].reshape(2, width, -1)

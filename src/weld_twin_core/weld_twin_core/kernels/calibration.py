@@ -84,10 +84,10 @@ def calibrate(
     wanted = tuple(channels) if channels is not None else minimal_channels(robot)
     by_qr, steps = False, 0
     for steps in range(1, STEPS + 1):  # noqa: B007 - counted for the result
-        columns, residual = _linearised(robot, q, poses, wanted, length)
+        columns, residual = linearised(robot, q, poses, wanted, length)
         step, qr = _solved(columns, residual)
         by_qr |= qr
-        robot = _moved(robot, wanted, step)
+        robot = moved(robot, wanted, step)
         if np.abs(step).max() < SETTLED:
             break
     left = _residual(BulkKernel(robot).poses(q), poses, length)
@@ -105,10 +105,14 @@ def _residual(found: Array, poses: Array, length: float) -> Array:
     return out
 
 
-def _linearised(
-    robot: Robot, q: Array, poses: Array, channels: Sequence[Channel], length: float
+def linearised(
+    robot: Robot, q: Array, poses: Array, channels: Sequence[Channel], length: float = 1.0
 ) -> tuple[Array, Array]:
-    """Return columns (P, 6 N) and residual (6 N,)."""
+    """
+    Return d pose / d channels, shape (P, 6 N), and measured minus found, shape (6 N,).
+
+    Frames are displaced along and about their own axes, the base's those of the world.
+    """
     turns = sorted(
         {(_TURN_OF[key], i) for key, i in channels if key in _TURN_OF}, key=lambda c: c[1]
     )
@@ -125,7 +129,7 @@ def _linearised(
         else:
             column[:] = screw
     columns[:, 3:] *= length
-    return columns.reshape(len(channels), -1), _residual(found, poses, length).ravel()
+    return columns.reshape(-1, 6 * len(q)), _residual(found, poses, length).ravel()
 
 
 def _base_frame(robot: Robot) -> Array:
@@ -159,8 +163,8 @@ def _solved(columns: Array, residual: Array) -> tuple[Array, bool]:
     return scale * step, True
 
 
-def _moved(robot: Robot, channels: Sequence[Channel], step: Array) -> Robot:
-    """Return the robot with its channels displaced."""
+def moved(robot: Robot, channels: Sequence[Channel], step: Array) -> Robot:
+    """Return the robot with its channels displaced; see `linearised`."""
     values: dict[str, Any] = {key: np.array(getattr(robot, key)) for key in _TURN_OF}
     small = {'base': np.zeros(6), 'tool': np.zeros(6)}
     for (key, i), change in zip(channels, step, strict=True):

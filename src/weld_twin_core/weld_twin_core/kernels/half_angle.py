@@ -55,15 +55,16 @@ class HalfAngle:
     ----------
     *shape : int
         Shape of the angles.
+    powers : array, shape (DEGREE + 1, size), optional
+        Memory that is free during a call and may be used otherwise between calls.
 
     """
 
-    def __init__(self, *shape: int) -> None:
+    def __init__(self, *shape: int, powers: Array | None = None) -> None:
         self.shape = shape
         size = int(np.prod(shape))
         self._turns = aligned(size)
-        self._powers = aligned(DEGREE + 1, size)
-        self._powers[0] = 1.0
+        self._powers = aligned(DEGREE + 1, size) if powers is None else powers
         self._half = aligned(2, size)
 
     def __call__(self, angles: Array) -> tuple[Array, Array]:
@@ -74,6 +75,7 @@ class HalfAngle:
         """
         r, power, half = self._turns, self._powers, self._half
         np.multiply(angles, 0.5 / np.pi, out=r.reshape(self.shape))
+        power[0] = 1.0
         np.rint(r, out=power[1])
         np.subtract(r, power[1], out=r)
         np.multiply(r, r, out=power[1])

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Contenders taking turns, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+
+REFERENCE = ('pinocchio',)
+
+
+@dataclass(frozen=True)
+class Contender:
+    """
+    One way to do a job.
+
+    Attributes
+    ----------
+    name : str
+    run : callable
+    items : int
+        How many poses, draws or runs one call does; a slow contender may do fewer of them.
+    gap : float
+        Largest difference of its result to the reference.
+    once : bool
+        So slow that one round has to do.
+
+    """
+
+    name: str
+    run: Callable[[], object]
+    items: int = 1
+    gap: float = 0.0
+    once: bool = False
+
+
+@dataclass(frozen=True)
+class Workload:
+    """
+    A job: its contenders, the item their time is counted by, and how well they must agree.
+
+    ``reference`` names the contenders whose times, added up, the others are compared with: those
+    that only do the job together.
+    """
+
+    title: str
+    item: str
+    contenders: Sequence[Contender]
+    tolerance: float
+    note: str = ''
+    reference: tuple[str, ...] = REFERENCE
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Processor seconds per item, shape (rounds,) for every contender."""
+
+    workload: Workload
+    seconds: dict[str, Array]
+
+    def ratio(self, name: str) -> Array | None:
+        """Return the reference's time over the contender's, per round; None without either."""
+        names = self.workload.reference
+        if not all(key in self.seconds for key in names):
+            return None
+        rounds = min(self.seconds[key].size for key in (*names, name))
+        total = sum(self.seconds[key][:rounds] for key in names)
+        return np.asarray(total / self.seconds[name][:rounds])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers and lists."""
+        rows = {}
+        for contender in self.workload.contenders:
+            ratio = self.ratio(contender.name)
+            rows[contender.name] = {
+                'seconds_per_item': self.seconds[contender.name].tolist(),
+                'ratio': None if ratio is None else ratio.tolist(),
+                'gap': contender.gap,
+                'items': contender.items,
+            }
+        load = self.workload
+        return {
+            'title': load.title, 'item': load.item, 'reference': list(load.reference),
+            'tolerance': load.tolerance, 'note': load.note, 'contenders': rows,
+        }  # fmt: skip
+
+
+def race(workload: Workload, rounds: int, least: float) -> Outcome:
+    """
+    Time the contenders in turn.
+
+    Parameters
+    ----------
+    workload : Workload
+    rounds : int
+    least : float [s]
+        How long each contender works in a round, in as many calls as that takes.
+
+    Raises
+    ------
+    DataError
+        A contender's result is not that of the others.
+
+    """
+    for contender in workload.contenders:
+        if not contender.gap <= workload.tolerance:
+            raise DataError(
+                f'{workload.title}: {contender.name} differs from the others by '
+                f'{contender.gap:.3g}, more than {workload.tolerance:.3g}; nothing was timed'
+            )
+    calls = {c.name: 1 if c.once else _calls(c, least) for c in workload.contenders}
+    seconds: dict[str, list[float]] = {c.name: [] for c in workload.contenders}
+    for k in range(rounds):
+        for contender in workload.contenders:
+            if k == 0 or not contender.once:
+                seconds[contender.name].append(_timed(contender, calls[contender.name]))
+    return Outcome(workload, {name: np.array(values) for name, values in seconds.items()})
+
+
+def _calls(contender: Contender, least: float) -> int:
+    contender.run()
+    calls, spent = 1, _timed(contender, 1) * contender.items
+    while spent < 0.1 * least:
+        calls *= 4
+        spent = _timed(contender, calls) * contender.items * calls
+    return max(1, round(calls * least / max(spent, 1e-9)))
+
+
+def _timed(contender: Contender, calls: int) -> float:
+    start = process_time()
+    for _ in range(calls):
+        contender.run()
+    return (process_time() - start) / (calls * contender.items)

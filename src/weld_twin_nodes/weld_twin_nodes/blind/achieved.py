@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.problem import Model
+from weld_twin_core.diagnosis.alignment import initial_frames, refined
+from weld_twin_core.diagnosis.problem import Model, Problem, usable
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_msgs_py.bags import read_recording
@@ -19,7 +20,7 @@ from weld_twin_msgs_py.models import read_model
 from weld_twin_msgs_py.robots import load_robot
 
 from . import layout
-from .displacement import rigid, rms
+from .displacement import rms
 
 TO_90 = 1.6448536269514722 / 1.959963984540054
 """Half-width of a normal 90 % interval over that of a 95 % one."""
@@ -63,12 +64,11 @@ def achieved(
     model = read_model(robot, diagnosis)
     test = read_recording(truths / name / layout.TEST, robot)
     good = _good(test, truth['outliers'])
-    bare = Model(robot, model.bases, model.known)
-    if 'base' not in truth['align']:
-        bare = Model(robot, (robot.T_world_base,), model.known)
+    bare = Model(robot, (robot.T_world_base,), model.known)
+    if truth['align']:
+        train = read_recording(cases / name / layout.TRAIN, robot)
+        bare = _aligned(bare, train, truth['align'])
     before, after = _gap(bare, test)[good], _gap(model, test)[good]
-    if 'base' in truth['align']:
-        before = before - rigid(_measured(test).position[good], before)
     first, left = rms(before), rms(after)
     ratio, ends = left / first, np.asarray(claim['ci95'], dtype=float)
     narrow = claim['ratio'] + TO_90 * (ends - claim['ratio'])
@@ -76,6 +76,12 @@ def achieved(
         first, left, ratio, float(claim['ratio']), bool(narrow[0] <= ratio <= narrow[1]),
         bool(ends[0] <= ratio <= ends[1]), left / float(truth['floor_m']), str(truth['test']),
     )  # fmt: skip
+
+
+def _aligned(model: Model, recording: Recording, align: list[str]) -> Model:
+    """Return the model with the frames that a diagnosis of this recording starts from."""
+    problem = Problem((usable(recording),), frozenset(align))
+    return refined(problem, initial_frames(problem, model))
 
 
 def _gap(model: Model, recording: Recording) -> Array:

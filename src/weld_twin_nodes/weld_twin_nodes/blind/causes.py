@@ -35,8 +35,11 @@ OUTSIDE = (
 FAMILIES = tuple(name for name in SIZES if name not in OUTSIDE)
 MOVING = frozenset({'servo_lag', 'time_delay', 'vibration', 'friction_wander', 'stick_slip'})
 """Causes that stations at rest cannot show."""
-SPREAD = (0.02, 60.0)
-"""How far a cause may be from its typical size and still be plausible."""
+SPREAD = (0.02, 20.0)
+"""How many times its typical size a cause may be and still be plausible."""
+MOST = {'vibration': 6.0, 'servo_lag': 10.0, 'time_delay': 10.0, 'quantization': 5.0,
+        'payload': 10.0}  # fmt: skip
+"""The same for causes that become absurd sooner."""
 RIPPLE_ORDERS = (1, 2, 3, 8, 20, 50, 80, 100)
 
 
@@ -58,6 +61,11 @@ def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Ca
         return {'effect': family, **drawn}
     size = SIZES[family][0]
     return {'effect': family, **drawn, size: drawn[size] * float(rng.choice([-1.0, 1.0]))}
+
+
+def plausible(family: str, factor: float) -> bool:
+    """Tell whether a cause may be so many times its typical size."""
+    return SPREAD[0] < factor < MOST.get(family, SPREAD[1])
 
 
 def scaled(cause: Mapping[str, Any], factor: float) -> Cause:

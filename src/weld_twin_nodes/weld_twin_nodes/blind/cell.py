@@ -213,11 +213,18 @@ def floor(cell: Cell, causes: Sequence[Cause], taken: Take) -> tuple[float, list
 
     """
     seen = record(cell, causes, taken)
-    same_instants = replace(
-        cell.tracker, sigma=0.0, sigma_orientation=0.0, outlier_share=0.0
-    )
-    noise = seen.position - record(cell, causes, taken, same_instants).position
+    quiet = replace(cell.tracker, sigma=0.0, sigma_orientation=0.0, outlier_share=0.0)
+    true = record(cell, causes, taken, quiet).position
+    noise = seen.position - true
     gross = np.linalg.norm(noise, axis=1) > GROSS * cell.noise
-    truth = record(cell, causes, taken, exact(cell.tracker))
-    left = seen.position - at_stamps(truth, seen.t_measured)
+    left = noise if seen.static else noise - _by_jitter(cell, causes, taken, seen)
     return rms(left[~gross]), [int(k) for k in np.nonzero(gross)[0]]
+
+
+def _by_jitter(
+    cell: Cell, causes: Sequence[Cause], taken: Take, seen: PlantRecording
+) -> Array:
+    """Return how far the tool moves between true instants and their stamps, shape (M, 3) [m]."""
+    steady = record(cell, causes, taken, exact(cell.tracker))
+    velocity = CubicSpline(steady.t_measured, steady.position)(steady.t_measured, 1)
+    return np.asarray(velocity * (seen.t_measured - steady.t_measured)[:, None])

@@ -14,6 +14,8 @@ from .achieved import Achieved
 from .judge import NOT_IN_LIBRARY, Judged
 from .statistics import Estimate, bootstrap, brier, calibration_error, share
 
+AS_GOOD = 1.05
+"""RMS left over what the true causes leave, up to which an answer predicts as the truth does."""
 CLEAR = 3.0
 """Effect RMS over noise from which a cause is plain to see."""
 BINS = ((0.0, 1.0, '< 1'), (1.0, 3.0, '1-3'), (3.0, 10.0, '3-10'), (10.0, np.inf, '> 10'))
@@ -94,6 +96,17 @@ def verdict_measures(cases: Sequence[Judged]) -> list[Measure]:
         Measure('confident_wrong', 'sure (> 0.8) and wrong',
                 _of(cases, lambda c: c.confidently_wrong), .01, False),
     ]  # fmt: skip
+
+
+def alias_measure(cases: Sequence[Judged], shrinks: Mapping[str, Achieved]) -> Measure:
+    """Return how often a cause no library knows is unknown, or what is named does as well."""
+    def told(case: Judged) -> bool:
+        shrink = shrinks.get(case.name)
+        return case.status == 'unknown' or (shrink is not None and shrink.over_floor < AS_GOOD)
+
+    foreign = [case for case in cases if case.kind in NOT_IN_LIBRARY]
+    return Measure('alias', "withheld or outside: 'unknown', or as good on the sealed recording",
+                   _of(foreign, told))  # fmt: skip
 
 
 def calibration_measures(cases: Sequence[Judged]) -> list[Measure]:

@@ -85,7 +85,7 @@ def _number(key: str, value: float | None) -> str:
 def _pictures(score: Score) -> Html:
     pictures = (
         ('How sure, how right', reliability_plot(score.cases)),
-        ('Shrink claimed and achieved', shrink_plot(list(score.shrinks.values()))),
+        ('Shrink claimed and achieved', shrink_plot(score.known_shrinks)),
         ('Outcome by effect size', outcome_plot(score.cases)),
         ('Errors of parameters', error_plot(score.cases)),
     )

@@ -16,9 +16,10 @@ from weld_twin_msgs_py.models import read_diagnosis
 
 from . import layout, seal
 from .achieved import Achieved, achieved
-from .judge import AS_IT_IS, NAMING, Judged, judge
+from .judge import AS_IT_IS, IN_LIBRARY, NAMING, NOT_IN_LIBRARY, Judged, judge
 from .measures import (
     Measure,
+    alias_measure,
     by,
     by_stratum,
     calibration_measures,
@@ -30,6 +31,8 @@ from .measures import (
 from .statistics import reliability
 
 MIB = 1 << 20
+SHRINKING = IN_LIBRARY | NOT_IN_LIBRARY
+"""Kinds of cases with a gap to shrink."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +46,7 @@ class Score:
         Seed, seal, engine and how the diagnosis was run.
     cases : list of Judged
     shrinks : dict
-        By case name, where causes in the library were named.
+        By case name, where causes were named.
     costs : dict
         Median and largest seconds and memory of a diagnosis.
     reasons : mapping
@@ -69,9 +72,16 @@ class Score:
         if self.own:
             return semi_real_measures(self.cases, self.own)
         return [
-            *verdict_measures(self.cases), *calibration_measures(self.cases),
-            *shrink_measures(list(self.shrinks.values())), *parameter_measures(self.cases),
+            *verdict_measures(self.cases), alias_measure(self.cases, self.shrinks),
+            *calibration_measures(self.cases), *shrink_measures(self.known_shrinks),
+            *parameter_measures(self.cases),
         ]  # fmt: skip
+
+    @property
+    def known_shrinks(self) -> list[Achieved]:
+        """Return the shrinks of the cases whose causes are in the library."""
+        known = {case.name for case in self.cases if case.in_library}
+        return [value for name, value in self.shrinks.items() if name in known]
 
     @property
     def failures(self) -> list[Judged]:
@@ -137,7 +147,7 @@ def score(
             own[case.motion] = case.said
             continue
         judged.append(case)
-        if diagnosis and case.in_library and case.status in NAMING:
+        if diagnosis and case.kind in SHRINKING and case.status in NAMING:
             claim = diagnosis['shrink']
             shrinks[name] = achieved(cases, truths, truth, file, claim)
     made = {key: listed[key] for key in ('seal', 'engine', 'version', 'with_holdout',

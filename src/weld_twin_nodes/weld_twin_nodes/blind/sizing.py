@@ -10,7 +10,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 
-from .causes import MOVING, SPREAD, Cause, draw, scaled
+from .causes import MOVING, Cause, draw, plausible, scaled
 from .cell import Cell, Take, deviation
 from .deck import STRATA
 from .displacement import correlation, rms
@@ -44,7 +44,7 @@ def sized(cell: Cell, cause: Cause, taken: Take, wanted: float) -> tuple[Cause, 
         if 1.0 / NEAR < ratio / wanted < NEAR:
             return trial, off
         factor *= wanted / max(ratio, 1e-9)
-        if not SPREAD[0] < factor < SPREAD[1]:
+        if not plausible(cause['effect'], factor):
             raise Unseen(f'{cause["effect"]} is {ratio:.3g} times the noise, wanted {wanted:.3g}')
     return trial, off
 
@@ -112,6 +112,6 @@ def sized_together(
         if 1.0 / NEAR < ratio / wanted < NEAR:
             break
         factor *= wanted / max(ratio, 1e-9)
-        if not SPREAD[0] < factor < SPREAD[1]:
+        if not all(plausible(cause['effect'], factor) for cause in causes):
             raise Unseen(f'the construction is {ratio:.3g} times the noise')
     return grown, ratio

@@ -26,7 +26,7 @@ from ..effects.base import Effect
 from .fit import Fit, coordinates, design, fit, solve_scaled, stepped
 from .problem import Model, Problem, Scale
 
-BANDS = (1, 2, 4, 8, 16, 24, 36, 54, 81, 121, 1000)
+BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
 """Ripple orders whose amplitudes are expected to be alike: up to a band's last order."""
 ROUNDS = 15
 FREE = 3

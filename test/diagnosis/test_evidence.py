@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a fall of the sum of squares is worth, and how many rows of a residual count."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import norm
+
+from diagnosis_cells import effect
+from weld_twin_core.diagnosis.gram import Gram
+from weld_twin_core.diagnosis.library import Unit
+from weld_twin_core.diagnosis.score import best_choice, effective_share, evidence
+
+
+def wandering(rho, samples, components, seed=0):
+    """Return a stationary first-order autoregression, shape (samples, components)."""
+    rng = np.random.default_rng(seed)
+    push = rng.normal(size=(samples, components))
+    push[0] /= np.sqrt(1.0 - rho**2)
+    return lfilter([1.0], [1.0, -rho], push, axis=0)
+
+
+@pytest.mark.parametrize('rho', [0.3, 0.6, 0.9])
+def test_the_share_of_independent_rows_is_that_of_an_autoregression(rho):
+    residual = wandering(rho, 60000, 3).ravel()
+    share = effective_share(residual, (3,), (60000,))
+    assert share == pytest.approx((1.0 - rho) / (1.0 + rho), rel=0.08)
+
+
+def test_every_row_of_white_noise_counts():
+    share = effective_share(wandering(0.0, 20000, 6).ravel(), (6,), (20000,))
+    assert 0.95 < share <= 1.0
+
+
+def test_a_residual_that_alternates_never_counts_more_than_its_rows():
+    assert effective_share(wandering(-0.7, 5000, 3).ravel(), (3,), (5000,)) <= 1.0
+
+
+def test_recordings_count_by_their_rows():
+    long, short = wandering(0.6, 40000, 3).ravel(), wandering(0.0, 20000, 3, seed=1).ravel()
+    share = effective_share(np.concatenate([long, short]), (3, 3), (40000, 20000))
+    assert share == pytest.approx((2.0 * 0.25 + 1.0) / 3.0, rel=0.08)
+
+
+def test_evidence_is_the_ratio_of_likelihoods_less_half_a_log_per_parameter():
+    rng = np.random.default_rng(4)
+    columns = rng.normal(size=(2, 50))
+    y = np.array([0.5, -0.3]) @ columns + rng.normal(size=50)
+    gram = Gram.of(columns, y)
+    left = y - np.linalg.lstsq(columns.T, y, rcond=None)[0] @ columns
+
+    def most_likely(residual):
+        return norm.logpdf(residual, scale=np.sqrt(np.mean(residual**2))).sum()
+
+    expected = most_likely(left) - most_likely(y) - 0.5 * 2.0 * np.log(50.0)
+    assert evidence(gram, gram.gain(np.arange(2)), 2.0, 50.0) == pytest.approx(expected)
+
+
+def test_fewer_independent_rows_make_the_same_fall_worth_less():
+    gram = Gram(np.zeros((0, 0)), np.zeros(0), 100.0, 1000, np.zeros(0))
+    worth = [evidence(gram, 20.0, 1.0, n) for n in (1000.0, 300.0, 100.0)]
+    assert worth[0] > worth[1] > worth[2] > 0.0
+
+
+def test_a_column_of_noise_is_rarely_worth_its_freedom():
+    rng = np.random.default_rng(5)
+    worth = []
+    for _ in range(300):
+        gram = Gram.of(rng.normal(size=(1, 400)), rng.normal(size=400))
+        worth.append(evidence(gram, gram.gain(np.arange(1)), 1.0, 400.0))
+    # chi-square of one degree beyond log 400: 1.4 %
+    assert np.mean(np.array(worth) > 0.0) < 0.04
+
+
+def unit(columns, trials=1.0):
+    seed = effect('base_pose', xyz=[0, 0, 0], rotvec=[0, 0, 0])
+    return Unit('base_pose', None, (seed,), (np.arange(columns),), trials)
+
+
+def test_only_the_columns_that_earn_their_place_are_chosen():
+    rng = np.random.default_rng(6)
+    columns = rng.normal(size=(6, 500))
+    y = 0.8 * columns[2] - 0.5 * columns[5] + rng.normal(size=500)
+    gram = Gram.of(columns, y)
+    choice = best_choice(gram, unit(6), 500.0)
+    assert sorted(choice.columns) == [2, 5]
+    vector = choice.effect(gram).vector()
+    expected = np.linalg.lstsq(columns[[2, 5]].T, y, rcond=None)[0]
+    np.testing.assert_allclose(vector, [0, 0, expected[0], 0, 0, expected[1]], rtol=1e-8)
+
+
+def test_columns_that_help_only_together_are_found():
+    rng = np.random.default_rng(7)
+    first, small = rng.normal(size=(2, 4000))
+    columns = np.stack([first, first + 0.03 * small])
+    y = 1.0 * (columns[1] - columns[0]) / 0.03 * 0.2 + rng.normal(size=4000)
+    choice = best_choice(Gram.of(columns, y), unit(2), 4000.0)
+    assert sorted(choice.columns) == [0, 1]
+
+
+def test_a_seed_found_among_many_pays_for_the_search():
+    rng = np.random.default_rng(8)
+    columns = rng.normal(size=(1, 200))
+    gram = Gram.of(columns, 0.5 * columns[0] + rng.normal(size=200))
+    free, searched = (best_choice(gram, unit(1, trials), 200.0) for trials in (1.0, 80.0))
+    assert free.nats - searched.nats == pytest.approx(np.log(80.0))

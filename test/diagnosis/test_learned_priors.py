@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The size learned for a family against maximising the marginal likelihood outright."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.stats import multivariate_normal
+
+from diagnosis_cells import effect, known_scale, tiny
+from weld_twin_core.diagnosis.fit import fit
+from weld_twin_core.diagnosis.shrinkage import groups, learned_precision, shrunk_fit
+
+ROWS = 150
+
+
+def members(sizes, noise, seed=0, count=12):
+    """Return columns, data, group numbers and scales of groups whose members have given sizes."""
+    rng = np.random.default_rng(seed)
+    labels = np.repeat(np.arange(len(sizes)), count)
+    scales = rng.uniform(0.5, 2.0, labels.size) * np.repeat([1e-3, 1.0, 30.0][: len(sizes)], count)
+    x = rng.normal(size=labels.size) * np.array(sizes)[labels] * scales
+    columns = rng.normal(size=(labels.size, ROWS)) / scales[:, None]
+    return columns, x @ columns + noise * rng.normal(size=ROWS), labels, scales
+
+
+def learned(columns, y, labels, scales):
+    return learned_precision(columns @ columns.T, columns @ y, y @ y, y.size, labels, scales)
+
+
+def most_likely(columns, y, labels, scales):
+    """Return the prior precision that maximises p(y), the members integrated out."""
+    parts = [
+        (columns[labels == g] * scales[labels == g, None]) for g in range(labels.max() + 1)
+    ]
+    kernels = [part.T @ part for part in parts]
+
+    def loss(logs):
+        covariance = np.exp(logs[-1]) * np.eye(y.size)
+        for log, kernel in zip(logs[:-1], kernels, strict=True):
+            covariance += np.exp(log) * kernel
+        return -multivariate_normal.logpdf(y, cov=covariance)
+
+    found = minimize(loss, np.zeros(len(parts) + 1), method='L-BFGS-B').x
+    return np.exp(found[-1] - found[labels]) / scales**2
+
+
+def test_the_precision_learned_maximises_the_marginal_likelihood():
+    problem = members([2.0, 0.5], noise=1.3)
+    np.testing.assert_allclose(learned(*problem), most_likely(*problem), rtol=0.03)
+
+
+def test_noise_far_from_the_assumed_one_is_learned_too():
+    columns, y, labels, scales = members([2.0, 0.7], noise=5.0, seed=3)
+    expected = most_likely(columns, y, labels, scales)
+    np.testing.assert_allclose(learned(columns, y, labels, scales), expected, rtol=0.05)
+
+
+def test_a_group_that_the_data_do_not_need_shrinks_to_nothing():
+    columns, y, labels, scales = members([1.0, 0.0], noise=1.0, seed=4)
+    precision = learned(columns, y, labels, scales)
+    fitted = np.linalg.solve(columns @ columns.T + np.diag(precision), columns @ y) / scales
+    free = np.linalg.lstsq(columns.T, y, rcond=None)[0] / scales
+    needed = labels == 0
+    assert np.linalg.norm(fitted[~needed]) < 0.35 * np.linalg.norm(free[~needed])
+    assert np.linalg.norm(fitted[needed]) > 0.9 * np.linalg.norm(free[needed])
+
+
+def test_members_marked_free_have_no_prior():
+    columns, y, labels, scales = members([1.0, 1.0], noise=1.0)
+    free = np.where(labels == 1, -1, labels)
+    precision = learned(columns, y, free, scales)
+    assert (precision[labels == 1] == 0.0).all() and (precision[labels == 0] > 0.0).all()
+
+
+def test_ripple_is_grouped_by_joint_and_band_and_small_groups_are_free():
+    ripple = effect('transmission_ripple', joint='elbow_joint', amplitude=[0.0] * 5,
+                    order=[5, 6, 7, 30, 8], phase=[0.0] * 5)  # fmt: skip
+    offsets = [effect('joint_offset', joint=j, offset=0.0)
+               for j in ('elbow_joint', 'wrist_1_joint', 'wrist_2_joint')]  # fmt: skip
+    numbers, scales = groups((ripple, *offsets))
+    assert scales.shape == (13,)
+    low, high, rest = numbers[[0, 1, 2, 3, 4, 5, 8, 9]], numbers[[6, 7]], numbers[10:]
+    assert np.unique(low).size == 1 and low[0] >= 0
+    assert (high == -1).all()
+    assert np.unique(rest).size == 1 and rest[0] not in (-1, low[0])
+
+
+FAMILIES = (('joint_offset', 'offset', 2e-4), ('link_length', 'da', 1e-4),
+            ('link_offset', 'dd', 1e-4), ('link_twist', 'dalpha', 2e-4))  # fmt: skip
+
+
+def small_errors(seed):
+    """Return errors of every joint and family, and the precision of a prior of their true sizes."""
+    rng = np.random.default_rng(seed)
+    joints = tiny()[1].robot.joint_names
+    true = tuple(effect(name, joint=j, **{key: float(rng.normal(scale=size))})
+                 for name, key, size in FAMILIES for j in joints)  # fmt: skip
+    return true, np.repeat([size**-2 for _, _, size in FAMILIES], len(joints))
+
+
+def test_sizes_learned_predict_nearly_as_well_as_sizes_known_and_better_than_none():
+    errors = []
+    for seed in range(6):
+        true, precision = small_errors(seed)
+        problem, model = tiny(true, seed, count=20, noise=1e-4, turned=False)
+        fresh, _ = tiny(true, seed + 50, count=200, noise=0.0, turned=False)
+        scale = known_scale(problem, position=1e-4)
+        start = model.with_found(tuple(e.with_coordinates(np.zeros(1)) for e in true))
+        fits = (shrunk_fit(problem, start, scale)[0], fit(problem, start, scale, precision),
+                fit(problem, start, scale), fit(problem, model, scale))  # fmt: skip
+        errors.append([(fresh.residuals(f.model)[0] ** 2).mean() for f in fits])
+    shrunk, known, free, none = np.sqrt(np.mean(errors, axis=0))
+    assert shrunk < 1.15 * known
+    assert shrunk < 0.9 * free
+    assert shrunk < 0.9 * none
+
+
+@pytest.mark.parametrize('align', [(), ('base',)])
+def test_with_priors_the_slope_of_the_fit_balances_their_pull(align):
+    offsets = tuple(effect('joint_offset', joint=j, offset=2e-4)
+                    for j in ('shoulder_lift_joint', 'elbow_joint', 'wrist_1_joint'))  # fmt: skip
+    problem, model = tiny(offsets, align=align)
+    scale = known_scale(problem)
+    precision = np.array([1e8, 1e9, 1e7])
+    found = fit(problem, model.with_found(offsets), scale, precision)
+    step = 1e-7
+    for k in range(3):
+        costs = []
+        for sign in (1.0, -1.0):
+            x = found.coordinates + sign * step * np.eye(3)[k]
+            moved = tuple(e.with_coordinates(x[j : j + 1]) for j, e in enumerate(offsets))
+            residual = problem.whitened(
+                problem.residuals(found.model.with_found(moved)), scale)
+            costs.append(residual @ residual)
+        slope = (costs[0] - costs[1]) / (2.0 * step)
+        assert slope == pytest.approx(-2.0 * precision[k] * found.coordinates[k], rel=2e-3)

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The noise floor on noise of known size; how often the interval of the shrink holds the truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis_cells import SIGMA
+from weld_twin_core.diagnosis.noise import noise_floor
+from weld_twin_core.diagnosis.problem import Problem
+from weld_twin_core.diagnosis.validation import ratio_interval
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+
+
+def moving(count, sigma=None):
+    t = np.arange(count) / 50.0
+    measured = Measurements(t, np.zeros((count, 3)), sigma=sigma)
+    return Recording('moving', JointMotion(t, np.zeros((count, 6))), measured)
+
+
+def resting(q):
+    t = np.arange(len(q), dtype=float)
+    measured = Measurements(t, np.zeros((len(q), 3)))
+    return Recording('resting', JointMotion(t, q, static=True), measured)
+
+
+def white(count, sigma=SIGMA, seed=0):
+    return np.random.default_rng(seed).normal(scale=sigma, size=(3, count))
+
+
+def test_in_motion_third_differences_see_the_noise_through_a_smooth_gap_of_ten_times_its_size():
+    t = np.arange(4000) / 50.0
+    gap = 10.0 * SIGMA * np.sin(2.0 * np.pi * 0.5 * t)
+    sigma, independent = noise_floor(Problem((moving(4000),)), [white(4000) + gap])
+    assert independent
+    assert sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_gross_errors_do_not_raise_the_floor():
+    off = white(4000)
+    off[:, ::100] += 2e-3
+    sigma, _ = noise_floor(Problem((moving(4000),)), [off])
+    assert sigma == pytest.approx(SIGMA, rel=0.15)
+
+
+def test_at_rest_repeated_stations_see_the_noise_whatever_the_gap():
+    rng = np.random.default_rng(2)
+    places = np.repeat(rng.uniform(-2.0, 2.0, (400, 6)), 3, axis=0)
+    gap = np.repeat(rng.normal(scale=2e-4, size=(3, 400)), 3, axis=1)
+    order = rng.permutation(1200)
+    problem = Problem((resting(places[order]),))
+    sigma, independent = noise_floor(problem, [(white(1200) + gap)[:, order]])
+    assert independent
+    assert sigma == pytest.approx(SIGMA, rel=0.06)
+
+
+def test_without_repeats_the_floor_at_rest_is_no_more_than_what_the_model_leaves():
+    q = np.random.default_rng(3).uniform(-2.0, 2.0, (1500, 6))
+    sigma, independent = noise_floor(Problem((resting(q),)), [white(1500)])
+    assert not independent
+    assert sigma == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_the_instruments_own_figure_serves_where_nothing_was_repeated():
+    recording = resting(np.random.default_rng(4).uniform(-2.0, 2.0, (500, 6)))
+    said = replace(recording.measured, sigma=np.full(500, 3e-5))
+    problem = Problem((recording.with_measured(said),))
+    sigma, independent = noise_floor(problem, [white(500, 2e-4)])
+    assert not independent
+    assert sigma == pytest.approx(3e-5)
+
+
+def test_recordings_count_by_their_samples():
+    problem = Problem((moving(6000), moving(2000)))
+    sigma, _ = noise_floor(problem, [white(6000), white(2000, 3.0 * SIGMA, seed=1)])
+    assert sigma == pytest.approx(SIGMA * (0.75 + 3.0 * 0.25), rel=0.05)
+
+
+def errors(rng, wander):
+    """Return squared errors before (RMS 1) and after (RMS 0.3), and their stretches."""
+    labels = np.repeat(np.arange(8), 60)
+    levels = np.exp(wander * rng.normal(size=(2, 8)))[:, labels]
+    levels /= np.exp(0.5 * wander**2)
+    squares = (rng.normal(size=(2, 3, labels.size)) ** 2).mean(axis=1)
+    return squares[0] * levels[0], 0.09 * squares[1] * levels[1], labels
+
+
+@pytest.mark.parametrize('wander', [0.0, 0.4])
+def test_the_interval_of_the_shrink_holds_the_truth_about_95_times_in_100(wander):
+    rng = np.random.default_rng(5)
+    held = []
+    for _ in range(600):
+        _, (low, high) = ratio_interval(*errors(rng, wander))
+        held.append(low < 0.3 < high)
+    assert 0.92 < np.mean(held) < 0.985
+
+
+def test_the_ratio_is_that_of_the_root_mean_squares():
+    before, after = np.array([4.0, 12.0, 8.0, 8.0]), np.array([1.0, 3.0, 0.0, 4.0])
+    ratio, (low, high) = ratio_interval(before, after, np.arange(4))
+    assert ratio == pytest.approx(0.5)
+    assert low < ratio < high
+
+
+def test_two_stretches_still_give_an_interval():
+    ratio, (low, high) = ratio_interval(np.full(50, 4.0), np.full(50, 1.0), np.arange(50) // 25)
+    assert ratio == pytest.approx(0.5)
+    assert 0.0 <= low < ratio < high

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Predictions of unseen stretches against fitting again with every stretch left out."""
+
+import numpy as np
+import pytest
+
+from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
+from weld_twin_core.diagnosis.fit import fit
+from weld_twin_core.diagnosis.heldout import TRUSTED, Unseen
+from weld_twin_core.diagnosis.problem import Scale
+
+TRUE = (
+    effect('joint_offset', joint='elbow_joint', offset=6e-4),
+    effect('link_length', joint='shoulder_lift_joint', da=4e-4),
+    effect('gear_ratio', joint='wrist_1_joint', scale=5e-4),
+)
+
+
+def made_up(columns, blocks, seed=0, rows=640, parts=3, prior=0.0):
+    """Return an `Unseen` of random columns and targets: two frame columns, then the parts."""
+    rng = np.random.default_rng(seed)
+    labels = np.sort(rng.integers(0, blocks, rows))
+    a, targets = rng.normal(size=(columns, rows)), rng.normal(size=(1 + parts, rows))
+    bounds = np.linspace(2, columns, parts + 1).astype(int)
+    slices = tuple(slice(lo, hi) for lo, hi in zip(bounds[:-1], bounds[1:], strict=True))
+    precision = np.concatenate([np.zeros(2), rng.uniform(0.0, prior, columns - 2)])
+    pull = precision * rng.normal(size=columns)
+    spans = [np.flatnonzero(labels == b) for b in range(blocks)]
+    normals = np.array([a[:, s] @ a[:, s].T for s in spans])
+    rights = np.array([a[:, s] @ targets[:, s].T for s in spans])
+    return Unseen(None, None, labels, a, slices, targets, precision, pull, normals, rights)
+
+
+def refitted(unseen, kept, extra=None, ridge=0.0):
+    """Return the residual on every stretch of least squares on the others, by orthogonal means."""
+    gone = [k for k in range(len(unseen.parts)) if k not in kept]
+    target = unseen.targets[0] + unseen.targets[[1 + k for k in gone]].sum(axis=0)
+    index = np.concatenate([np.arange(unseen.frames), *(
+        np.arange(unseen.parts[k].start, unseen.parts[k].stop) for k in kept)]).astype(int)
+    columns, root = unseen.columns[index], np.sqrt(unseen.precision[index])
+    wanted = -np.divide(unseen.pull[index], root, out=np.zeros(index.size), where=root > 0.0)
+    if extra is not None:
+        columns = np.concatenate([columns, extra])
+        root = np.concatenate([root, np.full(len(extra), np.sqrt(ridge))])
+        wanted = np.concatenate([wanted, np.zeros(len(extra))])
+    out = target.copy()
+    for b in np.unique(unseen.labels):
+        seen = unseen.labels != b
+        a = np.concatenate([columns[:, seen].T, np.diag(root)])
+        x = np.linalg.lstsq(a, np.concatenate([target[seen], wanted]), rcond=None)[0]
+        out[~seen] -= x @ columns[:, ~seen]
+    return out
+
+
+@pytest.mark.parametrize('kept', [[], [0], [1, 2], [0, 1, 2]])
+@pytest.mark.parametrize('columns', [20, 230])
+def test_predictions_are_those_of_least_squares_on_the_other_stretches(columns, kept):
+    # with 230 columns one inverse per stretch serves every choice of effects
+    unseen = made_up(columns, 5, prior=30.0)
+    np.testing.assert_allclose(unseen.predict(kept), refitted(unseen, kept), atol=1e-7)
+
+
+@pytest.mark.parametrize('kept', [[], [0, 2]])
+def test_further_columns_are_fitted_together_with_those_of_the_model(kept):
+    unseen = made_up(20, 5, seed=1, prior=30.0)
+    extra = np.random.default_rng(2).normal(size=(4, unseen.labels.size))
+    ridges = (0.3, 40.0)
+    found = unseen.base(kept).extended(extra, ridges)
+    for ridge, residual in zip(ridges, found, strict=True):
+        np.testing.assert_allclose(residual, refitted(unseen, kept, extra, ridge), atol=1e-7)
+
+
+def test_a_model_without_frames_and_effects_predicts_its_target():
+    unseen = made_up(20, 5)
+    bare = Unseen(None, None, unseen.labels, unseen.columns[:0], (), unseen.targets[:1],
+                  np.zeros(0), np.zeros(0), np.zeros((5, 0, 0)), np.zeros((5, 0, 1)))  # fmt: skip
+    np.testing.assert_array_equal(bare.predict([]), unseen.targets[0])
+    extra = np.random.default_rng(3).normal(size=(2, unseen.labels.size))
+    expected = refitted(bare, [], extra, 1.0)
+    np.testing.assert_allclose(bare.base([]).extended(extra, [1.0])[0], expected, atol=1e-7)
+
+
+@pytest.fixture(scope='module', params=[(), ('base',), ('base', 'tool')])
+def fitted(request):
+    problem, model = tiny(TRUE, count=90, align=request.param)
+    scale = known_scale(problem)
+    found = fit(problem, model.with_found(TRUE), scale)
+    return problem, scale, found, Unseen.of(problem, scale, found, np.zeros(0))
+
+
+@pytest.mark.parametrize('kept', [[0, 1, 2], [0, 2], [1], []])
+def test_predictions_are_those_of_the_twin_fitted_again_without_each_stretch(fitted, kept):
+    problem, scale, found, unseen = fitted
+    stretch = unseen.labels[:: problem.rows[0]]
+    model = found.model.with_found(tuple(found.model.found[k] for k in kept))
+    expected = np.zeros(unseen.labels.size)
+    for b in np.unique(stretch):
+        seen = problem.restricted([stretch != b])
+        again = fit(seen, model, known_scale(seen)).model
+        residual = problem.whitened(problem.residuals(again), scale)
+        expected[unseen.labels == b] = residual[unseen.labels == b]
+    # in units of the noise; second order of half a milliradian on a metre is 0.01
+    np.testing.assert_allclose(unseen.predict(kept), expected, atol=0.03)
+
+
+def test_the_error_on_unseen_stretches_exceeds_that_of_the_fit():
+    problem, model = tiny(TRUE, count=40, align=('base', 'tool'))
+    scale = known_scale(problem)
+    found = fit(problem, model.with_found(TRUE), scale)
+    unseen = Unseen.of(problem, scale, found, np.zeros(0))
+    assert unseen.rms(unseen.predict([0, 1, 2])) > unseen.rms(found.residual)
+
+
+def test_squared_errors_are_metres_of_the_trusted_samples_whatever_their_weight():
+    problem, model = tiny((), count=30)
+    weights = np.linspace(0.05, 1.0, 30)
+    scale = Scale(SIGMA, SIGMA_TURN, (weights,))
+    found = fit(problem, model, scale)
+    unseen = Unseen.of(problem, scale, found, np.zeros(0))
+    position = problem.residuals(model)[0][:3]
+    expected = (position**2).sum(axis=0)[weights >= TRUSTED]
+    np.testing.assert_allclose(unseen.squares(found.residual), expected, rtol=1e-9)
+    assert unseen.rms(found.residual) == pytest.approx(np.sqrt(expected.mean()))
+    assert unseen.trusted_labels().size == expected.size
+
+
+def test_stretches_never_span_two_recordings():
+    first, _ = tiny((), count=30)
+    second, _ = tiny((), seed=1, count=70, turned=False)
+    both = type(first)(first.recordings + second.recordings)
+    labels = both.block_labels(8)
+    ends = 6 * 30
+    assert labels.size == 6 * 30 + 3 * 70
+    assert set(labels[:ends]).isdisjoint(labels[ends:])
+    assert (np.diff(labels) >= 0).all() and np.unique(labels).size == 8

@@ -44,12 +44,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _names() -> list[str]:
     folder = Path(__file__).parent / 'commands'
-    return sorted(p.stem.rstrip('_') for p in folder.glob('[!_]*.py'))
+    return sorted(p.stem.rstrip('_').replace('_', '-') for p in folder.glob('[!_]*.py'))
 
 
 def _module(name: str) -> ModuleType:
     suffix = '_' if name == 'import' else ''
-    return import_module(f'{__package__}.commands.{name}{suffix}')
+    return import_module(f'{__package__}.commands.{name.replace("-", "_")}{suffix}')
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The diagnosis of the sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
+"""The sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from ..robot import Robot
 from .advice import actions, next_experiment
 from .alignment import initial_frames
 from .families import family_verdict
-
 from .flexible import structure
 from .heldout import TRUSTED, Unseen
 from .noise import noise_floor

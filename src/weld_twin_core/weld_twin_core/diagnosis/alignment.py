@@ -283,5 +283,5 @@ def nearest_rotation(matrix: Array) -> Array:
 
 
 def chord(first: Array, second: Array) -> Array:
-    """Return 2 sin(angle / 2) of the turns between rotations, shape (M,): their angle when small."""
+    """Return 2 sin(angle / 2) of the turns between rotations, shape (M,): small ones' angle."""
     return np.asarray(np.linalg.norm(first - second, axis=(1, 2)) / np.sqrt(2.0))

@@ -12,7 +12,7 @@ from .search import Search
 from .verdict import CALIBRATION, STRUCTURE, Evidence, Verdict
 
 WORTH = 0.03
-"""A family whose absence raises the squared error on unseen data by less than this is not named."""
+"""A family whose absence raises the squared unseen error by less than this is not named."""
 CERTAIN = 2.0
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, LinAlgError
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..arrays import Array
 from .problem import Model, Problem, Scale
@@ -60,7 +60,7 @@ class Fit:
         size = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
         scaled = self.information / np.outer(size, size)
         inverse = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True) / np.outer(size, size)
-        return inflation * inverse[-count:, -count:]
+        return np.asarray(inflation * inverse[-count:, -count:])
 
 
 def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[str]]:

@@ -3,10 +3,10 @@
 """
 Is something left that no named effect explains?
 
-Generic columns that know no physics (each joint bent by splines of its own angle, by its speed and
-acceleration; the frame moved by splines of time and by the place in the workspace) are given to the
-model. If they predict unseen stretches better, the residual has structure, and the columns that
-bring it say what it depends on.
+Generic columns that know no physics (each joint bent by splines of its own angle, by its speed
+and acceleration; the frame moved by splines of time and by the place in the workspace) are given
+to the model. If they predict unseen stretches better, the residual has structure, and the columns
+that bring it say what it depends on.
 """
 
 from __future__ import annotations
@@ -128,7 +128,8 @@ def _pose_group(
 
 def _unit(columns: Array) -> Array:
     size = np.sqrt((columns**2).mean(axis=1, keepdims=True))
-    return columns[size[:, 0] > 1e-12] / size[size[:, 0] > 1e-12]
+    live = size[:, 0] > 1e-12
+    return np.asarray(columns[live] / size[live])
 
 
 def _bumps(x: Array, low: float, high: float, count: int = KNOTS) -> Array:

@@ -13,8 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array
+
+Index = NDArray[np.intp]
 
 FLAT = 1e-9
 """A column whose norm falls below this share once others are projected out carries nothing new."""
@@ -56,30 +59,30 @@ class Gram:
             self.rows - other.rows, np.maximum(self.size - other.size, 1e-300),
         )  # fmt: skip
 
-    def live(self, index: Array) -> Array:
+    def live(self, index: Index) -> Index:
         """Return those of an index whose columns still carry something."""
         diagonal = self.normal[index, index]
         return index[diagonal > FLAT * self.size[index]]
 
-    def solve(self, index: Array, precision: Array | float = 0.0) -> Array:
+    def solve(self, index: Index, precision: Array | float = 0.0) -> Array:
         """Return the least-squares coefficients of some columns, shape (len(index),)."""
         normal = self.normal[np.ix_(index, index)]
         normal = normal + np.diag(np.broadcast_to(precision, index.shape))
         size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         scaled = normal / np.outer(size, size)
         scaled[np.diag_indices_from(scaled)] += 1e-11
-        return np.linalg.solve(scaled, self.right[index] / size) / size
+        return np.asarray(np.linalg.solve(scaled, self.right[index] / size) / size)
 
-    def gain(self, index: Array) -> float:
+    def gain(self, index: Index) -> float:
         """Return by how much the sum of squares falls when some columns are fitted."""
         return float(self.right[index] @ self.solve(index)) if index.size else 0.0
 
-    def residual_of(self, index: Array, coefficients: Array) -> float:
+    def residual_of(self, index: Index, coefficients: Array) -> float:
         """Return the sum of squares with given coefficients on some columns."""
         quadratic = coefficients @ self.normal[np.ix_(index, index)] @ coefficients
         return self.rss - 2.0 * float(self.right[index] @ coefficients) + float(quadratic)
 
-    def without(self, index: Array, precision: Array | float = 0.0) -> Gram:
+    def without(self, index: Index, precision: Array | float = 0.0) -> Gram:
         """Return the normal equations with some columns fitted and projected out."""
         index = self.live(index)
         if index.size == 0:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -21,6 +22,7 @@ from scipy.linalg.lapack import dpotri
 
 from ..arrays import Array
 from .fit import Fit, design
+from .gram import Index
 from .problem import Model, Problem, Scale
 
 BLOCKS = 8
@@ -88,7 +90,7 @@ class Unseen:
         labels = problem.block_labels(BLOCKS)
         stacked = np.array(targets)
         bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
-        spans = list(zip(bounds[:-1], bounds[1:], strict=True))
+        spans = list(pairwise(bounds))
         normals = np.array([columns[:, a:b] @ columns[:, a:b].T for a, b in spans])
         rights = np.array([columns[:, a:b] @ stacked[:, a:b].T for a, b in spans])
         return cls(
@@ -99,7 +101,7 @@ class Unseen:
     @property
     def frames(self) -> int:
         """Return the number of nuisance columns."""
-        return self.parts[0].start if self.parts else self.columns.shape[0]
+        return int(self.parts[0].start if self.parts else self.columns.shape[0])
 
     def predict(self, kept: Sequence[int]) -> Array:
         """Return the residual on every stretch of the model fitted on the others, (rows,)."""
@@ -154,7 +156,7 @@ class Unseen:
             factors.append((factor, size))
         return Base(self, index, target, factors, residual)
 
-    def _index(self, kept: Sequence[int]) -> Array:
+    def _index(self, kept: Sequence[int]) -> Index:
         """Return the columns of the frames and of some effects."""
         parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in kept]
         return np.concatenate([np.arange(self.frames), *parts]).astype(int)
@@ -168,7 +170,7 @@ class Unseen:
     def _total(self) -> Array:
         return np.asarray(self.normals.sum(axis=0) + np.diag(self.precision))
 
-    def _system(self, b: int, index: Array) -> Array:
+    def _system(self, b: int, index: Index) -> Array:
         """Return the normal matrix of some columns on all stretches but one."""
         if index.size == self.columns.shape[0]:
             return np.asarray(self._total - self.normals[b])
@@ -179,7 +181,7 @@ class Unseen:
         """Return the right-hand side of every column on all stretches but one."""
         return np.asarray((self.rights.sum(axis=0) - self.rights[b]) @ mix - self.pull)
 
-    def _moved(self, step: Array, index: Array, low: int, high: int) -> Array:
+    def _moved(self, step: Array, index: Index, low: int, high: int) -> Array:
         """Return what a step of some columns takes off a stretch of rows, without a copy."""
         whole = np.zeros(self.columns.shape[0])
         whole[index] = step
@@ -216,7 +218,7 @@ class Base:
     """A model fitted with each stretch left out in turn, ready to be given further columns."""
 
     unseen: Unseen
-    index: Array
+    index: Index
     target: Array
     factors: list[tuple[tuple[Array, bool], Array]]
     residual: Array

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array
-from ..effects.base import Effect, Stage
+from ..effects.base import Effect
 from ..effects.registry import REGISTRY
 from ..features import Features, sites
+from .gram import Index
 from .problem import Model, Problem, Scale
 
 NUISANCE = {'base': 'base_pose', 'tool': 'tool_pose'}
@@ -39,18 +40,13 @@ class Unit:
     family: str
     joint: str | None
     seeds: tuple[Effect, ...]
-    columns: tuple[Array, ...]
+    columns: tuple[Index, ...]
     trials: float
 
     @property
     def site(self) -> tuple[str, str | None]:
         """Return family and joint."""
         return self.family, self.joint
-
-    @property
-    def all_columns(self) -> Array:
-        """Return the column numbers of all seeds."""
-        return np.concatenate(self.columns)
 
     def __str__(self) -> str:
         """Return family and joint as people read them."""
@@ -75,7 +71,7 @@ class Library:
     """
 
     columns: Array
-    fixed: Array
+    fixed: Index
     units: tuple[Unit, ...]
     absent: dict[str, str]
 
@@ -109,7 +105,7 @@ def build(
     count = sum(block.shape[0] for block in blocks)
     fixed = np.arange(count)
     units: list[Unit] = []
-    absent = {name: 'excluded by the user' for name in exclude}
+    absent = dict.fromkeys(exclude, 'excluded by the user')
     for kind in families(exclude, problem.align):
         for joint in sites(kind, model.robot.joint_names):
             reason = _applicable(kind, joint, features)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..effects.base import Effect
+from ..effects.transmission_ripple import TransmissionRipple
 from ..features import Features
 from .problem import Model, Problem, Scale
 
@@ -71,7 +72,8 @@ class _Waves:
             weight = (column * mass).sum(axis=0)
             squares = sine**2 @ weight
             cross = (sine * cosine) @ weight
-            normal += np.stack([squares, cross, cross, weight.sum() - squares], -1).reshape(-1, 2, 2)
+            terms = [squares, cross, cross, weight.sum() - squares]
+            normal += np.stack(terms, -1).reshape(-1, 2, 2)
             columns.append(column)
             masses.append(mass)
             waves.append(np.concatenate([sine, cosine]).astype(np.float32))
@@ -118,7 +120,7 @@ def with_lines(problem: Problem, model: Model, scale: Scale) -> Model:
             angle = orders[k] * maker.view.q[:, i]
             wave = step[0] * np.sin(angle) + step[1] * np.cos(angle)
             residual[r] = residual[r] - waves[i].columns[r] * wave
-        free[i] &= np.abs(orders - orders[k]) >= waves[i].apart
+        free[i] = free[i] & (np.abs(orders - orders[k]) >= waves[i].apart)
         found = _with_order(found, model.robot.joint_names[i], float(orders[k]))
     return model.with_found(tuple(found))
 
@@ -127,22 +129,22 @@ def _free(model: Model, waves: _Waves, orders: Array) -> Array:
     """Return which orders no ripple of the joint is too close to, shape (O,)."""
     free = np.ones(orders.size, bool)
     for effect in model.found:
-        if effect.name == 'transmission_ripple':
-            if effect.site == model.robot.joint_names[waves.joint]:
-                for order in np.atleast_1d(effect.order):  # type: ignore[attr-defined]
-                    free &= np.abs(orders - order) >= waves.apart
+        here = effect.site == model.robot.joint_names[waves.joint]
+        if isinstance(effect, TransmissionRipple) and here:
+            for order in np.atleast_1d(effect.order):
+                free &= np.abs(orders - order) >= waves.apart
     return free
 
 
 def _with_order(found: list[Effect], joint: str, order: float) -> list[Effect]:
     out = []
     for effect in found:
-        if effect.name == 'transmission_ripple' and effect.site == joint:
+        if isinstance(effect, TransmissionRipple) and effect.site == joint:
             effect = replace(
                 effect,
-                amplitude=np.append(effect.amplitude, 0.0),  # type: ignore[attr-defined]
-                order=np.append(effect.order, order),  # type: ignore[attr-defined]
-                phase=np.append(effect.phase, 0.0),  # type: ignore[attr-defined]
+                amplitude=np.append(effect.amplitude, 0.0),
+                order=np.append(effect.order, order),
+                phase=np.append(effect.phase, 0.0),
             )
         out.append(effect)
     return out

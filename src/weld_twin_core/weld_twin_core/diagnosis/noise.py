@@ -49,7 +49,7 @@ def _differences(position: Array) -> float | None:
     if position.shape[1] < ENOUGH:
         return None
     third = np.diff(position, n=3, axis=1)
-    return 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0)
+    return 1.4826 * float(np.median(np.abs(third))) / float(np.sqrt(20.0))
 
 
 def _repeats(q: Array, position: Array) -> float | None:
@@ -61,4 +61,4 @@ def _repeats(q: Array, position: Array) -> float | None:
     if close.sum() < ENOUGH:
         return None
     change = np.diff(position[:, order], axis=1)[:, close]
-    return 1.4826 * float(np.median(np.abs(change))) / np.sqrt(2.0)
+    return 1.4826 * float(np.median(np.abs(change))) / float(np.sqrt(2.0))

@@ -7,8 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from ..arrays import Array
 from ..effects.base import Effect
 from ..recording import Recording
@@ -250,4 +248,4 @@ class Diagnosis:
 
 
 def _frame(matrix: Array) -> list[list[float]]:
-    return np.asarray(matrix).tolist()
+    return [[float(v) for v in row] for row in matrix]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..effects.base import Effect
-from .gram import Gram
+from .gram import Gram, Index
 from .library import Unit
 
 
@@ -32,7 +32,7 @@ class Choice:
 
     unit: Unit
     seed: int
-    columns: Array
+    columns: Index
     nats: float
 
     def effect(self, gram: Gram) -> Effect:
@@ -74,7 +74,7 @@ def best_choice(gram: Gram, unit: Unit, effective: float) -> Choice | None:
     return best
 
 
-def _grow(gram: Gram, columns: Array, effective: float) -> tuple[Array, float]:
+def _grow(gram: Gram, columns: Index, effective: float) -> tuple[Index, float]:
     """Return the columns that are worth it, added one at a time, and their evidence."""
     chosen = columns[:0]
     nats = -np.inf
@@ -95,26 +95,6 @@ def _grow(gram: Gram, columns: Array, effective: float) -> tuple[Array, float]:
         nats = trials[k]
         chosen = np.append(chosen, rest.pop(k))
     return (best_all[0], best_all[1]) if best_all[1] > nats else (chosen, nats)
-
-
-def held_out(blocks: list[Gram], total: Gram, index: Array, precision: Array | float) -> Array:
-    """
-    Return for every block its sum of squares when some columns are fitted on the others.
-
-    Parameters
-    ----------
-    blocks, total : Gram
-    index : array of int
-    precision : array, shape (len(index),), or float
-
-    Returns
-    -------
-    array, shape (blocks,)
-
-    """
-    return np.array([
-        block.residual_of(index, (total - block).solve(index, precision)) for block in blocks
-    ])
 
 
 def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, ...]) -> float:

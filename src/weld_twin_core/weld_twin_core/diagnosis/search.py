@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From recordings to a fitted set of effects: baseline, selection, many small errors, final fit."""
+"""From recordings to a fitted set of effects: baseline, selection, small errors, final fit."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def effective_rows(
     share = effective_share(found.residual, problem.rows, problem.samples) ** trust
     count = share * found.residual.size
     explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
-    return count / (1.0 + MISFIT**2 * explained / MISFIT_DIRECTIONS)
+    return float(count / (1.0 + MISFIT**2 * explained / MISFIT_DIRECTIONS))
 
 
 def search(

@@ -23,6 +23,7 @@ from scipy.linalg.lapack import dtrtri
 
 from ..arrays import Array
 from ..effects.base import Effect
+from ..effects.transmission_ripple import TransmissionRipple
 from .fit import Fit, coordinates, design, fit, solve_scaled, stepped
 from .problem import Model, Problem, Scale
 
@@ -44,7 +45,7 @@ def groups(found: tuple[Effect, ...]) -> tuple[Array, Array]:
     for effect in found:
         size = effect.coordinates().size
         scales.append(effect.coordinate_scales())
-        if effect.name == 'transmission_ripple':
+        if isinstance(effect, TransmissionRipple):
             band = np.searchsorted(BANDS, np.repeat(np.atleast_1d(effect.order), 2))
             labels += [(effect.name, str(effect.site), int(b)) for b in band]
         else:

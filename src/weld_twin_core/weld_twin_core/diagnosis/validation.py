@@ -70,7 +70,9 @@ def _waterfall(
 
 def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array, Array]:
     """Return squared errors before and after on held-out bags, and a stretch for every sample."""
-    before, after, labels = [], [], []
+    before: list[Array] = []
+    after: list[Array] = []
+    labels: list[Array] = []
     for recording in holdout:
         problem = Problem((usable(recording),), frozenset({'base'}) & found.problem.align)
         pair, good = [], np.ones(problem.samples[0], dtype=bool)
@@ -87,7 +89,7 @@ def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array,
 
 
 def _for_bag(problem: Problem, model: Model, recordings: Sequence[Recording]) -> Model:
-    """Return the model with the base of the recording that the bag's set-up matches, or its own."""
+    """Return the model with the base whose set-up the bag matches, or the bag's own."""
     recording = problem.recordings[0]
     choices = [
         Model(model.robot, (base,), model.known,
@@ -109,7 +111,9 @@ def _size(problem: Problem, model: Model) -> float:
     return float(np.median(np.linalg.norm(problem.residuals(model)[0][:3], axis=0)))
 
 
-def ratio_interval(before: Array, after: Array, labels: Array) -> tuple[float, tuple[float, float]]:
+def ratio_interval(
+    before: Array, after: Array, labels: Array
+) -> tuple[float, tuple[float, float]]:
     """
     Return RMS after over before and its 95 % interval, by leaving out one stretch at a time.
 
@@ -130,7 +134,8 @@ def ratio_interval(before: Array, after: Array, labels: Array) -> tuple[float, t
     logs = []
     for name in names:
         keep = labels != name
-        logs.append(0.5 * np.log(max(after[keep].mean(), 1e-300) / max(before[keep].mean(), 1e-300)))
+        pair = (max(after[keep].mean(), 1e-300), max(before[keep].mean(), 1e-300))
+        logs.append(0.5 * np.log(pair[0] / pair[1]))
     k = names.size
     error = float(np.sqrt((k - 1) / k * ((np.array(logs) - np.mean(logs)) ** 2).sum()))
     reach = 2.36 * error  # Student t, 7 degrees of freedom

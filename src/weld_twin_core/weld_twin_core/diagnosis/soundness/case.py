@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ import numpy as np
 from ...arrays import Array
 from ...errors import DataError
 from ...recording import Measurements, Recording
+from ..alignment import refined
 from ..problem import Model, Problem
 from .lag import Lag, lag
 from .snapshot import Snapshot, snapshot
@@ -22,6 +23,10 @@ LARGE = 5e-3
 """Median gap [m] above which the data may be mixed up; what wears in an arm is smaller."""
 ENOUGH = 30
 """Joint states from which a motion has a shape in time."""
+HINT = 0.8
+"""What the gap must fall to for a lag to be looked into, and"""
+EXPLAINED = 0.35
+"""for it to be believed once the frames are fitted with it."""
 
 
 class Finding(NamedTuple):
@@ -54,30 +59,46 @@ class Case:
         return float(np.median(np.concatenate([distance(part) for part in self.residuals])))
 
     @cached_property
-    def paths(self) -> list[Array]:
-        """Return the twin's path at the joint stamps, one array (N, 3) per recording."""
-        return [
-            self.model.twin(k).poses(r, r.joints.t).position for k, r in enumerate(self.recordings)
-        ]
-
-    @cached_property
     def lags(self) -> list[Lag | None]:
-        """Return how late the measurements are; None where no lag explains the gap."""
+        """
+        Return how late the measurements are; None where no lag explains the gap.
+
+        Frames fitted at a wrong lag hide it, so they are fitted again with the lag undone.
+        """
+        first = self._lags(self.model)
+        late = [f if f is not None and f.after < HINT * f.before else None for f in first]
+        if not any(late):
+            return [None] * len(late)
+        shot = snapshot(self.problem, self.model, self._motions(late))
+        again = self._lags(refined(replace(shot.problem, align=self.problem.align), shot.model))
+        return [
+            new if old is not None and new is not None and new.after < EXPLAINED * old.before
+            else None
+            for old, new in zip(late, again, strict=True)
+        ]  # fmt: skip
+
+    def _lags(self, model: Model) -> list[Lag | None]:
         out: list[Lag | None] = []
-        for recording, path in zip(self.recordings, self.paths, strict=True):
-            seen = measured(recording)
-            moving = not recording.joints.static and path.shape[0] >= ENOUGH
-            out.append(lag(recording.joints.t, path, seen.t, seen.position) if moving else None)
+        for k, recording in enumerate(self.recordings):
+            t, seen = recording.joints.t, measured(recording)
+            if recording.joints.static or t.size < ENOUGH:
+                out.append(None)
+                continue
+            path = model.twin(k).poses(recording, t).position
+            out.append(lag(t, path, seen.t, seen.position))
+        return out
+
+    def _motions(self, lags: Sequence[Lag | None]) -> list[Array]:
+        out = []
+        for recording, late in zip(self.recordings, lags, strict=True):
+            t = measured(recording).t
+            out.append(recording.joints.at(t if late is None else t - late.at(t))[0])
         return out
 
     @cached_property
     def motions(self) -> list[Array]:
         """Return joint positions at the measurements, lag undone, (M, n) per recording."""
-        out = []
-        for recording, late in zip(self.recordings, self.lags, strict=True):
-            t = measured(recording).t
-            out.append(recording.joints.at(t if late is None else t - late.at(t))[0])
-        return out
+        return self._motions(self.lags)
 
     @cached_property
     def snapshot(self) -> Snapshot:

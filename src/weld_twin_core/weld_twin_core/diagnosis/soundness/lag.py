@@ -16,8 +16,6 @@ MOST_LAG = 2.0
 COARSE = 0.01
 SAMPLES = 300
 ROUNDS = 6
-EXPLAINED = 0.35
-"""What the gap must fall to for a lag to be believed."""
 APART = 0.6
 """What clocks that run apart must leave of what a constant lag leaves."""
 KEPT = 0.8
@@ -25,11 +23,17 @@ KEPT = 0.8
 
 
 class Lag(NamedTuple):
-    """How late measurements are [s] at an instant [s], and how much later with every second."""
+    """
+    How late measurements are [s] at an instant [s], and how much later with every second.
+
+    ``before`` and ``after`` are the RMS gap [m] without and with the lag.
+    """
 
     late: float
     rate: float
     middle: float
+    before: float = 0.0
+    after: float = 0.0
 
     def at(self, t: Array) -> Array:
         """Return the lag at stamps of the measurements, shape (M,) [s]."""
@@ -38,7 +42,7 @@ class Lag(NamedTuple):
 
 def lag(joints: Array, path: Array, t: Array, position: Array) -> Lag | None:
     """
-    Return how late measurements are against a path; None when no lag explains much.
+    Return how late measurements are against a path; None when too few to tell.
 
     Whatever lag, the path may be turned and shifted, so no base frame is needed.
 
@@ -64,8 +68,8 @@ def lag(joints: Array, path: Array, t: Array, position: Array) -> Lag | None:
         _misfit(seen, _along(path, joints, stamps - trial.at(stamps)))
         for trial in (Lag(0.0, 0.0, middle), constant, drifting)
     ]
-    best = drifting if left[2] < APART * left[1] else constant
-    return best if min(left[1:]) < EXPLAINED * left[0] else None
+    best, after = (drifting, left[2]) if left[2] < APART * left[1] else (constant, left[1])
+    return best._replace(before=left[0], after=after)
 
 
 def _along(path: Array, joints: Array, t: Array) -> Array:

@@ -24,6 +24,8 @@ MOST = 3
 """So many mix-ups at once are looked for."""
 WORTH = 0.7
 """A further mix-up must bring the gap below this share of what it was."""
+ENOUGH = 1e-3
+"""A gap [m] this small after a rough fit needs no further trials."""
 SHORTLIST = 5
 FAR = 0.05
 """A gap [m] from which wrong frames are an instrument's own, not an error of set-up."""
@@ -101,8 +103,13 @@ def _best(
     shot: Snapshot, tries: Iterable[Suspicion]
 ) -> tuple[Suspicion | None, Snapshot, float]:
     """Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best."""
-    tried = [(suspicion, suspicion.undo(shot)) for suspicion in tries]
-    rough = np.array([trial.rough_gap() for _, trial in tried])
+    tried, rough = [], []
+    for suspicion in tries:
+        trial = suspicion.undo(shot)
+        tried.append((suspicion, trial))
+        rough.append(trial.rough_gap())
+        if rough[-1] < ENOUGH:
+            return suspicion, trial, gap(trial.problem, trial.framed())
     best: tuple[Suspicion | None, Snapshot, float] = (None, shot, np.inf)
     for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
         suspicion, trial = tried[k]

@@ -16,8 +16,10 @@ WINDOW = 7
 """Neighbours in time that a sample is compared with."""
 FAR = 10.0
 """Robust deviations from which a sample is an outlier."""
-SMALL = 0.25
+SMALL = 0.5
 """Share of the median gap below which nothing matters."""
+ALONE = 0.4
+"""A sample off its neighbours by less than this share is on the way from one to the other."""
 STATION_FAR = 8.0
 """Median gaps from which a station is an outlier."""
 MANY = 0.1
@@ -52,7 +54,14 @@ def _samples(part: Array) -> Array:
     # Vibration comes and goes: what one sample in ten does is no outlier.
     limit = max(FAR * float(np.median(off)), 4.0 * float(np.quantile(off, 0.9)))
     limit = max(limit, SMALL * float(np.median(distance(part))), 1e-9)
-    return np.where(off > limit, off, 0.0)
+    return np.where((off > limit) & (_peak(part[:3]) > ALONE * off), off, 0.0)
+
+
+def _peak(position: Array) -> Array:
+    """Return how far samples are off the middle of their two neighbours, shape (M,) [m]."""
+    padded = np.pad(position, ((0, 0), (1, 1)), mode='edge')
+    middle = 0.5 * (padded[:, :-2] + padded[:, 2:])
+    return np.asarray(np.linalg.norm(position - middle, axis=0))
 
 
 def _stations(part: Array) -> Array:

@@ -15,14 +15,20 @@ from ..problem import Model, Problem
 from .base_change import BaseChange, base_change
 from .case import Case, Finding, length, measured
 
-SURE = 10.0
-"""Nats by which a change must beat no change, and a step every smooth change or step of joints."""
+SURE = 6.0
+"""Nats by which a change of a set-up of stations must beat no change."""
+SURE_MOVING = 20.0
+"""The same for a moving arm, whose residuals hang together however good the model."""
+MARGIN = 10.0
+"""Nats by which a step must beat every smooth change, and a settling every other."""
 MOST = 4
 MOST_ROWS = 18000
-EDGE = 0.04
-"""A step nearer to either end of a recording, as a share of it, is not looked for."""
+EDGE = 0.05
+"""A step nearer to an end of a recording or another step, as a share, is not looked for."""
 CONSTANTS = np.geomspace(0.05, 0.7, 7)
 """Time constants of settling, as shares of the recording."""
+SLOW = 2.0
+"""Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
 NEIGHBOURS = np.geomspace(0.8, 1.25, 7)
 
 
@@ -83,62 +89,73 @@ def changes(parts: list[Array], problem: Problem, model: Model) -> list[Step | S
     problem, parts = _thinned(problem, parts)
     change = base_change(parts, problem, model)
     out: list[Step | Settling] = []
-    calmed: set[int] = set()
+    taken: list[_Trial] = []
     for _ in range(MOST):
-        trials = [
-            trial for k in range(len(parts)) for trial in _trials(change, problem, k)
-            if trial.abrupt or k not in calmed
-        ]  # fmt: skip
+        trials = [t for k in range(len(parts)) for t in _trials(change, problem, k, taken)]
         best = max(trials, key=lambda trial: trial.nats, default=None)
-        if best is None or best.nats < SURE:
+        if best is None:
             break
+        taken.append(best)
         if best.named is not None:
             out.append(best.named)
-        if not best.abrupt:
-            calmed.add(best.recording)
         change = change.without(best.shape)
     return out
 
 
 class _Trial(NamedTuple):
-    """A shape in time, its evidence, and what it is called where it may be."""
+    """A shape in time, its evidence, the sample where it is abrupt, and its name if it has one."""
 
     recording: int
     shape: Array
     nats: float
-    abrupt: bool
+    at: int | None
     named: Step | Settling | None
 
 
-def _trials(change: BaseChange, problem: Problem, k: int) -> Iterator[_Trial]:
-    """Yield the best smooth change and the best step of recording k."""
-    name, mine = problem.recordings[k].name, change.recording == k
-    t, age = measured(problem.recordings[k]).t, _age(problem, k)
+def _trials(
+    change: BaseChange, problem: Problem, k: int, taken: Sequence[_Trial]
+) -> Iterator[_Trial]:
+    """Yield the best smooth change and the best step of recording k, where they are sure."""
+    recording, mine = problem.recordings[k], change.recording == k
+    t, age = measured(recording).t, _age(problem, k)
+    before = [trial.at for trial in taken if trial.recording == k]
+    sure = SURE if recording.joints.static else SURE_MOVING
     constant, others = _smooth(change, mine, age)
     settled = _placed(np.exp(-age / constant), mine)
     other = max((_placed(shape, mine) for shape in others), key=change.gain)
     nats, plain = change.nats(settled), change.nats(other)
-    if nats > SURE + max(plain, change.of_joints.nats(settled)):
-        found = Settling(name, constant * float(np.ptp(t)), change.size(settled), nats)
-        yield _Trial(k, settled, nats, False, found)
-    else:
-        yield _Trial(k, other if plain > nats else settled, max(nats, plain), False, None)
-    at = _step(change, k, whole=k > 0 and 'base' not in problem.align)
-    if at is not None:
-        shape = _placed(np.arange(t.size) >= at, mine)
-        abrupt = change.nats(shape)
-        if abrupt > SURE + max(0.0, nats, plain, change.of_joints.nats(shape)):
-            step = Step(name, float(t[at]), change.size(shape), abrupt)
-            yield _Trial(k, shape, abrupt, True, step)
+    if max(nats, plain) > sure and None not in before:
+        span = float(np.ptp(t))
+        slow = recording.joints.static or constant * span > SLOW
+        if slow and nats > MARGIN + max(plain, change.of_joints.nats(settled)):
+            found = Settling(recording.name, constant * span, change.size(settled), nats)
+            yield _Trial(k, settled, nats, None, found)
+        else:
+            yield _Trial(k, other if plain > nats else settled, max(nats, plain), None, None)
+    at = _step(change, k, before, whole=k > 0 and 'base' not in problem.align)
+    if at is None:
+        return
+    shape = _placed(np.arange(t.size) >= at, mine)
+    abrupt, joints = change.nats(shape), change.of_joints.nats(shape)
+    joints += 0.0 if recording.joints.static else MARGIN
+    if abrupt > max(sure, MARGIN + max(nats, plain), joints):
+        yield _Trial(
+            k, shape, abrupt, at, Step(recording.name, float(t[at]), change.size(shape), abrupt)
+        )
 
 
-def _step(change: BaseChange, k: int, *, whole: bool) -> int | None:
+def _step(
+    change: BaseChange, k: int, before: Sequence[int | None], *, whole: bool
+) -> int | None:
     """Return the sample before which a step of recording k's base explains most."""
     gains = change.step_gains(k)
     edge = max(3, int(EDGE * gains.size))
     allowed = np.zeros(gains.size, dtype=bool)
     allowed[edge:-edge] = True
     allowed[0] = whole
+    for at in before:
+        if at is not None:
+            allowed[max(at - edge, 0) : at + edge] = False
     return int(np.where(allowed, gains, -np.inf).argmax()) if allowed.any() else None
 
 

@@ -41,7 +41,12 @@ _TURN_OF = {'theta': 'theta', 'd': 'theta', 'a': 'alpha', 'alpha': 'alpha', 'bet
 
 
 class Calibration(NamedTuple):
-    """What a calibration found: the robot, RMS [m, rad mixed], steps taken, and whether by QR."""
+    """
+    What a calibration found.
+
+    The robot, the RMS of what was left before the last step [m and rad], the number of steps, and
+    whether any of them needed the QR factorisation.
+    """
 
     robot: Robot
     rms: float
@@ -82,7 +87,7 @@ def calibrate(
 
     """
     wanted = tuple(channels) if channels is not None else minimal_channels(robot)
-    by_qr, steps = False, 0
+    by_qr, steps, residual = False, 0, np.zeros(1)
     for steps in range(1, STEPS + 1):  # noqa: B007 - counted for the result
         columns, residual = linearised(robot, q, poses, wanted, length)
         step, qr = _solved(columns, residual)
@@ -90,8 +95,7 @@ def calibrate(
         robot = moved(robot, wanted, step)
         if np.abs(step).max() < SETTLED:
             break
-    left = _residual(BulkKernel(robot).poses(q), poses, length)
-    return Calibration(robot, float(np.sqrt((left * left).mean())), steps, by_qr)
+    return Calibration(robot, float(np.sqrt((residual * residual).mean())), steps, by_qr)
 
 
 def _residual(found: Array, poses: Array, length: float) -> Array:

@@ -15,7 +15,8 @@ factorisation of the features [1]_, whose remainder bounds the error.
 References
 ----------
 .. [1] H. Cheng et al., "On the compression of low rank matrices", SIAM J. Sci. Comput. 26, 2005
-   (the interpolative decomposition).
+   (the interpolative decomposition); of random mixtures: P.-G. Martinsson, V. Rokhlin, M. Tygert,
+   "A randomized algorithm for the decomposition of matrices", ACHA 30, 2011.
 
 """
 
@@ -34,6 +35,9 @@ from .half_angle import sincos
 
 ROUNDING = 1e-14
 """Remainder of the features, relative to the strongest, that counts as none."""
+_NEGLIGIBLE = 1e-13
+"""Remainder up to which all samples are taken as determined by a few."""
+_MIXTURES = 48
 BLOCK = 504
 """Draws whose weights are built at once."""
 POINTS = 6000
@@ -92,7 +96,7 @@ class SeamDraws:
         if smooth:
             both = (features[0][:, None] * features[1][None]).reshape(-1, len(q))
             found = _determining(both)
-            if 2 * len(found.samples) < len(q):
+            if found is not None and 2 * len(found.samples) < len(q):
                 self.samples, self.spread, self.remainder = found
         self._near, self._far = (np.ascontiguousarray(f[:, self.samples]) for f in features)
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))
@@ -218,16 +222,23 @@ class _Determining(NamedTuple):
     remainder: float
 
 
-def _determining(features: Array) -> _Determining:
-    """Return samples, and the matrix (S, N) that turns values there into values everywhere."""
-    upper, order = qr(features, mode='r', pivoting=True, check_finite=False)
+def _determining(features: Array) -> _Determining | None:
+    """
+    Return samples, and the matrix (S, N) that turns values there into values everywhere.
+
+    The factorisation is of random mixtures of the features, which depend on each other as the
+    features do; the remainder is that of the features themselves. None if they are too many.
+    """
+    mixtures = np.random.default_rng(0).normal(size=(_MIXTURES, len(features))) @ features
+    upper, order = qr(mixtures, mode='r', pivoting=True, check_finite=False)
     strength = np.abs(np.diagonal(upper))
     rank = int((strength > ROUNDING * strength[0]).sum())
     spread = np.empty((rank, features.shape[1]))
     spread[:, order[:rank]] = np.eye(rank)
     spread[:, order[rank:]] = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
     left = np.abs(features[:, order[:rank]] @ spread - features).max()
-    return _Determining(order[:rank], spread, float(left / np.abs(features).max()))
+    remainder = float(left / np.abs(features).max())
+    return _Determining(order[:rank], spread, remainder) if remainder < _NEGLIGIBLE else None
 
 
 def _features(q: Array) -> Array:

@@ -25,6 +25,10 @@ HALF_ANGLE = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0], [0.0, -2.0, 0.0]])
 """(1, c, s) = (1, u, v) @ HALF_ANGLE, with u and v as in `half_angle`."""
 
 
+_TURNS = np.stack([skew(axis) for axis in np.eye(3)])
+"""Generators of turns about the coordinate axes, shape (3, 3, 3)."""
+
+
 class Factor(NamedTuple):
     """One of the factors of a row: which DH values it holds, which axis, and its matrices."""
 
@@ -81,18 +85,18 @@ def product(first: Array, second: Array) -> Array:
 def generator(axis: int) -> Array:
     """Return the generator of a turn about a coordinate axis, shape (4, 4)."""
     out = np.zeros((4, 4))
-    out[:3, :3] = skew(np.eye(3)[axis])
+    out[:3, :3] = _TURNS[axis]
     return out
 
 
 def adjoint(matrices: Array) -> Array:
     """Return how matrices (k, 4, 4) of one factor act on screws (moment, axis), (k, 6, 6)."""
     out = np.zeros((len(matrices), 6, 6))
-    turn, shift = matrices[:, :3, :3], matrices[:, :3, 3].copy()
+    turn, shift = matrices[:, :3, :3], matrices[:, :3, 3]
     out[:, :3, :3] = out[:, 3:, 3:] = turn
-    out[:, :3, 3:] = skew(shift[0]) @ turn
-    shift[0] = 0.0  # only a sliding joint moves the origin, and it does not turn
-    out[:, :3, 3:] += skew(shift) @ turn[0]
+    out[:, :3, 3:] = np.tensordot(shift[0], _TURNS, 1) @ turn
+    # Only a sliding joint moves the origin, and it does not turn.
+    out[1:, :3, 3:] += np.tensordot(shift[1:], _TURNS, 1) @ turn[0]
     return out
 
 
@@ -173,8 +177,7 @@ def _stack(parts: list[Array]) -> Array:
 
 def on_half_angles(weights: Array, joints: int) -> Array:
     """Return weights of (1, c, s) features turned into weights of (1, u, v) features."""
-    shape = weights.shape
-    out = weights.reshape((3,) * joints + shape[1:])
+    out = weights
     for axis in range(joints):
-        out = np.moveaxis(np.tensordot(HALF_ANGLE, out, axes=(1, axis)), 0, axis)
-    return out.reshape(shape)
+        out = HALF_ANGLE @ out.reshape(3**axis, 3, -1)
+    return out.reshape(weights.shape)

@@ -48,7 +48,9 @@ def smooth_motion(arm: Robot, count: int) -> Array:
     s = np.linspace(0.0, 1.0, count)[:, None]
     phases = np.arange(arm.n)
     rates = 0.7 + 0.13 * ((5 * phases) % 7)
-    return np.array([0.3, -1.2, 1.5, -1.9, -1.5, 0.2, 0.5])[phases] + 0.2 * np.sin(s * rates + phases)
+    return np.array([0.3, -1.2, 1.5, -1.9, -1.5, 0.2, 0.5])[phases] + 0.2 * np.sin(
+        s * rates + phases
+    )
 
 
 def links(robot: Robot) -> list[Array]:

@@ -39,9 +39,7 @@ def drawn(robot: Robot, unit: Array) -> DhDraws:
     return DhDraws(*(getattr(robot, k) + part for k, part in zip(DH_KEYS, parts, strict=True)))
 
 
-def _monte_carlo(
-    robot: Robot, q: Array, where: str, draws: int, with_pinocchio: bool
-) -> Workload:
+def _monte_carlo(robot: Robot, q: Array, where: str, draws: int, with_pinocchio: bool) -> Workload:
     unit = np.random.default_rng(4).random((draws, 4 * robot.n))
     some = drawn(robot, unit)
 

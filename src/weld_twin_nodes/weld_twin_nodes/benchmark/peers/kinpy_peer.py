@@ -38,7 +38,9 @@ def _urdf(robot: Robot) -> str:
     for i, placement in enumerate([*placements, tool]):
         kind = 'fixed' if i == robot.n else 'continuous'
         turn = Rotation.from_matrix(placement[:3, :3]).as_euler('xyz')
-        xyz, rpy = (' '.join(repr(float(v)) for v in vector) for vector in (placement[:3, 3], turn))
+        xyz, rpy = (
+            ' '.join(repr(float(v)) for v in vector) for vector in (placement[:3, 3], turn)
+        )
         parts.append(
             f'<joint name="q{i}" type="{kind}"><parent link="{names[i]}"/>'
             f'<child link="{names[i + 1]}"/><origin xyz="{xyz}" rpy="{rpy}"/>'

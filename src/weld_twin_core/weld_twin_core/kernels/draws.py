@@ -22,6 +22,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -40,7 +41,7 @@ _NEGLIGIBLE = 1e-13
 _MIXTURES = 48
 BLOCK = 504
 """Draws whose weights are built at once."""
-POINTS = 6000
+POINTS = 8000
 """Draws times samples worked on at once; a few of such arrays fit the processor's cache."""
 SPLIT = 3
 """Rows of the near piece, the first included, whose turn drops out."""
@@ -90,6 +91,7 @@ class SeamDraws:
             )
         self.robot = robot
         features = _features(q[:, 1:SPLIT]), _features(q[:, SPLIT:])
+        self._count = len(q)
         self.samples: NDArray[np.int_] = np.arange(len(q))
         self.spread: Array | None = None
         self.remainder = 0.0
@@ -105,26 +107,31 @@ class SeamDraws:
     def largest(self, draws: DhDraws) -> Array:
         """Return the largest distance from the nominal tool point along the seam, shape (D,)."""
         out = np.empty(len(draws.theta))
-        for start in range(0, len(out), BLOCK):
-            part = slice(start, start + BLOCK)
-            pieces = self._pieces(DhDraws(*(v[part] for v in draws)))
-            self._largest(pieces, out[part])
+        step = max(1, POINTS // self._count)
+        for start, away in self._away(draws):
+            for k in range(0, away.shape[1], step):
+                part = away[:, k : k + step]
+                self._squares(part).max(axis=1, out=out[start + k : start + k + part.shape[1]])
         return np.sqrt(out)
 
     def distances(self, draws: DhDraws) -> Array:
         """Return distances from the nominal tool point, shape (D, N) [m]."""
-        return np.sqrt(self._squares(*self._pieces(draws)))
+        parts = [self._squares(away) for _, away in self._away(draws)]
+        return np.sqrt(np.concatenate(parts))
 
-    def _largest(self, pieces: tuple[Array, Array, Array], out: Array) -> None:
-        step = max(1, POINTS // len(self.samples))
-        for start in range(0, len(out), step):
-            part = slice(start, start + step)
-            squares = self._squares(*(piece[..., part] for piece in pieces))
-            squares.max(axis=1, out=out[part])
+    def _away(self, draws: DhDraws) -> Iterator[tuple[int, Array]]:
+        """Yield the first draw of a block and its deviations at the samples, (3, D, S) [m]."""
+        step = min(BLOCK, max(1, POINTS // len(self.samples)))
+        for start in range(0, len(draws.theta), BLOCK):
+            block = DhDraws(*(values[start : start + BLOCK] for values in draws))
+            pieces = self._pieces(block)
+            for k in range(0, len(block.theta), step):
+                away = self._points(*(piece[..., k : k + step] for piece in pieces))
+                away -= self._nominal
+                yield start + k, away
 
-    def _squares(self, near: Array, far: Array, link: Array) -> Array:
-        away = self._points(near, far, link)
-        away -= self._nominal
+    def _squares(self, away: Array) -> Array:
+        """Return squared distances, shape (D, N), of deviations, which may be overwritten."""
         if self.spread is not None:
             away = away @ self.spread
         away *= away
@@ -181,8 +188,9 @@ class _Rows:
     """Builds the weights of pieces for all draws: vectors carried toward the base, row by row."""
 
     def __init__(self, draws: DhDraws) -> None:
-        self.sine, self.cosine = sincos(draws.theta.T)
-        self.alpha_sine, self.alpha_cosine = sincos(draws.alpha.T)
+        sine, cosine = sincos(np.concatenate([draws.theta.T, draws.alpha.T]))
+        self.sine, self.alpha_sine = np.split(sine, 2)
+        self.cosine, self.alpha_cosine = np.split(cosine, 2)
         self.d, self.a = draws.d.T, draws.a.T
 
     def linked(self, vectors: Array, i: int) -> Array:

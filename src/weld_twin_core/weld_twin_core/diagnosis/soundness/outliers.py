@@ -20,6 +20,7 @@ SMALL = 0.5
 """Share of the median gap below which nothing matters."""
 ALONE = 0.4
 """A sample off its neighbours by less than this share is on the way from one to the other."""
+SEVERAL, GROSS = 3, 3.0
 STATION_FAR = 8.0
 """Median gaps from which a station is an outlier."""
 MANY = 0.1
@@ -54,7 +55,11 @@ def _samples(part: Array) -> Array:
     # Vibration comes and goes: what one sample in ten does is no outlier.
     limit = max(FAR * float(np.median(off)), 4.0 * float(np.quantile(off, 0.9)))
     limit = max(limit, SMALL * float(np.median(distance(part))), 1e-9)
-    return np.where((off > limit) & (_peak(part[:3]) > ALONE * off), off, 0.0)
+    bad = (off > limit) & (_peak(part[:3]) > ALONE * off)
+    # Two joints that reverse at nearly the same time leave a spike; an instrument leaves several.
+    if bad.sum() < SEVERAL and off.max() < GROSS * limit:
+        return np.zeros(off.size)
+    return np.where(bad, off, 0.0)
 
 
 def _peak(position: Array) -> Array:

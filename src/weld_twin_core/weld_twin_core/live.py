@@ -88,7 +88,7 @@ class LiveTwin:
                 f'the joint state at {t:.6f} s is {self._last - t:.6g} s before the one already '
                 'seen; reset the twin after a jump back in time'
             )
-        if np.isinf(self._last):
+        if self._last == -np.inf:
             self._start = t
         self._last = t
         return q

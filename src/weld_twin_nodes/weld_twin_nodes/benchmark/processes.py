@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -108,7 +109,10 @@ def _said(words: list[str]) -> dict[str, Any]:
 
 
 def _run(words: list[str]) -> str:
-    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, check=False)
+    here = {**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))}
+    done = subprocess.run(
+        [sys.executable, *words], env=here, capture_output=True, text=True, check=False
+    )
     if done.returncode:
         reason = done.stderr.strip().splitlines() or ['no reason given']
         raise DataError(f'a process of the benchmark ended with {done.returncode}: {reason[-1]}')

@@ -20,7 +20,7 @@ from .race import Contender, Workload
 
 POINTS = 200
 BASE = 1024
-FEW = 12
+FEW = 16
 """Draws the peer is timed on; every draw costs it the same."""
 EXACT = 1e-12
 

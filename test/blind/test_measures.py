@@ -57,7 +57,7 @@ CASES = [
 )  # fmt: skip
 def test_measures_are_the_counts_made_by_hand(key, value, count):
     measure = next(m for m in verdict_measures(CASES) if m.key == key)
-    assert measure.estimate.count == count
+    assert measure.estimate.cases == count
     assert measure.estimate.value == (None if value is None else pytest.approx(value))
 
 

@@ -56,4 +56,4 @@ def test_a_calibrated_confidence_has_little_error():
 
 def test_certainty_is_in_the_last_bin():
     (last,) = reliability([1.0, 0.95], [True, True])
-    assert (last.low, last.high, last.right.count) == (0.9, 1.0, 2)
+    assert (last.low, last.high, last.right.cases) == (0.9, 1.0, 2)

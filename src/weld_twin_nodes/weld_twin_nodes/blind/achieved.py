@@ -95,7 +95,7 @@ def _good(recording: Recording, outliers: list[int]) -> Array:
     t, joints = _measured(recording).t, recording.joints
     good = (t >= joints.t[0]) & (t <= joints.t[-1])
     good[np.asarray(outliers, dtype=int)] = False
-    return good
+    return np.asarray(good)
 
 
 def _measured(recording: Recording) -> Measurements:

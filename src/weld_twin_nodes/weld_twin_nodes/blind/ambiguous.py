@@ -58,7 +58,7 @@ def _parallel(robot: Robot, span: float, rng: np.random.Generator) -> Constructi
         mates = [k for k in range(robot.n) if k != at and _linked(axes, at, k)]
         if mates:
             cause = _on('link_offset', robot, int(at), span, rng)
-            alike = [[('link_offset', robot.joint_names[k])] for k in mates]
+            alike: list[list[Site]] = [[('link_offset', robot.joint_names[k])] for k in mates]
             return Construction([cause], alike)
     return _first_axis(robot, span, rng)
 

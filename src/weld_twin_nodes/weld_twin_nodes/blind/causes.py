@@ -40,6 +40,8 @@ SPREAD = (0.02, 20.0)
 MOST = {'vibration': 6.0, 'servo_lag': 10.0, 'time_delay': 10.0, 'quantization': 5.0,
         'payload': 10.0}  # fmt: skip
 """The same for causes that become absurd sooner."""
+LEAST = {'servo_lag': 0.15, 'joint_compliance': 0.1}
+"""The same for causes that the simulator cannot have any smaller: a servo or spring too stiff."""
 RIPPLE_ORDERS = (1, 2, 3, 8, 20, 50, 80, 100)
 
 
@@ -65,7 +67,7 @@ def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Ca
 
 def plausible(family: str, factor: float) -> bool:
     """Tell whether a cause may be so many times its typical size."""
-    return SPREAD[0] < factor < MOST.get(family, SPREAD[1])
+    return LEAST.get(family, SPREAD[0]) < factor < MOST.get(family, SPREAD[1])
 
 
 def scaled(cause: Mapping[str, Any], factor: float) -> Cause:
@@ -95,7 +97,7 @@ def _joint(robot: Robot, rng: np.random.Generator) -> str:
 
 def _vector(size: float, rng: np.random.Generator) -> list[float]:
     way = rng.standard_normal(3)
-    return (size * way / np.linalg.norm(way)).tolist()
+    return [float(size * part) for part in way / np.linalg.norm(way)]
 
 
 def _one(key: str, size: float) -> Callable[..., Cause]:

@@ -177,9 +177,13 @@ def as_recording(name: str, made: PlantRecording) -> Recording:
     return Recording(
         name, JointMotion(made.t_joint, made.q, None if made.static else made.qd, made.static),
         Measurements(made.t_measured, made.position, rotation),
-        None if made.wrench is None else Signal(made.wrench_t, made.wrench), 'tool',
-        None if made.temperature is None else Signal(made.temperature_t, made.temperature),
+        _signal(made.wrench_t, made.wrench), 'tool',
+        _signal(made.temperature_t, made.temperature),
     )  # fmt: skip
+
+
+def _signal(t: Array | None, value: Array | None) -> Signal | None:
+    return None if t is None or value is None else Signal(t, value)
 
 
 def deviation(cell: Cell, causes: Sequence[Cause], taken: Take) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -104,7 +104,7 @@ def lots(
     return out
 
 
-class Deck:
+class Deck(Generic[Card]):
     """Cards dealt in a random order, all of them before any comes again."""
 
     def __init__(self, cards: Sequence[Card], seed: int, number: int) -> None:

@@ -99,12 +99,14 @@ def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> d
     """
     directory = Path(place)
     start = time.perf_counter()
+    answer, failure = None, None
     try:
-        answer = {'diagnosis': _diagnosis(directory, with_holdout), 'error': None}
+        answer = _diagnosis(directory, with_holdout)
     except Exception as error:
-        answer = {'diagnosis': None, 'error': f'{type(error).__name__}: {error}'}
+        failure = f'{type(error).__name__}: {error}'
     return {
-        'name': directory.name, **answer, 'seconds': time.perf_counter() - start,
+        'name': directory.name, 'diagnosis': answer, 'error': failure,
+        'seconds': time.perf_counter() - start,
         'memory_bytes': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _KIB,
     }  # fmt: skip
 

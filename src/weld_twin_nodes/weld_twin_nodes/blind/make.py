@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -140,15 +141,21 @@ def make_case(
 ) -> dict[str, str]:
     """Write one case and its truth; return its name and the hashes of both."""
     rng = np.random.default_rng([seed, 1000 + number])
-    case = draw_case(lot, rng, spans)
     name = f'case_{number + 1:04d}'
-    with new_directory(Path(cases) / name, mark=layout.CASE) as place:
+    for _ in range(TRIES):
+        case = draw_case(lot, rng, spans)
+        with suppress(FloatingPointError):
+            return _written(case, name, Path(cases), Path(truths))
+    raise DataError(f'the simulator cannot move any {name} of {", ".join(lot.families)}')
+
+
+def _written(case: Case, name: str, cases: Path, truths: Path) -> dict[str, str]:
+    with new_directory(cases / name, mark=layout.CASE) as place:
         write_case(place, name, case)
-    with new_directory(Path(truths) / name, mark=layout.TRUTH) as place:
+    with new_directory(truths / name, mark=layout.TRUTH) as place:
         write_truth(place, name, case)
     return {
-        'name': name, 'case': seal.digest(Path(cases) / name),
-        'truth': seal.digest(Path(truths) / name),
+        'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name)
     }  # fmt: skip
 
 
@@ -166,7 +173,7 @@ def draw_case(lot: Lot, rng: np.random.Generator, spans: tuple[float, float] = S
     for attempt in range(TRIES):
         try:
             return _attempt(_eased(lot, attempt), rng, spans)
-        except Unseen as error:
+        except (Unseen, FloatingPointError) as error:
             reason = error
     raise DataError(f'no case of {", ".join(lot.families)} on {lot.robot} came about: {reason}')
 

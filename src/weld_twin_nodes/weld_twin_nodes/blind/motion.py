@@ -68,7 +68,7 @@ def _air(start: Array, end: Array) -> Array:
 
 def _free(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
     """Return sums of slow sines about a working posture, every joint on its own."""
-    t = np.arange(0.0, span, 1.0 / RATE)
+    t = np.linspace(0.0, span, int(span * RATE), endpoint=False)
     centre = working_posture(robot)
     ramp = np.clip(t / RAMP, 0.0, 1.0)
     ramp = ramp * ramp * (3.0 - 2.0 * ramp)

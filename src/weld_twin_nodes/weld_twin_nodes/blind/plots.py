@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,6 +33,8 @@ def reliability_plot(cases: Sequence[Judged]) -> Html:
     axes.plot([0, 1], [0, 1], color=GREY, lw=1, ls='--')
     for b in reliability([c.confidence for c in told], [c.right for c in told]):
         value, low, high, count = b.right
+        if value is None or low is None or high is None:
+            continue
         axes.plot([b.confidence] * 2, [low, high], color=BLUE, lw=1.5)
         axes.plot(b.confidence, value, 'o', color=BLUE, ms=3.0 + 1.2 * np.sqrt(count))
         axes.annotate(f'{count}', (b.confidence, value), (8, -9), textcoords='offset points',
@@ -79,7 +81,8 @@ def error_plot(cases: Sequence[Judged]) -> Html:
     x = np.linspace(-5.0, 5.0, 201)
     axes.plot(x, np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi), color=ORANGE, lw=1.5)
     if z.size:
-        axes.hist(np.clip(z, -5.0, 5.0), np.linspace(-5.0, 5.0, 41), density=True, color=BLUE)
+        edges = np.linspace(-5.0, 5.0, 41).tolist()
+        axes.hist(np.clip(z, -5.0, 5.0), edges, density=True, color=BLUE)
     axes.set(xlabel='error of a parameter over its standard error', ylabel='density')
     return _svg(figure, 'Parameter errors in standard errors; the ends hold all beyond')
 
@@ -104,8 +107,7 @@ def _svg(figure: Figure, title: str) -> Html:
     import matplotlib
 
     stream = io.StringIO()
-    settings: dict[str, Any] = {'svg.hashsalt': title, 'svg.fonttype': 'none'}
-    with matplotlib.rc_context(settings):
+    with matplotlib.rc_context({'svg.hashsalt': title, 'svg.fonttype': 'none'}):
         figure.savefig(stream, format='svg', transparent=True, metadata={'Date': None})
     text = stream.getvalue()
     picture = text[text.index('<svg'):].replace(INK, 'currentColor')

@@ -74,9 +74,11 @@ def _seam(kind: str, pose: Array, size: float, rng: np.random.Generator) -> Path
         local = size * np.array(plane)
         return np.asarray(centre + local[:, :1] * along + local[:, 1:] * across)
 
-    line = Line(*points((-0.5, 0.0), (0.5, 0.0)), normal)
+    start, end = points((-0.5, 0.0), (0.5, 0.0))
+    line = Line(start, end, normal)
     if kind == 'arc':
-        return Arc(*points((-0.45, -0.15), (0.0, 0.15), (0.45, -0.15)), normal)
+        first, middle, last = points((-0.45, -0.15), (0.0, 0.15), (0.45, -0.15))
+        return Arc(first, middle, last, normal)
     if kind == 'circle':
         return Circle(centre, 0.3 * size, normal, along)
     if kind == 'polyline':

@@ -17,12 +17,12 @@ BINS = 10
 
 
 class Estimate(NamedTuple):
-    """A number, its 95 % interval, and how many cases it rests on."""
+    """A number, its 95 % interval, and how many ``cases`` it rests on."""
 
     value: float | None
     low: float | None
     high: float | None
-    count: int
+    cases: int
 
 
 def share(hits: Sequence[bool]) -> Estimate:

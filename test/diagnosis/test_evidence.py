@@ -4,10 +4,10 @@
 
 import numpy as np
 import pytest
+from diagnosis_cells import effect
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from diagnosis_cells import effect
 from weld_twin_core.diagnosis.gram import Gram
 from weld_twin_core.diagnosis.library import Unit
 from weld_twin_core.diagnosis.score import best_choice, effective_share, evidence

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, shaken, tiny
 from scipy.optimize import least_squares
 from scipy.stats import chi2, norm
 
-from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, shaken, tiny
 from weld_twin_core.diagnosis.fit import design, fit, robust_fit, robust_scale, stepped
 from weld_twin_core.diagnosis.heldout import TRUSTED
 from weld_twin_core.diagnosis.problem import Problem

@@ -4,10 +4,10 @@
 
 import numpy as np
 import pytest
+from diagnosis_cells import effect, known_scale, tiny
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
-from diagnosis_cells import effect, known_scale, tiny
 from weld_twin_core.diagnosis.fit import fit
 from weld_twin_core.diagnosis.shrinkage import groups, learned_precision, shrunk_fit
 
@@ -91,7 +91,7 @@ FAMILIES = (('joint_offset', 'offset', 2e-4), ('link_length', 'da', 1e-4),
 
 
 def small_errors(seed):
-    """Return errors of every joint and family, and the precision of a prior of their true sizes."""
+    """Return errors of every joint and family, and the precision of a prior of their sizes."""
     rng = np.random.default_rng(seed)
     joints = tiny()[1].robot.joint_names
     true = tuple(effect(name, joint=j, **{key: float(rng.normal(scale=size))})

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from diagnosis_cells import SIGMA
+
 from weld_twin_core.diagnosis.noise import noise_floor
 from weld_twin_core.diagnosis.problem import Problem
 from weld_twin_core.diagnosis.validation import ratio_interval

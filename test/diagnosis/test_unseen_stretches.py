@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Predictions of unseen stretches against fitting again with every stretch left out."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
+
 from weld_twin_core.diagnosis.fit import fit
 from weld_twin_core.diagnosis.heldout import TRUSTED, Unseen
 from weld_twin_core.diagnosis.problem import Scale
@@ -23,7 +25,7 @@ def made_up(columns, blocks, seed=0, rows=640, parts=3, prior=0.0):
     labels = np.sort(rng.integers(0, blocks, rows))
     a, targets = rng.normal(size=(columns, rows)), rng.normal(size=(1 + parts, rows))
     bounds = np.linspace(2, columns, parts + 1).astype(int)
-    slices = tuple(slice(lo, hi) for lo, hi in zip(bounds[:-1], bounds[1:], strict=True))
+    slices = tuple(slice(lo, hi) for lo, hi in pairwise(bounds))
     precision = np.concatenate([np.zeros(2), rng.uniform(0.0, prior, columns - 2)])
     pull = precision * rng.normal(size=columns)
     spans = [np.flatnonzero(labels == b) for b in range(blocks)]

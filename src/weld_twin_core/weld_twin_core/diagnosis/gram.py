@@ -75,6 +75,9 @@ class Gram:
 
     def gain(self, index: Index) -> float:
         """Return by how much the sum of squares falls when some columns are fitted."""
+        if index.size == 1:  # nearly every question of a search
+            k = index[0]
+            return float(self.right[k] ** 2 / max(self.normal[k, k], 1e-300))
         return float(self.right[index] @ self.solve(index)) if index.size else 0.0
 
     def residual_of(self, index: Index, coefficients: Array) -> float:

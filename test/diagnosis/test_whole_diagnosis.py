@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole engine on recordings of the independent plant, whose flaws are known."""
+
+import numpy as np
+import pytest
+from diagnosis_cells import SIGMA, recorded, sites, solved
+
+from weld_twin_core.catalog import load
+from weld_twin_core.diagnosis import diagnose
+
+SINGLE = {
+    'backlash': dict(joint='elbow_joint', width=8e-4),
+    'joint_compliance': dict(joint='shoulder_lift_joint', compliance=1.2e-5),
+    'servo_lag': dict(joint='elbow_joint', time_constant=8e-3),
+    'transmission_ripple': dict(joint='shoulder_lift_joint', amplitude=3e-4, order=8, phase=0.7),
+    'joint_offset': dict(joint='elbow_joint', offset=6e-4),
+    'time_delay': dict(delay=6e-3),
+    'tool_pose': dict(xyz=(4e-4, -3e-4, 2e-4), rotvec=(6e-4, 0.0, -8e-4)),
+}
+FLOOR = np.sqrt(3.0) * SIGMA
+
+
+def flaw(name, **values):
+    """Return an effect as a key of `solved`."""
+    return (name, *(item for pair in values.items() for item in pair))
+
+
+def near(found, truth):
+    """Return whether every parameter is within four standard errors and 2 % of the truth."""
+    entry = found.as_dict()
+    return {
+        key: bool(np.all(
+            np.abs(np.asarray(entry['parameters'][key]) - value)
+            <= 4.0 * np.asarray(entry['std'].get(key, 0.0)) + 0.02 * np.max(np.abs(value))
+        ))
+        for key, value in truth.items() if key != 'joint'
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize('name', SINGLE)
+def test_a_single_cause_is_named_on_its_joint_with_its_size(name):
+    truth = SINGLE[name]
+    answer = solved(flaw(name, **truth))
+    assert answer.status == 'identified', answer.reasons
+    assert sites(answer) == [{(name, truth.get('joint'))}]
+    (found,) = answer.effects
+    right = near(found, truth)
+    assert all(right.values()), (right, found.as_dict())
+    assert answer.confidence > 0.9
+    assert answer.shrink.rms_after_m == pytest.approx(FLOOR, rel=0.1)
+
+
+def test_growth_with_temperature_is_named_on_another_kind_of_arm():
+    answer = solved(flaw('thermal_growth', coefficient=5e-5), robot='kuka_kr6_r900', warm=True)
+    assert sites(answer) == [{('thermal_growth', None)}]
+    assert all(near(answer.effects[0], {'coefficient': 5e-5}).values())
+
+
+def test_two_causes_at_once_are_both_named():
+    play = dict(joint='elbow_joint', width=8e-4)
+    spring = dict(joint='shoulder_lift_joint', compliance=1.2e-5)
+    answer = solved(flaw('backlash', **play), flaw('joint_compliance', **spring))
+    assert answer.status == 'identified'
+    assert {frozenset(group) for group in sites(answer)} == {
+        frozenset({('backlash', 'elbow_joint')}),
+        frozenset({('joint_compliance', 'shoulder_lift_joint')}),
+    }
+    truth = {'backlash': play, 'joint_compliance': spring}
+    for found in answer.effects:
+        right = near(found, truth[found.effect.name])
+        assert all(right.values()), found.as_dict()
+
+
+def test_without_a_flaw_nothing_is_named():
+    answer = solved()
+    assert (answer.status, answer.effects, answer.indistinguishable) == ('none', (), ())
+    assert answer.gap.rms_m == pytest.approx(FLOOR, rel=0.1)
+    assert answer.gap.noise_floor_m == pytest.approx(FLOOR, rel=0.1)
+    assert answer.shrink.ratio == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_cause_taken_out_of_the_library_leaves_the_answer_unknown():
+    answer = solved(flaw('backlash', joint='elbow_joint', width=1.5e-3), exclude=('backlash',))
+    assert answer.status == 'unknown'
+    assert not any(joint == 'elbow_joint' for group in sites(answer) for _, joint in group)
+    assert answer.unexplained.above_noise
+    assert any('elbow_joint' in name for name in answer.unexplained.structure)
+    assert answer.absent['backlash'] == 'excluded by the user'
+    assert not any(c.site.effect == 'backlash' for c in answer.candidates)
+
+
+def test_offsets_of_parallel_links_are_named_together():
+    # axes 2, 3 and 4 of this arm are parallel: their d values do exactly the same
+    answer = solved(flaw('link_offset', joint='elbow_joint', dd=4e-4))
+    parallel = {('link_offset', f'{j}_joint') for j in ('shoulder_lift', 'elbow', 'wrist_1')}
+    assert answer.status == 'ambiguous'
+    assert sites(answer) == [parallel]
+    (found,) = answer.effects
+    assert all(near(found, {'dd': 4e-4}).values())
+
+
+@pytest.mark.parametrize('truth', [
+    flaw('joint_offset', joint='shoulder_pan_joint', offset=5e-4),
+    flaw('base_pose', xyz=(0.0, 0.0, 0.0), rotvec=(0.0, 0.0, 5e-4)),
+], ids=['offset', 'turn'])  # fmt: skip
+def test_an_offset_of_the_first_joint_and_a_turn_of_the_base_are_named_together(truth):
+    answer = solved(truth)
+    assert answer.status == 'ambiguous'
+    (group,) = sites(answer)
+    assert {('joint_offset', 'shoulder_pan_joint'), ('base_pose', None)} <= group
+    (found,) = answer.effects
+    assert (found.effect.name, found.effect.site) in group
+
+
+def test_positions_alone_are_enough_for_play():
+    truth = dict(joint='elbow_joint', width=8e-4)
+    answer = solved(flaw('backlash', **truth), orientation=False)
+    assert sites(answer) == [{('backlash', 'elbow_joint')}]
+    assert all(near(answer.effects[0], truth).values())
+    assert answer.gap.orientation_rms_rad is None
+
+
+def test_stations_at_rest_are_enough_for_a_soft_joint():
+    truth = dict(joint='shoulder_lift_joint', compliance=1.2e-5)
+    answer = solved(flaw('joint_compliance', **truth), static=120)
+    assert answer.status == 'identified'
+    assert sites(answer) == [{('joint_compliance', 'shoulder_lift_joint')}]
+    assert all(near(answer.effects[0], truth).values())
+
+
+def test_the_same_data_give_the_same_answer():
+    truth = dict(joint='shoulder_lift_joint', compliance=1.2e-5)
+    robot = load('ur5')
+    again = diagnose([recorded(robot, [{'effect': 'joint_compliance', **truth}], static=120)], robot)
+    assert again.as_dict() == solved(flaw('joint_compliance', **truth), static=120).as_dict()

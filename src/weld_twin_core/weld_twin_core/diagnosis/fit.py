@@ -173,7 +173,9 @@ def solve_scaled(normal: Array, right: Array, damping: float) -> Array:
     return out
 
 
-def robust_scale(problem: Problem, residuals: list[Array], least: Scale | None = None) -> Scale:
+def robust_scale(
+    problem: Problem, residuals: list[Array], least: Scale | None = None, freedom: float = 0.0
+) -> Scale:
     """
     Return the noise of residuals by median absolute deviation, and Huber weights per sample.
 
@@ -183,12 +185,15 @@ def robust_scale(problem: Problem, residuals: list[Array], least: Scale | None =
     residuals : list of array, shape (c, M)
     least : Scale, optional
         Never return less noise than this.
+    freedom : float
+        Coordinates that the residuals' own data determined; they took their share of the noise.
 
     """
+    lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
     position = np.concatenate([r[:3].ravel() for r in residuals])
     turn = np.concatenate([r[3:].ravel() for r in residuals])
-    sigma = _spread(position)
-    sigma_turn = _spread(turn) if turn.size else 1.0
+    sigma = _spread(position) / lost
+    sigma_turn = _spread(turn) / lost if turn.size else 1.0
     if least is not None:
         sigma, sigma_turn = max(sigma, least.position), max(sigma_turn, least.orientation)
     sigma = max(sigma, 1e-9)

@@ -24,7 +24,7 @@ from scipy.linalg.lapack import dtrtri
 from ..arrays import Array
 from ..effects.base import Effect
 from ..effects.transmission_ripple import TransmissionRipple
-from .fit import Fit, coordinates, design, fit, solve_scaled, stepped
+from .fit import Fit, coordinates, design, fit, robust_scale, solve_scaled, stepped
 from .problem import Model, Problem, Scale
 
 BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
@@ -59,9 +59,11 @@ def groups(found: tuple[Effect, ...]) -> tuple[Array, Array]:
 
 def learned_precision(
     normal: Array, right: Array, rss: float, rows: int, labels: Array, scales: Array
-) -> Array:
+) -> tuple[Array, float]:
     """
-    Return the prior precision of every coordinate that maximises the evidence, shape (K,).
+    Return the prior precision that maximises the evidence, shape (K,), and the freedom it leaves.
+
+    The freedom counts the coordinates that the data determine rather than the prior.
 
     Parameters
     ----------
@@ -94,22 +96,23 @@ def learned_precision(
                 variance[k] = max(float((mean[mine] ** 2).sum()) / share, floor)
     precision = np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 0.0) / scales**2
     # The fit works in whitened rows, so a prior counts against the noise actually there.
-    return precision * noise
+    return precision * noise, float(determined.sum())
 
 
-def shrunk_step(problem: Problem, model: Model, scale: Scale) -> Model:
-    """Return the model after one linear step with learned priors; enough to go on from."""
-    return _learned(problem, model, scale)[0]
+def shrunk_step(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Scale]:
+    """Return the model after one linear step with learned priors, and the noise it leaves."""
+    model, _, freedom = _learned(problem, model, scale)
+    return model, robust_scale(problem, problem.residuals(model), freedom=freedom)
 
 
 def shrunk_fit(problem: Problem, model: Model, scale: Scale) -> tuple[Fit, Array]:
     """Return the fit with learned priors, and their precision, shape (K,)."""
-    model, precision = _learned(problem, model, scale)
+    model, precision, _ = _learned(problem, model, scale)
     return fit(problem, model, scale, precision, iterations=1), precision
 
 
-def _learned(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Array]:
-    """Return the model after one linear step, and the prior precision learned for it."""
+def _learned(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Array, float]:
+    """Return the model after one linear step, the prior precision learned, and its freedom."""
     residual = problem.whitened(problem.residuals(model), scale)
     columns, _ = design(problem, model, scale)
     normal, right = columns @ columns.T, columns @ residual
@@ -117,7 +120,9 @@ def _learned(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Array
     x = coordinates(model)
     frames = right.size - x.size
     target = _target(normal, right, float(residual @ residual), x)
-    precision = learned_precision(*_projected(*target, frames), residual.size, labels, scales)
+    precision, freedom = learned_precision(
+        *_projected(*target, frames), residual.size, labels, scales
+    )
     ridge = np.concatenate([np.zeros(frames), precision])
     pull = ridge * np.concatenate([np.zeros(frames), x])
     step = solve_scaled(normal + np.diag(ridge), right - pull, 1e-9)
@@ -125,7 +130,7 @@ def _learned(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Array
     moved, x_moved = problem.whitened(problem.residuals(trial), scale), coordinates(trial)
     if moved @ moved + precision @ x_moved**2 > residual @ residual + precision @ x**2:
         trial = fit(problem, model, scale, precision, iterations=2).model
-    return trial, precision
+    return trial, precision, freedom + frames
 
 
 def _target(normal: Array, right: Array, rss: float, x: Array) -> tuple[Array, Array, float]:

@@ -37,17 +37,15 @@ def many_small(
     """Return the fit of all families together, its noise and its prior precision."""
     everything = model.with_found(_everything(problem, model, exclude))
     scale = robust_scale(problem, problem.residuals(model))
-    model = shrunk_step(problem, everything, scale)
+    model, scale = shrunk_step(problem, everything, scale)
     progress('families fitted together')
-    scale = robust_scale(problem, problem.residuals(model))
     if 'transmission_ripple' not in exclude:
         model = with_lines(problem, model, scale)
         progress('lines of high order looked for')
     if 'base' in problem.align:
         model = with_setup(problem, model, scale)
         progress('motion of the set-up looked for')
-    model = shrunk_step(problem, model, scale)
-    scale = robust_scale(problem, problem.residuals(model))
+    model, scale = shrunk_step(problem, model, scale)
     result, precision = shrunk_fit(problem, model, scale)
     return result, scale, precision
 
@@ -65,7 +63,7 @@ def _everything(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple
             if kind.applicable(maker.view, joint) is not None:
                 continue
             if kind.name == 'transmission_ripple':
-                out += _dense_ripple(maker, str(joint))
+                out += _dense_ripple(maker, str(joint), problem.size)
                 continue
             for seed in list(kind.seeds(maker.view, joint))[:2]:
                 if seed.name == 'backlash':
@@ -75,11 +73,15 @@ def _everything(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple
     return tuple(out)
 
 
-def _dense_ripple(maker: Features, joint: str) -> list[Effect]:
+def _dense_ripple(maker: Features, joint: str, rows: int) -> list[Effect]:
     q = maker.view.joint(maker.twin.robot.index(joint))
     if float(np.ptp(q)) < RANGE:
         return []
-    orders = np.arange(1.0, DENSE_ORDERS + 1.0)
+    # All joints' sines and cosines together stay below half the rows.
+    highest = min(DENSE_ORDERS, rows // (4 * maker.twin.robot.n))
+    if highest < 1:
+        return []
+    orders = np.arange(1.0, highest + 1.0)
     zero = np.zeros(orders.size)
     return [REGISTRY['transmission_ripple'](joint, zero, orders, zero)]  # type: ignore[call-arg]
 

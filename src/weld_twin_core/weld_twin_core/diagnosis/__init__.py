@@ -101,7 +101,7 @@ def diagnose(
     slots = found.slots
     evidence = Evidence(
         slots, loose, shrink.rms_before_m, shrink.rms_after_m, floor, independent,
-        _cancelling(unseen),
+        _parts(unseen),
     )  # fmt: skip
     verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
     baseline = Unseen.of(found.problem, found.scale, found.baseline, np.zeros(0))
@@ -201,10 +201,10 @@ def _candidates(
     return tuple(out)
 
 
-def _cancelling(unseen: Unseen) -> float:
+def _parts(unseen: Unseen) -> tuple[float, ...]:
     parts = unseen.targets[1:]
     total = parts.sum(axis=0)
-    return float((parts**2).sum() / max(float(total @ total), 1e-300))
+    return tuple(float(p @ p) / max(float(total @ total), 1e-300) for p in parts)
 
 
 def _position_rms(found: Search, rival: Rival) -> float:

@@ -109,7 +109,8 @@ def search(
 ) -> Search:
     """Return the effects that earn their place, fitted on all measurements."""
     full = problem.thinned(FIT_ROWS)
-    baseline, scale = robust_fit(full, start, full.unit_scale())
+    # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
+    baseline, scale = robust_fit(full, start, robust_scale(full, full.residuals(start)))
     progress('baseline fitted')
     small = problem.thinned(SEARCH_ROWS)
     model, dense = baseline.model, False

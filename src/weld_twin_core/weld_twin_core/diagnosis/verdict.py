@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import REGISTRY
+from ..effects.transmission_ripple import TransmissionRipple
 from .flexible import Structure
 from .result import Family, Site
 from .rivals import LISTED, Rival
@@ -17,7 +18,7 @@ SURE = 0.85
 """A leader less probable than this is not named alone."""
 STRUCTURE = 0.05
 """Share of the squared gap that may stay unexplained before the answer is 'unknown'."""
-ABOVE = 1.15
+ABOVE = 1.3
 """What remains must exceed an independently measured floor by this factor to count."""
 CERTAIN = 3.0
 """Standard errors between stretches that a structure must exceed."""
@@ -49,8 +50,8 @@ class Evidence:
         RMS on unseen data before and after, and of the noise, [m].
     independent : bool
         Whether the floor was measured apart from any model.
-    cancel : float
-        Sum of the squared contributions of the effects over the square of their sum.
+    parts : tuple of float
+        Squared contribution of every effect over the square of their sum.
 
     """
 
@@ -60,7 +61,7 @@ class Evidence:
     after: float
     floor: float
     independent: bool
-    cancel: float
+    parts: tuple[float, ...]
 
     @property
     def structured(self) -> bool:
@@ -103,8 +104,11 @@ def decide(evidence: Evidence) -> Verdict:
     sets = tuple(_leaders(slot) for slot in evidence.slots)
     doubt = _doubt(evidence)
     if left > STRUCTURE or doubt is not None:
-        solid = tuple(s for s in sets if len(s) == 1 and doubt is None
-                      and left < 0.5 and not _touched(s[0], evidence))  # fmt: skip
+        solid = tuple(
+            chosen for chosen, part in zip(sets, evidence.parts, strict=True)
+            if len(chosen) == 1 and doubt is None and part > left
+            and not _touched(chosen[0], evidence)
+        )  # fmt: skip
         reason = _depends(evidence) if doubt is None else doubt
         return Verdict('unknown', _unknown_confidence(left), solid, (reason,))
     mass = [
@@ -125,15 +129,16 @@ def decide(evidence: Evidence) -> Verdict:
 
 def _doubt(evidence: Evidence) -> str | None:
     """Return why the effects found are no plausible explanation, however well they fit."""
-    if len(evidence.slots) > 1 and evidence.cancel > CANCEL:
+    if len(evidence.slots) > 1 and sum(evidence.parts) > CANCEL:
         return (
             'the effects that fit best nearly cancel each other: together they imitate a cause '
             'that is not in the library'
         )
-    if len(evidence.slots) > CROWD:
+    count = sum(_orders(slot[0]) for slot in evidence.slots)
+    if count > CROWD:
         return (
-            f'{len(evidence.slots)} separate effects would be needed at once: together they '
-            'imitate a cause that is not in the library'
+            f'{count} separate effects would be needed at once: together they imitate a cause '
+            'that is not in the library'
         )
     return None
 
@@ -145,6 +150,15 @@ def _stacked(sets: tuple[tuple[Site, ...], ...]) -> bool:
         if chosen[0].joint and REGISTRY[chosen[0].effect].regime in ('static', 'load')
     ]
     return len(at_rest) > len(set(at_rest))
+
+
+def _orders(rival: Rival) -> int:
+    """Return how many causes a slot stands for: every further order of a ripple is another."""
+    for effect in rival.fit.model.found:
+        is_it = (effect.name, effect.site) == (rival.site.effect, rival.site.joint)
+        if is_it and isinstance(effect, TransmissionRipple):
+            return int(np.size(effect.order))
+    return 1
 
 
 def _touched(site: Site, evidence: Evidence) -> bool:

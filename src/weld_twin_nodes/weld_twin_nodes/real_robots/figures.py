@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of one arm: ripple against order, its error over a turn, the workspace before and after."""
+"""Pictures of one arm: ripple against order, error over a turn, the workspace before and after."""
 
 from __future__ import annotations
 

@@ -37,7 +37,8 @@ def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
             for site, size in family.members[:_LARGEST]
         ]
         name = cause(family.effect, None) + ('' if family.named else ' (exchangeable)')
-        rows.append([name, str(len(family.members)), millimetres(family.rms_m), ', '.join(largest)])
+        size = millimetres(family.rms_m)
+        rows.append([name, str(len(family.members)), size, ', '.join(largest)])
     return rows
 
 

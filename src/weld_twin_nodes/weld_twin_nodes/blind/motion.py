@@ -68,7 +68,7 @@ def _air(start: Array, end: Array) -> Array:
 
 def _free(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
     """Return sums of slow sines about a working posture, every joint on its own."""
-    t = np.linspace(0.0, span, int(span * RATE), endpoint=False)
+    t = np.arange(0.0, span, 1.0 / RATE)
     centre = working_posture(robot)
     ramp = np.clip(t / RAMP, 0.0, 1.0)
     ramp = ramp * ramp * (3.0 - 2.0 * ramp)
@@ -86,7 +86,8 @@ def _stations(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
     count = max(int(2.5 * span), 40)
     spread = np.minimum(0.4 * (robot.upper - robot.lower), 1.2)
     q = working_posture(robot) + rng.uniform(-1.0, 1.0, (count, robot.n)) * spread
-    return Motion(np.arange(count) * STATION_PAUSE, _inside(robot, q), static=True)
+    t = np.linspace(0.0, STATION_PAUSE * (count - 1), count)
+    return Motion(t, _inside(robot, q), static=True)
 
 
 def _inside(robot: Robot, q: Array) -> Array:

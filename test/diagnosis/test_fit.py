@@ -164,6 +164,15 @@ def test_the_noise_is_the_median_deviation_that_five_per_cent_of_gross_errors_le
     assert scale.orientation == pytest.approx(SIGMA_TURN, rel=0.06)
 
 
+def test_the_noise_makes_up_for_what_the_coordinates_took_of_it():
+    problem, _ = tiny(count=400, turned=False)
+    rng = np.random.default_rng(3)
+    noise, columns = SIGMA * rng.normal(size=1200), rng.normal(size=(1200, 600))
+    q, _ = np.linalg.qr(columns)
+    left = (noise - q @ (q.T @ noise)).reshape(3, 400)
+    assert robust_scale(problem, [left], freedom=600.0).position == pytest.approx(SIGMA, rel=0.06)
+
+
 def test_exact_data_have_a_least_noise_and_finite_weights():
     problem, model = tiny(noise=0.0, turned=False)
     scale = robust_scale(problem, problem.residuals(model))

@@ -25,6 +25,7 @@ def members(sizes, noise, seed=0, count=12):
 
 
 def learned(columns, y, labels, scales):
+    """Return the prior precision and the freedom it leaves."""
     return learned_precision(columns @ columns.T, columns @ y, y @ y, y.size, labels, scales)
 
 
@@ -47,18 +48,18 @@ def most_likely(columns, y, labels, scales):
 
 def test_the_precision_learned_maximises_the_marginal_likelihood():
     problem = members([2.0, 0.5], noise=1.3)
-    np.testing.assert_allclose(learned(*problem), most_likely(*problem), rtol=0.03)
+    np.testing.assert_allclose(learned(*problem)[0], most_likely(*problem), rtol=0.03)
 
 
 def test_noise_far_from_the_assumed_one_is_learned_too():
     columns, y, labels, scales = members([2.0, 0.7], noise=5.0, seed=3)
     expected = most_likely(columns, y, labels, scales)
-    np.testing.assert_allclose(learned(columns, y, labels, scales), expected, rtol=0.05)
+    np.testing.assert_allclose(learned(columns, y, labels, scales)[0], expected, rtol=0.05)
 
 
 def test_a_group_that_the_data_do_not_need_shrinks_to_nothing():
     columns, y, labels, scales = members([1.0, 0.0], noise=1.0, seed=4)
-    precision = learned(columns, y, labels, scales)
+    precision, _ = learned(columns, y, labels, scales)
     fitted = np.linalg.solve(columns @ columns.T + np.diag(precision), columns @ y) / scales
     free = np.linalg.lstsq(columns.T, y, rcond=None)[0] / scales
     needed = labels == 0
@@ -66,10 +67,19 @@ def test_a_group_that_the_data_do_not_need_shrinks_to_nothing():
     assert np.linalg.norm(fitted[needed]) > 0.9 * np.linalg.norm(free[needed])
 
 
+def test_the_freedom_left_is_the_trace_of_what_maps_data_to_fit():
+    columns, y, labels, scales = members([0.3, 0.1], noise=2.0, seed=5)
+    precision, freedom = learned(columns, y, labels, scales)
+    normal = columns @ columns.T
+    mapping = columns.T @ np.linalg.solve(normal + np.diag(precision), columns)
+    assert freedom == pytest.approx(np.trace(mapping), rel=0.02)
+    assert freedom < 0.9 * labels.size
+
+
 def test_members_marked_free_have_no_prior():
     columns, y, labels, scales = members([1.0, 1.0], noise=1.0)
     free = np.where(labels == 1, -1, labels)
-    precision = learned(columns, y, free, scales)
+    precision, _ = learned(columns, y, free, scales)
     assert (precision[labels == 1] == 0.0).all() and (precision[labels == 0] > 0.0).all()
 
 

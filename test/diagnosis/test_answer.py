@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What an answer holds: the public schema, shares that add up, figures that agree."""
+
+import json
+from numbers import Real
+
+import numpy as np
+import pytest
+from diagnosis_cells import solved
+
+from weld_twin_core.effects import effect_from_mapping
+
+NUMBER, TEXT, FLAG = Real, str, bool
+JOINT = (str, type(None))
+SCHEMA = {
+    'schema': TEXT,
+    'gap': {'rms_m': NUMBER, 'mean_m': NUMBER, 'max_m': NUMBER,
+            'orientation_rms_rad': (Real, type(None)), 'samples': int, 'noise_floor_m': NUMBER},
+    'where': {
+        'joints': [{'name': TEXT, 'share': NUMBER}],
+        'regimes': dict.fromkeys(('static', 'reversal', 'speed', 'acceleration', 'load',
+                                  'temperature', 'time'), NUMBER),
+        'path': [{'t_start': NUMBER, 't_end': NUMBER, 'share': NUMBER, 'rms_m': NUMBER}],
+        'direction': {'along_m': NUMBER, 'across_m': NUMBER, 'normal_m': NUMBER},
+    },
+    'verdict': {
+        'status': TEXT,
+        'effects': [{'effect': TEXT, 'joint': JOINT, 'parameters': dict, 'std': dict}],
+        'confidence': NUMBER,
+        'indistinguishable': [[{'effect': TEXT, 'joint': JOINT}]],
+    },
+    'candidates': [{'effect': TEXT, 'joint': JOINT, 'probability': NUMBER,
+                    'rms_after_m': NUMBER, 'shrink': NUMBER}],
+    'shrink': {'rms_before_m': NUMBER, 'rms_after_m': NUMBER, 'ratio': NUMBER, 'ci95': [NUMBER],
+               'held_out': TEXT},
+    'unexplained': {'rms_m': NUMBER, 'above_noise': FLAG, 'structure': [TEXT]},
+    'next_experiment': (dict, type(None)),
+}  # fmt: skip
+ANSWERS = {
+    'play': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {}),
+    'tool': ((('tool_pose', 'xyz', (4e-4, -3e-4, 2e-4), 'rotvec', (6e-4, 0.0, -8e-4)),), {}),
+    'parallel': ((('link_offset', 'joint', 'elbow_joint', 'dd', 4e-4),), {}),
+    'unknown': ((('backlash', 'joint', 'elbow_joint', 'width', 1.5e-3),),
+                {'exclude': ('backlash',)}),
+    'points': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {'orientation': False}),
+    'stations': ((('joint_compliance', 'joint', 'shoulder_lift_joint', 'compliance', 1.2e-5),),
+                 {'static': 120}),
+    'nothing': ((), {}),
+}  # fmt: skip
+
+
+@pytest.fixture(params=ANSWERS)
+def answer(request):
+    effects, options = ANSWERS[request.param]
+    return solved(*effects, **options)
+
+
+def faults(value, schema, path='diagnosis'):
+    """Return where a value departs from a schema; a list's only entry describes all of its own."""
+    if isinstance(schema, dict):
+        missing = [f'{path}.{key} is missing' for key in schema if key not in value]
+        return missing + [f for key, inner in schema.items() if key in value
+                          for f in faults(value[key], inner, f'{path}.{key}')]  # fmt: skip
+    if isinstance(schema, list):
+        if type(value) is not list:
+            return [f'{path} is no list']
+        return [f for k, v in enumerate(value) for f in faults(v, schema[0], f'{path}[{k}]')]
+    if schema is Real and isinstance(value, bool):
+        return [f'{path} is a flag']
+    return [] if isinstance(value, schema) else [f'{path} is {value!r}']
+
+
+def test_the_answer_has_every_key_of_the_public_schema_in_its_type(answer):
+    data = answer.as_dict()
+    assert faults(data, SCHEMA) == []
+    assert data['schema'] == 'weld_twin/diagnosis/1'
+    assert data['verdict']['status'] in ('identified', 'ambiguous', 'unknown', 'none')
+
+
+def test_the_answer_is_plain_json_without_infinities(answer):
+    data = answer.as_dict()
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+
+
+def test_effects_named_can_be_read_back_as_an_effects_file(answer):
+    for entry in answer.as_dict()['verdict']['effects']:
+        joint = {} if entry['joint'] is None else {'joint': entry['joint']}
+        effect = effect_from_mapping({'effect': entry['effect'], **joint, **entry['parameters']})
+        assert effect.to_mapping()['effect'] == entry['effect']
+        for key, error in entry['std'].items():
+            assert np.shape(error) == np.shape(entry['parameters'][key])
+            assert (np.asarray(error) > 0.0).all()
+
+
+def test_every_effect_named_belongs_to_a_set_and_every_set_to_an_effect(answer):
+    named = [(f.effect.name, f.effect.site) for f in answer.effects]
+    groups = [{(s.effect, s.joint) for s in group} for group in answer.indistinguishable]
+    assert len(named) == len(groups)
+    assert all(sum(site in group for group in groups) == 1 for site in named)
+
+
+def test_shares_of_joints_and_of_regimes_never_exceed_the_whole(answer):
+    joints = [share for _, share in answer.where.joints]
+    regimes = list(answer.where.regimes.values())
+    assert min(joints) >= 0.0 and min(regimes) >= 0.0
+    if answer.model.found:
+        assert sum(joints) <= 1.0 + 1e-9 and sum(regimes) <= 1.0 + 1e-9
+    assert joints == sorted(joints, reverse=True)
+    assert {name for name, _ in answer.where.joints} == set(answer.model.robot.joint_names)
+
+
+def test_stretches_of_the_path_share_out_the_whole_squared_gap(answer):
+    path = np.array(answer.where.path)
+    assert path[:, 2].sum() == pytest.approx(1.0)
+    assert (path[:, 1] >= path[:, 0]).all() and (path[1:, 0] > path[:-1, 1]).all()
+
+
+def test_the_three_directions_add_up_to_the_gap_as_recorded(answer):
+    parts = np.array(list(answer.where.direction.values()))
+    residual = answer.traces.before[0]
+    assert (parts**2).sum() == pytest.approx((residual**2).sum(axis=1).mean(), rel=1e-6)
+
+
+def test_the_probabilities_of_every_effects_rivals_add_up_to_one(answer):
+    total = sum(c.probability for c in answer.candidates)
+    assert total == pytest.approx(len(answer.model.found), abs=1e-9)
+
+
+def test_the_shrink_is_the_ratio_of_its_own_figures_inside_its_interval(answer):
+    shrink = answer.shrink
+    assert shrink.ratio == pytest.approx(shrink.rms_after_m / shrink.rms_before_m, rel=1e-9)
+    assert shrink.ci95[0] <= shrink.ratio <= shrink.ci95[1]
+    assert shrink.held_out == 'blocked cross-validation'
+
+
+def test_the_waterfall_ends_where_the_shrink_ends(answer):
+    if answer.model.found:
+        assert answer.shrink.steps[-1][1] == pytest.approx(answer.shrink.rms_after_m, rel=1e-9)
+        assert len(answer.shrink.alone) == len(answer.shrink.steps)
+
+
+@pytest.mark.parametrize(('name', 'joint', 'regime'), [
+    ('play', 'elbow_joint', 'reversal'), ('stations', 'shoulder_lift_joint', 'load'),
+])  # fmt: skip
+def test_most_of_the_gap_lies_on_the_joint_and_in_the_regime_of_its_cause(name, joint, regime):
+    effects, options = ANSWERS[name]
+    answer = solved(*effects, **options)
+    assert answer.where.joints[0][0] == joint
+    assert answer.where.joints[0][1] > 0.9
+    assert answer.where.regimes[regime] > 0.9
+
+
+def test_the_map_of_joints_points_at_reversals_of_the_joint_with_play():
+    answer = solved(*ANSWERS['play'][0])
+    shares = np.array(answer.where.map_shares)
+    joint, regressor = np.unravel_index(shares.argmax(), shares.shape)
+    assert answer.model.robot.joint_names[joint] == 'elbow_joint'
+    assert answer.where.map_regressors[regressor] == 'reversal'

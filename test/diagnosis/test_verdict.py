@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The verdict on evidence given by hand, and what is left that no effect explains."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnosis_cells import effect, known_scale, tiny
+
+from weld_twin_core.diagnosis.fit import fit
+from weld_twin_core.diagnosis.flexible import Structure, structure
+from weld_twin_core.diagnosis.heldout import Unseen
+from weld_twin_core.diagnosis.library import build
+from weld_twin_core.diagnosis.problem import Problem
+from weld_twin_core.diagnosis.result import Site
+from weld_twin_core.diagnosis.rivals import Rival
+from weld_twin_core.diagnosis.verdict import Evidence, decide
+from weld_twin_core.recording import Measurements
+
+PLAY, OFFSET = Site('backlash', 'elbow_joint'), Site('joint_offset', 'wrist_1_joint')
+NOTHING_LEFT = Structure(3.5e-5, 0.0, 0.0, ())
+ELBOW_LEFT = Structure(2e-5, 0.5, 9.0, ('the angle of elbow_joint',))
+
+
+def fitted(*found):
+    return SimpleNamespace(model=SimpleNamespace(found=found))
+
+
+def slot(*pairs, found=()):
+    return tuple(Rival(site, 0.0, fitted(*found), probability) for site, probability in pairs)
+
+
+def evidence(slots=(), loose=NOTHING_LEFT, after=3.5e-5, parts=None):
+    parts = (1.0 / max(len(slots), 1),) * len(slots) if parts is None else parts
+    return Evidence(slots, loose, 2e-4, after, 3.5e-5, True, parts)
+
+
+def test_a_sure_leader_is_named_alone():
+    verdict = decide(evidence((slot((PLAY, 0.97), (OFFSET, 0.03)),)))
+    assert verdict.status == 'identified'
+    assert verdict.sets == ((PLAY,),)
+    assert 0.9 < verdict.confidence < 0.97
+
+
+def test_rivals_as_probable_are_named_together_and_counted_together():
+    verdict = decide(evidence((slot((PLAY, 0.6), (OFFSET, 0.395), (Site('drift', None), 0.005)),)))
+    assert verdict.status == 'ambiguous'
+    assert verdict.sets == ((PLAY, OFFSET),)
+    assert 0.95 < verdict.confidence < 0.995
+
+
+def test_no_effect_and_nothing_left_is_none():
+    alone = Evidence((), NOTHING_LEFT, 3.5e-5, 3.5e-5, 3.5e-5, True, ())
+    assert decide(alone).status == 'none'
+
+
+def test_what_stands_above_an_independent_floor_is_unknown():
+    verdict = decide(evidence(after=1.8e-4))
+    assert (verdict.status, verdict.sets) == ('unknown', ())
+
+
+def test_a_floor_taken_from_the_model_itself_proves_nothing():
+    shared = Evidence((), NOTHING_LEFT, 3.5e-5, 1.8e-4, 3.5e-5, False, ())
+    assert decide(shared).status == 'none'
+
+
+def test_structure_on_its_own_joint_takes_the_name_off_an_effect():
+    slots = (slot((PLAY, 1.0)), slot((OFFSET, 1.0)))
+    verdict = decide(evidence(slots, ELBOW_LEFT, after=8e-5))
+    assert verdict.status == 'unknown'
+    assert verdict.sets == ((OFFSET,),)
+    assert 'elbow_joint' in verdict.reasons[0]
+
+
+def test_an_effect_smaller_than_what_remains_is_not_named():
+    slots = (slot((PLAY, 1.0)), slot((OFFSET, 1.0)))
+    verdict = decide(evidence(slots, after=1e-4, parts=(0.9, 0.1)))
+    assert verdict.status == 'unknown'
+    assert verdict.sets == ((PLAY,),)
+
+
+def test_every_order_of_a_ripple_counts_as_a_cause_of_its_own():
+    site = Site('transmission_ripple', 'elbow_joint')
+    for count, status in ((1, 'identified'), (4, 'unknown')):
+        ripple = effect('transmission_ripple', joint='elbow_joint', amplitude=[1e-4] * count,
+                        order=list(range(1, count + 1)), phase=[0.0] * count)  # fmt: skip
+        assert decide(evidence((slot((site, 1.0), found=(ripple,)),))).status == status
+
+
+def test_effects_that_cancel_each_other_are_not_named():
+    slots = (slot((PLAY, 1.0)), slot((OFFSET, 1.0)))
+    verdict = decide(evidence(slots, parts=(4.0, 4.0)))
+    assert (verdict.status, verdict.sets) == ('unknown', ())
+    assert 'cancel' in verdict.reasons[0]
+
+
+def test_doubt_in_each_effect_multiplies():
+    one = decide(evidence((slot((PLAY, 0.9)),)))
+    two = decide(evidence((slot((PLAY, 0.9)), slot((OFFSET, 0.9)))))
+    assert two.confidence == pytest.approx(0.9 * one.confidence)
+
+
+def with_bend(size):
+    """Return a problem whose elbow turns out wrong by a bump that no family has."""
+    problem, model = tiny(count=600)
+    recording = problem.recordings[0]
+    measured = recording.measured
+    q = recording.joints.q
+    bump = size * np.exp(-0.5 * ((q[:, 2] - 0.7) / 0.2) ** 2)
+    features = problem.features(model)[0]
+    moved = features.column(('q', 2))[:3] * bump
+    bent = Measurements(measured.t, measured.position + moved.T, measured.rotation)
+    return Problem((recording.with_measured(bent),)), model
+
+
+@pytest.mark.parametrize(('size', 'seen'), [(3e-4, True), (0.0, False)])
+def test_what_depends_on_the_angle_of_a_joint_is_said_to_and_noise_is_not(size, seen):
+    problem, model = with_bend(size)
+    scale = known_scale(problem)
+    bare = fit(problem, model, scale)
+    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, [])
+    assert (found.gain > 0.03 and found.sure > 3.0) is seen
+    assert (found.depends_on[:1] == ('the angle of elbow_joint',)) is seen
+
+
+def library(problem, model, exclude=()):
+    return build(problem, model, known_scale(problem), exclude)
+
+
+def test_families_taken_out_are_in_no_unit_and_said_to_be_absent():
+    problem, model = tiny()
+    found = library(problem, model, ('joint_offset',))
+    assert not any(unit.family == 'joint_offset' for unit in found.units)
+    assert found.absent['joint_offset'] == 'excluded by the user'
+    assert any(unit.family == 'joint_offset' for unit in library(problem, model).units)
+
+
+def test_what_the_data_cannot_show_is_absent_with_its_reason():
+    found = library(*tiny())
+    assert found.absent['servo_lag'] == 'static stations carry no velocity'
+    assert found.absent['thermal_growth'] == 'no temperature was recorded'
+    assert found.absent['cartesian_compliance'] == 'no tool wrench was recorded'
+
+
+@pytest.mark.parametrize(('align', 'gone'), [
+    (('base',), {'base_pose'}), (('tool',), {'tool_pose'}), ((), set()),
+])  # fmt: skip
+def test_frames_fitted_as_nuisance_are_no_cause(align, gone):
+    found = library(*tiny(align=align))
+    names = {unit.family for unit in found.units}
+    assert {'base_pose', 'tool_pose'} - names == gone
+    assert found.fixed.size == 6 * len(align)
+
+
+def test_the_columns_of_a_unit_are_the_change_of_pose_its_effect_makes():
+    problem, model = tiny()
+    found = library(problem, model)
+    scale = known_scale(problem)
+    for family, joint, key, step in (
+        ('link_twist', 'elbow_joint', 'dalpha', 1e-6),
+        ('gear_ratio', 'wrist_1_joint', 'scale', 1e-6),
+        ('joint_compliance', 'shoulder_lift_joint', 'compliance', 1e-9),
+    ):  # fmt: skip
+        unit = found.unit(family, joint)
+        moved = model.with_found((effect(family, joint=joint, **{key: step}),))
+        change = problem.whitened(problem.residuals(model), scale) - problem.whitened(
+            problem.residuals(moved), scale)
+        column = found.columns[unit.columns[0][0]]
+        assert np.linalg.norm(column * step - change) < 1e-3 * np.linalg.norm(change)

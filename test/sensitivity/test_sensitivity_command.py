@@ -128,5 +128,6 @@ def test_a_study_of_24_parameters_takes_less_than_three_times_what_salib_takes(f
         work()
         return time.process_time() - start
 
-    salib()
-    assert min(seconds(ours) for _ in range(3)) < 3.0 * min(seconds(salib) for _ in range(3))
+    # Turn about, so that whatever else the machine does slows both; the best of each counts.
+    taken = np.array([(seconds(ours), seconds(salib)) for _ in range(6)]).min(axis=0)
+    assert taken[0] < 3.0 * taken[1]

@@ -28,12 +28,12 @@ from .remembered import MEMORY, Remembered, remembered
 from .study import Study
 from .tolerance import Tolerance, with_draws
 
-CHUNK = 60_000
+CHUNK = 30_000
 """Runs times path points worked on at once; a few of such arrays fit the processor's cache."""
 Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
 _BLOCK = 8192
 """Runs whose play and lag are worked out together."""
-_RANK = 1e-7
+_RANK = 1e-6
 """Shapes weaker than this part of the strongest are left out."""
 
 

@@ -17,7 +17,7 @@ from ..poses import Poses
 from ..profiles import Profile, named
 from ..recording import Recording
 from ..robot import Robot
-from ..seam import path_length, path_tangents, seam_axes
+from ..seam import path_tangents, seam_axes
 from ..twin import Twin
 
 POINTS = 200
@@ -152,9 +152,7 @@ def recorded_study(
     out = _away(nominal.rotation, tangent) if normal is None else normal
     steps = np.linalg.norm(np.diff(nominal.position, axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(steps)])
-    axes = seam_axes(tangent, out)
-    length = path_length(nominal.position)
-    return Study(robot, recording, at, s, axes, length, known, nominal)
+    return Study(robot, recording, at, s, seam_axes(tangent, out), float(s[-1]), known, nominal)
 
 
 def _away(rotation: Array, tangent: Array) -> Array:

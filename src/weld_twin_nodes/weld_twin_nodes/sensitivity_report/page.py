@@ -74,8 +74,8 @@ def _answer(motion: str, found: dict[str, Any]) -> Html:
         tag('p', f'Total Sobol indices of the largest deviation with 95 % intervals; '
             f'N = {indices["base_samples"]}, {indices["runs"]} runs, seed {indices["seed"]}, '
             f'{settled} (widest half-width '
-            f'{max(row["ST_half"] for row in rows):.3f}, change from half of N '
-            f'{indices["convergence"]["largest_ST_change"]:.3f}); sum of first-order indices '
+            f'{indices["largest_ST_half"]:.3f}, change from half of N '
+            f'{indices["largest_ST_change"]:.3f}); sum of first-order indices '
             f'{indices["sum_S1"]:.2f}. The fast model is within {found["model_error"]:.0e} of the '
             'exact twin.', class_='note'),
         id_='answer',

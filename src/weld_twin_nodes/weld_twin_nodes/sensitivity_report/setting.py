@@ -98,7 +98,8 @@ class Setting:
         """Return what the study was asked, as plain data."""
         first = next(iter(self.studies.values()))
         return {
-            'robot': self.robot.name, 'tool': self.robot.to_mapping()['tool'], 'seam': self.seam, 'length_m': first.length,
+            'robot': self.robot.name, 'tool': self.robot.to_mapping()['tool'],
+            'seam': self.seam, 'length_m': first.length,
             'path_points': first.samples, 'profiles': list(self.studies),
             'samples': self.effort.samples, 'runs': self.effort.runs,
             'trajectories': self.effort.trajectories,

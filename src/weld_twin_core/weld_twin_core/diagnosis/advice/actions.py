@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What to mend: one sentence for every effect found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ...effects.base import Effect
+from ...robot import Robot
+from .units import frame, metres, number, radians, size
+
+Sentence = Callable[[Effect, Robot], str]
+
+
+def actions(found: Sequence[Effect], robot: Robot) -> tuple[str, ...]:
+    """
+    Return what to do about every effect found, one sentence each, in their order.
+
+    Parameters
+    ----------
+    found : sequence of Effect
+    robot : Robot
+        The nominal model: what is entered in the controller now.
+
+    """
+    return tuple(_SENTENCES.get(effect.name, _general)(effect, robot) for effect in found)
+
+
+def _value(effect: Effect, name: str) -> float:
+    return float(np.asarray(getattr(effect, name)))
+
+
+def _general(effect: Effect, robot: Robot) -> str:
+    parameters = ', '.join(
+        f'{p.name} {np.array2string(np.asarray(getattr(effect, p.name)), precision=4)} {p.unit}'
+        for p in effect.parameters
+    )
+    where = f' of {effect.site}' if effect.site else ''
+    return f'Put {effect.name}{where} into the model: {parameters}.'
+
+
+def _joint_offset(effect: Effect, robot: Robot) -> str:
+    offset = _value(effect, 'offset')
+    return (
+        f'Re-master {effect.site} by {radians(-offset)}: it stands {radians(offset)} from where '
+        'it reads.'
+    )
+
+
+def _row(parameter: str, key: str, words: str) -> Sentence:
+    def sentence(effect: Effect, robot: Robot) -> str:
+        error = _value(effect, parameter)
+        now = float(getattr(robot, key)[robot.index(str(effect.site))])
+        if key in ('a', 'd'):
+            old, new = f'{now * 1e3:.3f}', f'{(now + error) * 1e3:.3f} mm'
+            return (
+                f'Enter {key} = {new} for {effect.site} in the kinematic model in place of {old} '
+                f'mm: {words} {metres(error)}.'
+            )
+        old, new = f'{np.degrees(now):.4f}', f'{np.degrees(now + error):.4f} deg'
+        return (
+            f'Enter {key} = {new} for {effect.site} in the kinematic model in place of {old} '
+            f'deg: {words} {radians(error)}.'
+        )
+
+    return sentence
+
+
+def _base_pose(effect: Effect, robot: Robot) -> str:
+    moved = frame(effect.vector())
+    return f'Correct the base frame by {moved}; check the bolts of the pedestal if it was right.'
+
+
+def _tool_pose(effect: Effect, robot: Robot) -> str:
+    moved = frame(effect.vector())
+    return f'Correct the tool centre point by {moved}; a bent torch looks like this too.'
+
+
+def _gear_ratio(effect: Effect, robot: Robot) -> str:
+    scale = _value(effect, 'scale')
+    return (
+        f'Enter the gear ratio of {effect.site} times {1.0 + scale:.6f}: it turns '
+        f'{number(scale * 100.0)} % of its angle further than it reads.'
+    )
+
+
+def _ripple(effect: Effect, robot: Robot) -> str:
+    amplitude = np.atleast_1d(np.asarray(effect.amplitude))  # type: ignore[attr-defined]
+    order = np.atleast_1d(np.asarray(effect.order))  # type: ignore[attr-defined]
+    strongest = np.argsort(-np.abs(amplitude))[:3]
+    waves = ', '.join(
+        f'{size(amplitude[k] * 1e3, 2)} mrad at {order[k]:g} per turn' for k in strongest
+    )
+    more = f' and {amplitude.size - 3} smaller orders' if amplitude.size > 3 else ''
+    return (
+        f'Compensate the ripple of {effect.site} by table ({waves}{more}); inspect its gear and '
+        'encoder if it grows.'
+    )
+
+
+def _joint_coupling(effect: Effect, robot: Robot) -> str:
+    source = effect.source  # type: ignore[attr-defined]
+    ratio = _value(effect, 'ratio')
+    return (
+        f'Enter a coupling of {number(ratio * 1e3)} mrad per rad from {source} into '
+        f'{effect.site}.'
+    )
+
+
+def _backlash(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Service the gear of {effect.site}: it has {radians(_value(effect, "width"))} of play; '
+        'until then approach seams from one side.'
+    ).replace('+', '')
+
+
+def _joint_compliance(effect: Effect, robot: Robot) -> str:
+    compliance = _value(effect, 'compliance')
+    stiffness = f'{1.0 / compliance:.3g} N m/rad' if compliance > 0.0 else 'no physical stiffness'
+    return (
+        f'Compensate the spring of {effect.site}: it yields '
+        f'{number(compliance * 1e5)} mrad per 100 N m ({stiffness}).'
+    )
+
+
+def _cartesian_compliance(effect: Effect, robot: Robot) -> str:
+    values = np.asarray(effect.compliance) * 1e5  # type: ignore[attr-defined]
+    each = ', '.join(number(float(v)) for v in values)
+    return f'Compensate the yielding of the tool: ({each}) mm per 100 N along its x, y, z.'
+
+
+def _payload(effect: Effect, robot: Robot) -> str:
+    extra = _value(effect, 'mass')
+    com = np.asarray(effect.com) * 1e3  # type: ignore[attr-defined]
+    where = ', '.join(number(float(v)) for v in com)
+    return (
+        f'Enter a payload of {robot.payload_mass + extra:.2f} kg in place of '
+        f'{robot.payload_mass:.2f} kg; the {number(extra)} kg lie at ({where}) mm in the tool '
+        'frame.'
+    )
+
+
+def _servo_lag(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Give the controller of {effect.site} more feed-forward, or record measured in place of '
+        f'commanded joints: it lags by {size(_value(effect, "time_constant") * 1e3)} ms.'
+    )
+
+
+def _time_delay(effect: Effect, robot: Robot) -> str:
+    delay = _value(effect, 'delay')
+    order = 'late' if delay > 0.0 else 'early'
+    return (
+        f'Fix the clock: the measurements are stamped {size(delay * 1e3)} ms {order} against the '
+        'joint states; synchronise both computers or subtract the delay.'
+    )
+
+
+def _thermal_growth(effect: Effect, robot: Robot) -> str:
+    links = effect.links or ('all links',)  # type: ignore[attr-defined]
+    return (
+        'Warm the arm up before welding, or compensate '
+        f'{number(_value(effect, "coefficient") * 1e6)} um per m and K for {", ".join(links)}.'
+    )
+
+
+def _drift(effect: Effect, robot: Robot) -> str:
+    rate = np.asarray(effect.xyz_rate) * 3.6e6  # type: ignore[attr-defined]
+    each = ', '.join(number(float(v)) for v in rate)
+    return (
+        f'Find what creeps (fixture, tripod, pedestal): ({each}) mm per hour along x, y, z; '
+        'measure a fixed point now and then.'
+    )
+
+
+def _vibration(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Limit the jerk of {effect.site}, or shape its motion for '
+        f'{_value(effect, "frequency"):.3g} Hz (damping {_value(effect, "damping"):.2g}); look '
+        'for a loose mount.'
+    )
+
+
+def _quantization(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Read {effect.site} with a finer encoder or more digits: it is rounded to '
+        f'{radians(_value(effect, "step"))}.'
+    ).replace('+', '')
+
+
+def _measurement_scale(effect: Effect, robot: Robot) -> str:
+    return (
+        'Have the instrument calibrated, or correct for air temperature: lengths read '
+        f'{number(_value(effect, "scale") * 1e6)} um per m too long.'
+    )
+
+
+def _setup_step(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Fasten the set-up: it moved by {frame(-effect.vector()[:6])} at '
+        f'{_value(effect, "time"):.4g} s; measure what came before and after apart.'
+    )
+
+
+def _setup_settling(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Let the set-up settle before measuring: it started {frame(effect.vector()[:6])} from '
+        'where it ended.'
+    )
+
+
+_SENTENCES: dict[str, Sentence] = {
+    'joint_offset': _joint_offset,
+    'link_length': _row('da', 'a', 'it is off by'),
+    'link_offset': _row('dd', 'd', 'it is off by'),
+    'link_twist': _row('dalpha', 'alpha', 'the axes are twisted by'),
+    'axis_parallelism': _row('dbeta', 'beta', 'the axes are out of parallel by'),
+    'base_pose': _base_pose, 'tool_pose': _tool_pose, 'gear_ratio': _gear_ratio,
+    'transmission_ripple': _ripple, 'joint_coupling': _joint_coupling, 'backlash': _backlash,
+    'joint_compliance': _joint_compliance, 'cartesian_compliance': _cartesian_compliance,
+    'payload': _payload, 'servo_lag': _servo_lag, 'time_delay': _time_delay,
+    'thermal_growth': _thermal_growth, 'drift': _drift, 'vibration': _vibration,
+    'quantization': _quantization, 'measurement_scale': _measurement_scale,
+    'setup_step': _setup_step, 'setup_settling': _setup_settling,
+}  # fmt: skip

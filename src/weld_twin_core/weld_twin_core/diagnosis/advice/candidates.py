@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Measurements that could be made next: a motion, what is changed in the cell, the cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.stats import qmc
+
+from ...arrays import Array
+from ...recording import JointMotion, Recording, Signal
+from ...robot import Robot
+from ...rotation import transform
+from ..problem import Model, Problem
+
+STATIONS = 60
+STEP = 0.02
+"""Approach of a station from either side [rad, m]."""
+REACH = 1.3
+"""The recorded range of every joint is widened by this factor, within its limits."""
+LEAST = 0.35
+"""Half the range [rad, m] that is used at least."""
+MASS = 5.0
+LONGER = 0.2
+PRESS = 50.0
+PASSES = (1.0, 0.5, 0.25)
+"""Speeds of a sweep, as shares of the fastest."""
+FASTEST = 0.5
+"""Share of the joints' velocity limits that a sweep uses."""
+EXTRA = 25.0
+"""Cost [min] of a sweep where so far only stations were measured."""
+RATE = 100.0
+"""Samples per second that a sweep is predicted with."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """
+    A measurement that could be made.
+
+    Attributes
+    ----------
+    kind, sentence : str
+    cost : float [min]
+    recording : Recording
+        The motion, with side signals, without measurements.
+    model : Model
+        As the cell will be, without found effects; one base.
+    new_base, new_tool : bool
+        Whether the instrument or the tool is set up anew, so that its frame is not known.
+
+    """
+
+    kind: str
+    sentence: str
+    cost: float
+    recording: Recording
+    model: Model
+    new_base: bool = False
+    new_tool: bool = False
+
+
+def candidates(problem: Problem, model: Model) -> Iterator[Candidate]:
+    """Yield what could be measured next, the cheapest first."""
+    robot = model.robot
+    now = replace(model, bases=model.bases[:1], found=())
+    spread = _spread(problem, robot, STATIONS)
+    few = spread[: STATIONS // 3]
+    warm = _temperature(problem)
+    still = all(r.joints.static for r in problem.recordings)
+
+    def at(q: Array, seconds: float = 15.0, rise: float = 0.0) -> Recording:
+        t = seconds * np.arange(len(q), dtype=np.float64)
+        motion = JointMotion(t, q, static=True)
+        ramp = np.linspace(0.0, rise, t.size, dtype=np.float64)
+        heat = None if warm is None else Signal(t, warm + ramp)
+        return Recording('next measurement', motion, temperature=heat)
+
+    yield Candidate(
+        'speed_sweep', 'Run one path forth and back at three speeds and record joints and tool '
+        'all the way.', EXTRA if still else 5.0, Recording('next measurement', sweep(problem, robot)), now,
+    )  # fmt: skip
+    yield Candidate(
+        'stations', f'Measure {STATIONS} stations at rest, spread over a wider part of the '
+        'workspace.', 15.0, at(spread), now,
+    )  # fmt: skip
+    yield Candidate(
+        'bidirectional', f'Measure {STATIONS // 4} stations at rest, each approached from both '
+        'sides of every joint.', 20.0, at(_both_sides(spread[: STATIONS // 4])), now,
+    )  # fmt: skip
+    if any(r.wrench is not None for r in problem.recordings):
+        yield Candidate(
+            'press', f'Measure {len(few)} stations while the tool is pressed with {PRESS:g} N '
+            'along x, y and z in turn.', 25.0, _pressed(at(few)), now,
+        )  # fmt: skip
+    heavy = replace(robot, payload_mass=robot.payload_mass + MASS)
+    yield Candidate(
+        'payload_swap', f'Measure {len(few)} stations with {MASS:g} kg more on the flange, '
+        'entered as payload.', 30.0, at(few), replace(now, robot=heavy),
+    )  # fmt: skip
+    longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
+    yield Candidate(
+        'longer_tool', f'Measure {len(few)} stations with a tool {LONGER * 1e3:g} mm longer.',
+        40.0, at(few), replace(now, robot=robot.with_frames(tool=longer)), new_tool=True,
+    )  # fmt: skip
+    shift = transform(np.eye(3), np.array([1.5, 0.5, 0.0]))
+    yield Candidate(
+        'moved_instrument', f'Move the instrument by 1.5 m and measure {len(few)} stations.', 45.0,
+        at(few), replace(now, bases=(shift @ now.bases[0],)), new_base=True,
+    )  # fmt: skip
+    again = np.concatenate([spread[:5]] * (STATIONS // 5))
+    yield Candidate(
+        'warm_up', 'Measure five stations again and again for an hour while the arm warms up.',
+        60.0, at(again, 60.0, rise=15.0), now,
+    )  # fmt: skip
+
+
+def _range(problem: Problem, robot: Robot) -> tuple[Array, Array]:
+    q = np.concatenate([r.joints.q for r in problem.recordings])
+    middle = 0.5 * (q.min(axis=0) + q.max(axis=0))
+    half = np.maximum(REACH * 0.5 * np.ptp(q, axis=0), LEAST)
+    inset = np.where(np.isfinite(robot.upper - robot.lower), STEP, 0.0)
+    low = np.maximum(middle - half, robot.lower + inset)
+    high = np.maximum(np.minimum(middle + half, robot.upper - inset), low)
+    return np.asarray(low), np.asarray(high)
+
+
+def _spread(problem: Problem, robot: Robot, count: int) -> Array:
+    """Return stations that fill the range evenly, shape (count, n)."""
+    low, high = _range(problem, robot)
+    unit = qmc.Halton(robot.n, scramble=False).random(count + 1)[1:]
+    return np.asarray(low + unit * (high - low))
+
+
+def _both_sides(stations: Array) -> Array:
+    """Return every station after a step up to it and after a step down to it."""
+    approach = np.array([[-STEP], [0.0], [STEP], [0.0]])
+    return np.asarray(np.repeat(stations, 4, axis=0) + np.tile(approach, (len(stations), 1)))
+
+
+def sweep(problem: Problem, robot: Robot) -> JointMotion:
+    """Return one path forth and back at three speeds, from rest to rest."""
+    low, high = _range(problem, robot)
+    turn = np.linspace(0.0, 1.0, 7)
+    joint = np.arange(robot.n)
+    phase = turn[:, None] * (1 + joint % 3) + joint / 7.0
+    waves = np.sin(2.0 * np.pi * phase)
+    path = CubicSpline(turn, 0.5 * (low + high) + 0.25 * (high - low) * waves)
+    fine = path(np.linspace(0.0, 1.0, 500), 1)
+    finite = np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)
+    # s = (1 - cos)/2 is pi/2 times faster than its mean.
+    fastest = 0.5 * np.pi * float((np.abs(fine) / finite).max()) / FASTEST
+    shares, times, start = [], [], 0.0
+    for speed in PASSES:
+        span = 2.0 * fastest / speed
+        t = np.arange(0.0, span, 1.0 / RATE)
+        shares.append(0.5 * (1.0 - np.cos(2.0 * np.pi * t / span)))
+        times.append(start + t)
+        start += t[-1] + 1.0 / RATE
+    return JointMotion(np.concatenate(times), path(np.concatenate(shares)))
+
+
+def _pressed(recording: Recording) -> Recording:
+    t = recording.joints.t
+    force = np.zeros((t.size, 6))
+    force[np.arange(t.size), np.arange(t.size) % 3] = PRESS
+    return replace(recording, wrench=Signal(t, force), wrench_frame='base')
+
+
+def _temperature(problem: Problem) -> float | None:
+    found = [r.temperature.value.mean() for r in problem.recordings if r.temperature is not None]
+    return float(np.mean(found)) if found else None

@@ -1,0 +1,28 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Pairs of causes that no motion of the joints tells apart, and what does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+_WAYS: dict[frozenset[str], str] = {
+    frozenset({'joint_offset', 'base_pose'}): 'measure where the base stands (points on its '
+    'foot), or master the joint with its own gauge',
+    frozenset({'joint_offset', 'tool_pose'}): 'measure the tool by itself, or master the joint '
+    'with its own gauge',
+    frozenset({'base_pose', 'tool_pose'}): 'measure the tool by itself',
+    frozenset({'time_delay', 'servo_lag'}): 'record commanded and measured joints side by '
+    'side, or trigger both recordings with one signal',
+    frozenset({'joint_compliance', 'payload'}): 'weigh what hangs on the flange',
+    frozenset({'link_offset'}): 'only their sum moves the tool, so mending either mends both',
+    frozenset({'joint_offset'}): 'master one of the joints with its own gauge',
+    frozenset({'drift', 'thermal_growth'}): 'measure a fixed point beside the arm while it works',
+    frozenset({'measurement_scale', 'link_length'}): 'measure a bar of known length',
+}
+ELSE = 'mend whichever is easier, for anywhere in the workspace they differ by less than the noise'
+
+
+def way(families: Sequence[str]) -> str:
+    """Return what tells causes of these families apart when no motion does."""
+    return _WAYS.get(frozenset(families), ELSE)

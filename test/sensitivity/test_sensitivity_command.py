@@ -4,14 +4,9 @@
 
 import csv
 import json
-import time
 
-import numpy as np
 import pytest
 
-from weld_twin_core import catalog
-from weld_twin_core.paths import default_seam
-from weld_twin_core.sensitivity import default_tolerances, model, planned_study, sobol_indices
 from weld_twin_nodes.cli import main
 
 SMALL = ['--samples', '32', '--runs', '200', '--trajectories', '2', '--placements', '2',
@@ -99,35 +94,3 @@ def test_a_directory_of_something_else_is_left_alone(tmp_path, capsys):
     assert main(['sensitivity', '--robot', 'ur5', '--out', str(tmp_path)]) == 2
     assert 'holds something else' in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ['thesis.tex']
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('fourth', ['base_pose', 'backlash'])
-def test_a_study_of_24_parameters_takes_less_than_three_times_what_salib_takes(fourth):
-    from SALib.analyze import sobol as analysis
-    from SALib.sample import sobol as sampling
-
-    robot = catalog.load('ur5')
-    study = planned_study(robot, default_seam(robot), 'aggressive', points=200)
-    tolerances = default_tolerances(robot, ('joint_offset', 'link_length', 'link_twist', fourth))
-    names = [t.name for t in tolerances]
-    problem = {'num_vars': 24, 'names': names, 'bounds': [[0.0, 1.0]] * 24}
-    weights = np.arange(24.0)
-
-    def salib():
-        unit = sampling.sample(problem, 1024, calc_second_order=False, seed=1)
-        assert len(unit) == 26_624
-        return analysis.analyze(problem, unit @ weights, calc_second_order=False, seed=1)
-
-    def ours():
-        fast = model(study, tolerances)
-        return sobol_indices(lambda unit: fast.at_probabilities(unit).d_norm, names, 1024)
-
-    def seconds(work):
-        start = time.process_time()
-        work()
-        return time.process_time() - start
-
-    # Turn about, so that whatever else the machine does slows both; the best of each counts.
-    taken = np.array([(seconds(ours), seconds(salib)) for _ in range(6)]).min(axis=0)
-    assert taken[0] < 3.0 * taken[1]

@@ -56,12 +56,7 @@ def diagnose_cases(
         Truths lie within reach, or the directory holds no cases.
 
     """
-    truths = seal.truths_within_reach(cases)
-    if truths is not None and not allow_readable:
-        raise DataError(
-            f"the truths in '{truths}' can be read from here, so this would not be blind; move "
-            'them away, or say --allow-readable'
-        )
+    readable = _truths_readable(cases, allow_readable)
     listed = layout.read(cases / layout.CASES)
     engine = engine_digest()
     tasks = [
@@ -77,10 +72,20 @@ def diagnose_cases(
             write_text(file, json.dumps(content, indent=1) + '\n', overwrite=True)
     layout.write(out / layout.VERDICTS, {
         'seal': listed['seal'], 'engine': engine, 'version': __version__,
-        'with_holdout': with_holdout, 'truths_readable': truths is not None,
-        'verdicts': verdicts,
+        'with_holdout': with_holdout, 'truths_readable': readable, 'verdicts': verdicts,
     }, overwrite=True)  # fmt: skip
     return verdicts
+
+
+def _truths_readable(cases: Path, allowed: bool) -> bool:
+    """Return whether truths lie within reach; refuse that where it is not allowed."""
+    truths = seal.truths_within_reach(cases)
+    if truths is not None and not allowed:
+        raise DataError(
+            f"the truths in '{truths}' can be read from here, so this would not be blind; move "
+            'them away, or say --allow-readable'
+        )
+    return truths is not None
 
 
 def engine_digest() -> str:

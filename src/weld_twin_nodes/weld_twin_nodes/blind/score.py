@@ -132,9 +132,7 @@ def score(
 
     """
     opened = seal.opened(cases, truths, seal_given)
-    listed = layout.read(results / layout.VERDICTS)
-    if listed['seal'] != layout.read(cases / layout.CASES)['seal']:
-        raise DataError(f"the verdicts in '{results}' are on other cases than those in '{cases}'")
+    listed = _verdicts_on(cases, results)
     verdicts = {verdict['name']: verdict for verdict in listed['verdicts']}
     judged: list[Judged] = []
     shrinks, own = {}, {}
@@ -150,13 +148,20 @@ def score(
         if diagnosis and case.kind in SHRINKING and case.status in NAMING:
             claim = diagnosis['shrink']
             shrinks[name] = achieved(cases, truths, truth, file, claim)
-    made = {key: listed[key] for key in ('seal', 'engine', 'version', 'with_holdout',
-                                         'truths_readable')}  # fmt: skip
+    told = {key: value for key, value in listed.items() if key not in ('schema', 'verdicts')}
+    made = {'seed': layout.read(truths / layout.TRUTHS)['seed'], **told}
     return Score(
-        {'seed': layout.read(truths / layout.TRUTHS)['seed'], **made}, judged, shrinks,
+        made, judged, shrinks,
         _costs(list(verdicts.values())), reasons or {},
         {name: verdict['error'] for name, verdict in verdicts.items() if verdict['error']}, own,
     )  # fmt: skip
+
+
+def _verdicts_on(cases: Path, results: Path) -> dict[str, Any]:
+    listed = layout.read(results / layout.VERDICTS)
+    if listed['seal'] != layout.read(cases / layout.CASES)['seal']:
+        raise DataError(f"the verdicts in '{results}' are on other cases than those in '{cases}'")
+    return listed
 
 
 def _costs(verdicts: list[dict[str, Any]]) -> dict[str, float]:

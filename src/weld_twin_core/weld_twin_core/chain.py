@@ -27,7 +27,9 @@ Shift = Mapping[Channel, Array]
 ROW_CHANNELS = ('theta', 'd', 'a', 'alpha', 'beta')
 NO_SHIFT: Shift = {}
 MANY = 5000
-"""Joint positions from which `forward` leaves the work to `kernels.bulk`."""
+"""Joint positions from which `forward` leaves the work to `kernels.bulk`..."""
+MOST_JOINTS = 8
+"""... and joints up to which it does: there the work grows threefold with every other joint."""
 
 
 class RowAxes(NamedTuple):
@@ -167,7 +169,7 @@ def forward(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
 
     The product of the paper's eq. for T_i^{i-1} over the rows, between base and tool frame.
     """
-    if q.ndim == 2 and len(q) >= MANY and not shift:
+    if q.ndim == 2 and len(q) >= MANY and robot.n <= MOST_JOINTS and not shift:
         from .kernels.bulk import BulkKernel  # which imports this module
         return BulkKernel(robot).poses(q)
     chain = frames(robot, q, shift)

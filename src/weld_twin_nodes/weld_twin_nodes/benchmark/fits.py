@@ -24,6 +24,7 @@ from .race import Contender, Workload
 CLOSED = 1e-9
 """What inverse kinematics leaves open [m]."""
 NEWTON_STEPS = 20
+PYBOTICS_STEPS = 4
 
 
 def fits(poses: int, seam: int, peers: set[str]) -> Iterator[Workload]:
@@ -56,7 +57,8 @@ def _calibration(count: int, peers: set[str]) -> Workload:
         contenders.append(Contender('pybotics', _by_pybotics(robot, q, poses), 1, once=True))
     return Workload(
         f'calibration of {len(channels)} numbers on {count:,} poses', 'fit', contenders, 1e-9,
-        'scipy trf has the same analytic Jacobian; pybotics fits positions by differences, once',
+        'scipy trf has the same analytic Jacobian; pybotics fits positions by differences, and is '
+        f'stopped after {PYBOTICS_STEPS} steps',
         ('scipy trf',),
     )  # fmt: skip
 
@@ -100,7 +102,11 @@ def _by_pybotics(robot: Robot, q: Array, poses: Array) -> Callable[[], object]:
             pybotics_arm(robot), kinematic_chain_mask=True, world_mask=True
         )
         start = handler.generate_optimization_vector()
-        return leastsq(optimize_accuracy, start, (handler, q, poses[:, :3, 3]), maxfev=4 * 31)
+        positions = poses[:, :3, 3]
+        calls = PYBOTICS_STEPS * (start.size + 1)
+        return leastsq(
+            optimize_accuracy, start, (handler, q, positions), full_output=True, maxfev=calls
+        )
 
     return fit
 

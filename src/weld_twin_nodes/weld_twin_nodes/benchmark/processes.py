@@ -32,11 +32,13 @@ COMMANDS = {
     'weld-twin --help': ['-m', 'weld_twin_nodes', '--help'],
 }
 _PEAK = """
-def peak():  # ru_maxrss would count the parent's memory too
+def memory(key):  # getrusage would count the parent's memory too
     lines = open('/proc/self/status').read().splitlines()
-    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith('VmHWM'))
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(key))
 """
-_MEMORY = _PEAK + """
+_MEMORY = (
+    _PEAK
+    + """
 import json, sys
 import numpy as np
 from weld_twin_core.catalog import load
@@ -46,11 +48,14 @@ robot, q = load('ur5'), np.random.default_rng(0).random((count, 6))
 q *= 6.0
 q -= 3.0
 forward(robot, q[:6000])
-before = peak()
+before = memory('VmRSS')
 poses = forward(robot, q)
-print(json.dumps({'poses': count, 'bytes': peak() - before - poses.nbytes}))
+print(json.dumps({'poses': count, 'bytes': memory('VmHWM') - before - poses.nbytes}))
 """
-_BAG = _PEAK + """
+)
+_BAG = (
+    _PEAK
+    + """
 import json, sys, time
 import numpy as np
 from weld_twin_core.catalog import load
@@ -67,9 +72,10 @@ rms = float(np.sqrt((deviation(off) ** 2).mean()))
 done = time.process_time()
 print(json.dumps({
     'joint_states': recording.joints.t.size, 'poses': measured.t.size, 'read_s': read - start,
-    'compare_s': done - read, 'peak_bytes': peak(), 'rms_m': rms,
+    'compare_s': done - read, 'peak_bytes': memory('VmHWM'), 'rms_m': rms,
 }))
 """
+)
 
 
 def starts() -> dict[str, float]:

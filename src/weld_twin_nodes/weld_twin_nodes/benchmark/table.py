@@ -51,7 +51,7 @@ def costs(starts: dict[str, float], memory: dict[str, Any], bag: dict[str, Any])
         f'{name} {duration(value)}' for name, value in starts.items()
     )
     yield (
-        f'{memory["poses"]:,} poses: peak {memory["bytes"] / MEGABYTE:.0f} MB above what goes in '
+        f'{memory["poses"]:,} poses: peak {memory["bytes"] / MEGABYTE:.1f} MB above what goes in '
         'and comes out'
     )
     yield (

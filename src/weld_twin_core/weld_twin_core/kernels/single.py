@@ -71,11 +71,11 @@ class SinglePose:
             p0 += a
             p0, p1 = c * p0 - s * y, s * p0 + c * y
         pose = np.array((
-            (x0, z1 * x2 - z2 * x1, z0, p0),
-            (x1, z2 * x0 - z0 * x2, z1, p1),
-            (x2, z0 * x1 - z1 * x0, z2, p2),
-            (0.0, 0.0, 0.0, 1.0),
-        ))  # fmt: skip
+            x0, z1 * x2 - z2 * x1, z0, p0,
+            x1, z2 * x0 - z0 * x2, z1, p1,
+            x2, z0 * x1 - z1 * x0, z2, p2,
+            0.0, 0.0, 0.0, 1.0,
+        )).reshape(4, 4)  # fmt: skip
         return pose if self._base is None else self._base @ pose
 
 

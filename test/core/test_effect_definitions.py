@@ -55,6 +55,16 @@ def base_pose(cell):
     cell.base = cell.textbook.frame(cell.robot.T_world_base, SMALL, TURN, 'left')
 
 
+def setup_settling(cell):
+    left = np.exp(-max(cell.t - 1.0, 0.0) / 2.0)
+    cell.base = cell.textbook.frame(cell.robot.T_world_base, SMALL * left, TURN * left, 'left')
+
+
+def setup_step(cell):
+    if cell.t < 2.0:
+        cell.base = cell.textbook.frame(cell.robot.T_world_base, SMALL, TURN, 'left')
+
+
 def tool_pose(cell):
     cell.tool = cell.textbook.frame(cell.robot.T_flange_tool, SMALL, TURN, 'right')
 
@@ -132,6 +142,10 @@ DEFINITIONS = {
     'link_twist': ({'joint': 'j2', 'dalpha': 3e-3}, row('alpha')),
     'axis_parallelism': ({'joint': 'j2', 'dbeta': 3e-3}, row('beta')),
     'base_pose': ({'xyz': SMALL, 'rotvec': TURN}, base_pose),
+    'setup_settling': (
+        {'xyz': SMALL, 'rotvec': TURN, 'time_constant': 2.0, 'start': 1.0}, setup_settling,
+    ),
+    'setup_step': ({'xyz': SMALL, 'rotvec': TURN, 'time': 2.0}, setup_step),
     'tool_pose': ({'xyz': SMALL, 'rotvec': TURN}, tool_pose),
     'gear_ratio': ({'joint': 'j1', 'scale': 4e-3}, gear_ratio),
     'transmission_ripple': (
@@ -147,7 +161,7 @@ DEFINITIONS = {
     'drift': ({'xyz_rate': SMALL}, drift),
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
     'measurement_noise': ({'sigma': 1e-3}, nothing),
-}
+}  # fmt: skip
 IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay'}
 
 

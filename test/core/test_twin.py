@@ -130,6 +130,8 @@ DRAWN = {
     'axis_parallelism': {'joint': 'j1', 'dbeta': 1e-3},
     'base_pose': {'xyz': [1e-3, 2e-3, 3e-3], 'rotvec': [0.1, 0.2, 0.3]},
     'tool_pose': {'xyz': [1e-3, 2e-3, 3e-3], 'rotvec': [0.1, 0.2, 0.3]},
+    'setup_settling': {'xyz': [1e-3, 2e-3, 3e-3], 'rotvec': [0.1, 0.2, 0.3], 'time_constant': 2.0},
+    'setup_step': {'xyz': [1e-3, 2e-3, 3e-3], 'rotvec': [0.1, 0.2, 0.3], 'time': 1.0},
     'gear_ratio': {'joint': 'j1', 'scale': 1e-3},
     'transmission_ripple': {'joint': 'j1', 'amplitude': 1e-3, 'order': 3.0, 'phase': 0.3},
     'joint_coupling': {'joint': 'j1', 'source': 'j2', 'ratio': 1e-3},

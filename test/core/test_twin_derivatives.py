@@ -18,6 +18,8 @@ ENTRIES = {
     'axis_parallelism': {'joint': 'j1', 'dbeta': 1e-3},
     'base_pose': {'xyz': [1e-3, 2e-3, 0.0], 'rotvec': [1e-2, 0.2, 0.1]},
     'tool_pose': {'xyz': [1e-3, 2e-3, 0.1], 'rotvec': [1e-2, 0.2, 0.1]},
+    'setup_settling': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time_constant': 2.0},
+    'setup_step': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
     'gear_ratio': {'joint': 'j1', 'scale': 1e-3},
     'transmission_ripple': {
         'joint': 'j1', 'amplitude': [1e-4, 2e-4], 'order': [3, 50], 'phase': [0.3, 0.2],

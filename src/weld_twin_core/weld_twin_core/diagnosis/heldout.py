@@ -86,7 +86,8 @@ class Unseen:
         if precision.size:
             prior[frames:] = precision
         x = np.concatenate([np.zeros(frames), fit.coordinates])
-        tether = np.concatenate([np.zeros(frames), _tether(model)])
+        # A learned prior holds a coordinate already; a tether would tell it of unseen stretches.
+        tether = np.where(prior > 0.0, 0.0, np.concatenate([np.zeros(frames), _tether(model)]))
         labels = problem.block_labels(BLOCKS)
         stacked = np.array(targets)
         bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))

@@ -11,6 +11,7 @@ lines above the dense orders are then looked for one by one.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from .lines import DENSE_ORDERS, RANGE, with_lines
 from .problem import Model, Problem, Scale
 from .shrinkage import shrunk_fit, shrunk_step
 
+CLOSED = 1e-5
+"""Width of play [rad] that many small errors start from; less is none."""
 ONE_BY_ONE = ('quantization', 'payload', 'drift', 'measurement_scale')
 """Families kept only where the search has found them: not small errors of the arm's making."""
 SETUP = 60.0
@@ -38,6 +41,7 @@ def many_small(
     everything = model.with_found(_everything(problem, model, exclude))
     scale = robust_scale(problem, problem.residuals(model))
     model, scale = shrunk_step(problem, everything, scale)
+    model = model.with_found(tuple(_coasting(effect) for effect in model.found))
     progress('families fitted together')
     if 'transmission_ripple' not in exclude:
         model = with_lines(problem, model, scale)
@@ -48,6 +52,13 @@ def many_small(
     model, scale = shrunk_step(problem, model, scale)
     result, precision = shrunk_fit(problem, model, scale)
     return result, scale, precision
+
+
+def _coasting(effect: Effect) -> Effect:
+    """Return play that the data refuse as the arm resting ahead instead of behind."""
+    if effect.name != 'backlash' or effect.coordinates()[0] > CLOSED:
+        return effect
+    return replace(effect, form='coast', width=CLOSED)  # type: ignore[call-arg]
 
 
 def _everything(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple[Effect, ...]:
@@ -67,7 +78,7 @@ def _everything(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple
                 continue
             for seed in list(kind.seeds(maker.view, joint))[:2]:
                 if seed.name == 'backlash':
-                    seed = seed.with_coordinates(np.array([1e-5]))
+                    seed = seed.with_coordinates(np.array([CLOSED]))
                 if seed.key not in {e.key for e in out}:
                     out.append(have.get(seed.key, seed))
     return tuple(out)

@@ -9,6 +9,10 @@ next: the size of the deviation depends on the sample rate, and a slow reversal 
 gear with a gap behaves as the *play operator*: the output stays while the input crosses the gap
 and then trails by half of it until the next reversal. Play is the default; the literal form is
 the variant ``form: reversal``.
+
+An arm that stops at a station can do the opposite: driven gently, its inertia carries the link
+across the gap while the motor brakes, and friction keeps it there. It then rests half a gap ahead of
+where it came from, instead of behind. That is ``form: coast``, play mirrored about the input.
 """
 
 from __future__ import annotations
@@ -29,7 +33,7 @@ from .base import Effect, MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
-FORMS = ('play', 'reversal')
+FORMS = ('play', 'reversal', 'coast')
 
 
 @register
@@ -63,7 +67,12 @@ class Backlash(MemoryEffect):
             flips, state = _reversals(q, state)
             return {('q', i): -self.number('width') * flips}, state
         output = scan.play(q, self.number('width'), q[..., 0] if state is None else state)
-        return {('q', i): output - q}, output[..., -1]
+        return {('q', i): self._side * (output - q)}, output[..., -1]
+
+    @property
+    def _side(self) -> float:
+        """Return 1 where the output trails the input, -1 where it runs ahead."""
+        return -1.0 if self.form == 'coast' else 1.0
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the side of the gap last touched, -1/2 or +1/2; 0 before it is first touched."""
@@ -72,7 +81,7 @@ class Backlash(MemoryEffect):
         if self.form == 'reversal':
             return [{('q', i): -_reversals(q, None)[0]}]
         contact, touched = self._contact(q)
-        side = np.take_along_axis(np.sign(contact), np.maximum(touched, 0), -1)
+        side = self._side * np.take_along_axis(np.sign(contact), np.maximum(touched, 0), -1)
         return [{('q', i): np.where(touched >= 0, 0.5 * side, 0.0)}]
 
     def push(self, view: View, tangent: Array) -> Array:
@@ -81,7 +90,8 @@ class Backlash(MemoryEffect):
             return tangent
         _, touched = self._contact(view.joint(view.robot.index(self.joint)))
         at = np.broadcast_to(np.maximum(touched, 0), tangent.shape)
-        return np.take_along_axis(tangent, at, -1)
+        held = np.take_along_axis(tangent, at, -1)
+        return held if self.form == 'play' else 2.0 * tangent - held
 
     def _contact(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return output minus input where a side is touched (else 0), and when it last was."""

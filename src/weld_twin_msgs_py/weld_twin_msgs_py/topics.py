@@ -74,31 +74,31 @@ def _result(name: str, kind: str, depth: int, meaning: str) -> Topic:
 
 
 JOINT_STATES = _stream(
-    '/joint_states', 'sensor_msgs/msg/JointState', 200,
+    '/joint_states', 'sensor_msgs/msg/JointState', 1000,
     'commanded joint motion: position [rad or m], velocity where known',
 )  # fmt: skip
 ACTUAL_JOINT_STATES = _result(
-    '/actual/joint_states', 'sensor_msgs/msg/JointState', 200,
+    '/actual/joint_states', 'sensor_msgs/msg/JointState', 1000,
     'joint motion with the joint-space effects in it',
 )  # fmt: skip
 MEASURED_POSE = _stream(
-    '/measured/tool_pose', 'geometry_msgs/msg/PoseStamped', 200,
+    '/measured/tool_pose', 'geometry_msgs/msg/PoseStamped', 1000,
     'where the tool really is, in the measuring frame [m]',
 )  # fmt: skip
 MEASURED_POINT = _stream(
-    '/measured/tool_point', 'geometry_msgs/msg/PointStamped', 200,
+    '/measured/tool_point', 'geometry_msgs/msg/PointStamped', 1000,
     'the same from an instrument that gives no orientation [m]',
 )  # fmt: skip
 MEASURED_SIGMA = _stream(
-    '/measured/sigma', 'geometry_msgs/msg/Vector3Stamped', 200,
+    '/measured/sigma', 'geometry_msgs/msg/Vector3Stamped', 1000,
     'standard deviation of the measured position of the same stamp, per axis [m]',
 )  # fmt: skip
 TWIN_POSE = _result(
-    '/twin/tool_pose', 'geometry_msgs/msg/PoseStamped', 200,
+    '/twin/tool_pose', 'geometry_msgs/msg/PoseStamped', 1000,
     'where the twin says the tool is [m]',
 )  # fmt: skip
 DEVIATION = _result(
-    '/deviation', 'geometry_msgs/msg/Vector3Stamped', 200,
+    '/deviation', 'geometry_msgs/msg/Vector3Stamped', 1000,
     'measured minus twin in the base frame, at the stamp of the measurement [m]',
 )  # fmt: skip
 DEVIATION_METRICS = _result(

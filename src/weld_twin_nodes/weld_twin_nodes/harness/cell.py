@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -35,6 +36,8 @@ from ..pump import Pump
 from .process import NodeProcess
 from .tap import Tap
 
+DEEP = 20_000
+"""Samples a tap may be behind: what collects must not lose what the nodes keep up with."""
 LIMIT = 15.0
 """Seconds to wait for anything: discovery alone has been seen to take three."""
 BURST = 50
@@ -183,7 +186,7 @@ class Cell:
             raise TwinError(f'{topic!r} is not in the table of topics; say its message class')
         self.node.create_subscription(
             kind or row.message_class(), topic, tap.messages.append,
-            1000 if row is None else row.offered.to_rclpy(),
+            DEEP if row is None else replace(row.offered, depth=DEEP).to_rclpy(),
         )  # fmt: skip
         return tap
 

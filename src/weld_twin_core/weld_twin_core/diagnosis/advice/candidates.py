@@ -17,6 +17,7 @@ from ...robot import Robot
 from ...rotation import transform
 from ..problem import Model, Problem
 
+NAME = 'next measurement'
 STATIONS = 60
 STEP = 0.02
 """Approach of a station from either side [rad, m]."""
@@ -65,58 +66,69 @@ class Candidate:
 
 
 def candidates(problem: Problem, model: Model) -> Iterator[Candidate]:
-    """Yield what could be measured next, the cheapest first."""
-    robot = model.robot
+    """Yield what could be measured next."""
     now = replace(model, bases=model.bases[:1], found=())
-    spread = _spread(problem, robot, STATIONS)
-    few = spread[: STATIONS // 3]
-    warm = _temperature(problem)
+    spread = _spread(problem, model.robot, STATIONS)
+    yield from _as_it_is(problem, now, spread)
+    yield from _changed(problem, now, spread[: STATIONS // 3])
+
+
+def _as_it_is(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]:
+    """Yield measurements that leave the cell as it is."""
     still = all(r.joints.static for r in problem.recordings)
-
-    def at(q: Array, seconds: float = 15.0, rise: float = 0.0) -> Recording:
-        t = seconds * np.arange(len(q), dtype=np.float64)
-        motion = JointMotion(t, q, static=True)
-        ramp = np.linspace(0.0, rise, t.size, dtype=np.float64)
-        heat = None if warm is None else Signal(t, warm + ramp)
-        return Recording('next measurement', motion, temperature=heat)
-
     yield Candidate(
         'speed_sweep', 'Run one path forth and back at three speeds and record joints and tool '
-        'all the way.', EXTRA if still else 5.0, Recording('next measurement', sweep(problem, robot)), now,
+        'all the way.', EXTRA if still else 5.0, Recording(NAME, sweep(problem, now.robot)), now,
     )  # fmt: skip
     yield Candidate(
-        'stations', f'Measure {STATIONS} stations at rest, spread over a wider part of the '
-        'workspace.', 15.0, at(spread), now,
+        'stations', f'Measure {len(spread)} stations at rest, spread over a wider part of the '
+        'workspace.', 15.0, _stations(problem, spread), now,
     )  # fmt: skip
+    both = spread[: len(spread) // 4]
     yield Candidate(
-        'bidirectional', f'Measure {STATIONS // 4} stations at rest, each approached from both '
-        'sides of every joint.', 20.0, at(_both_sides(spread[: STATIONS // 4])), now,
+        'bidirectional', f'Measure {len(both)} stations at rest, each approached from both '
+        'sides of every joint.', 20.0, _stations(problem, _both_sides(both)), now,
     )  # fmt: skip
+    again = np.concatenate([spread[:5]] * (len(spread) // 5))
+    yield Candidate(
+        'warm_up', 'Measure five stations again and again for an hour while the arm warms up.',
+        60.0, _stations(problem, again, 60.0, rise=15.0), now,
+    )  # fmt: skip
+
+
+def _changed(problem: Problem, now: Model, few: Array) -> Iterator[Candidate]:
+    """Yield the same stations with something changed in the cell."""
+    robot, recording = now.robot, _stations(problem, few)
+    words = f'Measure {len(few)} stations'
     if any(r.wrench is not None for r in problem.recordings):
         yield Candidate(
-            'press', f'Measure {len(few)} stations while the tool is pressed with {PRESS:g} N '
-            'along x, y and z in turn.', 25.0, _pressed(at(few)), now,
+            'press', f'{words} while the tool is pressed with {PRESS:g} N along x, y and z in '
+            'turn.', 25.0, _pressed(recording), now,
         )  # fmt: skip
     heavy = replace(robot, payload_mass=robot.payload_mass + MASS)
     yield Candidate(
-        'payload_swap', f'Measure {len(few)} stations with {MASS:g} kg more on the flange, '
-        'entered as payload.', 30.0, at(few), replace(now, robot=heavy),
+        'payload_swap', f'{words} with {MASS:g} kg more on the flange, entered as payload.', 30.0,
+        recording, replace(now, robot=heavy),
     )  # fmt: skip
     longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
     yield Candidate(
-        'longer_tool', f'Measure {len(few)} stations with a tool {LONGER * 1e3:g} mm longer.',
-        40.0, at(few), replace(now, robot=robot.with_frames(tool=longer)), new_tool=True,
+        'longer_tool', f'{words} with a tool {LONGER * 1e3:g} mm longer.', 40.0,
+        recording, replace(now, robot=robot.with_frames(tool=longer)), new_tool=True,
     )  # fmt: skip
-    shift = transform(np.eye(3), np.array([1.5, 0.5, 0.0]))
+    base = transform(np.eye(3), np.array([1.5, 0.5, 0.0])) @ now.bases[0]
     yield Candidate(
-        'moved_instrument', f'Move the instrument by 1.5 m and measure {len(few)} stations.', 45.0,
-        at(few), replace(now, bases=(shift @ now.bases[0],)), new_base=True,
+        'moved_instrument', f'Move the instrument by 1.5 m. {words}.', 45.0, recording,
+        replace(now, bases=(base,)), new_base=True,
     )  # fmt: skip
-    again = np.concatenate([spread[:5]] * (STATIONS // 5))
-    yield Candidate(
-        'warm_up', 'Measure five stations again and again for an hour while the arm warms up.',
-        60.0, at(again, 60.0, rise=15.0), now,
-    )  # fmt: skip
+
+
+def _stations(problem: Problem, q: Array, seconds: float = 15.0, rise: float = 0.0) -> Recording:
+    """Return stations every so many seconds, while it grows warmer by a rise [K]."""
+    t = seconds * np.arange(len(q), dtype=np.float64)
+    warm = [r.temperature.value.mean() for r in problem.recordings if r.temperature is not None]
+    ramp = np.linspace(0.0, rise, t.size, dtype=np.float64)
+    heat = Signal(t, np.mean(warm) + ramp) if warm else None
+    return Recording(NAME, JointMotion(t, q, static=True), temperature=heat)
 
 
 def _range(problem: Problem, robot: Robot) -> tuple[Array, Array]:
@@ -169,8 +181,3 @@ def _pressed(recording: Recording) -> Recording:
     force = np.zeros((t.size, 6))
     force[np.arange(t.size), np.arange(t.size) % 3] = PRESS
     return replace(recording, wrench=Signal(t, force), wrench_frame='base')
-
-
-def _temperature(problem: Problem) -> float | None:
-    found = [r.temperature.value.mean() for r in problem.recordings if r.temperature is not None]
-    return float(np.mean(found)) if found else None

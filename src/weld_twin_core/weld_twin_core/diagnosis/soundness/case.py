@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ...errors import DataError
-from ...recording import Measurements, Recording
+from ...recording import Recording
 from ..alignment import refined
 from ..problem import Model, Problem
 from .lag import Lag, lag
-from .snapshot import Snapshot, snapshot
+from .snapshot import Snapshot, measured, snapshot
 
 LARGE = 5e-3
 """Median gap [m] above which the data may be mixed up; what wears in an arm is smaller."""
@@ -107,21 +106,6 @@ class Case:
 
 
 Checker = Callable[[Case], Sequence[Finding]]
-
-
-def measured(recording: Recording) -> Measurements:
-    """
-    Return what was measured.
-
-    Raises
-    ------
-    DataError
-        Nothing was.
-
-    """
-    if recording.measured is None:
-        raise DataError(f'{recording.name} holds no measured poses or points')
-    return recording.measured
 
 
 def distance(part: Array) -> Array:

@@ -9,8 +9,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...recording import Recording
-from .case import Case, Finding, measured
+from .case import Case, Finding
 from .lag import Lag
+from .snapshot import measured
 
 FEW = 3.0
 """A lag of fewer samples is left to the fit."""

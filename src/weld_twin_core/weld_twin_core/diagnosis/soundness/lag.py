@@ -13,7 +13,7 @@ from ..alignment import nearest_rotation
 
 MOST_LAG = 2.0
 """Lags up to this [s] are looked at, and up to a tenth of the recording."""
-COARSE = 0.01
+COARSE, STEP = 0.02, 0.01
 SAMPLES = 300
 ROUNDS = 6
 APART = 0.6
@@ -90,7 +90,7 @@ def _polished(start: Lag, joints: Array, path: Array, t: Array, seen: Array, fre
     for _ in range(ROUNDS):
         here = _along(path, joints, t - now.at(t))
         turn, keep = _aligned(seen, here)
-        speed = (_along(path, joints, t - now.at(t) + COARSE) - here) @ turn.T / -COARSE
+        speed = (_along(path, joints, t - now.at(t) + STEP) - here) @ turn.T / -STEP
         columns = [speed, speed * (t - now.middle)[:, None]][:free]
         system = np.stack([_centred(c, keep)[keep].ravel() for c in columns], axis=1)
         gap = _centred(seen, keep) - _centred(here, keep) @ turn.T

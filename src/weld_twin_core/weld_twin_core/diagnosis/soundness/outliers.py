@@ -10,7 +10,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ...arrays import Array
-from .case import Case, Finding, distance, length, measured
+from .case import Case, Finding, distance, length
+from .snapshot import measured
 
 WINDOW = 7
 """Neighbours in time that a sample is compared with."""

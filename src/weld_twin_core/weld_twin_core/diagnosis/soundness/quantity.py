@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...errors import DataError
-from .case import Case, Finding, measured
+from .case import Case, Finding
+from .snapshot import measured
 
 STILL = 1e-5
 """A spread [m, rad] below which nothing moved."""

@@ -10,7 +10,8 @@ from itertools import combinations
 import numpy as np
 
 from ...arrays import Array
-from .case import Case, Finding, measured
+from .case import Case, Finding
+from .snapshot import measured
 
 FROZEN = 0.02
 """Share of measurements that repeat the one before, from which it is said."""

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ..problem import Model, Problem
 from .base_change import BaseChange, base_change
-from .case import Case, Finding, length, measured
+from .case import Case, Finding, length
+from .snapshot import measured
 
 SURE = 6.0
 """Nats by which a change of a set-up of stations must beat no change."""

@@ -51,7 +51,7 @@ class Snapshot:
         factor = scale * np.array([1.0, -1.0 if mirror else 1.0, 1.0])
         out = []
         for r in self.recordings:
-            seen = _seen(r)
+            seen = measured(r)
             turn = None if mirror else seen.rotation
             out.append(
                 r.with_measured(replace(seen, position=seen.position * factor, rotation=turn))
@@ -61,7 +61,7 @@ class Snapshot:
     def with_turns(self, turns: list[Array | None]) -> Snapshot:
         """Return the snapshot with other measured rotations, or none."""
         pairs = zip(self.recordings, turns, strict=True)
-        out = [r.with_measured(replace(_seen(r), rotation=turn)) for r, turn in pairs]
+        out = [r.with_measured(replace(measured(r), rotation=turn)) for r, turn in pairs]
         return replace(self, recordings=tuple(out))
 
     def with_robot(self, robot: Robot) -> Snapshot:
@@ -96,7 +96,7 @@ def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
     share = max(12, SAMPLES // len(problem.recordings))
     out = []
     for recording, q in zip(problem.recordings, motions, strict=True):
-        seen = _seen(recording)
+        seen = measured(recording)
         index = np.unique(np.linspace(0, seen.t.size - 1, share).round().astype(int))
         joints = JointMotion(seen.t[index], q[index], static=True)
         out.append(replace(recording, joints=joints, measured=seen.take(index)))
@@ -109,7 +109,16 @@ def gap(problem: Problem, model: Model) -> float:
     return float(np.median(np.concatenate([np.linalg.norm(p[:3], axis=0) for p in parts])))
 
 
-def _seen(recording: Recording) -> Measurements:
+def measured(recording: Recording) -> Measurements:
+    """
+    Return what was measured.
+
+    Raises
+    ------
+    DataError
+        Nothing was.
+
+    """
     if recording.measured is None:
         raise DataError(f'{recording.name} holds no measured poses or points')
     return recording.measured

@@ -9,7 +9,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...arrays import Array
-from .case import Case, Finding, measured
+from .case import Case, Finding
+from .snapshot import measured
 
 GAP = 4.5
 """A step of so many usual steps is a gap."""

@@ -11,8 +11,8 @@ and then trails by half of it until the next reversal. Play is the default; the 
 the variant ``form: reversal``.
 
 An arm that stops at a station can do the opposite: driven gently, its inertia carries the link
-across the gap while the motor brakes, and friction keeps it there. It then rests half a gap ahead of
-where it came from, instead of behind. That is ``form: coast``, play mirrored about the input.
+across the gap while the motor brakes, and friction keeps it there. It then rests half a gap ahead
+of its command, instead of behind. That is ``form: coast``, play mirrored about the input.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ import numpy as np
 
 from weld_twin_core.effects.measurement_noise import MeasurementNoise
 from weld_twin_nodes.noise import Noise
-from weld_twin_nodes.pump import Pump
+from weld_twin_nodes.pump import STALLED, Pump
 
 STAMPS = np.arange(100) * 10_000_000 + 5
 S = 1_000_000_000
@@ -36,8 +36,9 @@ def test_answers_that_stay_out_open_the_window():
     pump = Pump(STAMPS, playback=0.0, window=10, answered=True)
     pump.due(0, 50)
     pump.due(1, 50)
-    pump.due(S, 50)
-    assert len(pump.due(S + 1, 50)) > 0
+    stalled = int((STALLED + 0.1) * S)
+    pump.due(stalled, 50)
+    assert len(pump.due(stalled + 1, 50)) > 0
 
 
 def test_every_sample_is_sent_once():

@@ -14,6 +14,8 @@ from .verdict import CALIBRATION, STRUCTURE, Evidence, Verdict
 WORTH = 0.03
 """A family whose absence raises the squared unseen error by less than this is not named."""
 CERTAIN = 2.0
+LEAST = 1e-6
+"""A member that moves the tool by less [m] is nobody's concern."""
 
 
 def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict:
@@ -49,6 +51,8 @@ def weighed(found: Search, unseen: Unseen) -> tuple[Family, ...]:
         size = float(np.sqrt(max(falls.mean(), 0.0)))
         sites = [(Site(name, model.found[k].site), unseen.rms(unseen.targets[1 + k]))
                  for k in index]  # fmt: skip
+        sites = [item for item in sites if item[1] > LEAST]
         sites.sort(key=lambda item: -item[1])
-        out.append(Family(name, named, size, tuple(sites)))
+        if sites:
+            out.append(Family(name, named, size, tuple(sites)))
     return tuple(sorted(out, key=lambda family: -family.rms_m))

@@ -41,12 +41,13 @@ def owner_advice(diagnosis: Diagnosis) -> list[str]:
     step = _first(diagnosis, 'setup_step')
     if step is not None:
         out.append(
-            f'Between stations {step.time:.0f} and {step.time + 1:.0f} '  # type: ignore[attr-defined]
-            'base or tracker moved: check their fixtures.'
+            f'About station {step.time:.0f} '  # type: ignore[attr-defined]
+            'base or tracker moved a little: check their fixtures.'
         )
     out.append(
-        f'Do not expect less than {millimetres(diagnosis.gap.noise_floor_m)}: that is left of '
-        'poses close to each other, from the repeatability of the arm and the instrument.'
+        f'Do not expect less than {millimetres(diagnosis.gap.noise_floor_m)}, the noise of arm '
+        f'and instrument; what remains above it, up to {millimetres(diagnosis.shrink.rms_after_m)}'
+        ', follows no joint, direction, load, time or place that was looked at.'
     )
     return out
 

@@ -66,6 +66,9 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
 def _sets(diagnosis: Diagnosis) -> Html:
     sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
     title = tag('h3', 'What these data cannot tell apart')
+    if not sets and diagnosis.families:
+        shared = [tag('li', in_words(reason, ())) for reason in diagnosis.reasons]
+        return joined([title, tag('ul', *shared, class_='sentences')])
     if not sets:
         return joined([title, tag('p', 'Nothing: every effect named stands alone.')])
     items = [

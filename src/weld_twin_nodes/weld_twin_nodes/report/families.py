@@ -28,6 +28,17 @@ class Ripple(NamedTuple):
     """Order and amplitude [rad], strongest first."""
 
 
+def worth_doing(diagnosis: Diagnosis) -> list[str]:
+    """Return the actions worth reading: with dozens of small errors, the first and where to go."""
+    if not diagnosis.families or len(diagnosis.actions) <= _LARGEST:
+        return list(diagnosis.actions)
+    more = len(diagnosis.actions) - _LARGEST
+    return [*diagnosis.actions[:_LARGEST], (
+        f'{more} smaller ones are in diagnosis.json. Together they are best taken in by the '
+        'corrected robot.yaml or robot.urdf, and by compensated commands (weld-twin compensate).'
+    )]  # fmt: skip
+
+
 def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
     """Return kind, number of members, what it accounts for, its largest members."""
     rows = []

@@ -8,6 +8,7 @@ from datetime import datetime, timezone
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
+from .families import worth_doing
 from .html import Html, tag
 from .quantities import interval, millimetres, milliradians, odds, percent
 from .words import STATUS, verdict
@@ -76,5 +77,5 @@ def _figures(diagnosis: Diagnosis) -> Html:
 def _actions(diagnosis: Diagnosis) -> Html | None:
     if not diagnosis.actions:
         return None
-    items = [tag('li', action) for action in diagnosis.actions]
+    items = [tag('li', action) for action in worth_doing(diagnosis)]
     return tag('div', tag('h3', 'What to do'), tag('ul', *items), class_='actions')

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from .families import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
+from .families import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows, worth_doing
 from .quantities import change, millimetres, odds, parameter_rows
 from .words import STATUS, found_name, listed, site_name, verdict
 
@@ -35,7 +35,7 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     for check in diagnosis.checks:
         if check.level == 'warning':
             console.print(f'[yellow]data:[/] {escape(check.sentence)}')
-    for action in diagnosis.actions:
+    for action in worth_doing(diagnosis):
         console.print(f'[bold]do:[/] {escape(action)}')
 
 

@@ -34,7 +34,7 @@ def page(outcomes: list[Outcome]) -> str:
         load = outcome.workload
         own = outcome.seconds[OWN]
         others = [
-            f'{c.name} {np.median(outcome.seconds[c.name][: own.size]) / np.median(own):.3g}'
+            f'{c.name} {short(np.median(outcome.seconds[c.name]) / np.median(own))}'
             for c in load.contenders if c.name != OWN and c.name not in load.reference
         ]  # fmt: skip
         reference = ' + '.join(load.reference)
@@ -66,7 +66,12 @@ def times(outcome: Outcome, name: str) -> str:
     ratio = outcome.ratio(name)
     if ratio is None:
         return '-'
-    return f'{np.median(ratio):.3g} ({ratio.min():.3g} to {ratio.max():.3g})'
+    return f'{short(np.median(ratio))} ({short(ratio.min())} to {short(ratio.max())})'
+
+
+def short(ratio: float) -> str:
+    """Return a ratio with three digits, or all before the point."""
+    return f'{ratio:,.0f}' if ratio >= 100.0 else f'{ratio:.3g}'
 
 
 def duration(seconds: float) -> str:

@@ -24,6 +24,7 @@ PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes']
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
 MODULES = {
     'PyYAML': 'yaml', 'urdf-parser-py': 'urdf_parser_py', 'pin': 'pinocchio', 'SALib': 'SALib',
+    'roboticstoolbox-python': 'roboticstoolbox',
 }  # fmt: skip
 """Modules of the distributions that are called otherwise."""
 ROS = {

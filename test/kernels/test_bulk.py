@@ -102,6 +102,15 @@ def test_channels_out_of_order_are_refused(make_robot: Callable[..., Robot]) -> 
         BulkKernel(make_robot(6), [('theta', 5), ('theta', 0)])
 
 
+def test_memory_that_poses_cannot_be_written_to_is_refused(
+    make_robot: Callable[..., Robot],
+) -> None:
+    kernel = BulkKernel(make_robot(6))
+    for out in (np.empty((4, 4, 5)).transpose(2, 0, 1), np.empty((4, 4, 4))):
+        with pytest.raises(ModelError, match='contiguous array'):
+            kernel.poses(positions(kernel.robot, 5), out)
+
+
 def test_forward_of_many_is_forward_of_each(make_robot: Callable[..., Robot]) -> None:
     robot = make_robot(6)
     q = positions(robot, chain.MANY)

@@ -81,9 +81,19 @@ class BulkKernel:
         """
         Return tool poses ``T_world_tool``, shape (N, 4, 4), of joint positions (N, n).
 
-        ``out`` is a contiguous array to write them to.
+        Parameters
+        ----------
+        q : array, shape (N, n) [rad or m]
+        out : array, shape (N, 4, 4), optional
+            Where they are written to; contiguous.
+
+        Raises
+        ------
+        ModelError
+            ``out`` is of another shape or not contiguous.
+
         """
-        out = np.empty((len(q), 4, 4)) if out is None else out
+        out = _poses_like(q, out)
         for part in self._blocks(len(q)):
             self._pose_block(q[part], out[part])
         return out
@@ -96,9 +106,10 @@ class BulkKernel:
 
         Velocity of the tool point [m/rad] first, then the axis. A channel that slides moves the
         tool point along the axis of its screw: what `chain.column` gives for 'd' is rows 3 to 5
-        of the screw of 'theta', and 'a' goes with 'alpha' likewise.
+        of the screw of 'theta', and 'a' goes with 'alpha' likewise. ``poses`` and ``out`` are
+        where both are written to, as in `poses`.
         """
-        poses = np.empty((len(q), 4, 4)) if poses is None else poses
+        poses = _poses_like(q, poses)
         out = aligned(6, len(self.channels), len(q)) if out is None else out
         for part in self._blocks(len(q)):
             memory = self._pose_block(q[part], poses[part])
@@ -153,6 +164,17 @@ class BulkKernel:
                 np.add(total, part, total)
                 np.multiply(turn[2], vector[2], part)
                 np.add(total, part, target)
+
+
+def _poses_like(q: Array, out: Array | None) -> Array:
+    if out is None:
+        return np.empty((len(q), 4, 4))
+    if out.shape != (len(q), 4, 4) or not out.flags.c_contiguous:
+        raise ModelError(
+            f'poses of {len(q)} joint positions need a contiguous array of shape '
+            f'({len(q)}, 4, 4) to be written to, got {out.shape}'
+        )
+    return out
 
 
 def _columns(poses: Array) -> Array:

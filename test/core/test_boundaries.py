@@ -90,7 +90,7 @@ EFFECTS = [
     ({'effect': 'backlash', 'joint': 'j0', 'width': -1e-3},
      'backlash: width = -0.001 rad is outside [0, inf]'),
     ({'effect': 'backlash', 'joint': 'j0', 'form': 'gap'},
-     "backlash: form must be one of ('play', 'reversal'), got 'gap'"),
+     "backlash: form must be one of ('play', 'reversal', 'coast'), got 'gap'"),
     ({'effect': 'joint_coupling', 'joint': 'j0'}, 'joint_coupling needs a source joint'),
     ({'effect': 'joint_coupling', 'joint': 'j0', 'source': 'j0'},
      'joint_coupling: source and joint are the same; use gear_ratio'),

@@ -89,7 +89,8 @@ def draw_cell(
         align=('base',) if rng.random() < 0.1 and 'base_pose' not in families else (),
         loaded='cartesian_compliance' in families or (bool(spring) and rng.random() < 0.5),
         warming='thermal_growth' in families or rng.random() < 0.2,
-        richness=float(rng.uniform(*RICHNESS)),
+        # Springs given as known are exactly what they are said to be.
+        richness=0.0 if known else float(rng.uniform(*RICHNESS)),
     )  # fmt: skip
 
 

@@ -132,6 +132,10 @@ def shrink_measures(shrinks: Sequence[Achieved]) -> list[Measure]:
         Measure('shrink_off_new', 'the same, another motion', _off(other)),
         Measure('shrink_cover', '90 % interval of the shrink holds the achieved (85-95 %)',
                 share([s.covered_90 for s in shrinks]), .85),
+        Measure('shrink_cover_same', 'the same, motion repeated',
+                share([s.covered_90 for s in same])),
+        Measure('shrink_cover_new', 'the same, another motion',
+                share([s.covered_90 for s in other])),
         Measure('over_floor', 'RMS left over what the true causes leave, median',
                 bootstrap([s.over_floor for s in shrinks]), 1.05, False),
     ]  # fmt: skip

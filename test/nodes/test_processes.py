@@ -36,6 +36,7 @@ def test_every_node_ends_quietly_when_told_to(cell, tmp_path, number):
         for name in MODULES
     ]
     wait_for_nodes(cell, MODULES)
+    cell.trigger('/recorder/counts')
     for process in processes:
         process.signal(number)
     assert [process.end() for process in processes] == [0] * len(processes)

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -38,8 +39,8 @@ from .tap import Tap
 
 DEEP = 20_000
 """Samples a tap may be behind: what collects must not lose what the nodes keep up with."""
-LIMIT = 15.0
-"""Seconds to wait for anything: discovery alone has been seen to take three."""
+LIMIT = 40.0
+"""Seconds to wait for anything: on a crowded machine discovery alone has been seen to take ten."""
 BURST = 50
 FIRST_STAMP = 1_000_000_000
 """Stamp of the first sample fed [ns]."""
@@ -196,6 +197,7 @@ class Cell:
             topic.message_class(), topic.name, topic.offered.to_rclpy()
         )
         self.wait(lambda: out.get_subscription_count() > 0, f'a subscriber of {topic.name}')
+        self._meet()
         return out
 
     def feed(
@@ -280,6 +282,23 @@ class Cell:
             if time.monotonic() > end:
                 raise CellTimeout(f'waited {limit:g} s for {what}' + ''.join(self._logs()))
             self._executor.spin_once(timeout_sec=0.02)
+
+    def _meet(self) -> None:
+        """
+        Wait until the started nodes know what listens and publishes here.
+
+        Discovery is one-sided: a node this process sees may not see the taps of this process yet,
+        and what it publishes until then is lost to them. Endpoints are announced in order, so a
+        node that answers a client made after the taps knows the taps.
+        """
+        for process in self.processes:
+            if process.code is not None or not process.known:
+                continue
+            client = self.node.create_client(GetParameters, f'/{process.name}/get_parameters')
+            self.wait(client.service_is_ready, f'the parameters of {process.name}')
+            answer = client.call_async(GetParameters.Request())
+            self.wait(answer.done, f'{process.name} to answer')
+            self.node.destroy_client(client)
 
     def _logs(self) -> Iterator[str]:
         for process in self.processes:

@@ -23,7 +23,7 @@ MODULES = {
     'recorder': 'weld_twin_nodes.recorder',
     'live_diagnosis': 'weld_twin_nodes.live_diagnosis',
 }
-GRACE = 5.0
+GRACE = 20.0
 """Seconds a process has to end after SIGINT before it is killed."""
 
 
@@ -39,11 +39,18 @@ class NodeProcess:
     folder : Path
         Where the parameter file and the log go.
 
+    Attributes
+    ----------
+    name : str
+    known : bool
+        Whether it is a node of this package, so that ``name`` is its name on the graph.
+
     """
 
     def __init__(
         self, node: str | Sequence[str], parameters: Mapping[str, Any], folder: Path
     ) -> None:
+        self.known = isinstance(node, str)
         self.name = node if isinstance(node, str) else Path(node[0]).name
         self._log = folder / f'{self.name}.log'
         command = _command(node)

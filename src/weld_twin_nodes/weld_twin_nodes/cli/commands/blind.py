@@ -12,7 +12,7 @@ import argparse
 from importlib import import_module
 from inspect import getdoc
 
-JOBS = ('make', 'diagnose', 'score', 'run', 'semi-real')
+JOBS = ('make', 'diagnose', 'score', 'run', 'semi-real', 'recovery')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

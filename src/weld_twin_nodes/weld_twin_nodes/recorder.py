@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError, TwinError
-from weld_twin_msgs_py.bags import BagWriter
+from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
 from weld_twin_msgs_py.robots import load_robot
 from weld_twin_msgs_py.topics import BY_NAME, TOPICS
 
@@ -28,16 +28,25 @@ ASKED = {'error_injector': 'effects', 'forward_kinematics_twin': 'twin_effects'}
 """Nodes whose parameters tell how the bag came about, and where their effects are noted."""
 QUESTIONS = ['robot', 'base_link', 'tip_link', 'model', 'effects']
 ASK_EVERY = 0.2
+LOOK_EVERY = 0.2
 
 
 class Recorder(CellNode):
-    """Writes messages as they arrive, unread; the bag appears under its name when complete."""
+    """
+    Writes messages as they arrive, unread; the bag appears under its name when complete.
+
+    Until then it grows in ``OUT.unfinished``, where a kill or a power cut leaves all but the last
+    moment of it.
+    """
 
     settings = (
         Setting('out', '', 'path of the bag to write; must not exist'),
         Setting('storage', 'mcap', 'mcap or sqlite3'),
         Setting('topics', [topic.name for topic in TOPICS], 'what to record'),
-        Setting('flush_every', 1.0, 'longest time a message is only in memory [s]', 0.05, 60.0),
+        Setting('flush_every', 0.5, 'longest time a message is only in memory [s]', 0.05, 60.0),
+        Setting('split_size', 1024.0, 'size of a file of the bag, 0 is any [MB]', 0.0, 1e6),
+        Setting('split_duration', 3600.0, 'time a file of the bag spans, 0 is any [s]', 0.0, 1e7),
+        Setting('buffer', 64.0, 'memory for messages a slow disk keeps waiting [MB]', 0.01, 1e4),
     )
 
     def __init__(self, **kwargs: Any) -> None:
@@ -47,15 +56,20 @@ class Recorder(CellNode):
         unknown = [name for name in self.setting('topics') if name not in BY_NAME]
         if unknown:
             raise DataError(f'cannot record {unknown[0]!r}; topics are {", ".join(BY_NAME)}')
-        self._writer = BagWriter(
-            self.setting('out'), storage=self.setting('storage'),
-            provenance={'version': __version__},
-        ).open()  # fmt: skip
-        self._counts = dict.fromkeys(self.setting('topics'), 0)
-        for name in self._counts:
+        self._bag = BackgroundBag(
+            GrowingBag(
+                self.setting('out'), storage=self.setting('storage'),
+                split_bytes=int(self.setting('split_size') * 1e6),
+                split_ns=int(self.setting('split_duration') * 1e9),
+                provenance={'version': __version__},
+            ),
+            flush_every=self.setting('flush_every'),
+            most_bytes=int(self.setting('buffer') * 1e6),
+        )  # fmt: skip
+        for name in self.setting('topics'):
             topic = BY_NAME[name]
             self.listen(topic, partial(self._write, topic.name, topic.type), raw=True)
-        self.create_timer(self.setting('flush_every'), self._writer.flush)
+        self.create_timer(LOOK_EVERY, self._look)
         self._unasked = {name: AsyncParameterClient(self, name) for name in ASKED}
         self._changes: list[dict[str, Any]] = []
         self.create_subscription(ParameterEvent, '/parameter_events', self._changed, 10)
@@ -64,17 +78,28 @@ class Recorder(CellNode):
 
     def destroy_node(self) -> None:
         """Complete the bag."""
-        self._writer.close()
+        try:
+            self._bag.close()
+        except TwinError as error:
+            self.failure = error
         super().destroy_node()
 
     def _write(self, topic: str, kind: str, data: bytes) -> None:
-        self._writer.write_cdr(topic, kind, data, self.get_clock().now().nanoseconds)
-        self._counts[topic] += 1
+        taken = self._bag.put(topic, kind, data, self.get_clock().now().nanoseconds)
+        if not taken and self._bag.failure is None:
+            self.refuse(topic, 'the disk does not keep up, messages are dropped')
 
     def _tell(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = True
-        response.message = json.dumps(self._counts)
+        """Answer with the messages written by topic, and those dropped."""
+        written, dropped = self._bag.counts()
+        counts = {topic: written.get(topic, 0) for topic in self.setting('topics')}
+        response.success = not dropped
+        response.message = json.dumps({**counts, 'dropped': dropped})
         return response
+
+    def _look(self) -> None:
+        """End the node when nothing can be written any more."""
+        self.finished = self.finished or self._bag.failure is not None
 
     def _ask(self) -> None:
         for name, client in list(self._unasked.items()):
@@ -94,10 +119,10 @@ class Recorder(CellNode):
         except TwinError as error:
             self.refuse(name, str(error))
             return
-        self._writer.note('robot', robot.to_mapping())
-        self._writer.note(ASKED[name], [effect.to_mapping() for effect in effects])
+        self._bag.note('robot', robot.to_mapping())
+        self._bag.note(ASKED[name], [effect.to_mapping() for effect in effects])
         if name == 'error_injector':
-            self._writer.note('seed', answer.result().values[5].integer_value)
+            self._bag.note('seed', answer.result().values[5].integer_value)
 
     def _changed(self, event: ParameterEvent) -> None:
         """Note effects that change while recording, with the time they did."""
@@ -108,7 +133,7 @@ class Recorder(CellNode):
                 self._changes.append({
                     'node': node, 'log_ns': now, 'effects': parameter.value.string_value,
                 })  # fmt: skip
-                self._writer.note('effects_changes', self._changes)
+                self._bag.note('effects_changes', self._changes)
 
 
 def main(args: list[str] | None = None) -> int:

@@ -20,6 +20,7 @@ from weld_twin_core.errors import TwinError
 
 from .cell_node import CellNode
 
+USAGE_ERROR = 2
 LOOP = 0.25
 """Seconds of one turn of the loop; also how late an end may be noticed."""
 
@@ -61,8 +62,7 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     except (
         TwinError, OSError, InvalidParameterValueException, InvalidParameterTypeException,
     ) as error:  # fmt: skip
-        print(f'weld_twin: {error}', file=sys.stderr)
-        return 2
+        return _told(error)
     except Exception:
         if rclpy.ok():
             raise
@@ -71,4 +71,9 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
-    return 0
+    return 0 if node is None or node.failure is None else _told(node.failure)
+
+
+def _told(error: Exception) -> int:
+    print(f'weld_twin: {error}', file=sys.stderr)
+    return USAGE_ERROR

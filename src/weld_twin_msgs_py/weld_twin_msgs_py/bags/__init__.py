@@ -2,16 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags (mcap and sqlite3, directories and single files) in and out; nothing else opens one."""
 
+from .background import BackgroundBag
 from .from_bag import read_recording
+from .growing import GrowingBag
 from .info import BagInfo, TopicInfo, bag_info
 from .reader import BagReader, provenance
 from .to_bag import write_recording
 from .writer import BagWriter
 
 __all__ = [
+    'BackgroundBag',
     'BagInfo',
     'BagReader',
     'BagWriter',
+    'GrowingBag',
     'TopicInfo',
     'bag_info',
     'provenance',

@@ -12,34 +12,17 @@ import json
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from rosbags.interfaces import (
-    Connection,
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
-from rosbags.rosbag2 import StoragePlugin, Writer
-
 from weld_twin_core.errors import DataError
 
 from ..convert import stamp_ns
-from ..topics import BY_NAME, RELIABLE
-from ..topics import Qos as TopicQos
-from .flush import flush
 from .reader import PROVENANCE_PREFIX
+from .segment import Channel, Segment, check_storage, clear_write_errors
 from .store import TYPES
-
-STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
-_NEVER = QosTime(9223372036, 854775807)
-_DEFAULT_QOS = TopicQos(RELIABLE, 10)
 
 
 class BagWriter:
@@ -67,14 +50,11 @@ class BagWriter:
         storage: str = 'mcap',
         provenance: Mapping[str, Any] | None = None,
     ) -> None:
-        if storage not in STORAGES:
-            raise DataError(f'storage must be one of {", ".join(STORAGES)}, got {storage!r}')
         self.path = Path(path)
-        self._storage = storage
+        self._storage = check_storage(storage)
         self._provenance = dict(provenance or {})
         self._scratch: Path | None = None
-        self._writer: Writer | None = None
-        self._connections: dict[str, Connection] = {}
+        self._segment: Segment | None = None
 
     def open(self) -> BagWriter:
         """
@@ -91,40 +71,8 @@ class BagWriter:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             scratch = tempfile.mkdtemp(prefix=f'.{self.path.name}-', dir=self.path.parent)
             self._scratch = Path(scratch)
-            self._writer = Writer(
-                self._scratch / self.path.name,
-                version=Writer.VERSION_LATEST,
-                storage_plugin=STORAGES[self._storage],
-            )
-            self._writer.open()
-        for key, value in self._provenance.items():
-            self.note(key, value)
+            self._segment = Segment(self._scratch / self.path.name, self._storage)
         return self
-
-    def note(self, key: str, value: Any) -> None:
-        """
-        Add to the provenance of the open bag, or change it.
-
-        Raises
-        ------
-        DataError
-            The bag is not open.
-
-        """
-        self._opened().set_custom_data(PROVENANCE_PREFIX + key, json.dumps(value))
-
-    def flush(self) -> None:
-        """
-        Put what was written on the disk, where it outlives this process.
-
-        Raises
-        ------
-        DataError
-            The bag is not open, or the disk refuses.
-
-        """
-        with self._clear_errors():
-            flush(self._opened())
 
     def write(self, topic: str, message: Any, log_ns: int | None = None) -> None:
         """
@@ -152,14 +100,15 @@ class BagWriter:
             The bag is not open, or the disk refuses.
 
         """
-        writer = self._opened()
+        segment = self._opened()
         with self._clear_errors():
-            writer.write(self._connection(topic, kind), log_ns, data)
+            segment.write(Channel(topic, kind), data, log_ns)
 
     def add_topic(self, topic: str, kind: str) -> None:
         """Announce a topic that may stay without messages."""
+        segment = self._opened()
         with self._clear_errors():
-            self._connection(topic, kind)
+            segment.announce(Channel(topic, kind))
 
     def close(self) -> None:
         """
@@ -171,11 +120,11 @@ class BagWriter:
             Something of that name has appeared meanwhile, or the disk refuses.
 
         """
-        if self._writer is None or self._scratch is None:
+        if self._segment is None or self._scratch is None:
             return
         try:
             with self._clear_errors():
-                self._writer.close()
+                self._segment.close(custom_data(self._provenance))
                 self._refuse_existing()
                 (self._scratch / self.path.name).rename(self.path)
         finally:
@@ -183,14 +132,12 @@ class BagWriter:
 
     def discard(self) -> None:
         """Throw away what was written; does nothing once the bag is closed."""
-        writer, self._writer = self._writer, None
-        if writer is not None and writer.storage is not None:
-            with suppress(Exception):  # the reason to discard is what the caller wants to see
-                writer.abort()
+        segment, self._segment = self._segment, None
+        if segment is not None:
+            segment.abort()
         if self._scratch is not None:
             shutil.rmtree(self._scratch, ignore_errors=True)
         self._scratch = None
-        self._connections.clear()
 
     def __enter__(self) -> BagWriter:
         """Start the bag."""
@@ -208,24 +155,10 @@ class BagWriter:
         else:
             self.discard()
 
-    def _connection(self, topic: str, kind: str) -> Connection:
-        known = self._connections.get(topic)
-        if known is None:
-            writer = self._opened()
-            if kind not in TYPES.types:
-                raise DataError(f"topic '{topic}' has the type {kind!r}, which no bag here holds")
-            row = BY_NAME.get(topic)
-            offered = _offered(_DEFAULT_QOS if row is None else row.offered)
-            known = writer.add_connection(
-                topic, kind, typestore=TYPES, offered_qos_profiles=[offered]
-            )
-            self._connections[topic] = known
-        return known
-
-    def _opened(self) -> Writer:
-        if self._writer is None:
+    def _opened(self) -> Segment:
+        if self._segment is None:
             raise DataError(f"bag '{self.path}' is not open for writing")
-        return self._writer
+        return self._segment
 
     def _refuse_existing(self) -> None:
         if self.path.exists():
@@ -234,22 +167,13 @@ class BagWriter:
     @contextmanager
     def _clear_errors(self) -> Iterator[None]:
         try:
-            yield
-        except OSError as error:
+            with clear_write_errors(self.path):
+                yield
+        except DataError:
             self.discard()
-            reason = error.strerror or str(error)
-            raise DataError(f"bag '{self.path}' cannot be written: {reason}") from None
+            raise
 
 
-def _offered(qos: TopicQos) -> Qos:
-    return Qos(
-        history=QosHistory.KEEP_LAST,
-        depth=qos.depth,
-        reliability=QosReliability[qos.reliability.upper()],
-        durability=QosDurability.VOLATILE,
-        deadline=_NEVER,
-        lifespan=_NEVER,
-        liveliness=QosLiveliness.AUTOMATIC,
-        liveliness_lease_duration=_NEVER,
-        avoid_ros_namespace_conventions=False,
-    )
+def custom_data(provenance: Mapping[str, Any]) -> dict[str, str]:
+    """Return provenance as a bag's ``custom_data`` holds it."""
+    return {PROVENANCE_PREFIX + key: json.dumps(value) for key, value in provenance.items()}

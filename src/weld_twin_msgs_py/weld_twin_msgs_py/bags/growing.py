@@ -1,0 +1,208 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A bag that grows for hours or weeks, and of which nothing is lost when its writer dies.
+
+It grows in ``NAME.unfinished`` beside its final place, file after file, and takes its name when it
+is complete. A process that is killed leaves that directory; `recover` makes a bag of it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core.errors import DataError
+
+from ..outputs import write_text
+from .segment import Channel, check_storage, clear_write_errors, sync
+from .segments import Segments
+from .writer import custom_data
+
+UNFINISHED = '.unfinished'
+NOTES = 'provenance.json'
+
+
+class GrowingBag:
+    """
+    A bag being recorded.
+
+    Parameters
+    ----------
+    path : Path or str
+        Must not exist yet, and neither must the unfinished bag of that name.
+    storage : str
+        'mcap' or 'sqlite3'.
+    split_bytes : int
+        About how large a file may become; 0 is without limit.
+    split_ns : int [ns]
+        What time a file may span; 0 is without limit.
+    provenance : mapping, optional
+        As of `BagWriter`.
+
+    """
+
+    def __init__(
+        self, path: Path | str, *, storage: str = 'mcap', split_bytes: int = 0, split_ns: int = 0,
+        provenance: Mapping[str, Any] | None = None,
+    ) -> None:  # fmt: skip
+        self.path = Path(path)
+        self.folder = unfinished(self.path)
+        self._storage = check_storage(storage)
+        self._split_bytes = split_bytes
+        self._split_ns = split_ns
+        self._provenance = dict(provenance or {})
+        self._segments: Segments | None = None
+        self._lock = -1
+
+    def open(self) -> GrowingBag:
+        """
+        Start the bag.
+
+        Raises
+        ------
+        DataError
+            Something of that name exists, or the place cannot be written.
+
+        """
+        self._refuse_existing()
+        with clear_write_errors(self.path):
+            self.folder.mkdir(parents=True)
+            self._lock = lock(self.folder)
+            self._write_notes()
+            self._segments = Segments(self.folder, self.path.name, self._storage)
+            sync(self.path.parent)
+        return self
+
+    def note(self, key: str, value: Any) -> None:
+        """
+        Add to the provenance of the open bag, or change it.
+
+        Raises
+        ------
+        DataError
+            The disk refuses.
+
+        """
+        self._provenance[key] = value
+        with self._clear_errors():
+            self._write_notes()
+
+    def write_cdr(self, topic: str, kind: str, data: bytes, log_ns: int) -> None:
+        """
+        Write a serialised message, as a raw subscription receives it.
+
+        Raises
+        ------
+        DataError
+            The bag is not open, or the disk refuses.
+
+        """
+        segments = self._opened()
+        with self._clear_errors():
+            if self._full(segments, log_ns):
+                segments.split()
+            segments.write(Channel(topic, kind), data, log_ns)
+
+    def flush(self) -> None:
+        """
+        Put what was written on the disk, where it outlives this process and a power cut.
+
+        Raises
+        ------
+        DataError
+            The bag is not open, or the disk refuses.
+
+        """
+        segments = self._opened()
+        with self._clear_errors():
+            segments.growing.flush()
+
+    def close(self) -> None:
+        """
+        Finish the bag and give it its name; what cannot be finished stays as it is.
+
+        Raises
+        ------
+        DataError
+            Something of that name has appeared meanwhile, or the disk refuses.
+
+        """
+        if self._segments is None:
+            return
+        try:
+            with self._clear_errors():
+                self._segments.finish(custom_data(self._provenance))
+                (self.folder / NOTES).unlink()
+                if self.path.exists():
+                    raise FileExistsError(0, 'something of that name has appeared meanwhile')
+                self.folder.rename(self.path)
+                sync(self.path.parent)
+        finally:
+            self.release()
+
+    def release(self) -> None:
+        """Let go of the bag as it is, unfinished."""
+        if self._segments is not None:
+            self._segments.abort()
+        if self._lock >= 0:
+            os.close(self._lock)
+        self._segments, self._lock = None, -1
+
+    def _full(self, segments: Segments, log_ns: int) -> bool:
+        growing = segments.growing
+        if growing.first_ns is None:
+            return False
+        return 0 < self._split_bytes <= growing.size or (
+            0 < self._split_ns <= log_ns - growing.first_ns
+        )
+
+    def _write_notes(self) -> None:
+        write_text(self.folder / NOTES, json.dumps(self._provenance), overwrite=True)
+
+    def _opened(self) -> Segments:
+        if self._segments is None:
+            raise DataError(f"bag '{self.path}' is not open for writing")
+        return self._segments
+
+    def _refuse_existing(self) -> None:
+        if self.path.exists():
+            raise DataError(f"'{self.path}' exists already and is not overwritten")
+        if self.folder.exists():
+            raise DataError(
+                f"'{self.folder}' is a recording that was cut short and is not overwritten; make "
+                f"a bag of it with 'weld-twin recover {self.path}', or choose another name"
+            )
+
+    def _clear_errors(self) -> Any:
+        return clear_write_errors(
+            self.path, f"; what was recorded until then is kept: 'weld-twin recover {self.path}'"
+        )
+
+
+def unfinished(path: Path) -> Path:
+    """Return where a bag grows."""
+    return path.with_name(path.name + UNFINISHED)
+
+
+def lock(folder: Path) -> int:
+    """
+    Return a descriptor that holds a directory; the end of the process lets go of it.
+
+    Raises
+    ------
+    DataError
+        Another process holds it.
+
+    """
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        raise DataError(f"'{folder}' is still being recorded; stop the recorder first") from None
+    return descriptor

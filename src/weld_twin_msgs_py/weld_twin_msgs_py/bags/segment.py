@@ -1,0 +1,241 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One storage file that grows, and is put on the disk piece by piece.
+
+rosbags keeps an open transaction (sqlite3) or up to 1 MiB of messages (mcap) in memory and
+offers nothing to part with them before the end, so this reaches into its writers. Chunks of an
+mcap get the checksum rosbags leaves out: after a power cut a file may have its length without its
+content, and only a checksum tells.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+from zlib import crc32
+
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from weld_twin_core.errors import DataError
+
+from ..topics import BY_NAME, RELIABLE
+from ..topics import Qos as TopicQos
+from .store import TYPES
+
+STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
+SUFFIXES = ('.mcap', '.db3')
+CHUNK = 512 * 1024
+"""Bytes of messages in a chunk; less than rosbags waits for before it closes one by itself."""
+OVERHEAD = 32
+"""Bytes either storage adds to a message, about."""
+_CRC_AT = 1 + 8 + 8 + 8 + 8
+"""Where in a chunk record its checksum is: after opcode, length, two times and a size."""
+_NEVER = QosTime(9223372036, 854775807)
+_DEFAULT_QOS = TopicQos(RELIABLE, 10)
+
+
+class Channel(NamedTuple):
+    """
+    What the messages of one topic are.
+
+    Attributes
+    ----------
+    topic, type : str
+    definition : str
+        Text of a message definition that Jazzy does not know, with its hash; else empty.
+    digest : str
+    qos : tuple
+        As offered; empty for what the table of topics says.
+
+    """
+
+    topic: str
+    type: str
+    definition: str = ''
+    digest: str = ''
+    qos: tuple[Qos, ...] = ()
+
+
+class Segment:
+    """
+    A storage file being written.
+
+    Parameters
+    ----------
+    folder : Path
+        Directory to make for it; the file in it has the same name and the storage's suffix.
+    storage : str
+        'mcap' or 'sqlite3'.
+
+    Attributes
+    ----------
+    size : int
+        Bytes written, about.
+    first_ns : int, optional [ns]
+        When the first message was recorded.
+
+    """
+
+    def __init__(self, folder: Path, storage: str) -> None:
+        self.folder = folder
+        self.size = 0
+        self.first_ns: int | None = None
+        self._pending = 0
+        self._unflushed = False
+        self._connections: dict[tuple[str, str], Connection] = {}
+        self._writer = Writer(
+            folder, version=Writer.VERSION_LATEST, storage_plugin=STORAGES[storage]
+        )
+        self._writer.open()
+
+    @property
+    def file(self) -> Path:
+        """Return the storage file."""
+        return next(file for file in self.folder.iterdir() if file.suffix in SUFFIXES)
+
+    def announce(self, channel: Channel) -> Connection:
+        """
+        Return the connection of a channel, made when it is new.
+
+        Raises
+        ------
+        DataError
+            Nobody knows its type.
+
+        """
+        known = self._connections.get(channel[:2])
+        if known is None:
+            known = self._connections[channel[:2]] = self._connect(channel)
+        return known
+
+    def write(self, channel: Channel, data: bytes, log_ns: int) -> None:
+        """Write a serialised message."""
+        self._writer.write(self.announce(channel), log_ns, data)
+        size = len(data) + OVERHEAD
+        self.size += size
+        self._pending += size
+        self._unflushed = True
+        if self.first_ns is None:
+            self.first_ns = log_ns
+        if self._pending > CHUNK:
+            self._part()
+
+    def flush(self) -> None:
+        """Put everything written so far where it outlives this process and a power cut."""
+        if not self._unflushed:
+            return
+        self._part()
+        storage: Any = self._writer.storage
+        if hasattr(storage, 'bio'):
+            storage.bio.flush()
+            os.fsync(storage.bio.fileno())
+        else:
+            storage.conn.commit()
+        self._unflushed = False
+
+    def close(self, custom: dict[str, str]) -> None:
+        """Complete the file and write what is in it to a metadata.yaml beside it."""
+        if self._unflushed:
+            self._part()
+        for key, value in custom.items():
+            self._writer.set_custom_data(key, value)
+        self._writer.close()
+        sync(self.file)
+        sync(self.folder / 'metadata.yaml')
+
+    def abort(self) -> None:
+        """Let go of the file as it is."""
+        with suppress(Exception):  # the reason to let go is what the caller wants to see
+            self._writer.abort()
+
+    def _connect(self, channel: Channel) -> Connection:
+        topic, kind = channel[:2]
+        row = BY_NAME.get(topic)
+        qos = list(channel.qos) or [_offered(_DEFAULT_QOS if row is None else row.offered)]
+        self._unflushed = True
+        if kind in TYPES.types:
+            return self._writer.add_connection(
+                topic, kind, typestore=TYPES, offered_qos_profiles=qos
+            )
+        if not channel.definition or not channel.digest:
+            raise DataError(f"topic '{topic}' has the type {kind!r}, which no bag here holds")
+        return self._writer.add_connection(
+            topic, kind, msgdef=channel.definition, rihs01=channel.digest,
+            offered_qos_profiles=qos,
+        )  # fmt: skip
+
+    def _part(self) -> None:
+        """Close the pending chunk of an mcap, with its checksum."""
+        self._pending = 0
+        storage: Any = self._writer.storage
+        if not hasattr(storage, 'close_chunk') or not storage.chunk.bio.tell():
+            return
+        checksum = crc32(storage.chunk.bio.getbuffer())
+        start = storage.bio.tell()
+        storage.close_chunk()
+        end = storage.bio.tell()
+        storage.bio.seek(start + _CRC_AT)
+        storage.bio.write(checksum.to_bytes(4, 'little'))
+        storage.bio.seek(end)
+
+
+def sync(path: Path) -> None:
+    """Put a closed file, or the names in a directory, on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def clear_write_errors(path: Path, left: str = '') -> Iterator[None]:
+    """Turn what a full or missing disk makes the storages raise into one sentence."""
+    try:
+        yield
+    except (OSError, sqlite3.Error) as error:
+        reason = getattr(error, 'strerror', None) or str(error)
+        raise DataError(f"bag '{path}' cannot be written: {reason}{left}") from None
+
+
+def check_storage(storage: str) -> str:
+    """
+    Return the name of a storage.
+
+    Raises
+    ------
+    DataError
+        There is no such storage.
+
+    """
+    if storage not in STORAGES:
+        raise DataError(f'storage must be one of {", ".join(STORAGES)}, got {storage!r}')
+    return storage
+
+
+def _offered(qos: TopicQos) -> Qos:
+    return Qos(
+        history=QosHistory.KEEP_LAST,
+        depth=qos.depth,
+        reliability=QosReliability[qos.reliability.upper()],
+        durability=QosDurability.VOLATILE,
+        deadline=_NEVER,
+        lifespan=_NEVER,
+        liveliness=QosLiveliness.AUTOMATIC,
+        liveliness_lease_duration=_NEVER,
+        avoid_ros_namespace_conventions=False,
+    )

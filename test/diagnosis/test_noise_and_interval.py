@@ -104,6 +104,14 @@ def test_the_ratio_is_that_of_the_root_mean_squares():
     assert low < ratio < high
 
 
+def test_motions_that_differ_widen_the_interval_by_their_distance():
+    before, after = np.full(80, 4.0), np.full(80, 1.0)
+    labels = np.arange(80) // 10
+    ratio, (low, high) = ratio_interval(before, after, labels, elsewhere=0.5 * np.exp(0.2))
+    assert ratio == pytest.approx(0.5)
+    assert (low, high) == pytest.approx((0.5 * np.exp(-2.36 * 0.2), 0.5 * np.exp(2.36 * 0.2)))
+
+
 def test_two_stretches_still_give_an_interval():
     ratio, (low, high) = ratio_interval(np.full(50, 4.0), np.full(50, 1.0), np.arange(50) // 25)
     assert ratio == pytest.approx(0.5)

@@ -18,6 +18,8 @@ from .result import Shrink
 from .search import Search
 
 LARGE = 300
+FARTHEST = 1.0
+"""Log of a ratio between two motions beyond which it tells of a model that fits neither."""
 MOVED = 5.0
 """A held-out bag whose frame is this many times better refitted stems from another set-up."""
 
@@ -26,15 +28,14 @@ def held_out_shrink(found: Search, unseen: Unseen, holdout: Sequence[Recording])
     """Return the gap before and after, on the held-out bags or on stretches taking their turn."""
     model = found.final.model
     steps, alone = _waterfall(unseen, model)
+    before = unseen.squares(unseen.predict([]))
+    after = unseen.squares(unseen.predict(range(len(model.found))))
+    labels, source, elsewhere = unseen.trusted_labels(), 'blocked cross-validation', None
     if holdout:
+        elsewhere = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
         before, after, labels = _on_bags(found, holdout)
         source = ', '.join(r.name for r in holdout)
-    else:
-        everything = list(range(len(model.found)))
-        before = unseen.squares(unseen.predict([]))
-        after = unseen.squares(unseen.predict(everything))
-        labels, source = unseen.trusted_labels(), 'blocked cross-validation'
-    ratio, interval = ratio_interval(before, after, labels)
+    ratio, interval = ratio_interval(before, after, labels, elsewhere)
     return Shrink(
         float(np.sqrt(before.mean())), float(np.sqrt(after.mean())), ratio, interval, source,
         steps, alone,
@@ -112,18 +113,23 @@ def _size(problem: Problem, model: Model) -> float:
 
 
 def ratio_interval(
-    before: Array, after: Array, labels: Array
+    before: Array, after: Array, labels: Array, elsewhere: float | None = None
 ) -> tuple[float, tuple[float, float]]:
     """
     Return RMS after over before and its 95 % interval, by leaving out one stretch at a time.
 
-    Jackknife over stretches, so that neighbouring samples do not count as independent.
+    Jackknife over stretches, so that neighbouring samples do not count as independent. Stretches
+    of one motion say little of another motion: how far the ratio is from that on the recordings
+    fitted, each stretch unseen, is one draw of that spread, and its square is added to the
+    variance.
 
     Parameters
     ----------
     before, after : array, shape (samples,)
         Squared errors on unseen data.
     labels : array of int, shape (samples,)
+    elsewhere : float, optional
+        The same ratio on other recordings.
 
     """
     ratio = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
@@ -137,6 +143,9 @@ def ratio_interval(
         pair = (max(after[keep].mean(), 1e-300), max(before[keep].mean(), 1e-300))
         logs.append(0.5 * np.log(pair[0] / pair[1]))
     k = names.size
-    error = float(np.sqrt((k - 1) / k * ((np.array(logs) - np.mean(logs)) ** 2).sum()))
-    reach = 2.36 * error  # Student t, 7 degrees of freedom
+    variance = float((k - 1) / k * ((np.array(logs) - np.mean(logs)) ** 2).sum())
+    if elsewhere is not None:
+        apart = np.log(max(elsewhere, 1e-300) / max(ratio, 1e-300))
+        variance += min(abs(float(apart)), FARTHEST) ** 2
+    reach = 2.36 * np.sqrt(variance)  # Student t, 7 degrees of freedom
     return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))

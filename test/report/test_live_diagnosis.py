@@ -12,6 +12,7 @@ import pytest
 from weld_twin_core.catalog import load
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.robot import Robot
 from weld_twin_core.twin import Twin
 from weld_twin_msgs_py import convert
 from weld_twin_msgs_py.messages import bag_messages
@@ -20,6 +21,10 @@ from weld_twin_nodes.diagnosis_window import LONGEST, Window
 from weld_twin_nodes.diagnosis_worker import Finding, Job, Worker
 
 START = 1_700_000_000_000_000_000
+ONE_JOINT = Robot.from_mapping({
+    'name': 'one', 'convention': 'standard',
+    'joints': [{'name': 'a', 'a': 0.5, 'alpha': 0.0, 'd': 0.0, 'theta_offset': 0.0}],
+})  # fmt: skip
 OFFSET = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3}
 
 
@@ -40,7 +45,7 @@ def points(effects, motion, sigma=2e-5):
 
 def filled(duration=60.0, effects=(OFFSET,), seconds=12.0):
     make, motion = bag_messages(), wandering(seconds)
-    window = Window(load('ur5').joint_names, duration)
+    window = Window(load('ur5'), duration)
     for t, q, p in zip(motion.t, motion.q, points(effects, motion), strict=True):
         stamp = START + round(t * 1e9)
         window.take_joints(make.joint_state(stamp, load('ur5').joint_names, q))
@@ -56,14 +61,14 @@ def test_the_window_holds_its_duration_and_no_more():
 
 
 def test_a_stream_without_stamps_moving_on_is_bounded_by_number():
-    window, make = Window(('a',), 1e6), bag_messages()
+    window, make = Window(ONE_JOINT, 1e6), bag_messages()
     for k in range(1, LONGEST + 100):
         window.take_joints(make.joint_state(k, ('a',), np.zeros(1)))
     assert len(window._streams['joints']) == LONGEST
 
 
 def test_a_resting_arm_gives_nothing_to_diagnose():
-    window, make, names = Window(('a',), 60.0), bag_messages(), ('a',)
+    window, make, names = Window(ONE_JOINT, 60.0), bag_messages(), ('a',)
     for k in range(1000):
         window.take_joints(make.joint_state(START + k * 10_000_000, names, np.ones(1)))
         window.take_point(make.point(START + k * 10_000_000, np.zeros(3)))

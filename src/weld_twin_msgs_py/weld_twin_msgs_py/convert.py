@@ -18,6 +18,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion
 from weld_twin_core.rotation import matrix_from_quaternion
 
 NANOSECONDS = 1_000_000_000
@@ -53,6 +54,16 @@ def _indices(present: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[int, ..
     return tuple(present.index(name) for name in wanted)
 
 
+@lru_cache(maxsize=64)
+def _present(present: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for name in wanted if name in present)
+
+
+def joints_present(message: Any, joint_names: Sequence[str]) -> tuple[str, ...]:
+    """Return which of the joints a joint state tells of, in the order they were asked for."""
+    return _present(tuple(message.name), tuple(joint_names))
+
+
 def joint_positions(message: Any, joint_names: Sequence[str]) -> Array:
     """
     Return joint positions, shape (n,) [rad or m], matched by name.
@@ -73,9 +84,9 @@ def joint_positions(message: Any, joint_names: Sequence[str]) -> Array:
             f'the joint state has {len(message.name)} names but {len(values)} positions; '
             'it must give one position per name'
         )
-    out = np.array([values[k] for k in index], dtype=np.float64)
-    _refuse_unfinite(out, joint_names, 'position')
-    return out
+    chosen = [values[k] for k in index]
+    _refuse_unfinite(chosen, joint_names, 'position')
+    return np.array(chosen, dtype=np.float64)
 
 
 def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
@@ -95,16 +106,17 @@ def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
     if len(values) != len(message.name):
         return None
     index = _indices(tuple(message.name), tuple(joint_names))
-    out = np.array([values[k] for k in index], dtype=np.float64)
-    if np.isnan(out).any():
+    chosen = [values[k] for k in index]
+    if any(value != value for value in chosen):
         return None
-    _refuse_unfinite(out, joint_names, 'velocity')
-    return out
+    _refuse_unfinite(chosen, joint_names, 'velocity')
+    return np.array(chosen, dtype=np.float64)
 
 
-def _refuse_unfinite(values: Array, joint_names: Sequence[str], what: str) -> None:
-    if not np.isfinite(values).all():
-        k = int(np.argmin(np.isfinite(values)))
+def _refuse_unfinite(values: Sequence[float], joint_names: Sequence[str], what: str) -> None:
+    """Refuse in plain numbers: for one sample of an arm numpy costs more than the arithmetic."""
+    if not all(map(isfinite, values)):
+        k = [isfinite(value) for value in values].index(False)
         raise DataError(
             f'joint {joint_names[k]!r} has the {what} {values[k]}; it must be a finite number'
         )
@@ -211,6 +223,50 @@ def position_sigma(message: Any) -> float | None:
     if (diagonal < 0.0).any():
         raise DataError('the covariance of the pose has a negative variance')
     return float(np.sqrt(diagonal.mean())) if diagonal.any() else None
+
+
+def joint_trajectory(message: Any, joint_names: Sequence[str]) -> JointMotion:
+    """
+    Return the motion of a JointTrajectory, matched by name, t from its first point [s].
+
+    Velocities are kept where every point has them.
+
+    Raises
+    ------
+    DataError
+        A joint is missing, there are fewer than two points, a point has not one position per
+        name, a number is not finite, or the times do not increase.
+
+    """
+    index = list(_indices(tuple(message.joint_names), tuple(joint_names)))
+    count, points = len(message.joint_names), message.points
+    if len(points) < 2:
+        raise DataError(f'the joint trajectory has {len(points)} points; a motion needs two')
+    if any(len(p.positions) != count for p in points):
+        raise DataError(f'every point of the joint trajectory must have {count} positions')
+    q = np.array([p.positions for p in points], dtype=np.float64)[:, index]
+    known = all(len(p.velocities) == count for p in points)
+    qd = np.array([p.velocities for p in points], dtype=np.float64)[:, index] if known else None
+    since = [p.time_from_start for p in points]
+    t = np.array([s.sec + s.nanosec / NANOSECONDS for s in since])
+    if (np.diff(t) <= 0.0).any():
+        raise DataError('time_from_start must increase from point to point')
+    return JointMotion(t - t[0], q, qd)
+
+
+def path_points(message: Any) -> Array:
+    """
+    Return the positions of a Path, shape (N, 3) [m].
+
+    Raises
+    ------
+    DataError
+        There are fewer than two poses, or a coordinate is not finite.
+
+    """
+    if len(message.poses) < 2:
+        raise DataError(f'the path has {len(message.poses)} poses; a seam needs two')
+    return np.stack([_xyz(item.pose.position, 'a pose of the path') for item in message.poses])
 
 
 def diagnostics(message: Any) -> dict[str, dict[str, str]]:

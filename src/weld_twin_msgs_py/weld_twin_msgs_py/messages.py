@@ -12,11 +12,12 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from weld_twin_core.arrays import Array
+from weld_twin_core.recording import JointMotion
 
 from .convert import NANOSECONDS
 
@@ -67,7 +68,7 @@ class Messages:
 
     def pose(self, ns: int, position: Array, rotation: Array, frame_id: str = 'base') -> Any:
         """Return a PoseStamped from position (3,) [m] and rotation (3, 3)."""
-        x, y, z, w = _quaternion(rotation)
+        x, y, z, w = quaternion(rotation)
         turned = self._make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
         inner = self._make(
             'geometry_msgs/msg/Pose', position=self._xyz('Point', position), orientation=turned
@@ -112,20 +113,104 @@ class Messages:
         hardware_id: str = '',
     ) -> Any:  # fmt: skip
         """Return a DiagnosticArray with one status; numbers are written to round trip."""
+        status = Status(name, level, message, values, hardware_id)
+        return self.statuses(ns, [status])
+
+    def statuses(self, ns: int, statuses: Sequence[Status]) -> Any:
+        """Return a DiagnosticArray."""
+        return self._make(
+            'diagnostic_msgs/msg/DiagnosticArray', header=self.header(ns, ''),
+            status=[self._status(status) for status in statuses],
+        )  # fmt: skip
+
+    def _status(self, status: Status) -> Any:
         pairs = [
             self._make('diagnostic_msgs/msg/KeyValue', key=str(k), value=_text(v))
-            for k, v in values.items()
+            for k, v in status.values.items()
         ]
-        status = self._make(
-            'diagnostic_msgs/msg/DiagnosticStatus', level=self._level(level), name=name,
-            message=message, hardware_id=hardware_id, values=pairs,
-        )  # fmt: skip
         return self._make(
-            'diagnostic_msgs/msg/DiagnosticArray', header=self.header(ns, ''), status=[status]
-        )
+            'diagnostic_msgs/msg/DiagnosticStatus', level=self._level(status.level),
+            name=status.name, message=status.message, hardware_id=status.hardware_id,
+            values=pairs,
+        )  # fmt: skip
+
+    def joint_trajectory(self, ns: int, names: Sequence[str], motion: JointMotion) -> Any:
+        """Return a JointTrajectory of a motion; its first point is at time zero."""
+        points = []
+        for t, q, qd in zip(motion.t - motion.t[0], motion.q, motion.velocity, strict=True):
+            sec, nanosec = divmod(round(float(t) * NANOSECONDS), NANOSECONDS)
+            points.append(self._make(
+                'trajectory_msgs/msg/JointTrajectoryPoint', positions=self._numbers(q),
+                velocities=self._numbers(qd), accelerations=self._numbers(np.zeros(0)),
+                effort=self._numbers(np.zeros(0)), time_from_start=self._make(
+                    'builtin_interfaces/msg/Duration', sec=sec, nanosec=nanosec),
+            ))  # fmt: skip
+        return self._make(
+            'trajectory_msgs/msg/JointTrajectory', header=self.header(ns, ''),
+            joint_names=list(names), points=points,
+        )  # fmt: skip
+
+    def path(self, ns: int, poses: Array, frame_id: str = 'world') -> Any:
+        """Return a Path through tool poses, shape (N, 4, 4)."""
+        stamped = [self.pose(ns, T[:3, 3], T[:3, :3], frame_id) for T in poses]
+        return self._make('nav_msgs/msg/Path', header=self.header(ns, frame_id), poses=stamped)
+
+    def markers(self, ns: int, markers: Sequence[Lines], frame_id: str = 'world') -> Any:
+        """Return a MarkerArray; each marker replaces the one of its name."""
+        return self._make(
+            'visualization_msgs/msg/MarkerArray',
+            markers=[self._lines(ns, frame_id, item) for item in markers],
+        )  # fmt: skip
+
+    def _lines(self, ns: int, frame_id: str, lines: Lines) -> Any:
+        kinds = self._lookup('visualization_msgs/msg/Marker')
+        colors = [
+            self._make('std_msgs/msg/ColorRGBA', r=float(r), g=float(g), b=float(b), a=1.0)
+            for r, g, b in lines.colors
+        ]
+        return self._make(
+            'visualization_msgs/msg/Marker', header=self.header(ns, frame_id), ns=lines.name,
+            id=0, type=kinds.LINE_STRIP if lines.strip else kinds.LINE_LIST, action=kinds.ADD,
+            pose=self._make('geometry_msgs/msg/Pose'),
+            scale=self._xyz('Vector3', np.array([lines.width, 0.0, 0.0])),
+            points=[self._xyz('Point', point) for point in lines.points], colors=colors,
+        )  # fmt: skip
 
 
-def _quaternion(rotation: Array) -> list[float]:
+class Status(NamedTuple):
+    """One status of a DiagnosticArray."""
+
+    name: str
+    level: int
+    message: str
+    values: Mapping[str, Any]
+    hardware_id: str = ''
+
+
+class Lines(NamedTuple):
+    """
+    A marker of lines.
+
+    Attributes
+    ----------
+    name : str
+    points : array, shape (N, 3) [m]
+    colors : array, shape (N, 3)
+        Red, green, blue of each point, 0 to 1.
+    width : float [m]
+    strip : bool
+        One line through all points, or one between each two.
+
+    """
+
+    name: str
+    points: Array
+    colors: Array
+    width: float
+    strip: bool
+
+
+def quaternion(rotation: Array) -> list[float]:
     """
     Return the quaternion x y z w, w >= 0, of one rotation (3, 3).
 

@@ -17,14 +17,17 @@ from typing import Any
 
 RELIABLE = 'reliable'
 BEST_EFFORT = 'best_effort'
+VOLATILE = 'volatile'
+LATCHED = 'transient_local'
 
 
 @dataclass(frozen=True)
 class Qos:
-    """Quality of service: keep the last ``depth`` samples; volatile, as all streams are."""
+    """Quality of service: keep the last ``depth`` samples; for latecomers too where latched."""
 
     reliability: str
     depth: int
+    durability: str = VOLATILE
 
     def to_rclpy(self) -> Any:
         """Return the rclpy profile; needs a ROS installation."""
@@ -40,7 +43,7 @@ class Qos:
             history=HistoryPolicy.KEEP_LAST,
             depth=self.depth,
             reliability=ReliabilityPolicy[self.reliability.upper()],
-            durability=DurabilityPolicy.VOLATILE,
+            durability=DurabilityPolicy[self.durability.upper()],
             liveliness=LivelinessPolicy.AUTOMATIC,
         )
 
@@ -71,6 +74,11 @@ def _stream(name: str, kind: str, depth: int, meaning: str) -> Topic:
 def _result(name: str, kind: str, depth: int, meaning: str) -> Topic:
     """Return a topic that only this project's nodes publish."""
     return Topic(name, kind, Qos(RELIABLE, depth), Qos(RELIABLE, depth), meaning)
+
+
+def _latched(name: str, kind: str, meaning: str) -> Topic:
+    """Return a topic whose last message waits for whoever comes later."""
+    return Topic(name, kind, Qos(RELIABLE, 1, LATCHED), Qos(RELIABLE, 1, LATCHED), meaning)
 
 
 JOINT_STATES = _stream(
@@ -122,7 +130,42 @@ TOPICS = (
     JOINT_STATES, ACTUAL_JOINT_STATES, MEASURED_POSE, MEASURED_POINT, MEASURED_SIGMA, TWIN_POSE,
     DEVIATION, DEVIATION_METRICS, DIAGNOSIS, TOOL_WRENCH, TEMPERATURE,
 )  # fmt: skip
-BY_NAME = {topic.name: topic for topic in TOPICS}
+"""What a recording of the cell holds."""
+
+ROBOT_DESCRIPTION = _latched(
+    '/robot_description', 'std_msgs/msg/String',
+    'URDF of the cell, as robot_state_publisher tells it',
+)  # fmt: skip
+JOINT_TRAJECTORY = _result(
+    '/joint_trajectory', 'trajectory_msgs/msg/JointTrajectory', 10,
+    'motion the trajectory generator is to run, planned by somebody else',
+)  # fmt: skip
+PATH = _result(
+    '/path', 'nav_msgs/msg/Path', 10,
+    'seam the trajectory generator is to plan and run, in the measuring frame',
+)  # fmt: skip
+PLANNED_TRAJECTORY = _latched(
+    '/planned/joint_trajectory', 'trajectory_msgs/msg/JointTrajectory',
+    'the motion the trajectory generator runs',
+)  # fmt: skip
+PLANNED_PATH = _latched(
+    '/planned/path', 'nav_msgs/msg/Path', 'the tool path of that motion',
+)  # fmt: skip
+MARKERS = _result(
+    '/deviation/markers', 'visualization_msgs/msg/MarkerArray', 10,
+    'the seam coloured by deviation, and the deviations magnified',
+)  # fmt: skip
+DIAGNOSTICS = _result(
+    '/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 10,
+    'health of every node: each input with its rate, age, refusals and the last reason',
+)  # fmt: skip
+
+AROUND = (
+    ROBOT_DESCRIPTION, JOINT_TRAJECTORY, PATH, PLANNED_TRAJECTORY, PLANNED_PATH, MARKERS,
+    DIAGNOSTICS,
+)  # fmt: skip
+"""What surrounds it; recorded on request."""
+BY_NAME = {topic.name: topic for topic in (*TOPICS, *AROUND)}
 
 
 @dataclass(frozen=True)

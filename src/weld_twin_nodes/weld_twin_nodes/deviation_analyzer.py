@@ -47,10 +47,16 @@ class DeviationAnalyzer(CellNode):
         self._metrics = self.offer(DEVIATION_METRICS)
         self._stamp = 0
         self._seen = self._told = 0
-        self.create_timer(self.setting('metrics_idle'), self._on_idle)
+        self._every = self.setting('metrics_every')
+        self.every(self.setting('metrics_idle'), self._on_idle)
         self.listen(MEASURED_POSE, self._on_pose)
         self.listen(MEASURED_POINT, self._on_point)
-        self.listen(TWIN_POSE, self._on_twin)
+        self.listen(TWIN_POSE, self._on_twin, required=True)
+
+    def time_went_back(self) -> None:
+        """Forget what was not paired, and begin the metrics anew."""
+        self._deviations.reset()
+        self._seen = self._told = 0
 
     def _on_pose(self, message: Any) -> None:
         position, _ = convert.pose(message)
@@ -68,7 +74,7 @@ class DeviationAnalyzer(CellNode):
         for stamp, vector in deviations:
             self._vector.publish(self.messages.vector3(stamp, vector, BASE))
             self._stamp = stamp
-            if self._deviations.samples % self.setting('metrics_every') == 0:
+            if self._deviations.samples % self._every == 0:
                 self._publish_metrics()
 
     def _on_idle(self) -> None:

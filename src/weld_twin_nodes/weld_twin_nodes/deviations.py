@@ -43,8 +43,13 @@ class Deviations:
         self, robot: Robot, path_length: float = 0.0, depth: int = 2000, max_gap: float = 0.5
     ) -> None:
         self._rotation_base_world = robot.T_world_base[:3, :3].T
-        self._pairing = Pairing(depth, max_gap)
-        self._metrics = RunningMetrics(path_length)
+        self._depth, self._max_gap, self._path_length = depth, max_gap, path_length
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, as after a jump of the clock."""
+        self._pairing = Pairing(self._depth, self._max_gap)
+        self._metrics = RunningMetrics(self._path_length)
 
     @property
     def samples(self) -> int:
@@ -57,7 +62,11 @@ class Deviations:
 
     def add_twin(self, stamp: int, position: Array) -> Iterator[Deviation]:
         """Take a twin position (3,) [m]; yield the deviations that are known now."""
-        return self._each(self._pairing.add_twin(stamp, position))
+        restarts = self._pairing.restarts
+        pairs = self._pairing.add_twin(stamp, position)
+        if self._pairing.restarts > restarts:
+            self._metrics = RunningMetrics(self._path_length)
+        return self._each(pairs)
 
     def metrics(self) -> dict[str, float | int]:
         """Return the metrics so far by their names on `/deviation/metrics`."""

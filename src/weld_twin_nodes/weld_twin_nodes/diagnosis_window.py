@@ -12,8 +12,10 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
+from weld_twin_core.robot import Robot
 from weld_twin_msgs_py import convert
 
+from .joint_states import JointStates
 from .order import Forward
 
 LONGEST = 50_000
@@ -31,17 +33,22 @@ class Window:
 
     Parameters
     ----------
-    joint_names : tuple of str
+    robot : Robot
     duration : float [s]
 
     """
 
-    def __init__(self, joint_names: tuple[str, ...], duration: float) -> None:
-        self._names = joint_names
+    def __init__(self, robot: Robot, duration: float) -> None:
+        self._robot = robot
         self._duration = round(duration * convert.NANOSECONDS)
+        self._wrench_frame = 'tool'
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything, as after a jump of the clock."""
+        self._joints = JointStates(self._robot)
         self._streams: dict[str, deque[Row]] = {}
         self._orders: dict[str, Forward] = {}
-        self._wrench_frame = 'tool'
 
     @property
     def last(self) -> int | None:
@@ -51,31 +58,32 @@ class Window:
 
     def take_joints(self, message: Any) -> None:
         """Take a joint state; a velocity that is not told stays open."""
-        q = convert.joint_positions(message, self._names)
-        qd = convert.joint_velocities(message, self._names)
-        row = np.concatenate([q, np.full(q.size, np.nan) if qd is None else qd])
-        self._add('joints', message, row)
+        sample = self._joints.take(message)
+        if sample is not None:
+            stamp, q, qd = sample
+            row = np.concatenate([q, np.full(q.size, np.nan) if qd is None else qd])
+            self._add('joints', stamp, row)
 
     def take_pose(self, message: Any) -> None:
         """Take a measured pose."""
         position, rotation = convert.pose(message)
-        self._add('pose', message, np.concatenate([position, rotation.ravel()]))
+        self._add('pose', convert.stamp_ns(message), np.concatenate([position, rotation.ravel()]))
 
     def take_point(self, message: Any) -> None:
         """Take a measured point."""
-        self._add('point', message, convert.point(message))
+        self._add('point', convert.stamp_ns(message), convert.point(message))
 
     def take_wrench(self, message: Any) -> None:
         """Take the load on the tool."""
         self._wrench_frame = 'base' if 'base' in message.header.frame_id else 'tool'
-        self._add('wrench', message, convert.wrench(message))
+        self._add('wrench', convert.stamp_ns(message), convert.wrench(message))
 
     def take_temperature(self, message: Any) -> None:
         """Take the temperature."""
-        self._add('temperature', message, np.array([convert.temperature(message)]))
+        value = convert.temperature(message)
+        self._add('temperature', convert.stamp_ns(message), np.array([value]))
 
-    def _add(self, name: str, message: Any, row: Array) -> None:
-        stamp = convert.stamp_ns(message)
+    def _add(self, name: str, stamp: int, row: Array) -> None:
         if self._orders.setdefault(name, Forward()).restarted_at(stamp):
             self._streams.clear()
         stream = self._streams.setdefault(name, deque(maxlen=LONGEST))
@@ -101,7 +109,7 @@ class Window:
             return None
         overlap = min(joints[-1][0], measured[-1][0]) - max(joints[0][0], measured[0][0])
         values = np.stack([row for _, row in joints])
-        n = len(self._names)
+        n = self._robot.n
         if overlap * 1e-9 < least or np.ptp(values[:, :n], axis=0).max() < MOTION:
             return None
         epoch = joints[0][0]

@@ -13,6 +13,7 @@ from weld_twin_core.poses import Poses
 from weld_twin_core.twin import Twin
 from weld_twin_msgs_py import convert
 
+from .joint_states import JointStates
 from .order import Forward
 
 
@@ -43,6 +44,8 @@ class JointStream:
 
     def __init__(self, twin: Twin) -> None:
         self._live = twin.live()
+        self._delay = round(twin.delay * convert.NANOSECONDS)
+        self.joints = JointStates(twin.robot)
         self._order = Forward()
         self._epoch: int | None = None
         self._before: tuple[int, Array] | None = None
@@ -58,6 +61,16 @@ class JointStream:
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""
         self._live.twin = twin
+        self._delay = round(twin.delay * convert.NANOSECONDS)
+
+    def reset(self) -> None:
+        """Begin anew, as after a jump of the clock; wrench and temperature hold."""
+        self._order = Forward()
+        self._forget()
+
+    def _forget(self) -> None:
+        self._live.reset()
+        self._epoch = self._before = None
 
     def take_wrench(self, message: Any) -> None:
         """Take the load on the tool."""
@@ -68,9 +81,9 @@ class JointStream:
         """Take the temperature."""
         self._temperature = convert.temperature(message)
 
-    def step(self, message: Any) -> Sample:
+    def step(self, message: Any) -> Sample | None:
         """
-        Return the arm at a joint state.
+        Return the arm at a joint state, None while joints of other publishers are awaited.
 
         Raises
         ------
@@ -78,14 +91,12 @@ class JointStream:
             The message cannot be used; nothing has changed then.
 
         """
-        robot = self._live.twin.robot
-        stamp = convert.stamp_ns(message)
-        q = convert.joint_positions(message, robot.joint_names)
-        robot.check_positions(q)
-        qd = convert.joint_velocities(message, robot.joint_names)
+        sample = self.joints.take(message)
+        if sample is None:
+            return None
+        stamp, q, qd = sample
         if self._order.restarted_at(stamp):
-            self._live.reset()
-            self._epoch = self._before = None
+            self._forget()
         if self._epoch is None:
             self._epoch = stamp
         if qd is None:
@@ -95,8 +106,7 @@ class JointStream:
             self._wrench, self._temperature, self._wrench_frame,
         )  # fmt: skip
         self._before = (stamp, q)
-        delay = round(self._live.twin.delay * convert.NANOSECONDS)
-        return Sample(stamp, stamp + delay, joints, poses)
+        return Sample(stamp, stamp + self._delay, joints, poses)
 
     def _difference(self, stamp: int, q: Array) -> Array:
         """Return the velocity since the sample before, for controllers that do not tell it."""

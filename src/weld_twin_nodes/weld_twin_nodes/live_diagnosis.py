@@ -52,7 +52,7 @@ class LiveDiagnosis(CellNode):
         super().__init__('live_diagnosis', **kwargs)
         self._twin = build_twin(robot_of(self), self.setting('model'))
         self._align = _frames(self.setting('align'))
-        self._window = Window(self._twin.robot.joint_names, self.setting('window'))
+        self._window = Window(self._twin.robot, self.setting('window'))
         self._worker = Worker()
         self._begun = -float('inf')
         self._seen: int | None = None
@@ -62,13 +62,18 @@ class LiveDiagnosis(CellNode):
         self.listen(TEMPERATURE, self._window.take_temperature)
         self.listen(MEASURED_POSE, self._window.take_pose)
         self.listen(MEASURED_POINT, self._window.take_point)
-        self.listen(JOINT_STATES, self._window.take_joints)
-        self.create_timer(LOOK_EVERY, self._look)
+        self.listen(JOINT_STATES, self._window.take_joints, required=True)
+        self.every(LOOK_EVERY, self._look)
 
     def destroy_node(self) -> None:
         """End the diagnosis under way."""
         self._worker.stop()
         super().destroy_node()
+
+    def time_went_back(self) -> None:
+        """Forget the window."""
+        self._window.reset()
+        self._seen = None
 
     def _look(self) -> None:
         """Publish what has been found, and begin anew where there is something new."""

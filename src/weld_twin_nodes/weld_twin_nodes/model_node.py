@@ -46,7 +46,17 @@ class ModelNode(CellNode):
         """Take input; to be called when the outputs are there."""
         self.listen(TOOL_WRENCH, self.stream.take_wrench)
         self.listen(TEMPERATURE, self.stream.take_temperature)
-        self.listen(JOINT_STATES, lambda message: self.publish(self.stream.step(message)))
+        self._input = self.listen(JOINT_STATES, self._on_joints, required=True)
+
+    def time_went_back(self) -> None:
+        """Forget the motion so far."""
+        self.stream.reset()
+
+    def _on_joints(self, message: Any) -> None:
+        sample = self.stream.step(message)
+        self._input.others = self.stream.joints.others
+        if sample is not None:
+            self.publish(sample)
 
     @abstractmethod
     def publish(self, sample: Sample) -> None:

@@ -50,6 +50,7 @@ class Pairing:
         self._twin_order = Forward()
         self._measured_order = Forward()
         self.dropped = 0
+        self.restarts = 0
 
     @property
     def waiting(self) -> int:
@@ -68,6 +69,7 @@ class Pairing:
         """
         if self._twin_order.restarted_at(stamp):
             self._twin.clear()
+            self.restarts += 1
         self._twin.append((stamp, position))
         return self._complete()
 

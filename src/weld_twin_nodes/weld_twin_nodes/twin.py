@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from weld_twin_msgs_py.cdr import PoseEncoder
 from weld_twin_msgs_py.topics import TWIN_POSE
 
 from .frames import WORLD
@@ -20,12 +21,13 @@ class ForwardKinematicsTwin(ModelNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('forward_kinematics_twin', **kwargs)
         self._pose = self.offer(TWIN_POSE)
+        self._encode = PoseEncoder(WORLD)
         self.start()
 
     def publish(self, sample: Sample) -> None:
         """Publish where the tool should be, at the stamp a measurement of it would carry."""
         position, rotation = sample.poses
-        self._pose.publish(self.messages.pose(sample.pose_stamp, position, rotation, WORLD))
+        self._pose.publish(self._encode(sample.pose_stamp, position, rotation))
 
 
 def main(args: list[str] | None = None) -> int:

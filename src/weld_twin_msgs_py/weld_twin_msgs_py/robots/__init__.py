@@ -3,7 +3,9 @@
 """Robot models: bundled ones, YAML and URDF in; YAML and URDF out."""
 
 from .load import load_robot, read_robot_yaml, write_robot_yaml
-from .urdf_read import read_urdf
+from .urdf_read import parse_urdf, read_urdf
 from .urdf_write import write_urdf
 
-__all__ = ['load_robot', 'read_robot_yaml', 'read_urdf', 'write_robot_yaml', 'write_urdf']
+__all__ = [
+    'load_robot', 'parse_urdf', 'read_robot_yaml', 'read_urdf', 'write_robot_yaml', 'write_urdf',
+]  # fmt: skip

@@ -14,7 +14,7 @@ from weld_twin_core.robot import STANDARD_GRAVITY, Robot
 
 from .axes_to_dh import Axis, dh_rows, inverse
 from .plausible import refuse_wrong_units
-from .urdf_tree import MOVABLE, Joint, Tree, read_tree
+from .urdf_tree import MOVABLE, Joint, Tree, parse_tree, read_tree
 
 
 def read_urdf(
@@ -39,7 +39,27 @@ def read_urdf(
         The file is no usable URDF, or the chain between the links is no serial arm.
 
     """
-    tree = read_tree(path)
+    return _of_tree(read_tree(path), path, base_link, tip_link)
+
+
+def parse_urdf(
+    text: str, source: str, base_link: str | None = None, tip_link: str | None = None
+) -> Robot:
+    """
+    Read the text of a URDF, as `/robot_description` carries it; otherwise as `read_urdf`.
+
+    Raises
+    ------
+    ModelError
+        The text is no usable URDF, or the chain between the links is no serial arm.
+
+    """
+    return _of_tree(parse_tree(text, source), source, base_link, tip_link)
+
+
+def _of_tree(
+    tree: Tree, path: Path | str, base_link: str | None, tip_link: str | None
+) -> Robot:
     try:
         base = _base(tree, base_link)
         tip = _tip(tree, base, tip_link)

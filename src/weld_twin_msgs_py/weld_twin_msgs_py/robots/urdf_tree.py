@@ -93,7 +93,19 @@ def read_tree(path: Path | str) -> Tree:
         The file cannot be read, is not well-formed, carries a DTD, or is no URDF.
 
     """
-    text = read_text(path, 'URDF')
+    return parse_tree(read_text(path, 'URDF'), path)
+
+
+def parse_tree(text: str, path: Path | str) -> Tree:
+    """
+    Read the text of a URDF; ``path`` says in errors where it came from.
+
+    Raises
+    ------
+    ModelError
+        The text is not well-formed, carries a DTD, or is no URDF.
+
+    """
     try:
         root = fromstring(text, forbid_dtd=True)
     except ParseError as error:

@@ -203,6 +203,18 @@ class Unseen:
         """Return the RMS position error over trusted samples, [m]."""
         return float(np.sqrt(self.squares(residual).mean()))
 
+    def turn_rms(self, residual: Array) -> float | None:
+        """Return the RMS orientation error over trusted samples [rad], None without any."""
+        out, at = [], 0
+        for c, m, weight in zip(
+            self.problem.rows, self.problem.samples, self.scale.weights, strict=True
+        ):
+            part = residual[at : at + c * m].reshape(m, c)[:, 3:] * self.scale.orientation
+            at += c * m
+            if c > 3:
+                out.append(((part**2).sum(axis=1) / weight)[weight >= TRUSTED])
+        return float(np.sqrt(np.concatenate(out).mean())) if out else None
+
     def trusted_labels(self) -> Array:
         """Return the stretch of every trusted sample."""
         out, at = [], 0

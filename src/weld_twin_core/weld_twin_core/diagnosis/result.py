@@ -137,6 +137,8 @@ class Shrink:
     """The waterfall: RMS [m] on unseen data as each effect is added in turn."""
     alone: tuple[tuple[str, float], ...] = ()
     """RMS [m] that would remain if only this one were mended."""
+    orientation_rad: tuple[float, float] | None = None
+    """RMS orientation gap before and after, on stretches taking their turn; poses only."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +159,8 @@ class Traces:
     before: tuple[Array, ...]
     """Position residual before, shape (M, 3) [m]."""
     after: tuple[Array, ...]
+    trusted: tuple[Array, ...] = ()
+    """Which samples are no outliers, bool, shape (M,); empty for all of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +216,10 @@ class Diagnosis:
                 'held_out': self.shrink.held_out,
                 'steps': [{'added': n, 'rms_m': v} for n, v in self.shrink.steps],
                 'alone': [{'mended': n, 'rms_m': v} for n, v in self.shrink.alone],
+                'orientation_rms_rad': self.shrink.orientation_rad and {
+                    'before': self.shrink.orientation_rad[0],
+                    'after': self.shrink.orientation_rad[1],
+                },
             },
             'unexplained': {
                 'rms_m': self.unexplained.rms_m, 'above_noise': self.unexplained.above_noise,

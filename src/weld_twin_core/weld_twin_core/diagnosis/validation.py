@@ -28,8 +28,9 @@ def held_out_shrink(found: Search, unseen: Unseen, holdout: Sequence[Recording])
     """Return the gap before and after, on the held-out bags or on stretches taking their turn."""
     model = found.final.model
     steps, alone = _waterfall(unseen, model)
-    before = unseen.squares(unseen.predict([]))
-    after = unseen.squares(unseen.predict(range(len(model.found))))
+    first, last = unseen.predict([]), unseen.predict(range(len(model.found)))
+    before, after = unseen.squares(first), unseen.squares(last)
+    turned = (unseen.turn_rms(first), unseen.turn_rms(last))
     labels, source, elsewhere = unseen.trusted_labels(), 'blocked cross-validation', None
     if holdout:
         elsewhere = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
@@ -38,7 +39,7 @@ def held_out_shrink(found: Search, unseen: Unseen, holdout: Sequence[Recording])
     ratio, interval = ratio_interval(before, after, labels, elsewhere)
     return Shrink(
         float(np.sqrt(before.mean())), float(np.sqrt(after.mean())), ratio, interval, source,
-        steps, alone,
+        steps, alone, None if turned[0] is None or turned[1] is None else (turned[0], turned[1]),
     )  # fmt: skip
 
 

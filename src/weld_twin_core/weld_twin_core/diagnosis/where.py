@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..features import Features
-from .heldout import Unseen
+from .heldout import TRUSTED, Unseen
 from .problem import Model, Problem
 from .result import Where
 
@@ -42,8 +42,9 @@ def locate(problem: Problem, baseline: Unseen, start: Model, final: Unseen, foun
                                                              strict=True)}  # fmt: skip
         regimes = _map_regimes(shares)
     ordered = sorted(joints.items(), key=lambda item: -item[1])
+    good = [weight >= TRUSTED for weight in final.scale.weights]
     return Where(
-        tuple(ordered), regimes, _path(problem, start), _direction(problem, start),
+        tuple(ordered), regimes, _path(problem, start, good), _direction(problem, start, good),
         REGRESSORS, tuple(tuple(float(v) for v in row) for row in shares),
     )  # fmt: skip
 
@@ -135,16 +136,19 @@ def _map_regimes(shares: Array) -> dict[str, float]:
     return {name: best[name] for name in REGIMES}
 
 
-def _path(problem: Problem, model: Model) -> tuple[tuple[float, float, float, float], ...]:
+def _path(
+    problem: Problem, model: Model, good: list[Array]
+) -> tuple[tuple[float, float, float, float], ...]:
     """Return stretches of time with their share of the squared gap and their RMS."""
     out = []
     parts = problem.residuals(model)
-    total = sum(float((part[:3] ** 2).sum()) for part in parts)
-    for recording, part in zip(problem.recordings, parts, strict=True):
+    total = sum(float((part[:3, g] ** 2).sum()) for part, g in zip(parts, good, strict=True))
+    for recording, part, trusted in zip(problem.recordings, parts, good, strict=True):
         assert recording.measured is not None
         squares = (part[:3] ** 2).sum(axis=0)
         count = max(1, round(STRETCHES * squares.size / max(sum(problem.samples), 1)))
-        for index in np.array_split(np.arange(squares.size), count):
+        for stretch in np.array_split(np.arange(squares.size), count):
+            index = stretch[trusted[stretch]]
             if index.size:
                 t = recording.measured.t[index]
                 share = float(squares[index].sum()) / max(total, 1e-300)
@@ -153,15 +157,15 @@ def _path(problem: Problem, model: Model) -> tuple[tuple[float, float, float, fl
     return tuple(out)
 
 
-def _direction(problem: Problem, model: Model) -> dict[str, float]:
+def _direction(problem: Problem, model: Model, good: list[Array]) -> dict[str, float]:
     """
     Return the RMS gap along the path, across it, and along the tool's axis (stick-out), [m].
 
     Along is the direction of travel; stations have none and count as across.
     """
     sums = np.zeros(3)
-    for recording, part, maker in zip(
-        problem.recordings, problem.residuals(model), problem.features(model), strict=True
+    for recording, part, maker, trusted in zip(
+        problem.recordings, problem.residuals(model), problem.features(model), good, strict=True
     ):
         error, poses = part[:3].T, maker.run.poses
         normal = poses.rotation[:, :, 2]
@@ -172,8 +176,8 @@ def _direction(problem: Problem, model: Model) -> dict[str, float]:
         along = np.where(size > 1e-6, travel / np.maximum(size, 1e-12), 0.0)
         normal = normal - along * (normal * along).sum(axis=1, keepdims=True)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-        a, c = (error * along).sum(axis=1), (error * normal).sum(axis=1)
-        across = np.maximum((error**2).sum(axis=1) - a**2 - c**2, 0.0)
+        a, c = (error * along).sum(axis=1)[trusted], (error * normal).sum(axis=1)[trusted]
+        across = np.maximum((error[trusted] ** 2).sum(axis=1) - a**2 - c**2, 0.0)
         sums += [float((a**2).sum()), float(across.sum()), float((c**2).sum())]
-    rms = np.sqrt(sums / max(sum(problem.samples), 1))
+    rms = np.sqrt(sums / max(sum(int(g.sum()) for g in good), 1))
     return {'along_m': float(rms[0]), 'across_m': float(rms[1]), 'normal_m': float(rms[2])}

@@ -13,8 +13,10 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
     ],
-    # rosbags has no ROS package; on ROS machines pip adds it beside the rest
-    install_requires=['setuptools', 'numpy', 'PyYAML', 'defusedxml', 'urdf_parser_py', 'rosbags'],
+    # rosbags, mcap and lz4 have no ROS package; on ROS machines pip adds them beside the rest
+    install_requires=[
+        'setuptools', 'numpy', 'PyYAML', 'defusedxml', 'urdf_parser_py', 'rosbags', 'mcap', 'lz4',
+    ],
     extras_require={'test': ['pytest']},
     zip_safe=False,
     maintainer='weld_twin contributors',

@@ -7,6 +7,7 @@ from .from_bag import read_recording
 from .growing import GrowingBag
 from .info import BagInfo, TopicInfo, bag_info
 from .reader import BagReader, provenance
+from .recover import Recovery, recover
 from .to_bag import write_recording
 from .writer import BagWriter
 
@@ -16,9 +17,11 @@ __all__ = [
     'BagReader',
     'BagWriter',
     'GrowingBag',
+    'Recovery',
     'TopicInfo',
     'bag_info',
     'provenance',
     'read_recording',
+    'recover',
     'write_recording',
 ]

@@ -10,10 +10,11 @@ a bag that also holds somebody's own types reads as well.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from struct import unpack_from
+from tempfile import TemporaryDirectory
 from traceback import clear_frames
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -23,10 +24,10 @@ from rosbags.rosbag2 import Reader
 from weld_twin_core.errors import DataError, TwinError
 
 from ..convert import NANOSECONDS
-from .store import TYPES, decode
+from .opening import PACKED, look
+from .store import PROVENANCE_PREFIX, TYPES, decode
+from .unpack import unpack_file, unzstd
 
-SUFFIXES = ('.mcap', '.db3')
-PROVENANCE_PREFIX = 'weld_twin/'
 CDR_HEADER = 4
 """Bytes before the first field of a serialised message; the second gives the byte order."""
 
@@ -58,6 +59,7 @@ class BagReader:
         self.path = Path(path)
         self.topics: dict[str, tuple[str, int]] = {}
         self.provenance: dict[str, Any] = {}
+        self._packed = False
         self._readers: list[Reader] = []
         self._stack = ExitStack()
 
@@ -71,15 +73,14 @@ class BagReader:
             Nothing is there, it is no bag, or it is damaged.
 
         """
-        files = _storage_paths(self.path)
         try:
             with clear_errors(self.path):
-                for file in _databases(files):
-                    _refuse_truncated(file)
-                for file in files:
-                    self._readers.append(self._stack.enter_context(Reader(file)))
+                bag = look(self.path)
+                self._packed = bag.packed
+                for file in bag.files:
+                    self._open(file)
                 self._list_topics()
-                self.provenance = self._provenance()
+                self.provenance = _provenance(bag.custom)
         except BaseException:
             self._stack.close()
             raise
@@ -124,7 +125,8 @@ class BagReader:
                 if not wanted:
                     continue
                 for connection, log_ns, data in reader.messages(wanted):
-                    yield connection.topic, connection.msgtype, log_ns, data
+                    whole = unzstd(data) if self._packed else data
+                    yield connection.topic, connection.msgtype, log_ns, whole
 
     def stamps(self) -> Iterator[tuple[str, int, bool]]:
         """
@@ -143,8 +145,9 @@ class BagReader:
                 stamped = {c.id: _has_header(c.msgtype) for c in reader.connections}
                 for connection, log_ns, data in reader.messages():
                     if stamped[connection.id]:
-                        order = '<' if data[1] else '>'
-                        sec, nanosec = unpack_from(order + 'iI', data, CDR_HEADER)
+                        whole = unzstd(data) if self._packed else data
+                        order = '<' if whole[1] else '>'
+                        sec, nanosec = unpack_from(order + 'iI', whole, CDR_HEADER)
                         yield connection.topic, sec * NANOSECONDS + nanosec, True
                     else:
                         yield connection.topic, log_ns, False
@@ -155,20 +158,23 @@ class BagReader:
                 count = self.topics.get(connection.topic, ('', 0))[1]
                 self.topics[connection.topic] = (connection.msgtype, count + connection.msgcount)
 
-    def _provenance(self) -> dict[str, Any]:
-        custom: dict[str, str] = {}
-        for reader in self._readers:
-            custom |= reader.storage.metadata.custom or {}
-        beside = self.path.parent / 'metadata.yaml'
-        if self.path.suffix in SUFFIXES and beside.exists():
-            with Reader(self.path.parent) as reader:
-                custom |= reader.storage.metadata.custom or {}
-        start = len(PROVENANCE_PREFIX)
-        return {
-            key[start:]: json.loads(value)
-            for key, value in custom.items()
-            if key.startswith(PROVENANCE_PREFIX)
-        }
+    def _open(self, file: Path) -> None:
+        if file.suffix == PACKED:
+            scratch = Path(self._stack.enter_context(TemporaryDirectory())) / file.stem
+            unpack_file(file, scratch)
+            file = scratch
+        if file.suffix == '.db3':
+            _refuse_truncated(file)
+        self._readers.append(self._stack.enter_context(Reader(file)))
+
+
+def _provenance(custom: Mapping[Any, Any]) -> dict[str, Any]:
+    start = len(PROVENANCE_PREFIX)
+    return {
+        key[start:]: json.loads(value)
+        for key, value in custom.items()
+        if str(key).startswith(PROVENANCE_PREFIX)
+    }
 
 
 def _has_header(kind: str) -> bool:
@@ -192,15 +198,9 @@ def clear_errors(path: Path) -> Iterator[None]:
         _let_go(error)
         reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
         raise DataError(
-            f"bag '{path}' is damaged or was cut short ({reason[:200]}); record it again, or "
-            "repair it with 'mcap recover' or 'sqlite3 .recover'"
+            f"bag '{path}' is damaged or was cut short ({reason[:200]}); what is whole of it "
+            f"becomes a bag with 'weld-twin recover {path}'"
         ) from None
-
-
-def _databases(paths: list[Path]) -> list[Path]:
-    """Return the sqlite3 files among storage files, or in a bag directory."""
-    inside = [file for path in paths if path.is_dir() for file in sorted(path.glob('*.db3'))]
-    return inside + [path for path in paths if path.suffix == '.db3']
 
 
 def _let_go(error: BaseException | None) -> None:
@@ -221,28 +221,6 @@ def _refuse_truncated(path: Path) -> None:
     expected = (65536 if page == 1 else page) * pages
     if path.stat().st_size < expected:
         raise ValueError(f'the file has {path.stat().st_size} of {expected} bytes')
-
-
-def _storage_paths(path: Path) -> list[Path]:
-    """Return what to open: the path itself, or the files of a bag that lost its metadata."""
-    if not path.exists():
-        raise DataError(f"there is no bag at '{path}'")
-    if path.suffix == '.bag':
-        raise DataError(f"'{path}' is a ROS 1 bag; convert it with rosbags-convert first")
-    if path.is_file():
-        if path.suffix not in SUFFIXES:
-            raise DataError(
-                f"'{path}' is no bag: expected a rosbag2 directory, a .mcap or a .db3 file"
-            )
-        return [path]
-    if (path / 'metadata.yaml').exists():
-        return [path]
-    files = sorted(file for file in path.iterdir() if file.suffix in SUFFIXES)
-    if not files:
-        raise DataError(
-            f"'{path}' is no bag: it holds neither metadata.yaml nor a .mcap or .db3 file"
-        )
-    return files
 
 
 def provenance(path: Path | str) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Message definitions of ROS 2 Jazzy, as rosbags carries them."""
+"""Message definitions of ROS 2 Jazzy, as rosbags carries them, and what marks our own bags."""
 
 from typing import Any
 
@@ -8,6 +8,8 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
+PROVENANCE_PREFIX = 'weld_twin/'
+"""Of the keys in a bag's ``custom_data`` that are ours."""
 
 
 def decode(data: bytes, kind: str) -> Any:

@@ -20,9 +20,8 @@ from typing import Any
 from weld_twin_core.errors import DataError
 
 from ..convert import stamp_ns
-from .reader import PROVENANCE_PREFIX
 from .segment import Channel, Segment, check_storage, clear_write_errors
-from .store import TYPES
+from .store import PROVENANCE_PREFIX, TYPES
 
 
 class BagWriter:

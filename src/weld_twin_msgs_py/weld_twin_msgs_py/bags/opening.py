@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a path to a bag stands for: its storage files, and what is said about them."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePath
+from typing import Any, NamedTuple
+
+import yaml
+
+from weld_twin_core.errors import DataError
+
+from .growing import UNFINISHED, unfinished
+from .segment import SUFFIXES
+from .segments import INFORMATION, METADATA
+
+PACKED = '.zstd'
+SIZE_LIMIT = 16_000_000
+"""Bytes of metadata.yaml; a bag of a thousand files has some hundred kilobytes."""
+_Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+
+
+class Bag(NamedTuple):
+    """
+    Where a bag lies.
+
+    Attributes
+    ----------
+    files : list of Path
+        Storage files, in the order they were written.
+    custom : dict
+        The ``custom_data`` of its metadata.
+    packed : bool
+        Messages are compressed one by one.
+
+    """
+
+    files: list[Path]
+    custom: dict[str, str]
+    packed: bool = False
+
+
+def look(path: Path) -> Bag:
+    """
+    Return what a path to a bag stands for.
+
+    Raises
+    ------
+    DataError
+        Nothing is there, it is no bag, or it is not finished.
+    ValueError, KeyError, TypeError, OSError, yaml.YAMLError
+        Its metadata is damaged.
+
+    """
+    refuse_unfinished(path)
+    if path.suffix == '.bag':
+        raise DataError(f"'{path}' is a ROS 1 bag; convert it with rosbags-convert first")
+    if path.is_file():
+        if path.suffix not in SUFFIXES:
+            raise DataError(
+                f"'{path}' is no bag: expected a rosbag2 directory, a .mcap or a .db3 file"
+            )
+        custom = _information(path.parent).get('custom_data') or {}
+        return Bag([path], custom if isinstance(custom, dict) else {})
+    if (path / METADATA).exists():
+        return _listed(path)
+    files = storage_files(path)
+    if not files:
+        raise DataError(
+            f"'{path}' is no bag: it holds neither metadata.yaml nor a .mcap or .db3 file"
+        )
+    return Bag(files, {})
+
+
+def refuse_unfinished(path: Path) -> None:
+    """
+    Refuse what is not there, and say so if it is there under the name of a growing bag.
+
+    Raises
+    ------
+    DataError
+        There is no bag, or it is not finished.
+
+    """
+    growing = path if path.name.endswith(UNFINISHED) else unfinished(path)
+    named = growing.with_name(growing.name[: -len(UNFINISHED)])
+    if growing.is_dir() and not (path.exists() and path != growing):
+        raise DataError(
+            f"the recording of '{named}' is still running or was cut short; what is on the disk "
+            f"becomes a bag with 'weld-twin recover {named}'"
+        )
+    if not path.exists():
+        raise DataError(f"there is no bag at '{path}'")
+
+
+def storage_files(folder: Path) -> list[Path]:
+    """Return the storage files of a directory, the tenth after the ninth."""
+    files = [file for file in folder.iterdir() if file.suffix in SUFFIXES and file.is_file()]
+    return sorted(files, key=lambda file: (_number(file), file.name))
+
+
+def _number(file: Path) -> int:
+    digits = file.stem.rpartition('_')[2]
+    return int(digits) if digits.isdecimal() and digits.isascii() else 0
+
+
+def _listed(path: Path) -> Bag:
+    """Return the files that the metadata lists; only their names count, never their folders."""
+    made = _information(path)
+    names = [PurePath(str(name)).name for name in made['relative_file_paths']]
+    files = [path / name for name in names]
+    for file in files:
+        if not file.is_file():
+            raise ValueError(f'metadata.yaml lists {file.name!r}, which is not there')
+        if file.suffix not in (*SUFFIXES, PACKED):
+            raise ValueError(f'metadata.yaml lists {file.name!r}, which is no storage file')
+    mode = str(made.get('compression_mode') or '').lower()
+    custom = made.get('custom_data') or {}
+    return Bag(files, custom if isinstance(custom, dict) else {}, mode == 'message')
+
+
+def _information(folder: Path) -> dict[str, Any]:
+    """Return what metadata.yaml of a directory says; nothing without one."""
+    file = folder / METADATA
+    if not file.is_file():
+        return {}
+    if file.stat().st_size > SIZE_LIMIT:
+        raise ValueError(f'metadata.yaml is larger than {SIZE_LIMIT / 1e6:g} MB')
+    made = yaml.load(file.read_bytes(), Loader=_Loader)[INFORMATION]
+    if not isinstance(made, dict):
+        raise ValueError('metadata.yaml is no mapping')
+    return made

@@ -29,7 +29,8 @@ def _found(diagnosis: Diagnosis) -> Html:
         return families_table(diagnosis)
     heads = ['Effect', 'Parameter', 'Value ± standard error']
     alone = [_alone(diagnosis, found) for found in diagnosis.effects]
-    told = any(left is not None for left in alone)
+    # With a single effect it is what the whole verdict leaves.
+    told = len(alone) > 1 and any(left is not None for left in alone)
     rows: list[list[Child]] = []
     for found, left in zip(diagnosis.effects, alone, strict=True):
         for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):

@@ -66,12 +66,19 @@ def _figures(diagnosis: Diagnosis) -> Html:
     if diagnosis.status in _SURE_OF:
         rows.append(('Confidence', odds(diagnosis.confidence), _SURE_OF[diagnosis.status]))
     if gap.orientation_rms_rad is not None:
-        rows.append(('Orientation', milliradians(gap.orientation_rms_rad), 'RMS gap'))
+        rows.append(('Orientation', milliradians(gap.orientation_rms_rad), _turned(diagnosis)))
     cells = [
         tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
         for name, value, note in rows
     ]
     return tag('dl', *cells, class_='figures')
+
+
+def _turned(diagnosis: Diagnosis) -> str:
+    turned = diagnosis.shrink.orientation_rad
+    if turned is None or not diagnosis.effects:
+        return 'RMS gap'
+    return f'RMS gap; {milliradians(turned[1])} left over'
 
 
 def _actions(diagnosis: Diagnosis) -> Html | None:

@@ -168,7 +168,7 @@
     ['left', 'center', 'right'].forEach((side, k) => {
       pen.textAlign = side;
       const value = (k * data.top / 2000).toPrecision(2);
-      const text = k ? `${Number(value)}${k === 2 ? ' mm and more' : ''}` : '0';
+      const text = k ? (k === 2 ? `≥ ${Number(value)} mm` : `${Number(value)}`) : '0';
       pen.fillText(text, k * width / 2, height - 4);
     });
   }

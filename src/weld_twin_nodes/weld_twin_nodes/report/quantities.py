@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.diagnosis.result import Shrink
+from weld_twin_core.diagnosis.result import Diagnosis, Shrink
 from weld_twin_core.effects import Effect, Parameter
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 
@@ -19,7 +19,11 @@ _BY_UNIT = {
     '-': (1.0, ''),
 }  # fmt: skip
 _BY_NAME = {'phase': (1.0, 'rad'), 'scale': (1e6, 'ppm'), 'ratio': (1e6, 'ppm')}
+UNCHANGED = 0.005
+"""Share of a gap below which it counts as the same."""
 MISSING = '\N{EN DASH}'
+STAYS = 0.95
+"""Ratio of after to before from which a gap counts as staying."""
 _GAP = '\N{NO-BREAK SPACE}'
 
 
@@ -52,7 +56,9 @@ def percent(share: float) -> str:
 
 def change(shrink: float) -> str:
     """Return how much a gap shrinks, or grows."""
-    return f'{percent(abs(shrink))} {"less" if shrink >= 0.0 else "more"}'
+    if abs(shrink) < UNCHANGED:
+        return 'unchanged'
+    return f'{percent(abs(shrink))} {"less" if shrink > 0.0 else "more"}'
 
 
 def interval(shrink: Shrink) -> str:
@@ -62,9 +68,18 @@ def interval(shrink: Shrink) -> str:
     return f'95{_GAP}% interval {low:.{places}f} to {high:.{places}f}{_GAP}%'
 
 
+def turns_only(diagnosis: Diagnosis) -> bool:
+    """Tell whether what was found shows in the tool's orientation and not in its position."""
+    shrink = diagnosis.shrink
+    if shrink.orientation_rad is None or not diagnosis.effects or shrink.ratio < STAYS:
+        return False
+    before, after = shrink.orientation_rad
+    return after < STAYS * before
+
+
 def odds(probability: float) -> str:
-    """Return a probability as '98 %'."""
-    return percent(min(max(probability, 0.0), 1.0))
+    """Return a probability as '98 %'; nothing is certain, and nothing beyond possibility."""
+    return percent(min(max(probability, 1e-9), 1.0 - 1e-9))
 
 
 def seconds(value: float) -> str:

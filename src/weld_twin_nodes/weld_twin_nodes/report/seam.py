@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.diagnosis.result import Diagnosis, Traces
 
 from .html import Html, section, tag
 
@@ -25,15 +25,24 @@ def seam_data(diagnosis: Diagnosis) -> dict[str, Any]:
     each = max(50, _POINTS // max(len(traces.measured), 1))
     runs = []
     for k, measured in enumerate(traces.measured):
-        before, after = traces.before[k], traces.after[k]
+        good = trusted(traces, k)
+        before, after = traces.before[k][good], traces.after[k][good]
+        measured = measured[good]
         kept = thinned(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1), each)
         static = k < len(diagnosis.recordings) and diagnosis.recordings[k].joints.static
         runs.append({
             'dots': bool(static), 'path': _micrometres((measured - before)[kept]),
             'before': _micrometres(before[kept]), 'after': _micrometres(after[kept]),
         })  # fmt: skip
-    top = _large(traces.before)
+    top = _large(tuple(part[trusted(traces, k)] for k, part in enumerate(traces.before)))
     return {'runs': runs, 'top': round(1e6 * top, 1), 'stretch': _stretch(traces.measured, top)}
+
+
+def trusted(traces: Traces, k: int) -> np.ndarray:
+    """Return which samples of a recording to draw: a gross outlier would hide all the others."""
+    if traces.trusted:
+        return traces.trusted[k]
+    return np.ones(traces.t[k].size, dtype=bool)
 
 
 def thinned(before: Array, after: Array, most: int) -> np.ndarray:

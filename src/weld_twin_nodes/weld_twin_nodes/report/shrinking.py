@@ -12,6 +12,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from .causes import leftover
 from .html import Html, section, tag
 from .quantities import interval, millimetres, percent
+from .seam import trusted
 from .words import cause
 
 _STEPS = 12
@@ -22,23 +23,19 @@ _HEIGHT, _WIDTH = 100.0, 1000.0
 
 def shrink_section(diagnosis: Diagnosis) -> Html:
     """Return the waterfall and one chart over time per recording."""
-    shrink = diagnosis.shrink
     charts = [_chart(diagnosis, k) for k in range(min(len(diagnosis.traces.t), _RECORDINGS))]
     more = len(diagnosis.traces.t) - len(charts)
     note = tag('p', f'{more} more recordings are not drawn.', class_='note') if more > 0 else None
-    judged = (
-        f'Judged on {shrink.held_out}, {percent(shrink.ratio)} of the gap is left '
-        f'({interval(shrink)}).'
-    )
     return section(
-        'How far it shrinks', _waterfall(diagnosis), tag('p', judged),
+        'How far it shrinks', _waterfall(diagnosis), tag('p', _judged(diagnosis)),
         tag('h3', 'Deviation over time'), _key(), *charts, note, leftover(diagnosis), id_='shrink',
-        lead='RMS gap as each effect is put into the twin in turn, on data not used for fitting.',
+        lead='RMS gap as each effect is put into the twin in turn, each stretch of the recordings '
+        'predicted from the others.',
     )  # fmt: skip
 
 
 def _waterfall(diagnosis: Diagnosis) -> Html:
-    steps = [('as given', diagnosis.shrink.rms_before_m), *(
+    steps = [('as given', _given(diagnosis)), *(
         (_readable(name), rms) for name, rms in diagnosis.shrink.steps)]
     if len(steps) > _STEPS + 1:
         skipped = len(steps) - _STEPS
@@ -51,6 +48,27 @@ def _waterfall(diagnosis: Diagnosis) -> Html:
     floor = diagnosis.gap.noise_floor_m
     rows.append(_step('noise floor', floor / largest, floor / largest, floor, 'floor'))
     return tag('ul', *rows, class_='bars waterfall wide')
+
+
+def _apart(diagnosis: Diagnosis) -> bool:
+    """Tell whether other recordings judge the shrink; the steps are on those fitted."""
+    return diagnosis.shrink.held_out != 'blocked cross-validation'
+
+
+def _given(diagnosis: Diagnosis) -> float:
+    """Return the gap the steps start from, on the recordings that they are judged on."""
+    return diagnosis.gap.rms_m if _apart(diagnosis) else diagnosis.shrink.rms_before_m
+
+
+def _judged(diagnosis: Diagnosis) -> str:
+    shrink = diagnosis.shrink
+    left = f'{percent(shrink.ratio)} of the gap is left ({interval(shrink)})'
+    if not _apart(diagnosis):
+        return f'Judged by {shrink.held_out}, {left}.'
+    return (
+        f'On {shrink.held_out}, which was not fitted, {millimetres(shrink.rms_before_m)} shrinks '
+        f'to {millimetres(shrink.rms_after_m)}: {left}.'
+    )
 
 
 def _readable(name: str) -> str:
@@ -80,10 +98,11 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     traces = diagnosis.traces
     recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
     static = recording is not None and recording.joints.static
-    sizes = [np.linalg.norm(part, axis=1) for part in (traces.before[k], traces.after[k])]
+    good = trusted(traces, k)
+    sizes = [np.linalg.norm(part[good], axis=1) for part in (traces.before[k], traces.after[k])]
     if sizes[0].size == 0:
         return tag('p', 'No samples.')
-    x = np.arange(sizes[0].size, dtype=float) if static else traces.t[k]
+    x = (np.arange(good.size, dtype=float) if static else traces.t[k])[good]
     # a single outlier must not flatten the rest
     top = 1.15 * max(float(np.percentile(np.concatenate(sizes), 99.5)), 1e-7)
     lines = [_line(x, size, top, name) for size, name in zip(sizes, ('before', 'after'),
@@ -94,8 +113,11 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
         'svg', *lines, floor, viewBox=f'0 0 {_WIDTH:.0f} {_HEIGHT:.0f}',
         preserveAspectRatio='none', role='img', aria_label='Deviation before and after',
     )  # fmt: skip
-    unit = ('station 1', f'station {x.size}') if static else (f'{x[0]:.1f} s', f'{x[-1]:.1f} s')
+    unit = ('station 1', f'station {good.size}') if static else (f'{x[0]:.1f} s', f'{x[-1]:.1f} s')
     title = recording.name if recording is not None else f'recording {k + 1}'
+    outliers = int((~good).sum())
+    if outliers:
+        title += f' ({outliers} outlier{"s"[: outliers > 1]} not drawn)'
     return tag(
         'figure', tag('figcaption', title),
         tag('div', tag('span', millimetres(top)), tag('span', '0'), class_='y'), picture,

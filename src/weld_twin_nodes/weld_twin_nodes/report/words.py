@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
-from .quantities import millimetres, odds
+from .quantities import millimetres, milliradians, odds, turns_only
 
 CAUSES = {
     'joint_offset': 'zero offset', 'link_length': 'link length error',
@@ -74,7 +74,7 @@ def verdict(diagnosis: Diagnosis) -> tuple[str, str]:
 
 
 def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
-    size = millimetres(diagnosis.gap.rms_m)
+    size = _size(diagnosis)
     names = [found_name(found) for found in diagnosis.effects]
     sure = odds(diagnosis.confidence)
     if diagnosis.families:
@@ -83,14 +83,14 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
             for f in diagnosis.families if f.named
         ]  # fmt: skip
         first = (
-            f'The gap of {size} comes from many small errors together ({sure} sure), mostly '
+            f'The {size} comes from many small errors together ({sure} sure), mostly '
             f'{listed(kinds[:_NAMED])}.'
         )
         return first, _gain(diagnosis)
     if len(names) <= _NAMED:
-        return f'The gap of {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
+        return f'The {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
     first = (
-        f'The gap of {size} comes from {len(names)} errors together, mostly '
+        f'The {size} comes from {len(names)} errors together, mostly '
         f'{_families(diagnosis)}; the largest is {names[0]} ({sure} sure).'
     )
     return first, _gain(diagnosis)
@@ -102,11 +102,11 @@ def _families(diagnosis: Diagnosis) -> str:
 
 
 def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
-    size = millimetres(diagnosis.gap.rms_m)
+    size = _size(diagnosis)
     open_sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
     choices = '; and from '.join(_either(group) for group in open_sets[:2])
     settled = listed(_settled(diagnosis))
-    start = f'The gap of {size} comes '
+    start = f'The {size} comes '
     if settled:
         start += f'in part from {settled}, in part '
     return f'{start}from {choices}: these data do not tell which.', _gain(diagnosis, 'Either way')
@@ -155,10 +155,25 @@ def _none(diagnosis: Diagnosis) -> tuple[str, str]:
     return first, 'As far as these data reach, the twin is the robot.'
 
 
+def _size(diagnosis: Diagnosis) -> str:
+    """Return what the effects found account for: the gap in position, or in orientation."""
+    turn = diagnosis.gap.orientation_rms_rad
+    if turn is not None and turns_only(diagnosis):
+        return f'orientation gap of {milliradians(turn)}'
+    return f'gap of {millimetres(diagnosis.gap.rms_m)}'
+
+
 def _gain(diagnosis: Diagnosis, start: str = '') -> str:
     shrink = diagnosis.shrink
     what = 'it' if len(diagnosis.effects) == 1 else 'them'
     opening = f'{start}, with {what} in the twin' if start else f'With {what} in the twin'
+    if shrink.orientation_rad is not None and turns_only(diagnosis):
+        before, after = map(milliradians, shrink.orientation_rad)
+        return (
+            f'{opening}, {before} shrinks to {after} on data not used for fitting; the position '
+            f'gap, {millimetres(shrink.rms_after_m)} at a noise floor of '
+            f'{millimetres(diagnosis.gap.noise_floor_m)}, stays as it is.'
+        )
     return (
         f'{opening}, {millimetres(shrink.rms_before_m)} shrinks to '
         f'{millimetres(shrink.rms_after_m)} on data not used for fitting; the noise floor is '

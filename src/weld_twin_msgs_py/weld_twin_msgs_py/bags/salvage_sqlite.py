@@ -49,6 +49,7 @@ def _open(path: Path, stack: ExitStack) -> sqlite3.Connection:
     base = sqlite3.connect(f'{path.resolve().as_uri()}?{mode}', uri=True)
     stack.enter_context(closing(base))
     base.execute('PRAGMA trusted_schema = OFF')
+    base.execute('PRAGMA writable_schema = ON')  # or a file that lacks its last page is refused
     return base
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable
 
@@ -56,6 +57,7 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     node = None
     try:
         node = make()
+        gc.freeze()  # what has been loaded stays; looking through it again is a pause of the node
         spin(node)
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from copy import copy
 from typing import Any
 
 RATES = (125.0, 500.0, 1000.0)
@@ -78,22 +79,19 @@ def _beside_diagnosis(
 
     job, worker = _job(), Worker()
     samples: dict[str, dict[str, float]] = {}
-    latency: dict[str, list[int]] = {'alone': [], 'beside': []}
-    cpu = {'alone': 0, 'beside': 0}
+    both = {'alone': copy(twin), 'beside': copy(twin)}
+    for contender in both.values():
+        contender.clear()
     for _ in range(args.turns):
-        for name in latency:
-            if name == 'beside' and not worker.busy:
+        for name, contender in both.items():
+            if name == 'beside':
                 worker.start(job)
             twin.clear()
             race.turn(twin, 500.0, args.seconds)
-            latency[name] += twin.latency
-            cpu[name] += twin.cpu
-            if name == 'beside':
-                worker.stop()
-    for name, values in latency.items():
-        twin.latency, twin.cpu = values, cpu[name]
-        twin.sent = args.turns * round(500.0 * args.seconds)
-        samples[name] = twin.result()
+            contender.add(twin)
+            worker.stop()
+    for name, contender in both.items():
+        samples[name] = contender.result()
         tell(f'   500 Hz  twin {name:7} {samples[name]}')
     return samples
 

@@ -22,6 +22,7 @@ from .salvage_mcap import salvage_mcap
 from .salvage_sqlite import salvage_sqlite
 from .segment import SUFFIXES, clear_write_errors, sync
 from .segments import Segments
+from .store import TYPES, decode
 from .writer import custom_data
 
 _STORAGE = {'.mcap': ('mcap', salvage_mcap), '.db3': ('sqlite3', salvage_sqlite)}
@@ -161,6 +162,12 @@ def _write(
     segments: Segments, found: Found, file: Path, counts: Counter[str], damage: Damage
 ) -> None:
     channel, log_ns, data = found
+    try:
+        if channel.type in TYPES.types:
+            decode(data, channel.type)
+    except Exception:  # half a message surfaces as anything
+        damage.tell(file, 'holds broken messages, which are left out')
+        return
     try:
         segments.write(channel, data, log_ns)
     except DataError as error:

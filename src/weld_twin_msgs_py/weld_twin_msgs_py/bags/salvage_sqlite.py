@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 from collections.abc import Iterator
@@ -36,21 +37,35 @@ def salvage_sqlite(path: Path, damage: Damage) -> Iterator[Found]:
 
 
 def _open(path: Path, stack: ExitStack) -> sqlite3.Connection:
-    """Open a database; one with a step half done is opened as a copy, which undoes it."""
+    """
+    Open a database as it is, or as a copy that can be mended.
+
+    Opening undoes a step that was half done; half a page at the end is cut off, for it would
+    read as half a message and zeros.
+    """
     journals = [file for file in _beside(path) if file.exists()]
+    torn = path.stat().st_size % _page(path)
     mode = 'immutable=1'
-    if journals:
+    if journals or torn:
         folder = Path(
             stack.enter_context(TemporaryDirectory(dir=path.parent, prefix='.recovering-'))
         )
         for file in (path, *journals):
             shutil.copy(file, folder / file.name)
         path, mode = folder / path.name, 'mode=rw'
+        os.truncate(path, path.stat().st_size - torn)
     base = sqlite3.connect(f'{path.resolve().as_uri()}?{mode}', uri=True)
     stack.enter_context(closing(base))
     base.execute('PRAGMA trusted_schema = OFF')
     base.execute('PRAGMA writable_schema = ON')  # or a file that lacks its last page is refused
     return base
+
+
+def _page(path: Path) -> int:
+    """Return the size of a page [bytes]."""
+    with path.open('rb') as file:
+        size = int.from_bytes(file.read(18)[16:18], 'big')
+    return 65536 if size == 1 else max(size, 512)
 
 
 def _beside(path: Path) -> list[Path]:

@@ -31,9 +31,10 @@ def slot(*pairs, found=()):
     return tuple(Rival(site, 0.0, fitted(*found), probability) for site, probability in pairs)
 
 
-def evidence(slots=(), loose=NOTHING_LEFT, after=3.5e-5, parts=None):
+def evidence(slots=(), loose=NOTHING_LEFT, after=3.5e-5, parts=None, fitted=None):
     parts = (1.0 / max(len(slots), 1),) * len(slots) if parts is None else parts
-    return Evidence(slots, loose, 2e-4, after, 3.5e-5, True, parts)
+    fitted = after if fitted is None else fitted
+    return Evidence(slots, loose, 2e-4, after, 3.5e-5, fitted, True, parts)
 
 
 def test_a_sure_leader_is_named_alone():
@@ -51,7 +52,7 @@ def test_rivals_as_probable_are_named_together_and_counted_together():
 
 
 def test_no_effect_and_nothing_left_is_none():
-    alone = Evidence((), NOTHING_LEFT, 3.5e-5, 3.5e-5, 3.5e-5, True, ())
+    alone = Evidence((), NOTHING_LEFT, 3.5e-5, 3.5e-5, 3.5e-5, 3.5e-5, True, ())
     assert decide(alone).status == 'none'
 
 
@@ -61,8 +62,33 @@ def test_what_stands_above_an_independent_floor_is_unknown():
 
 
 def test_a_floor_taken_from_the_model_itself_proves_nothing():
-    shared = Evidence((), NOTHING_LEFT, 3.5e-5, 1.8e-4, 3.5e-5, False, ())
-    assert decide(shared).status == 'none'
+    shared = Evidence((), NOTHING_LEFT, 3.5e-5, 1.8e-4, 3.5e-5, 1.8e-4, False, ())
+    verdict = decide(shared)
+    assert verdict.status == 'none'
+    assert verdict.confidence < 0.8
+
+
+def test_a_structure_that_a_few_stretches_hold_counts_when_it_is_large():
+    step = Structure(2e-5, 0.8, 2.5, ('time',))
+    verdict = decide(Evidence((), step, 6e-5, 6e-5, 3.5e-5, 6e-5, False, ()))
+    assert verdict.status == 'unknown'
+    assert 'time' in verdict.reasons[0]
+
+
+def test_what_does_not_carry_over_to_another_motion_is_unknown():
+    slots = (slot((PLAY, 1.0)),)
+    assert decide(evidence(slots, after=4.7e-5, fitted=4.7e-5)).status == 'identified'
+    verdict = decide(evidence(slots, after=4.7e-5, fitted=3.5e-5))
+    assert verdict.status == 'unknown'
+    assert 'held-out motion' in verdict.reasons[0]
+
+
+def test_belief_falls_as_what_remains_stands_above_the_floor():
+    beliefs = [decide(evidence((slot((PLAY, 1.0)),), after=a)).confidence
+               for a in (3.5e-5, 3.8e-5, 4.4e-5, 5e-5)]  # fmt: skip
+    assert beliefs == sorted(beliefs, reverse=True)
+    assert beliefs[0] > 0.95
+    assert beliefs[-1] < 0.5
 
 
 def test_structure_on_its_own_joint_takes_the_name_off_an_effect():

@@ -20,19 +20,25 @@ STRUCTURE = 0.05
 """Share of the squared gap that may stay unexplained before the answer is 'unknown'."""
 ABOVE = 1.3
 """What remains must exceed an independently measured floor by this factor to count."""
-CERTAIN = 3.0
-"""Standard errors between stretches that a structure must exceed."""
-CANCEL = 3.0
+GAIN, CERTAIN = 0.03, 3.0
+"""Share of the squared error that a structure must take away, in standard errors as well."""
+BLATANT, LIKELY = 0.15, 1.5
+"""The same for a structure so large that a few stretches may hold all of it."""
+CANCEL = 5.0
 """Effects whose squares sum to this many times the square of their sum cancel each other."""
 CROWD = 3
 """More separate causes than this at once are more likely one that the library lacks."""
-FAR_ABOVE = 1.5
-INCOMPLETE = 0.7
-"""Belief left in a verdict whose remainder stands that far above the floor; a judgement."""
+CARRIED = 1.3
+"""What remains on a held-out motion over what remains on unseen stretches of those fitted: beyond
+this the model does not carry over, as a cause would that was found."""
+RISE = 0.25
+"""Rise above the floor, as a share of it, that halves the belief."""
 STACKED = 0.75
 """Belief left when two effects at rest sit on one joint; a judgement."""
 CALIBRATION = 0.985
 """Belief left where all evidence agrees: no model is the robot; a judgement."""
+DOUBTED = 0.75
+"""Belief in 'unknown' where effects fit but are no plausible explanation; a judgement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +54,9 @@ class Evidence:
         What generic columns still find.
     gap, after, floor : float
         RMS on unseen data before and after, and of the noise, [m].
+    fitted : float
+        RMS after on unseen stretches of the recordings fitted, [m]; the same as ``after`` where
+        nothing was held out.
     independent : bool
         Whether the floor was measured apart from any model.
     parts : tuple of float
@@ -60,18 +69,30 @@ class Evidence:
     gap: float
     after: float
     floor: float
+    fitted: float
     independent: bool
     parts: tuple[float, ...]
 
     @property
     def structured(self) -> bool:
         """Return whether generic columns find something beyond doubt."""
-        return self.structure.gain > 0.03 and self.structure.sure > CERTAIN
+        gain, sure = self.structure.gain, self.structure.sure
+        return (gain > GAIN and sure > CERTAIN) or (gain > BLATANT and sure > LIKELY)
 
     @property
     def above_noise(self) -> bool:
         """Return whether what remains rises above the floor."""
         return self.structured or (self.independent and self.after > ABOVE * self.floor)
+
+    @property
+    def rise(self) -> float:
+        """Return by what share of an independent floor what remains stands above it."""
+        return max(self.after / self.floor - 1.0, 0.0) if self.independent else 0.0
+
+    @property
+    def carried(self) -> bool:
+        """Return whether the model does on a held-out motion what it does on those fitted."""
+        return self.rise < ABOVE - 1.0 or self.after < CARRIED * self.fitted
 
     @property
     def left(self) -> float:
@@ -100,7 +121,7 @@ def decide(evidence: Evidence) -> Verdict:
     if not evidence.slots:
         if left > STRUCTURE:
             return Verdict('unknown', _unknown_confidence(left), (), (_depends(evidence),))
-        return Verdict('none', 0.97, (), ('the gap does not rise above the noise',))
+        return _none(evidence)
     sets = tuple(_leaders(slot) for slot in evidence.slots)
     doubt = _doubt(evidence)
     if left > STRUCTURE or doubt is not None:
@@ -110,7 +131,8 @@ def decide(evidence: Evidence) -> Verdict:
             and not _touched(chosen[0], evidence)
         )  # fmt: skip
         reason = _depends(evidence) if doubt is None else doubt
-        return Verdict('unknown', _unknown_confidence(left), solid, (reason,))
+        sure = _unknown_confidence(left) if doubt is None else DOUBTED
+        return Verdict('unknown', sure, solid, (reason,))
     mass = [
         sum(r.probability for r in slot if r.site in chosen)
         for slot, chosen in zip(evidence.slots, sets, strict=True)
@@ -119,12 +141,21 @@ def decide(evidence: Evidence) -> Verdict:
     confidence = float(np.prod(mass)) * complete * CALIBRATION
     if _stacked(sets):
         confidence *= STACKED
-    if evidence.independent and evidence.after > FAR_ABOVE * evidence.floor:
-        confidence *= INCOMPLETE
+    confidence /= 1.0 + (evidence.rise / RISE) ** 2
     reasons = tuple(_alike(slot, chosen) for slot, chosen in zip(evidence.slots, sets, strict=True)
                     if len(chosen) > 1)  # fmt: skip
     status = 'ambiguous' if reasons else 'identified'
     return Verdict(status, confidence, sets, reasons)
+
+
+def _none(evidence: Evidence) -> Verdict:
+    """Return that there is no gap, with less belief where only the rest shows the noise."""
+    if not evidence.independent and evidence.after > ABOVE * evidence.floor:
+        return Verdict('none', 0.6, (), (
+            'nothing is found, but what remains is not spread as noise is, and nothing on these '
+            'recordings shows the noise by itself: repeat some poses',
+        ))  # fmt: skip
+    return Verdict('none', 0.97, (), ('the gap does not rise above the noise',))
 
 
 def _doubt(evidence: Evidence) -> str | None:
@@ -139,6 +170,12 @@ def _doubt(evidence: Evidence) -> str | None:
         return (
             f'{count} separate effects would be needed at once: together they imitate a cause '
             'that is not in the library'
+        )
+    if not evidence.carried:
+        return (
+            f'what was found leaves {evidence.after / evidence.fitted:.1f} times as much on the '
+            'held-out motion as on the recordings fitted: it imitates a cause that is not in the '
+            'library'
         )
     return None
 
@@ -167,7 +204,7 @@ def _touched(site: Site, evidence: Evidence) -> bool:
 
 
 def _unknown_confidence(left: float) -> float:
-    return float(np.clip(0.5 + left, 0.5, 0.95))
+    return float(np.clip(0.7 + left, 0.7, 0.95))
 
 
 def _leaders(slot: tuple[Rival, ...]) -> tuple[Site, ...]:

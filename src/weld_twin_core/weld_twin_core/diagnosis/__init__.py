@@ -100,8 +100,8 @@ def diagnose(
     shrink = held_out_shrink(found, unseen, holdout)
     slots = found.slots
     evidence = Evidence(
-        slots, loose, shrink.rms_before_m, shrink.rms_after_m, floor, independent,
-        _parts(unseen),
+        slots, loose, shrink.rms_before_m, shrink.rms_after_m, floor,
+        unseen.rms(unseen.predict(kept)), independent, _parts(unseen),
     )  # fmt: skip
     verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
     baseline = Unseen.of(found.problem, found.scale, found.baseline, np.zeros(0))

@@ -29,6 +29,9 @@ MANY = 8
 SEVERAL = 4
 """From this many on, the many are tried, and taken if they predict unseen stations better."""
 BETTER = 0.95
+MEMBER = 0.1
+"""Share of the largest one's size from which an effect counts as one of the many; a few large ones
+that small ones mend are one cause that the library lacks."""
 SWAPS = 3
 HOPE = 0.3
 MISFIT = 0.012
@@ -146,7 +149,10 @@ def search(
     progress('many small errors at once: fitting them together')
     final, scale, precision = many_small(full, model, exclude, progress)
     together = replace(sparse, scale=scale, final=final, precision=precision, slots=(), dense=True)
-    return together if dense or _unseen_rms(together) < BETTER * _unseen_rms(sparse) else sparse
+    if dense:
+        return together
+    better = _unseen_rms(together) < BETTER * _unseen_rms(sparse)
+    return together if better and _members(together) >= MANY else sparse
 
 
 def settled(
@@ -165,6 +171,13 @@ def settled(
         else:
             break
     return now, tuple(slots)
+
+
+def _members(found: Search) -> int:
+    """Return how many effects move the tool by more than a share of what the largest does."""
+    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
+    sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
+    return int((sizes > MEMBER * sizes.max()).sum())
 
 
 def _unseen_rms(found: Search) -> float:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..arrays import Array
 from ..effects.base import Effect
 from ..recording import Recording
 from ..robot import Robot
@@ -34,6 +33,7 @@ from .result import (
 from .rivals import Rival
 from .search import Search, search
 from .soundness import check
+from .uncertainty import standard_errors
 from .validation import held_out_shrink
 from .verdict import Evidence, Verdict, decide
 from .where import locate
@@ -143,48 +143,19 @@ def _effects(found: Search, unseen: Unseen, verdict: Verdict) -> tuple[Found, ..
         return ()
     model = found.final.model
     worth = (unseen.targets[1:] ** 2).sum(axis=1)
-    covariance = found.final.covariance(1.0 / _independent(found))
+    errors = standard_errors(
+        found.problem, model, found.scale, found.precision, _independent(found)
+    )
     named = {site for group in verdict.sets for site in group}
-    at, out = 0, []
-    for k, effect in enumerate(model.found):
-        size = effect.coordinates().size
-        block = covariance[at : at + size, at : at + size]
-        at += size
-        if Site(effect.name, effect.site) in named:
-            out.append((worth[k], Found(effect, _std(effect, np.diag(block)))))
+    out = [
+        (worth[k], Found(effect, errors[k])) for k, effect in enumerate(model.found)
+        if Site(effect.name, effect.site) in named
+    ]  # fmt: skip
     return tuple(item for _, item in sorted(out, key=lambda pair: -pair[0]))
 
 
 def _independent(found: Search) -> float:
     return max(found.effective(found.small) / found.small.residual.size, 1e-3)
-
-
-def _std(effect: Effect, variance: Array) -> dict[str, object]:
-    """Return standard errors in the shape of the parameters; those not fitted have none."""
-    std = np.sqrt(np.maximum(variance, 0.0))
-    if effect.name == 'transmission_ripple':
-        pairs = std.reshape(-1, 2)
-        amplitude = np.atleast_1d(np.asarray(effect.amplitude))  # type: ignore[attr-defined]
-        spread = np.sqrt((pairs**2).mean(axis=1))
-        phase = spread / np.maximum(amplitude, 1e-300)
-        many = np.ndim(effect.amplitude) > 0  # type: ignore[attr-defined]
-        return {
-            'amplitude': spread.tolist() if many else float(spread[0]),
-            'phase': np.minimum(phase, np.pi).tolist() if many else float(min(phase[0], np.pi)),
-        }
-    out: dict[str, object] = {}
-    at = 0
-    for parameter, index in effect.components():
-        if not parameter.differentiable:
-            continue
-        if index is None:
-            out[parameter.name] = float(std[at])
-        else:
-            values = out.setdefault(parameter.name, [])
-            assert isinstance(values, list)
-            values.append(float(std[at]))
-        at += 1
-    return out
 
 
 def _candidates(
@@ -244,6 +215,7 @@ def _traces(found: Search) -> Traces:
         tuple(r.measured.t for r in recordings if r.measured is not None),
         tuple(r.measured.position for r in recordings if r.measured is not None),
         tuple(p[:3].T for p in before), tuple(p[:3].T for p in after),
+        tuple(w >= TRUSTED for w in found.scale.weights),
     )  # fmt: skip
 
 

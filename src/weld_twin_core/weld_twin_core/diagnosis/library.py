@@ -96,8 +96,8 @@ def build(
     """Return the library at a model: one set of columns that all hypotheses share."""
     features = problem.features(model)
     residual = problem.residuals(model)[0]
-    residual[:3] /= scale.position**2
-    residual[3:] /= scale.orientation**2
+    residual[:3] *= scale.weights[0] / scale.position**2
+    residual[3:] *= scale.weights[0] / scale.orientation**2
     blocks = [problem.whitened(problem.frame_columns(features)[0], scale)]
     for effect in model.found:
         parts = problem.effect_columns(features, effect, atoms=False)

@@ -17,6 +17,7 @@ from .gram import Gram
 from .library import Library, Unit
 from .problem import Model, Problem, Scale
 from .score import Choice, best_choice, evidence
+from .starts import searched, started
 
 ENTER = 6.0
 """Nats a unit must be worth to enter: odds of about 400 to 1, for a hundred or so candidates."""
@@ -153,6 +154,7 @@ def _refined(
 
 def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
     """Return the fit of a model with one more effect, merged where its kind can merge."""
+    effect = started(work.problem, model, work.scale, effect)
     return fit(work.problem, model.with_found(merged(model.found, effect)), work.scale, None, 5)
 
 
@@ -173,8 +175,27 @@ def without(model: Model, k: int) -> Model:
     return model.with_found(model.found[:k] + model.found[k + 1 :])
 
 
+def restarted(work: Workspace, now: Fit) -> Fit:
+    """
+    Return the fit after effects with many optima were searched for again beside all others.
+
+    The first to enter was found while the others were still in the residual.
+    """
+    for k, effect in enumerate(now.model.found):
+        if not searched(effect):
+            continue
+        rest = fit(work.problem, without(now.model, k), work.scale, None, 4)
+        again = fitted_with(work, rest.model, effect)
+        if again.rss < now.rss:
+            found = list(again.model.found)
+            found.insert(k, found.pop())
+            now = fit(work.problem, again.model.with_found(tuple(found)), work.scale, None, 4)
+    return now
+
+
 def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
     """Return the fit with every effect dropped that is not worth its freedom given the others."""
+    now = restarted(work, now)
     while now.model.found:
         count = effective(now)
         losses = []

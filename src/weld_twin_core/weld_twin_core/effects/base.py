@@ -91,6 +91,16 @@ class Effect(Parametric, ABC):
         """
         yield cls._at(joint)
 
+    def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
+        """
+        Return instances to choose a fit's start from, and what each displaces, shape (D, N).
+
+        For an effect on one joint whose response bends so much with a parameter that a local fit
+        would stop beside the best. ``zoom`` counts up from 0, each time about the best so far,
+        until there are none. Where a parameter is linear, the instances have it at one.
+        """
+        return None
+
     @classmethod
     def trials(cls, view: View, joint: str | None) -> float:
         """Return how many instances `seeds` chose among; 0 means as many as it yields."""

@@ -18,6 +18,10 @@ from .view import Parameter, Stage, Value, View
 FINEST, COARSEST = 1e-4, 2e-2
 """Steps that a search considers [rad]."""
 PEAKS = 3
+PHASE = 1.0 / 16.0
+"""Periods by which neighbours on the first grid of steps differ at the far end of the travel."""
+ZOOM, ZOOMS = 16, 3
+MOST = 2000
 
 
 @register
@@ -83,6 +87,26 @@ class Quantization(Effect):
         """Return how many steps the spectrum tells apart."""
         travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
         return max(1.0, travel / FINEST)
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
+        """
+        Return steps so close that the staircase stays in phase up to the largest position.
+
+        A spectrum tells a step only as finely as one period over the travel; stairs are counted
+        from zero, so at position q a step off by ds shifts them by q ds / step of a period.
+        """
+        q = view.joint(view.robot.index(self.joint))
+        travel, far = float(np.ptp(q)), float(np.abs(q).max())
+        if zoom == ZOOMS or self.step <= 0.0 or travel <= 0.0:
+            return None
+        fine = PHASE / far
+        half = 1.0 / (travel * fine) if zoom == 0 else float(ZOOM)
+        offset = np.arange(-min(int(half) + 1, MOST // 2), min(int(half) + 1, MOST // 2) + 1)
+        steps = 1.0 / (1.0 / self.step + offset * fine / (0.5 * ZOOM) ** zoom)
+        steps = steps[steps > 0.0]
+        many = Quantization(self.joint, steps)
+        displaced = many.displace(view)[('q', view.robot.index(self.joint))]
+        return [Quantization(self.joint, float(step)) for step in steps], displaced
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the rounding error itself; its right coefficient is one."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
 from .. import scan
 from ..arrays import Array
@@ -21,6 +22,13 @@ from ..chain import Shift
 from .base import Effect, MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+
+FREQUENCIES = np.geomspace(1.0, 40.0, 64)
+"""Modes [Hz] that a fit may start from, and"""
+DAMPINGS = (0.03, 0.08, 0.25)
+"""their dampings."""
+HIGHEST = 0.4
+"""Frequency times the step in time of the joint stream that a search goes up to."""
 
 
 @register
@@ -38,9 +46,10 @@ class Vibration(MemoryEffect):
     stage = Stage.SERVO
     regime = 'acceleration'
     parameters = (
-        Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False),
-        Parameter('damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False),
-        Parameter('gain', '-', typical=0.3),
+        Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False, idealised=0.01),
+        Parameter('damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False,
+                  idealised=0.02),
+        Parameter('gain', '-', typical=0.3, idealised=0.02),
     )
     needs = frozenset({'velocity', 'time'})
 
@@ -117,7 +126,7 @@ class Vibration(MemoryEffect):
         """Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them."""
         if view.static or view.t.size < 3:
             return
-        highest = 0.4 / float(np.median(np.diff(view.t)))
+        highest = HIGHEST / float(np.median(np.diff(view.t)))
         for frequency in np.geomspace(2.0, 40.0, 22):
             if frequency < highest:
                 yield cls(str(joint), float(frequency), 0.05, 0.0)
@@ -127,6 +136,28 @@ class Vibration(MemoryEffect):
         i = view.robot.index(self.joint)
         z = self._response(view, None)[0]
         return [{('q', i): z.imag}, {('q', i): z.real}]
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
+        """
+        Return modes of all frequencies and dampings: far from the mode the fit has other optima.
+
+        On evenly spaced stamps, on which the recursion is a plain filter.
+        """
+        if zoom or view.static or view.t.size < 3:
+            return None
+        step = float(np.median(np.diff(view.t)))
+        t = np.arange(view.t[0], view.t[-1] + step, step)
+        q = np.interp(t, view.t, view.joint(view.robot.index(self.joint)))
+        kick = np.concatenate([np.zeros(2), np.diff(q, n=2)]) / step
+        modes = [Vibration(self.joint, float(f), z, 1.0)
+                 for f in FREQUENCIES[FREQUENCIES * step < HIGHEST] for z in DAMPINGS]  # fmt: skip
+        out = np.empty((len(modes), view.t.size))
+        for k, mode in enumerate(modes):
+            pole, damped = mode._mode()
+            decay = np.exp(pole * step)
+            response = lfilter([-decay / damped], [1.0, -decay], kick).imag
+            out[k] = np.interp(view.t, t, response)
+        return list(modes), out
 
     def from_atoms(self, coefficients: Array) -> Effect:
         """Return the mode whose gain is the in-phase coefficient."""

@@ -56,6 +56,9 @@ class Parameter:
         Whether `Effect.gradient` gives its derivative.
     linear : bool
         Whether the displacement is proportional to it.
+    idealised : float
+        Share by which an arm's own value differs from the one that fits best, because springs
+        harden and modes couple where the formula is ideal.
 
     """
 
@@ -67,6 +70,7 @@ class Parameter:
     upper: float = np.inf
     differentiable: bool = True
     linear: bool = True
+    idealised: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

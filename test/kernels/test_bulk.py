@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import pytest
 from weld_twin_core import chain
 from weld_twin_core.errors import ModelError
 from weld_twin_core.kernels.buffers import aligned
-from weld_twin_core.kernels.bulk import BulkKernel
+from weld_twin_core.kernels.bulk import LENGTHS, BulkKernel, kernel_of
 from weld_twin_core.kernels.half_angle import COSINE, SINE, sincos
 from weld_twin_core.kernels.single import SinglePose
 from weld_twin_core.robot import Robot
@@ -95,6 +96,31 @@ def test_a_kernel_gives_the_same_after_other_batches(make_robot: Callable[..., R
     kernel.screws(positions(robot, 37))
     again = kernel.screws(q)
     assert all((a == b).all() for a, b in zip(first, again, strict=True))
+
+
+def test_poses_are_the_same_with_and_without_screws(make_robot: Callable[..., Robot]) -> None:
+    robot = make_robot(6)
+    kernel = BulkKernel(robot, [('theta', i) for i in range(6)])
+    q = positions(robot, 100)
+    assert np.abs(kernel.poses(q) - kernel.screws(q)[0]).max() < EXACT
+
+
+def test_a_kernel_is_prepared_once_for_each_thread(make_robot: Callable[..., Robot]) -> None:
+    robot = make_robot(6)
+    others: list[BulkKernel] = []
+    thread = Thread(target=lambda: others.append(kernel_of(robot)))
+    thread.start()
+    thread.join()
+    assert kernel_of(robot) is kernel_of(robot) is not others[0]
+
+
+def test_a_kernel_keeps_the_memory_of_a_few_lengths_only(
+    make_robot: Callable[..., Robot],
+) -> None:
+    kernel = BulkKernel(make_robot(6))
+    for count in range(1, 20):
+        kernel.poses(positions(kernel.robot, count))
+    assert len(kernel._memory) <= LENGTHS
 
 
 def test_channels_out_of_order_are_refused(make_robot: Callable[..., Robot]) -> None:

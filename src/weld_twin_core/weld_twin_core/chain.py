@@ -169,9 +169,9 @@ def forward(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
 
     The product of the paper's eq. for T_i^{i-1} over the rows, between base and tool frame.
     """
-    if q.ndim == 2 and len(q) >= MANY and robot.n <= MOST_JOINTS and not shift:
-        from .kernels.bulk import BulkKernel  # which imports this module
-        return BulkKernel(robot).poses(q)
+    if q.size >= MANY * robot.n and robot.n <= MOST_JOINTS and not shift:
+        from .kernels.bulk import kernel_of  # which imports this module
+        return kernel_of(robot).poses(q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 4, 4)
     chain = frames(robot, q, shift)
     return transform(chain.rotation, chain.position)
 

@@ -5,17 +5,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..arrays import Array
-from ..chain import frames
+from ..chain import forward, frames
 from ..errors import ReachError
+from ..kernels.bulk import kernel_of
 from ..robot import Robot
 from ..rotation import rotation_matrix, rotation_vector, transform
 from .closed_form import branches, family
-from .continuity import Mask, joined, jumps, reach, travel
+from .continuity import Mask, distances, joined, jumps, reach, travel
+from .following import follow
 from .newton import chain_jacobian, polish
 from .one import OTHER_POSTURE, gap, past_limit, where, why_not
 from .search import CLOSED, centring, null_space, search
@@ -35,24 +38,16 @@ _COMFORTABLE = 0.5
 @dataclass(frozen=True, eq=False)
 class PathSolution:
     """
-    Joint positions along a path and how well the arm stands there.
+    Joint positions along a path; how well the arm stands there is worked out when asked for.
 
     Attributes
     ----------
+    robot : Robot
+    poses : array, shape (N, 4, 4)
+        What was asked for.
     q : array, shape (N, n) [rad or m]
-    residual : array, shape (N, 2) [m, rad]
-        What is missing to each pose.
-    condition : array, shape (N,)
-        Condition number of the Jacobian with lengths divided by the arm's reach; large means
-        near a singularity.
-    manipulability : array, shape (N,)
-        Yoshikawa's measure, sqrt(det(J J^T)), of the same Jacobian.
-    limit_margin : array, shape (N,) [rad or m]
-        Distance to the nearest joint limit.
-    branch : int
-        Index of the posture among those found.
     method : str
-        Family of the closed form, or 'search'.
+        'followed' from a seed, the family of the closed form, or 'search'.
 
     References
     ----------
@@ -60,13 +55,38 @@ class PathSolution:
 
     """
 
+    robot: Robot
+    poses: Array
     q: Array
-    residual: Array
-    condition: Array
-    manipulability: Array
-    limit_margin: Array
-    branch: int
     method: str
+
+    @cached_property
+    def residual(self) -> Array:
+        """Return what is missing to each pose, shape (N, 2) [m, rad]."""
+        return np.stack(distances(forward(self.robot, self.q), self.poses), axis=1)
+
+    @property
+    def condition(self) -> Array:
+        """
+        Return the condition number of the Jacobian with lengths over the arm's reach, shape (N,).
+
+        Large means near a singularity.
+        """
+        return self._posture[0]
+
+    @property
+    def manipulability(self) -> Array:
+        """Return Yoshikawa's measure, sqrt(det(J J^T)), of the same Jacobian, shape (N,) [1]_."""
+        return self._posture[1]
+
+    @property
+    def limit_margin(self) -> Array:
+        """Return the distance to the nearest joint limit, shape (N,) [rad or m]."""
+        return self._posture[2]
+
+    @cached_property
+    def _posture(self) -> tuple[Array, Array, Array]:
+        return _posture(self.robot, self.q)
 
 
 def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSolution:
@@ -91,21 +111,20 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
 
     """
     poses = np.asarray(poses, dtype=np.float64)
-    if family(robot) is None:
-        tracks, method = _followed(robot, poses, seed), 'search'
-    else:
-        tracks, method = _closed(robot, poses, seed), str(family(robot))
+    if seed is not None:
+        q = follow(robot, poses, np.asarray(seed, dtype=np.float64))
+        if q is not None:
+            return PathSolution(robot, poses, q, 'followed')
+    kind = family(robot)
+    of_all = _followed if kind is None else _closed
+    tracks = of_all(robot, poses, seed)
     failures = np.array([_first_failure(robot, q, poses) for q in tracks])
     good = np.flatnonzero(failures == len(poses))
     if not good.size:
         raise ReachError(_explain(robot, tracks, failures, poses))
-    ranked = sorted(good, key=lambda k: _rank(robot, tracks[k], seed))
-    best = int(ranked[0])
-    q, error = polish(robot, tracks[best], poses)
-    residual = np.stack(
-        [np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)], axis=1
-    )
-    return PathSolution(q, residual, *_posture(robot, q), best, method)
+    best = min(good, key=lambda k: _rank(robot, tracks[k], seed))
+    q = polish(robot, tracks[best], poses)[0]
+    return PathSolution(robot, poses, q, kind or 'search')
 
 
 def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
@@ -125,8 +144,10 @@ def _determined(robot: Robot, q: Array, poses: Array) -> Array:
     There the pose leaves joints undetermined; a little way towards the next sample it does not.
     The straight way there bends off the path, so the joints are right to a part of a step.
     """
-    jacobian = chain_jacobian(robot, frames(robot, np.nan_to_num(q)))
-    singular = np.flatnonzero((np.abs(np.linalg.det(jacobian)) < _SINGULAR).any(axis=0))
+    kernel = kernel_of(robot, tuple(('theta', i) for i in range(robot.n)))
+    screws = kernel.screws(np.nan_to_num(q).reshape(-1, robot.n))[1]
+    size = np.abs(np.linalg.det(screws.T)).reshape(q.shape[:2])
+    singular = np.flatnonzero((size < _SINGULAR).any(axis=0))
     if singular.size and len(poses) > 1:
         other = np.where(singular + 1 < len(poses), singular + 1, singular - 1)
         q = q.copy()

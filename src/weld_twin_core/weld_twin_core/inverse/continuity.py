@@ -6,17 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..chain import frames
+from ..chain import forward
 from ..robot import Robot
-from ..rotation import rotation_vector
-from .newton import pose_error
 
 Mask = NDArray[np.bool_]
 
-_LEAP = 0.5
+LEAP = 0.5
 """Joint step [rad] between neighbours that calls for a second look."""
 _STEEP = 20.0
 """Joint motion per motion of the tool (both in rad, lengths over reach) beyond which it flips."""
+
+_SUMS = np.array([[[0.0, 1.0]] * 3 + [[1.0, 0.0]]] * 3 + [[[0.0, 0.0]] * 4]).reshape(16, 2)
+"""Adds up the squares of a pose's position and of its rotation."""
 
 
 def reach(robot: Robot) -> float:
@@ -26,10 +27,17 @@ def reach(robot: Robot) -> float:
 
 def travel(robot: Robot, poses: Array) -> Array:
     """Return a strictly increasing measure of the way along the poses, shape (N,) [rad]."""
-    turns = rotation_vector(poses[1:, :3, :3] @ np.swapaxes(poses[:-1, :3, :3], -1, -2))
-    steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) / reach(robot)
-    steps = steps + np.linalg.norm(turns, axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps + 1e-9)])
+    moved, turned = distances(poses[1:], poses[:-1])
+    return np.concatenate([[0.0], np.cumsum(moved / reach(robot) + turned + 1e-9)])
+
+
+def distances(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return how far poses (N, 4, 4) are apart, shape (N,) each [m, rad]."""
+    gap = (first - second).reshape(-1, 16)
+    gap *= gap
+    moved, turned = np.sqrt(gap @ _SUMS).T
+    # The chord between rotations, as long as 2 sqrt(2) sin(angle / 2).
+    return moved, 2.0 * np.arcsin(np.minimum(turned / np.sqrt(8.0), 1.0))
 
 
 def joined(tracks: Array) -> Array:
@@ -41,7 +49,7 @@ def joined(tracks: Array) -> Array:
     """
     tracks = tracks.copy()
     steps = np.abs(_turned(np.diff(tracks, axis=1))).max(axis=-1)
-    for i in np.flatnonzero((steps > _LEAP).any(axis=0)) + 1:
+    for i in np.flatnonzero((steps > LEAP).any(axis=0)) + 1:
         apart = np.abs(_turned(tracks[:, i] - tracks[:, i - 1, None])).max(axis=-1)
         apart = np.where(np.isnan(apart), np.inf, apart)
         order = np.where(np.isinf(apart).all(axis=1), np.arange(len(tracks)), apart.argmin(axis=1))
@@ -59,15 +67,14 @@ def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
     """
     if len(q) < 2:
         return np.zeros(0, dtype=bool)
-    chain = frames(robot, np.nan_to_num(0.5 * (q[1:] + q[:-1])))
-    size = reach(robot)
-    scale = np.array([1.0 / size] * 3 + [1.0] * 3)
-    before = np.linalg.norm(pose_error(chain, poses[:-1]) * scale, axis=-1)
-    after = np.linalg.norm(pose_error(chain, poses[1:]) * scale, axis=-1)
+    halfway = forward(robot, np.nan_to_num(0.5 * (q[1:] + q[:-1])))
     tool = np.diff(travel(robot, poses))
+    size, away = reach(robot), -3.0 * tool
+    for ends in (poses[:-1], poses[1:]):
+        moved, turned = distances(halfway, ends)
+        away += np.hypot(moved / size, turned)
     joints = np.abs(np.diff(q, axis=0)).max(axis=-1)
-    away = before + after > 3.0 * tool + 1e-3
-    return np.asarray(away | ((joints > _LEAP) & (joints > _STEEP * tool)))
+    return np.asarray((away > 1e-3) | ((joints > LEAP) & (joints > _STEEP * tool)))
 
 
 def _turned(angle: Array) -> Array:

@@ -12,6 +12,8 @@ runs over blocks of poses that stay in the processor's cache, in memory that is 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
+from threading import get_ident
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,11 @@ from .weights import Piece, on_half_angles
 
 BLOCK = 1000
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
+
+POSE = 12
+"""Outputs that make up a pose; those of the channels follow."""
+LENGTHS = 4
+"""Lengths of blocks whose working memory a kernel keeps."""
 
 
 class BulkKernel:
@@ -95,7 +102,7 @@ class BulkKernel:
         """
         out = _poses_like(q, out)
         for part in self._blocks(len(q)):
-            self._pose_block(q[part], out[part])
+            self._pose_block(q[part], out[part], POSE)
         return out
 
     def screws(
@@ -112,7 +119,7 @@ class BulkKernel:
         poses = _poses_like(q, poses)
         out = aligned(6, len(self.channels), len(q)) if out is None else out
         for part in self._blocks(len(q)):
-            memory = self._pose_block(q[part], poses[part])
+            memory = self._pose_block(q[part], poses[part], None)
             self._screw_block(memory, out[:, :, part])
         return poses, out
 
@@ -124,18 +131,20 @@ class BulkKernel:
             starts.append(count - size)
         return [slice(start, start + size) for start in starts]
 
-    def _pose_block(self, q: Array, out: Array) -> _Memory:
+    def _pose_block(self, q: Array, out: Array, rows: int | None) -> _Memory:
+        """Write poses; of the weights only so many rows are used."""
         n = len(q)
         if n not in self._memory:
-            self._memory = {k: m for k, m in self._memory.items() if k == self.block}
+            if len(self._memory) == LENGTHS:
+                self._memory.pop(next(k for k in self._memory if k != self.block))
             self._memory[n] = _Memory(self, n)
         memory = self._memory[n]
         memory.fill(q, self.robot.prismatic)
         for weights, features, piece in zip(
             self._weights, memory.features, memory.pieces, strict=True
         ):
-            np.matmul(weights, features, out=piece)
-        near, far = (piece[:12].reshape(4, 3, n) for piece in memory.pieces)
+            np.matmul(weights[:rows], features, out=piece[:rows])
+        near, far = (piece[:POSE].reshape(4, 3, n) for piece in memory.pieces)
         sums = memory.sums
         np.multiply(far.swapaxes(0, 1)[:, :, None], near[:3, None], sums[:36].reshape(3, 4, 3, n))
         sums[36:39] = near[3]
@@ -151,19 +160,29 @@ class BulkKernel:
             tip = memory.sums[9:12] + memory.sums[21:24]
             tip += memory.sums[33:36]
             tip += memory.sums[36:39]
-            moment, axis = near[12:].reshape(2, 3, inner, n)
+            moment, axis = near[POSE:].reshape(2, 3, inner, n)
             _velocity(moment, axis, tip, out[:3, :inner], memory.spares(inner, n))
             out[3:, :inner] = axis
         if outer:
             turn = near[:9].reshape(3, 3, 1, n)
             total, part = memory.spares(3 * outer, n).reshape(2, 3, outer, n)
-            vectors = far[12:].reshape(2, 3, outer, n)
+            vectors = far[POSE:].reshape(2, 3, outer, n)
             for vector, target in zip(vectors, (out[:3, inner:], out[3:, inner:]), strict=True):
                 np.multiply(turn[0], vector[0], total)
                 np.multiply(turn[1], vector[1], part)
                 np.add(total, part, total)
                 np.multiply(turn[2], vector[2], part)
                 np.add(total, part, target)
+
+
+def kernel_of(robot: Robot, channels: tuple[Channel, ...] = ()) -> BulkKernel:
+    """Return a kernel of this thread, the same when asked for again: they take time to prepare."""
+    return _kept(robot, channels, get_ident())
+
+
+@lru_cache(maxsize=8)
+def _kept(robot: Robot, channels: tuple[Channel, ...], thread: int) -> BulkKernel:
+    return BulkKernel(robot, channels)
 
 
 def _poses_like(q: Array, out: Array | None) -> Array:

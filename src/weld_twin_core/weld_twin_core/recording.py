@@ -209,3 +209,20 @@ class Recording:
     def with_measured(self, measured: Measurements | None) -> Recording:
         """Return the recording with other measurements beside the same motion."""
         return replace(self, measured=measured)
+
+    def thinned(self, most: int) -> Recording:
+        """
+        Return the recording with at most so many measurements, evenly over all of them.
+
+        The joint stream stays whole, for play and lag depend on every motion before; a note says
+        what was left out.
+        """
+        count = 0 if self.measured is None else self.measured.t.size
+        if self.measured is None or count <= most:
+            return self
+        index = np.unique(np.linspace(0, count - 1, most).round().astype(int))
+        note = (
+            f'{index.size} of {count} measurements are used, evenly over the whole recording; the '
+            'joint stream is used whole'
+        )
+        return replace(self, measured=self.measured.take(index), notes=(*self.notes, note))

@@ -7,6 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ..arrays import Array
 from ..effects.base import Effect
 from ..recording import Recording
@@ -159,7 +161,7 @@ class Traces:
     before: tuple[Array, ...]
     """Position residual before, shape (M, 3) [m]."""
     after: tuple[Array, ...]
-    trusted: tuple[Array, ...] = ()
+    trusted: tuple[np.ndarray, ...] = ()
     """Which samples are no outliers, bool, shape (M,); empty for all of them."""
 
 

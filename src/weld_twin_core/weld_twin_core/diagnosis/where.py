@@ -137,7 +137,7 @@ def _map_regimes(shares: Array) -> dict[str, float]:
 
 
 def _path(
-    problem: Problem, model: Model, good: list[Array]
+    problem: Problem, model: Model, good: list[np.ndarray]
 ) -> tuple[tuple[float, float, float, float], ...]:
     """Return stretches of time with their share of the squared gap and their RMS."""
     out = []
@@ -157,7 +157,7 @@ def _path(
     return tuple(out)
 
 
-def _direction(problem: Problem, model: Model, good: list[Array]) -> dict[str, float]:
+def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[str, float]:
     """
     Return the RMS gap along the path, across it, and along the tool's axis (stick-out), [m].
 

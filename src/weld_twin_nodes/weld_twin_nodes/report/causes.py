@@ -4,14 +4,24 @@
 
 from __future__ import annotations
 
-from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
+from collections.abc import Sequence
+
+from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Found, Site
 
 from .families import families_table
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, change, millimetres, odds, parameter_rows
 from .words import found_name, in_words, listed, site_name
 
-_CANDIDATES = 10
+_CANDIDATES = 6
+"""Hypotheses shown for a cause."""
+_SLOTS = 6
+_STAND_IN = (
+    'No effect is named. These imitate the unknown cause together; figures and pictures that say '
+    'after are with them.'
+)
+_ABOVE = 1.5
+"""Ratio to the noise floor above which what remains is not at its level."""
 
 
 def causes_section(diagnosis: Diagnosis) -> Html:
@@ -22,9 +32,9 @@ def causes_section(diagnosis: Diagnosis) -> Html:
     )  # fmt: skip
 
 
-def _found(diagnosis: Diagnosis) -> Html:
+def _found(diagnosis: Diagnosis) -> Html | None:
     if not diagnosis.effects:
-        return tag('p', 'No effect was put into the twin.')
+        return None if diagnosis.model.found else tag('p', 'No effect was put into the twin.')
     if diagnosis.families:
         return families_table(diagnosis)
     heads = ['Effect', 'Parameter', 'Value ± standard error']
@@ -47,24 +57,46 @@ def _alone(diagnosis: Diagnosis, found: Found) -> float | None:
 
 
 def _candidates(diagnosis: Diagnosis) -> Html | None:
-    shown = diagnosis.candidates[:_CANDIDATES]
-    if not shown:
+    """Return the hypotheses for every cause, the most probable first."""
+    if not diagnosis.candidates:
         return None
-    rows = [
-        (site_name(c.site), c.probability,
-         f'{odds(c.probability)} · leaves {millimetres(c.rms_after_m)} '
-         f'({change(c.shrink)})')
-        for c in shown
-    ]  # fmt: skip
-    more = len(diagnosis.candidates) - len(shown)
+    slots = _slots(diagnosis.candidates)
+    parts: list[Html] = []
+    for slot in slots[:_SLOTS]:
+        parts.append(bars([_candidate(diagnosis, c) for c in slot[:_CANDIDATES]], 'wide'))
+    more = len(diagnosis.candidates) - sum(len(s[:_CANDIDATES]) for s in slots[:_SLOTS])
     note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
-    return joined([
-        tag('h3', 'Candidates and their probabilities'),
-        bars(rows, 'wide'), note,
-    ])  # fmt: skip
+    if not diagnosis.effects:
+        title, lead = 'What fits best, though it explains nothing', _STAND_IN
+    else:
+        title = 'Candidates and their probabilities'
+        lead = 'A group for every cause: what was found, and what else it could be.'
+    told = tag('p', lead, class_='note') if len(slots) > 1 or not diagnosis.effects else None
+    return joined([tag('h3', title), told, *parts, note])
 
 
-def _sets(diagnosis: Diagnosis) -> Html:
+def _candidate(diagnosis: Diagnosis, c: Candidate) -> tuple[str, float, str]:
+    """Return label, length and text of a bar; what only stands in has no probability."""
+    left = f'leaves {millimetres(c.rms_after_m)} ({change(c.shrink)})'
+    if not diagnosis.effects:
+        return site_name(c.site), c.shrink, left
+    return site_name(c.site), c.probability, f'{odds(c.probability)} · {left}'
+
+
+def _slots(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+    """Return the hypotheses cause by cause: within one, probabilities do not rise."""
+    out: list[list[Candidate]] = []
+    for c in candidates:
+        if out and c.probability <= out[-1][-1].probability:
+            out[-1].append(c)
+        else:
+            out.append([c])
+    return out
+
+
+def _sets(diagnosis: Diagnosis) -> Html | None:
+    if not diagnosis.effects:
+        return None
     sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
     title = tag('h3', 'What these data cannot tell apart')
     if not sets and diagnosis.families:
@@ -98,6 +130,10 @@ def _absent(diagnosis: Diagnosis) -> Html | None:
 def leftover(diagnosis: Diagnosis) -> Html:
     """Return what remains after the verdict."""
     rest = diagnosis.unexplained
+    floor = diagnosis.gap.noise_floor_m
+    if not rest.above_noise and rest.rms_m > _ABOVE * floor:
+        return tag('p', f'What remains, {millimetres(rest.rms_m)}, depends on nothing that was '
+                   f'looked at, but the instrument is better than that: {millimetres(floor)}.')
     if not rest.above_noise:
         text = f'What remains, {millimetres(rest.rms_m)}, is at the level of the noise.'
         return tag('p', text)

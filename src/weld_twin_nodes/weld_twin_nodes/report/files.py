@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -17,15 +18,22 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_msgs_py.outputs import write_text
 
 from ..exports import write_all
+from ..joint_file import write_joint_motion
 from .page import report_page
 from .provenance import InputFile
 
 RESULT = 'diagnosis.json'
 PAGE = 'report.html'
+NEXT = 'next_experiment.yaml'
+"""The motion to measure next, where one decides; the trajectory generator runs it."""
 
 
 def write_results(directory: Path, diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> None:
-    """Write diagnosis.json, the page, and the model in every form."""
+    """Write diagnosis.json, the page, the model in every form, and what to measure next."""
+    wanted = diagnosis.next_experiment
+    if wanted is not None and wanted.get('motion') is not None:
+        write_joint_motion(directory / NEXT, wanted['motion'], wanted['sentence'])
+        diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': NEXT})
     write_text(directory / PAGE, report_page(diagnosis, inputs))
     write_all(directory, diagnosis.model)
     write_text(directory / RESULT, diagnosis_text(diagnosis, inputs))

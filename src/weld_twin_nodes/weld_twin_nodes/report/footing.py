@@ -8,11 +8,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from weld_twin_core import __version__
-from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.diagnosis.result import Diagnosis, Site
 
-from .html import Child, Html, section, table, tag
+from .html import Child, Html, joined, section, table, tag
 from .provenance import InputFile
+from .words import in_words
 
+_APART = ('kind', 'motion', 'cost', 'expected_separation_sigma')
+"""What programs need of a measurement, or the page says in words."""
 _ORDER = {'warning': 0, 'note': 1, 'ok': 2}
 
 
@@ -20,12 +23,35 @@ def next_section(diagnosis: Diagnosis) -> Html:
     """Return the measurement that would decide, or that none is needed."""
     wanted = diagnosis.next_experiment
     if wanted is not None:
-        content = tag('dl', *_entries(wanted), class_='pairs')
+        content = _wanted(wanted, _sites(diagnosis))
     elif diagnosis.status in ('ambiguous', 'unknown'):
         content = tag('p', 'No measurement that would decide has been found.')
     else:
         content = tag('p', 'No further measurement is needed for this verdict.')
     return section('What to measure next', content, id_='next')
+
+
+def _sites(diagnosis: Diagnosis) -> set[Site]:
+    """Return the sites that sentences may speak of."""
+    named = {site for group in diagnosis.indistinguishable for site in group}
+    return named | {candidate.site for candidate in diagnosis.candidates}
+
+
+def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
+    """Return what to measure, why, and what it takes."""
+    told = {'sentence', 'reason', *_APART}
+    cost, sigma = wanted.get('cost'), wanted.get('expected_separation_sigma')
+    rest = {key: value for key, value in wanted.items() if key not in told}
+    if cost:
+        rest['takes'] = f'about {cost:.0f} min'
+    if sigma:
+        rest['parts them by'] = f'{sigma:.0f} standard deviations, as far as can be foreseen'
+    lines = [
+        tag('p', in_words(wanted[key], sites), class_=class_)
+        for key, class_ in (('sentence', None), ('reason', 'note')) if wanted.get(key)
+    ]  # fmt: skip
+    entries = _entries(rest)
+    return joined([*lines, tag('dl', *entries, class_='pairs') if entries else None])
 
 
 def _entries(mapping: dict[str, Any]) -> list[Html]:

@@ -11,13 +11,14 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from .families import worth_doing
 from .html import Html, tag
 from .quantities import interval, millimetres, milliradians, odds, percent
-from .words import STATUS, verdict
+from .words import STATUS, found_name, listed, verdict
 
 _SURE_OF = {
     'identified': 'that the causes named are right',
     'ambiguous': 'that one of those named is right',
     'unknown': 'that the cause is none of those known',
 }
+_FEW = 3
 _FIRST_REAL_STAMP = 10**18
 """Stamps [ns] before 2001 count from something else than the epoch."""
 
@@ -58,9 +59,7 @@ def _figures(diagnosis: Diagnosis) -> Html:
     rows = [
         ('Gap', millimetres(gap.rms_m), f'RMS of {gap.samples} samples; '
          f'{millimetres(gap.max_m)} at most'),
-        ('Left over', millimetres(shrink.rms_after_m),
-         f'{percent(shrink.ratio)} of it on unseen data '
-         f'({interval(shrink)})'),
+        ('Left over', millimetres(shrink.rms_after_m), _left(diagnosis)),
         ('Noise floor', millimetres(gap.noise_floor_m), 'what the data cannot resolve'),
     ]  # fmt: skip
     if diagnosis.status in _SURE_OF:
@@ -74,6 +73,14 @@ def _figures(diagnosis: Diagnosis) -> Html:
     return tag('dl', *cells, class_='figures')
 
 
+def _left(diagnosis: Diagnosis) -> str:
+    shrink = diagnosis.shrink
+    if not diagnosis.model.found:
+        return 'on unseen data; no effect is in the twin'
+    with_what = '' if diagnosis.effects else ', with what fits best'
+    return f'{percent(shrink.ratio)} of it on unseen data{with_what} ({interval(shrink)})'
+
+
 def _turned(diagnosis: Diagnosis) -> str:
     turned = diagnosis.shrink.orientation_rad
     if turned is None or not diagnosis.effects:
@@ -85,4 +92,8 @@ def _actions(diagnosis: Diagnosis) -> Html | None:
     if not diagnosis.actions:
         return None
     items = [tag('li', action) for action in worth_doing(diagnosis)]
-    return tag('div', tag('h3', 'What to do'), tag('ul', *items), class_='actions')
+    title = 'What to do'
+    if diagnosis.status == 'ambiguous':
+        named = listed([found_name(found) for found in diagnosis.effects[:_FEW]])
+        title = f'What to do, should it be {named}'
+    return tag('div', tag('h3', title), tag('ul', *items), class_='actions')

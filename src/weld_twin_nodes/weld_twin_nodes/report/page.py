@@ -36,9 +36,9 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
 
     """
     body = tag(
-        'main', header(diagnosis), opening(diagnosis), seam_section(), where_section(diagnosis),
-        causes_section(diagnosis), shrink_section(diagnosis), next_section(diagnosis),
-        checks_section(diagnosis), inputs_section(inputs),
+        'main', header(diagnosis), opening(diagnosis), seam_section(diagnosis),
+        where_section(diagnosis), causes_section(diagnosis), shrink_section(diagnosis),
+        next_section(diagnosis), checks_section(diagnosis), inputs_section(inputs),
     )  # fmt: skip
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
     head = joined([

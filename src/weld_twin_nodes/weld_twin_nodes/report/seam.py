@@ -15,6 +15,14 @@ from .html import Html, section, tag
 
 _POINTS = 3000
 """Points on the page, over all recordings; more cannot be told apart on a screen."""
+_LINE = (
+    'The thin line is where the twin has the tool, the coloured one where it was measured, its '
+    'deviation enlarged.'
+)
+_STATIONS = (
+    'Each line goes from where the twin has the tool to a dot where it was measured, its '
+    'deviation enlarged.'
+)
 _SHOWN = 0.04
 """Part of the seam's extent that a large deviation is drawn at."""
 
@@ -74,8 +82,15 @@ def _stretch(measured: tuple[Array, ...], top: float) -> int:
     return int(power * max(step for step in (1, 2, 5) if step * power <= wanted * 1.0001))
 
 
-def seam_section() -> Html:
+def at_rest(diagnosis: Diagnosis) -> bool:
+    """Tell whether all that was recorded are stations at rest."""
+    return bool(diagnosis.recordings) and all(r.joints.static for r in diagnosis.recordings)
+
+
+def seam_section(diagnosis: Diagnosis) -> Html:
     """Return the two views; the page's script draws them."""
+    after = 'with the effects found' if diagnosis.model.found else 'the same, nothing was found'
+    stations = at_rest(diagnosis)
     panels = [
         tag(
             'figure', tag('figcaption', title),
@@ -83,7 +98,7 @@ def seam_section() -> Html:
         )
         for side, title, label in (
             ('before', 'Before: the twin as given', 'Seam coloured by deviation before'),
-            ('after', 'After: with the effects found', 'Seam coloured by deviation after'),
+            ('after', f'After: {after}', 'Seam coloured by deviation after'),
         )
     ]  # fmt: skip
     views = [
@@ -95,11 +110,10 @@ def seam_section() -> Html:
         tag('input', type='range', id_='stretch', min='0', max='1', step='0.01'),
     )  # fmt: skip
     return section(
-        'The seam', tag('div', *panels, class_='panels'),
+        'The stations' if stations else 'The seam', tag('div', *panels, class_='panels'),
         tag('div', tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
             tag('div', *views, class_='views'), slider, class_='controls'),
         tag('noscript', tag('p', 'The picture needs scripts switched on.')),
         id_='seam',
-        lead='The thin line is where the twin has the tool, the coloured one where it was '
-        'measured, its deviation enlarged. Drag to turn, scroll or pinch to zoom.',
+        lead=f'{_STATIONS if stations else _LINE} Drag to turn, scroll or pinch to zoom.',
     )  # fmt: skip

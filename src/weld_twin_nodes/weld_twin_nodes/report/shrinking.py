@@ -12,7 +12,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from .causes import leftover
 from .html import Html, section, tag
 from .quantities import interval, millimetres, percent
-from .seam import trusted
+from .seam import at_rest, trusted
 from .words import cause
 
 _STEPS = 12
@@ -26,9 +26,10 @@ def shrink_section(diagnosis: Diagnosis) -> Html:
     charts = [_chart(diagnosis, k) for k in range(min(len(diagnosis.traces.t), _RECORDINGS))]
     more = len(diagnosis.traces.t) - len(charts)
     note = tag('p', f'{more} more recordings are not drawn.', class_='note') if more > 0 else None
+    title = 'Deviation by station' if at_rest(diagnosis) else 'Deviation over time'
     return section(
         'How far it shrinks', _waterfall(diagnosis), tag('p', _judged(diagnosis)),
-        tag('h3', 'Deviation over time'), _key(), *charts, note, leftover(diagnosis), id_='shrink',
+        tag('h3', title), _key(), *charts, note, leftover(diagnosis), id_='shrink',
         lead='RMS gap as each effect is put into the twin in turn, each stretch of the recordings '
         'predicted from the others.',
     )  # fmt: skip
@@ -39,7 +40,7 @@ def _waterfall(diagnosis: Diagnosis) -> Html:
         (_readable(name), rms) for name, rms in diagnosis.shrink.steps)]
     if len(steps) > _STEPS + 1:
         skipped = len(steps) - _STEPS
-        steps = [*steps[:_STEPS], (f'{skipped} more effects', steps[-1][1])]
+        steps = [*steps[:_STEPS], (f'{skipped} more', steps[-1][1])]
     largest = max(*(rms for _, rms in steps), diagnosis.gap.noise_floor_m, 1e-12)
     rows, before = [], steps[0][1]
     for k, (name, rms) in enumerate(steps):
@@ -62,6 +63,8 @@ def _given(diagnosis: Diagnosis) -> float:
 
 def _judged(diagnosis: Diagnosis) -> str:
     shrink = diagnosis.shrink
+    if not diagnosis.model.found:
+        return f'No effect is in the twin, so nothing shrinks; judged on {shrink.held_out}.'
     left = f'{percent(shrink.ratio)} of the gap is left ({interval(shrink)})'
     if not _apart(diagnosis):
         return f'Judged by {shrink.held_out}, {left}.'

@@ -35,6 +35,9 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     for check in diagnosis.checks:
         if check.level == 'warning':
             console.print(f'[yellow]data:[/] {escape(check.sentence)}')
+    for recording in diagnosis.recordings:
+        for note in recording.notes:
+            console.print(f'[dim]note:[/] {escape(recording.name)}: {escape(note)}')
     for action in worth_doing(diagnosis):
         console.print(f'[bold]do:[/] {escape(action)}')
 

@@ -8,6 +8,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .html import Html, bars, section, tag
 from .quantities import millimetres, percent, seconds
+from .seam import at_rest
 from .words import REGIMES
 
 _VISIBLE = 0.005
@@ -17,7 +18,7 @@ def where_section(diagnosis: Diagnosis) -> Html:
     """Return the map first, then what it sums up to."""
     where = diagnosis.where
     parts = [
-        _part('By joint', bars([(n, s, percent(s)) for n, s in where.joints])),
+        _part('By joint', _joints(diagnosis)),
         _part('By regime', bars([
             (REGIMES.get(name, name), share, percent(share))
             for name, share in sorted(where.regimes.items(), key=lambda item: -item[1])
@@ -60,9 +61,19 @@ def _cell(share: float) -> Html:
     return tag('td', text, style=f'--share:{strength:.3f}', class_=class_)
 
 
+def _joints(diagnosis: Diagnosis) -> Html:
+    joints = diagnosis.where.joints
+    if diagnosis.effects and not any(share > 0.0 for _, share in joints):
+        return tag('p', 'What was found sits on no joint.', class_='note')
+    return bars([(name, share, percent(share)) for name, share in joints])
+
+
 def _directions(diagnosis: Diagnosis) -> Html:
-    direction = diagnosis.where.direction
+    direction = dict(diagnosis.where.direction)
     names = {'along_m': 'along the seam', 'across_m': 'across it', 'normal_m': 'along the tool'}
+    if at_rest(diagnosis):
+        direction = {key: value for key, value in direction.items() if key != 'along_m'}
+        names['across_m'] = 'across the tool'
     largest = max([*direction.values(), 1e-12])
     return bars([
         (names.get(key, key), value / largest, millimetres(value))

@@ -142,6 +142,8 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
         first = f'No effect in the library explains the gap of {size}.'
     structure = diagnosis.unexplained.structure
     if not structure:
+        if diagnosis.reasons and not diagnosis.unexplained.above_noise:
+            return first, in_words(diagnosis.reasons[0], ())
         return first, 'What remains is above the noise, but shows no simple dependence.'
     return first, f'What remains depends on {listed(structure[:_NAMED])}.'
 

@@ -34,6 +34,6 @@ def radians(value: float) -> str:
 
 def frame(step: Array) -> str:
     """Return a displacement [m] and a turn [rad] of a frame, shape (6,), in mm and degrees."""
-    moved = ', '.join(number(float(v) * 1e3) for v in step[:3])
-    turned = ', '.join(number(float(np.degrees(v))) for v in step[3:])
+    moved = ', '.join(f'{float(v) * 1e3:+.3f}' for v in step[:3])
+    turned = ', '.join(f'{float(np.degrees(v)):+.4f}' for v in step[3:])
     return f'({moved}) mm and ({turned}) deg about x, y, z'

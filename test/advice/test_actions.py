@@ -22,7 +22,7 @@ def said(robot, **entry):
          ['a = -424.400 mm', 'in place of -425.000 mm', '+0.600 mm']),
         ({'effect': 'link_twist', 'joint': 'elbow_joint', 'dalpha': -1e-3}, ['-0.0573 deg']),
         ({'effect': 'tool_pose', 'xyz': [1e-3, 0.0, -2e-3], 'rotvec': [0.0, 0.01, 0.0]},
-         ['(+1.00, 0, -2.00) mm', '(0, +0.573, 0) deg']),
+         ['(+1.000, +0.000, -2.000) mm', '(+0.0000, +0.5730, +0.0000) deg']),
         ({'effect': 'payload', 'mass': 2.1}, ['Enter a payload of 2.10 kg in place of 0.00 kg']),
         ({'effect': 'backlash', 'joint': 'shoulder_lift_joint', 'width': 5e-4},
          ['Service the gear of shoulder_lift_joint', '0.500 mrad']),

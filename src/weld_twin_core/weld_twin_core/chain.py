@@ -13,6 +13,7 @@ Inside, vectors are kept components first (see `vectors`); public results have t
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -161,6 +162,19 @@ def _modified_row(
     x, y = _turn(x, y, v['theta'])
     p = p + v['d'] * z
     return x, y, z, p, RowAxes(z_row, z_point, alpha_axis, start, y_row, start)
+
+
+def displaced_robot(robot: Robot, shift: Mapping[Channel, float]) -> Robot:
+    """Return the robot with displacements of rows, base and tool built in, one number each."""
+    rows = {key: getattr(robot, key).copy() for key in ROW_CHANNELS}
+    for (name, i), value in shift.items():
+        if name in rows:
+            rows[name][i] += value
+    arrays = {key: np.asarray(value) for key, value in shift.items()}
+    base, tool = base_frame(robot, arrays), tool_frame(robot, arrays)
+    return replace(
+        robot, **rows, T_world_base=transform(*base), T_flange_tool=transform(*tool)
+    )
 
 
 def forward(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:

@@ -11,14 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .arrays import Array
+from .chain import Channel, displaced_robot
 from .effects.base import View
 from .errors import DataError
 from .kernels.single import SinglePose
 from .memory import added, in_series
-from .poses import Poses
+from .poses import Poses, posed
 
 if TYPE_CHECKING:
     from .twin import Twin
+
+
+BESIDE = ('tau', 'pose')
+"""Channels that act through the joints and behind the chain, not within it."""
 
 
 class LiveTwin:
@@ -30,11 +35,23 @@ class LiveTwin:
     """
 
     def __init__(self, twin: Twin) -> None:
-        self.twin = twin
+        self._twin = twin
         self._single = SinglePose(twin.robot)
+        self._others: dict[Channel, float] | None = None
+        self._changed: SinglePose | None = None
         self._states: dict[tuple[Any, ...], Any] = {}
         self._start = 0.0
         self._last = -np.inf
+
+    @property
+    def twin(self) -> Twin:
+        """Return the robot with its effects."""
+        return self._twin
+
+    @twin.setter
+    def twin(self, twin: Twin) -> None:
+        self._twin = twin
+        self._others = self._changed = None
 
     def reset(self) -> None:
         """Forget the motion so far, as after a jump back in time."""
@@ -71,12 +88,28 @@ class LiveTwin:
         if not self.twin.effects:
             return q.copy(), self._nominal(q)
         view = self._remembered(self._view(t, q, qd, wrench, temperature, wrench_frame))
-        run = self.twin.pointwise(view)
+        view = self.twin.displaced(view)
         joints = view.q[0].copy()
-        for (name, i), value in run.view.shift.items():
+        others = {}
+        for (name, i), value in view.shift.items():
             if name == 'q':
                 joints[i] += np.ravel(value)[0]
-        return joints, Poses(run.poses.position[0], run.poses.rotation[0])
+            elif name not in BESIDE:
+                others[name, i] = float(np.ravel(value)[0])
+        return joints, self._pose(view, joints, others)
+
+    def _pose(self, view: View, joints: Array, others: dict[Channel, float]) -> Poses:
+        """Return the pose; displacements that stay are built into the chain the second time."""
+        if others != self._others:
+            self._others, self._changed = others, None
+            chain = Poses(view.frames.position, view.frames.rotation)
+        else:
+            if self._changed is None:
+                self._changed = SinglePose(displaced_robot(self.twin.robot, others))
+            pose = self._changed(joints)[None]
+            chain = Poses(pose[:, :3, 3], pose[:, :3, :3])
+        poses = posed(view, chain)
+        return Poses(poses.position[0], poses.rotation[0])
 
     def _checked(self, t: float, q: Array) -> Array:
         robot = self.twin.robot

@@ -18,10 +18,9 @@ from .errors import ModelError
 from .live import LiveTwin
 from .memory import Tangent, indexed, rates, run_all
 from .picker import Picker
-from .poses import Poses
+from .poses import Poses, posed
 from .recording import JointMotion, Recording
 from .robot import Robot
-from .rotation import rotation_matrix
 
 __all__ = ['Component', 'Evaluation', 'LiveTwin', 'Poses', 'Twin', 'load_torque']
 
@@ -219,6 +218,16 @@ class Twin:
 
         ``tangents`` are the derivatives of what came before; left out, none are computed.
         """
+        view, ordered = self._stages(view, tangents)
+        return Evaluation(view, view.frames, posed(view), ordered)
+
+    def displaced(self, view: View) -> View:
+        """Run the stages without memory and leave the poses to the caller."""
+        return self._stages(view, None)[0]
+
+    def _stages(
+        self, view: View, tangents: Sequence[Tangent] | None
+    ) -> tuple[View, tuple[Tangent, ...]]:
         slopes: dict[Channel, Any] = {}
         own: list[Tangent] = []
         for stage in POINTWISE:
@@ -233,8 +242,7 @@ class Twin:
             for shift in [effect.displace(view) for _, effect in effects]:
                 view = view.displaced(shift, keep_frames=stage in (Stage.LOAD, Stage.POSE))
         before = [(k, c, _sloped(shift, slopes)) for k, c, shift in tangents or ()]
-        ordered = tuple(sorted(before + own, key=lambda item: item[:2]))
-        return Evaluation(view, view.frames, _posed(view), ordered)
+        return view, tuple(sorted(before + own, key=lambda item: item[:2]))
 
     def live(self) -> LiveTwin:
         """Return a stepper that gives the same poses one joint state at a time."""
@@ -264,20 +272,3 @@ def _clock_view(robot: Robot, motion: JointMotion) -> View:
 
 def _sloped(shift: Shift, slopes: dict[Channel, Any]) -> Shift:
     return {key: value * (1.0 + slopes.get(key, 0.0)) for key, value in shift.items()}
-
-
-def _posed(view: View) -> Poses:
-    """Return the poses of the frames, displaced on the 'pose' channels."""
-    chain = view.frames
-    position, rotation = chain.position, chain.rotation
-    error = [view.shift.get(('pose', k)) for k in range(6)]
-    if any(e is not None for e in error[:3]):
-        position = position + _stack(error[:3])
-    if any(e is not None for e in error[3:]):
-        rotation = rotation_matrix(_stack(error[3:])) @ rotation
-    return Poses(position, rotation)
-
-
-def _stack(parts: list[Any]) -> Array:
-    filled = [np.asarray(0.0 if part is None else part) for part in parts]
-    return np.stack(np.broadcast_arrays(*filled), axis=-1)

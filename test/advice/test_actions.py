@@ -26,6 +26,8 @@ def said(robot, **entry):
         ({'effect': 'payload', 'mass': 2.1}, ['Enter a payload of 2.10 kg in place of 0.00 kg']),
         ({'effect': 'backlash', 'joint': 'shoulder_lift_joint', 'width': 5e-4},
          ['Service the gear of shoulder_lift_joint', '0.500 mrad']),
+        ({'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4, 'form': 'coast'},
+         ['elbow_joint always from one side', 'coasts across 0.500 mrad', 'ahead']),
         ({'effect': 'time_delay', 'delay': 0.0123}, ['Fix the clock', '12.3 ms late']),
         ({'effect': 'time_delay', 'delay': -0.0123}, ['12.3 ms early']),
         ({'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 2e-5},

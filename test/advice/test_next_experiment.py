@@ -10,11 +10,12 @@ import pytest
 from measured_cells import asked, moving, recorded, stations
 
 from weld_twin_core import catalog
-from weld_twin_core.diagnosis.advice import next_experiment
+from weld_twin_core.diagnosis.advice import experiment, next_experiment, separation
 from weld_twin_core.diagnosis.fit import fit
 from weld_twin_core.diagnosis.problem import Problem, Scale
 from weld_twin_core.effects import effects_from_list
-from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Recording, Signal
 
 NOISE = 2e-5
 
@@ -114,6 +115,35 @@ def test_an_unknown_cause_asks_for_data_of_the_other_kind(ur5, kind, wanted):
     problem, model = at_hand(ur5, kind)
     found = next_experiment(problem, model, [()], known_scale(problem))
     assert found['kind'] == wanted and found['expected_separation_sigma'] is None
+
+
+@pytest.mark.parametrize('kind', [stations, moving])
+def test_what_needs_temperature_and_wrench_is_foreseen_with_those_recorded(ur5, kind):
+    problem, model = at_hand(ur5, kind)
+    t = problem.recordings[0].joints.t
+    sides = {
+        'temperature': Signal(t, np.linspace(25.0, 31.0, t.size)),
+        'wrench': Signal(t, np.tile([0.0, 0.0, -40.0, 0.0, 0.0, 0.0], (t.size, 1))),
+    }
+    problem = replace(problem, recordings=(replace(problem.recordings[0], **sides),))
+    found = proposed(
+        ur5, problem, model, {'effect': 'thermal_growth', 'coefficient': 1e-5},
+        {'effect': 'cartesian_compliance', 'compliance': [1e-6, 1e-6, 1e-6]},
+    )  # fmt: skip
+    assert found['motion'] is not None and 'skipped' not in found
+
+
+def test_a_measurement_that_cannot_be_foreseen_is_skipped_with_the_reason(ur5, monkeypatch):
+    def ahead(problem, candidate, *rest):
+        if candidate.kind == 'speed_sweep':
+            raise DataError('nothing is known of it')
+        return separation.ahead(problem, candidate, *rest)
+
+    monkeypatch.setattr(experiment, 'ahead', ahead)
+    late = {'effect': 'time_delay', 'delay': 5e-3}
+    found = proposed(ur5, *at_hand(ur5, moving), late, OFFSET)
+    assert found['kind'] != 'speed_sweep'
+    assert found['skipped'] == ['speed_sweep: nothing is known of it']
 
 
 @pytest.mark.parametrize('name', ['ur5', 'abb_irb120', 'franka_panda'])

@@ -17,6 +17,7 @@ from weld_twin_core.recording import JointMotion
 from weld_twin_core.robot import Robot
 from weld_twin_msgs_py.convert import NANOSECONDS
 
+from .joint_file import read_joint_motion, through_stations
 from .path_file import read_path
 
 
@@ -49,6 +50,27 @@ def plan_motion(
         return plan(robot, default_seam(robot, path), law, rate, fit=not speed)
     seam, torch = read_path(path)
     return plan(robot, seam, law, rate, torch=torch, fit=not speed)
+
+
+def joint_motion(
+    robot: Robot, path: str, profile: str = 'smooth', rate: float = 125.0, speed: float = 0.0
+) -> JointMotion:
+    """
+    Return the motion of a file of kind 'joints', or the planned one along a seam.
+
+    Raises
+    ------
+    DataError, PathError
+        The file cannot be read, or its motion is not one for this robot.
+
+    """
+    given = None if path in KINDS else read_joint_motion(path, robot)
+    if given is None:
+        return plan_motion(robot, path, profile, rate, speed).motion
+    t, q, stations = given
+    if stations:
+        return through_stations(robot, t, q, rate)
+    return sampled(robot, JointMotion(t - t[0], q), rate)
 
 
 def plan_through(

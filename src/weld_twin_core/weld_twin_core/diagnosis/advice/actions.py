@@ -111,6 +111,12 @@ def _joint_coupling(effect: Effect, robot: Robot) -> str:
 
 
 def _backlash(effect: Effect, robot: Robot) -> str:
+    if effect.form == 'coast':  # type: ignore[attr-defined]
+        return (
+            f'Approach stations with {effect.site} always from one side, or preload its gear: '
+            f'where it stops it coasts across {radians(_value(effect, "width"))} of play and '
+            'rests ahead of its command.'
+        ).replace('+', '')
     return (
         f'Service the gear of {effect.site}: it has {radians(_value(effect, "width"))} of play; '
         'until then approach seams from one side.'

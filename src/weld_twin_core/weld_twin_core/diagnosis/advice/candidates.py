@@ -78,7 +78,8 @@ def _as_it_is(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate
     still = all(r.joints.static for r in problem.recordings)
     yield Candidate(
         'speed_sweep', 'Run one path forth and back at three speeds and record joints and tool '
-        'all the way.', EXTRA if still else 5.0, Recording(NAME, sweep(problem, now.robot)), now,
+        'all the way.', EXTRA if still else 5.0, _with_sides(problem, sweep(problem, now.robot)),
+        now,
     )  # fmt: skip
     yield Candidate(
         'stations', f'Measure {len(spread)} stations at rest, spread over a wider part of the '
@@ -125,10 +126,24 @@ def _changed(problem: Problem, now: Model, few: Array) -> Iterator[Candidate]:
 def _stations(problem: Problem, q: Array, seconds: float = 15.0, rise: float = 0.0) -> Recording:
     """Return stations every so many seconds, while it grows warmer by a rise [K]."""
     t = seconds * np.arange(len(q), dtype=np.float64)
+    recording = _with_sides(problem, JointMotion(t, q, static=True))
+    if recording.temperature is None:
+        return recording
+    ramp = recording.temperature.value[0] + np.linspace(0.0, rise, t.size)
+    return replace(recording, temperature=Signal(t, ramp))
+
+
+def _with_sides(problem: Problem, joints: JointMotion) -> Recording:
+    """Return a recording of a motion, as warm and as loaded as those at hand were on average."""
+    ends = joints.t[[0, -1]]
     warm = [r.temperature.value.mean() for r in problem.recordings if r.temperature is not None]
-    ramp = np.linspace(0.0, rise, t.size, dtype=np.float64)
-    heat = Signal(t, np.mean(warm) + ramp) if warm else None
-    return Recording(NAME, JointMotion(t, q, static=True), temperature=heat)
+    load = [(r.wrench.value.mean(axis=0), r.wrench_frame) for r in problem.recordings
+            if r.wrench is not None]  # fmt: skip
+    heat = Signal(ends, np.full(2, np.mean(warm))) if warm else None
+    if not load:
+        return Recording(NAME, joints, temperature=heat)
+    wrench = Signal(ends, np.stack([load[0][0]] * 2))
+    return Recording(NAME, joints, wrench=wrench, wrench_frame=load[0][1], temperature=heat)
 
 
 def _range(problem: Problem, robot: Robot) -> tuple[Array, Array]:

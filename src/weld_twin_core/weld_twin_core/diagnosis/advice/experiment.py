@@ -12,6 +12,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.base import Effect
+from ...errors import TwinError
 from ...recording import JointMotion
 from ..problem import Model, Problem, Scale
 from .candidates import Candidate, candidates
@@ -46,7 +47,8 @@ def next_experiment(
     dict or None
         'kind', 'sentence', 'reason', 'expected_separation_sigma' (None where nothing is compared),
         'cost' [min] and 'motion': 'static', 'joint_names', 't' [s] and 'q' [rad, m]; 'motion' is
-        None when no motion decides.
+        None when no motion decides. 'skipped' says which measurements could not be foreseen.
+        None when none could.
 
     """
     options = list(candidates(problem, model))
@@ -54,10 +56,28 @@ def next_experiment(
         return _entry(_widening(problem, options), _UNKNOWN, None, model)
     now = at_hand(problem, model, alternatives, scale)
     before = separations(now, None)
-    tables = []
+    tried, tables, skipped = [], [], []
     for option in options:
-        both = separations(now, ahead(problem, option, alternatives, scale))
+        try:
+            both = separations(now, ahead(problem, option, alternatives, scale))
+        except TwinError as error:
+            # Data of another kind may lack what an explanation needs; the others still count.
+            skipped.append(f'{option.kind}: {error}')
+            continue
+        tried.append(option)
         tables.append(np.sqrt(np.maximum(both**2 - before**2, 0.0)))
+    chosen = _chosen(alternatives, model, tried, tables, before) if tried else None
+    return chosen | {'skipped': skipped} if chosen and skipped else chosen
+
+
+def _chosen(
+    alternatives: Sequence[tuple[Effect, ...]],
+    model: Model,
+    options: Sequence[Candidate],
+    tables: Sequence[Array],
+    before: Array,
+) -> dict[str, Any]:
+    """Return the cheapest measurement that decides nearly as much as the best one."""
     pairs = list(combinations(range(len(alternatives)), 2))
     scores = np.array(
         [sum(min(table[p], DECIDES) for p in pairs if table[p] > NOTHING) for table in tables]
@@ -65,7 +85,7 @@ def next_experiment(
     if scores.max() == 0.0:
         return _outside(alternatives[0], alternatives[1])
     enough = np.flatnonzero(scores >= WORTH * scores.max())
-    best = min(enough, key=lambda k: options[k].cost)
+    best = min(enough.tolist(), key=lambda k: float(options[k].cost))
     pair = max(pairs, key=lambda p: tables[best][p])
     return _entry(
         options[best], _reason(alternatives, pair, before, tables[best]),

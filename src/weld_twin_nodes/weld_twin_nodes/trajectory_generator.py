@@ -24,7 +24,7 @@ from weld_twin_msgs_py.topics import (
 
 from .cell_node import CellNode
 from .frames import WORLD
-from .motions import backward, plan_motion, plan_through, sampled, stamps, thinned
+from .motions import backward, joint_motion, plan_through, sampled, stamps, thinned
 from .pump import Pump
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .running import run
@@ -84,7 +84,7 @@ class TrajectoryGenerator(CellNode):
     def _take_source(self) -> None:
         source = self.setting('source')
         if source == 'plan':
-            self._run(plan_motion(self._robot, self.setting('path'), *self._law).motion)
+            self._run(joint_motion(self._robot, self.setting('path'), *self._law))
         elif source == 'joint_trajectory':
             self.listen(JOINT_TRAJECTORY, self._on_trajectory, required=True)
         elif source == 'path':

@@ -140,25 +140,18 @@ class SeamDraws:
         squares: Array = away[0]
         return squares
 
-    def _pieces(self, draws: DhDraws) -> tuple[Array, Array, Array]:
-        """
-        Return the weights of both pieces and the first link.
-
-        The near piece is (F, 3, 4, D), the far one (F, 3, 1, D); the link, shape (6, D),
-        is d, a, and the cosine and sine of alpha and of theta.
-        """
+    def _pieces(self, draws: DhDraws) -> tuple[Array, Array]:
+        """Return the weights of both pieces: frames (3, F, 4, D) and tips (3, F, 1, D)."""
         count, n = draws.theta.shape
         rows = _Rows(draws)
         tool = self.robot.T_flange_tool[:3, 3]
-        point = np.broadcast_to(tool[:, None, None], (3, 1, count))[None]
-        far = rows.carried(point, range(n - 1, SPLIT - 1, -1))
-        start = np.zeros((1, 3, 4, count))
-        start[0, [0, 1, 2], [0, 1, 2]] = 1.0
-        near = rows.carried(start, range(SPLIT - 1, 0, -1))
-        turns = rows.alpha_cosine[0], rows.alpha_sine[0], rows.cosine[0], rows.sine[0]
-        return near, far, np.stack([rows.d[0], rows.a[0], *turns])
+        tip = np.broadcast_to(tool[:, None, None, None], (3, 1, 1, count))
+        far = rows.carried(tip, range(n - 1, SPLIT - 1, -1))
+        start = np.zeros((3, 1, 4, count))
+        start[[0, 1, 2], 0, [0, 1, 2]] = 1.0
+        return rows.linked(rows.carried(start, range(SPLIT - 1, 0, -1)), 0), far
 
-    def _points(self, near: Array, far: Array, link: Array) -> Array:
+    def _points(self, near: Array, far: Array) -> Array:
         """Return tool points after the first joint's turn was taken away, shape (3, D, S)."""
         tip = _on_features(far, self._far)[:, 0]
         frame = _on_features(near, self._near)
@@ -166,11 +159,6 @@ class SeamDraws:
         for k in range(3):
             frame[:, k] *= tip[k]
             out += frame[:, k]
-        d, a, alpha_cosine, alpha_sine, cosine, sine = link[..., None]
-        out[0] += a
-        _turn(out[1], out[2], alpha_cosine, alpha_sine)
-        out[2] += d
-        _turn(out[0], out[1], cosine, sine)
         return out
 
 
@@ -197,30 +185,31 @@ class _Rows:
         """
         Apply Rz(theta) Tz(d) Tx(a) Rx(alpha) of row i, the joint at zero.
 
-        ``vectors`` are shape (features, 3, k, D); the last of the k is a point, the others are
+        ``vectors`` are shape (3, features, k, D); the last of the k is a point, the others are
         directions.
         """
-        x, y, z = (vectors[:, k] for k in range(3))
+        x, y, z = vectors
         c, s = self.alpha_cosine[i], self.alpha_sine[i]
         out = np.empty_like(vectors)
-        np.subtract(c * y, s * z, out=out[:, 1])
-        np.add(s * y, c * z, out=out[:, 2])
-        out[0, 2, -1] += self.d[i]
-        out[:, 0] = x
+        np.subtract(c * y, s * z, out=out[1])
+        np.add(s * y, c * z, out=out[2])
+        out[2, 0, -1] += self.d[i]
+        out[0] = x
         out[0, 0, -1] += self.a[i]
-        _turn(out[:, 0], out[:, 1], self.cosine[i], self.sine[i])
+        _turn(out[0], out[1], self.cosine[i], self.sine[i])
         return out
 
     def carried(self, vectors: Array, rows: range) -> Array:
         """Return vectors before some rows, on the features (1, c, s) of their joints."""
         for i in rows:
-            fixed = self.linked(vectors, i)
-            vectors = np.zeros((3, *fixed.shape))
-            vectors[0, :, 2] = fixed[:, 2]
-            vectors[1, :, :2] = fixed[:, :2]
-            np.negative(fixed[:, 1], out=vectors[2, :, 0])
-            vectors[2, :, 1] = fixed[:, 0]
-            vectors = vectors.reshape(-1, *fixed.shape[1:])
+            x, y, z = self.linked(vectors, i)
+            _, features, *rest = vectors.shape
+            vectors = np.zeros((3, 3, features, *rest))
+            vectors[2, 0] = z
+            vectors[0, 1], vectors[1, 1] = x, y
+            np.negative(y, out=vectors[0, 2])
+            vectors[1, 2] = x
+            vectors = vectors.reshape(3, 3 * features, *rest)
         return vectors
 
 
@@ -259,7 +248,7 @@ def _features(q: Array) -> Array:
 
 
 def _on_features(weights: Array, features: Array) -> Array:
-    """Return weights (F, 3, k, D) applied to features (F, S), shape (3, k, D, S)."""
-    flat = weights.reshape(len(weights), -1)
-    found: Array = flat.T @ features
-    return found.reshape(*weights.shape[1:], -1)
+    """Return weights (3, F, k, D) applied to features (F, S), shape (3, k, D, S)."""
+    flat = weights.reshape(*weights.shape[:2], -1)
+    found: Array = flat.swapaxes(1, 2) @ features
+    return found.reshape(3, *weights.shape[2:], -1)

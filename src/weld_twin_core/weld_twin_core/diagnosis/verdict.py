@@ -31,8 +31,11 @@ CROWD = 3
 CARRIED = 1.3
 """What remains on a held-out motion over what remains on unseen stretches of those fitted: beyond
 this the model does not carry over, as a cause would that was found."""
-RISE = 0.25
-"""Rise above the floor, as a share of it, that halves the belief."""
+RISE, SHARE = 0.25, 0.12
+"""Rise above the floor, as a share of it, and as a share of the gap, that together halve the
+belief: a large gap leaves more of the physics that no model has, a small one more of the noise."""
+CARRIED_SHARE = 0.1
+"""Share of the gap that a model may leave on any motion before it is said not to carry over."""
 STACKED = 0.75
 """Belief left when two effects at rest sit on one joint; a judgement."""
 CALIBRATION = 0.985
@@ -92,7 +95,19 @@ class Evidence:
     @property
     def carried(self) -> bool:
         """Return whether the model does on a held-out motion what it does on those fitted."""
-        return self.rise < ABOVE - 1.0 or self.after < CARRIED * self.fitted
+        return (
+            self.rise < ABOVE - 1.0
+            or self.after < CARRIED * self.fitted
+            or self.share < CARRIED_SHARE
+        )
+
+    @property
+    def share(self) -> float:
+        """Return what remains above the floor as a share of the gap."""
+        if not self.independent:
+            return 0.0
+        gap = max(self.gap**2 - self.floor**2, 1e-18)
+        return float(np.sqrt(max(self.after**2 - self.floor**2, 0.0) / gap))
 
     @property
     def left(self) -> float:
@@ -141,7 +156,7 @@ def decide(evidence: Evidence) -> Verdict:
     confidence = float(np.prod(mass)) * complete * CALIBRATION
     if _stacked(sets):
         confidence *= STACKED
-    confidence /= 1.0 + (evidence.rise / RISE) ** 2
+    confidence /= 1.0 + min(evidence.rise / RISE, evidence.share / SHARE) ** 2
     reasons = tuple(_alike(slot, chosen) for slot, chosen in zip(evidence.slots, sets, strict=True)
                     if len(chosen) > 1)  # fmt: skip
     status = 'ambiguous' if reasons else 'identified'

@@ -22,5 +22,5 @@ def salib(module: str) -> Any:
         return import_module(f'SALib.{module}')
     except ImportError:
         raise DataError(
-            'Sobol and Morris indices need SALib; install it with: pip install SALib'
+            'Morris measures need SALib; install it with: pip install SALib'
         ) from None

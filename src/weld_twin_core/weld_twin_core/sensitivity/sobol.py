@@ -3,8 +3,8 @@
 """
 Sobol indices: which error the scatter of the deviation comes from, alone and with the others.
 
-SALib estimates the indices. Its seeds and its silence about results that are not numbers are taken
-care of here.
+Design, estimators and intervals are those of SALib, in whole-array form; results that are not
+numbers are refused.
 
 References
 ----------
@@ -20,13 +20,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from ..arrays import Array
 from ..errors import DataError
+from ..kernels.saltelli import base_pair, mixed, sobol_estimates, sobol_half_widths
 from .evaluate import Function
 from .outcome import refuse_unfinite
-from .salib import salib
 
 CONFIDENCE = 0.95
 SETTLED = 0.05
@@ -125,22 +124,11 @@ class SobolDesign:
         """Return what gets an index: the inputs, or the groups in order of appearance."""
         return tuple(dict.fromkeys(self.groups)) if self.groups else self.names
 
-    def _problem(self) -> dict[str, Any]:
-        bounds = [[0.0, 1.0]] * len(self.names)
-        problem = {'num_vars': len(self.names), 'names': list(self.names), 'bounds': bounds}
-        if self.groups:
-            problem['groups'] = list(self.groups)
-        return problem
-
     def samples(self) -> Array:
         """Return probabilities of every input, shape (N (G + 2), P)."""
         inputs = len(self.names)
-        # The layout SALib's estimator expects; its own sampler fills it one number at a time.
-        base = qmc.Sobol(2 * inputs, seed=self.seed).random(self.base_samples)
-        one, other = base[:, :inputs], base[:, inputs:]
-        groups = np.array(self.groups or self.names)
-        blocks = [one, *(np.where(groups == g, other, one) for g in self.labels), other]
-        return np.stack(blocks, axis=1).reshape(-1, inputs)
+        first, second = base_pair(inputs, self.base_samples, self.seed)
+        return mixed(first, second, self.groups).reshape(-1, inputs)
 
     def indices(self, results: Array) -> SobolIndices:
         """
@@ -161,24 +149,17 @@ class SobolDesign:
         refuse_unfinite(values, 'Sobol indices')
         if np.ptp(values) == 0.0:
             raise DataError('the result is the same in all runs; there is no scatter to share out')
-        last = self._analyse(values)
-        before = self._analyse(values[: values.size // 2], resamples=2)  # its intervals: unused
-        change = float(np.abs(last['ST'] - before['ST']).max())
-        settled = max(change, float(last['ST_conf'].max())) < SETTLED
-        return SobolIndices(
-            self.labels, last['S1'], last['S1_conf'], last['ST'], last['ST_conf'],
-            self.base_samples, values.size, float(values.mean()), float(values.std()), change,
-            settled, self.seed,
-        )  # fmt: skip
-
-    def _analyse(self, values: Array, resamples: int = 100) -> dict[str, Array]:
-        # SALib takes the seed 0 for no seed; a generator it takes for what it is.
+        runs = values.reshape(self.base_samples, block)
+        first, total = sobol_estimates(runs)
         rng = np.random.default_rng(self.seed)
-        found = salib('analyze.sobol').analyze(
-            self._problem(), values, calc_second_order=False, conf_level=CONFIDENCE, seed=rng,
-            num_resamples=resamples,
-        )
-        return {key: np.asarray(value) for key, value in found.items()}
+        first_half, total_half = sobol_half_widths(runs, CONFIDENCE, rng)
+        before = sobol_estimates(runs[: self.base_samples // 2])[1]
+        change = float(np.abs(total - before).max())
+        settled = max(change, float(total_half.max())) < SETTLED
+        return SobolIndices(
+            self.labels, first, first_half, total, total_half, self.base_samples, values.size,
+            float(values.mean()), float(values.std()), change, settled, self.seed,
+        )  # fmt: skip
 
 
 def sobol_indices(

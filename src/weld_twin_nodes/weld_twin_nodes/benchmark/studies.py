@@ -11,7 +11,12 @@ from scipy.special import ndtri
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.kernels.draws import DhDraws, SeamDraws
-from weld_twin_core.kernels.saltelli import saltelli_design, sobol_estimates
+from weld_twin_core.kernels.saltelli import (
+    base_pair,
+    mixed,
+    sobol_estimates,
+    sobol_half_widths,
+)
 from weld_twin_core.robot import Robot
 
 from .arms import DH_KEYS, SIZE, random_positions, smooth_motion, turn_x, turn_z
@@ -23,6 +28,8 @@ BASE = 1024
 FEW = 16
 """Draws the peer is timed on; every draw costs it the same."""
 EXACT = 1e-12
+CONFIDENCE = 0.95
+ESTIMATES = ('S1', 'ST', 'S1_conf', 'ST_conf')
 
 
 def studies(robot: Robot, draws: int, base: int, with_pinocchio: bool) -> Iterator[Workload]:
@@ -33,15 +40,14 @@ def studies(robot: Robot, draws: int, base: int, with_pinocchio: bool) -> Iterat
     yield _sobol(robot, base, with_pinocchio)
 
 
-def drawn(robot: Robot, unit: Array) -> DhDraws:
-    """Return normal draws of all DH values from probabilities, shape (D, 4 n)."""
-    parts = np.split(SIZE * ndtri(unit), len(DH_KEYS), axis=1)
+def drawn(robot: Robot, normal: Array) -> DhDraws:
+    """Return draws of all DH values from standard normal ones, shape (D, 4 n)."""
+    parts = np.split(SIZE * normal, len(DH_KEYS), axis=1)
     return DhDraws(*(getattr(robot, k) + part for k, part in zip(DH_KEYS, parts, strict=True)))
 
 
 def _monte_carlo(robot: Robot, q: Array, where: str, draws: int, with_pinocchio: bool) -> Workload:
-    unit = np.random.default_rng(4).random((draws, 4 * robot.n))
-    some = drawn(robot, unit)
+    some = drawn(robot, np.random.default_rng(4).normal(size=(draws, 4 * robot.n)))
 
     def own() -> Array:
         return SeamDraws(robot, q).largest(some)
@@ -96,16 +102,17 @@ def _sobol(robot: Robot, base: int, with_pinocchio: bool) -> Workload:
     runs = base * (inputs + 2)
     q = smooth_motion(robot, POINTS)
 
-    def own() -> tuple[Array, Array]:
-        unit = saltelli_design(inputs, base, seed=1).reshape(runs, inputs)
-        largest = SeamDraws(robot, q).largest(drawn(robot, unit))
-        return sobol_estimates(largest.reshape(base, inputs + 2))
+    def own() -> tuple[Array, ...]:
+        first, second = (ndtri(part) for part in base_pair(inputs, base, seed=1))
+        draws = drawn(robot, mixed(first, second).reshape(runs, inputs))
+        results = SeamDraws(robot, q).largest(draws).reshape(base, inputs + 2)
+        rng = np.random.default_rng(1)
+        return *sobol_estimates(results), *sobol_half_widths(results, CONFIDENCE, rng)
 
     contenders = [Contender(OWN, own, runs)]
     if with_pinocchio:
-        unit = saltelli_design(inputs, FEW, seed=1)[:, 0]
+        few = drawn(robot, ndtri(base_pair(inputs, FEW, seed=1)[0]))
         peer = rebuilding(robot, q)
-        few = drawn(robot, unit)
         gap = np.abs(peer(few) - SeamDraws(robot, q).largest(few)).max()
         contenders.append(Contender('pinocchio', lambda: peer(few), FEW, float(gap)))
         contenders.append(_salib(robot, q, base, own()))
@@ -116,7 +123,7 @@ def _sobol(robot: Robot, base: int, with_pinocchio: bool) -> Workload:
     )  # fmt: skip
 
 
-def _salib(robot: Robot, q: Array, base: int, wanted: tuple[Array, Array]) -> Contender:
+def _salib(robot: Robot, q: Array, base: int, wanted: tuple[Array, ...]) -> Contender:
     """Return SALib's part: the design and the estimates."""
     from SALib.analyze import sobol as analyze
     from SALib.sample import sobol as sample
@@ -131,7 +138,7 @@ def _salib(robot: Robot, q: Array, base: int, wanted: tuple[Array, Array]) -> Co
     def estimates(results: Array) -> dict[str, Array]:
         return analyze.analyze(problem, results, calc_second_order=False, seed=1)
 
-    results = SeamDraws(robot, q).largest(drawn(robot, design()))
+    results = SeamDraws(robot, q).largest(drawn(robot, ndtri(design())))
     found = estimates(results)
-    gap = max(np.abs(found[k] - v).max() for k, v in zip(('S1', 'ST'), wanted, strict=True))
+    gap = max(np.abs(found[k] - v).max() for k, v in zip(ESTIMATES, wanted, strict=True))
     return Contender('SALib', lambda: (design(), estimates(results)), results.size, float(gap))

@@ -48,7 +48,8 @@ def test_rivals_as_probable_are_named_together_and_counted_together():
     verdict = decide(evidence((slot((PLAY, 0.6), (OFFSET, 0.395), (Site('drift', None), 0.005)),)))
     assert verdict.status == 'ambiguous'
     assert verdict.sets == ((PLAY, OFFSET),)
-    assert 0.95 < verdict.confidence < 0.995
+    alone = decide(evidence((slot((PLAY, 0.995)),)))
+    assert verdict.confidence == pytest.approx(alone.confidence)
 
 
 def test_no_effect_and_nothing_left_is_none():
@@ -87,7 +88,7 @@ def test_belief_falls_as_what_remains_stands_above_the_floor():
     beliefs = [decide(evidence((slot((PLAY, 1.0)),), after=a)).confidence
                for a in (3.5e-5, 3.8e-5, 4.4e-5, 5e-5)]  # fmt: skip
     assert beliefs == sorted(beliefs, reverse=True)
-    assert beliefs[0] > 0.95
+    assert beliefs[0] > 0.9
     assert beliefs[-1] < 0.5
 
 

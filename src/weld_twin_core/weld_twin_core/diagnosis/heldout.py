@@ -159,7 +159,7 @@ class Unseen:
 
     def _index(self, kept: Sequence[int]) -> Index:
         """Return the columns of the frames and of some effects."""
-        parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in kept]
+        parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in sorted(kept)]
         return np.concatenate([np.arange(self.frames), *parts]).astype(int)
 
     def _spans(self) -> list[tuple[int, int]]:

@@ -31,15 +31,16 @@ CROWD = 3
 CARRIED = 1.3
 """What remains on a held-out motion over what remains on unseen stretches of those fitted: beyond
 this the model does not carry over, as a cause would that was found."""
-RISE, SHARE = 0.25, 0.12
+RISE, SHARE = 0.2, 0.12
 """Rise above the floor, as a share of it, and as a share of the gap, that together halve the
 belief: a large gap leaves more of the physics that no model has, a small one more of the noise."""
 CARRIED_SHARE = 0.1
 """Share of the gap that a model may leave on any motion before it is said not to carry over."""
 STACKED = 0.75
 """Belief left when two effects at rest sit on one joint; a judgement."""
-CALIBRATION = 0.985
-"""Belief left where all evidence agrees: no model is the robot; a judgement."""
+CALIBRATION = 0.95
+"""Belief left where all evidence agrees: no library is complete, and on some motions a cause that
+it lacks moves the tool exactly as one that it holds."""
 DOUBTED = 0.75
 """Belief in 'unknown' where effects fit but are no plausible explanation; a judgement."""
 
@@ -170,7 +171,7 @@ def _none(evidence: Evidence) -> Verdict:
             'nothing is found, but what remains is not spread as noise is, and nothing on these '
             'recordings shows the noise by itself: repeat some poses',
         ))  # fmt: skip
-    return Verdict('none', 0.97, (), ('the gap does not rise above the noise',))
+    return Verdict('none', CALIBRATION, (), ('the gap does not rise above the noise',))
 
 
 def _doubt(evidence: Evidence) -> str | None:

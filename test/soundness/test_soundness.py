@@ -3,6 +3,7 @@
 """Each way to spoil data is found and named; sound data raise no warning."""
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from measured_cells import (
 
 from weld_twin_core import catalog
 from weld_twin_core.diagnosis.alignment import initial_frames
-from weld_twin_core.diagnosis.soundness import CHECKS, check, moved_setup, settling
+from weld_twin_core.diagnosis.soundness import CHECKS, Step, check, moved_setup, settling
+from weld_twin_core.diagnosis.soundness.case import Case
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -275,6 +277,15 @@ def test_a_set_up_moved_between_recordings_is_named_unless_each_has_its_own_base
     assert 'before second' in sentence(ur5, 'set-up', first, second, align=('tool',))
     found = findings(ur5, first, second, align=('base', 'tool'))
     assert not [c for c in found if c.name == 'set-up']
+
+
+@pytest.mark.parametrize(('size', 'named'), [(9e-4, True), (1.1e-3, False)])
+def test_a_step_larger_than_any_gap_shows_did_not_happen(ur5, run, monkeypatch, size, named):
+    case = Case(*asked(ur5, spoilt(run, np.full(run.measured.t.size, 5e-4)), align=()))
+    step = Step(run.name, 5.0, size, 500.0)
+    module = import_module('weld_twin_core.diagnosis.soundness.setup')
+    monkeypatch.setattr(module, 'changes', lambda *_: [step])
+    assert bool(module.setup(case)) is named
 
 
 # No false alarms -------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ..problem import Model, Problem
 from .base_change import BaseChange, base_change
-from .case import Case, Finding, length
+from .case import Case, Finding, distance, length
 from .snapshot import measured
 
 SURE = 6.0
@@ -24,6 +24,12 @@ MARGIN = 10.0
 """Nats by which a step must beat every smooth change, and a settling every other."""
 MOST = 4
 MOST_ROWS = 18000
+SEEN = 2.0
+"""
+A change this many times as large as the largest gaps did not happen: whatever is aligned, one side
+of a step keeps half of it. A strong shake makes such steps that other columns undo.
+"""
+LARGEST = 0.99
 EDGE = 0.05
 """A step nearer to an end of a recording or another step, as a share, is not looked for."""
 CONSTANTS = np.geomspace(0.05, 0.7, 7)
@@ -54,10 +60,11 @@ class Settling(NamedTuple):
 def setup(case: Case) -> Sequence[Finding]:
     """Return steps and settling of the set-up in what the aligned model leaves."""
     found = changes(case.residuals, case.problem, case.model)
+    most = SEEN * max(float(np.quantile(distance(part), LARGEST)) for part in case.residuals)
     return [
         Finding('warning', _moved(case, each)) if isinstance(each, Step)
         else Finding('note', _settled(case, each))
-        for each in found
+        for each in found if each.size < most
     ]  # fmt: skip
 
 

@@ -279,7 +279,7 @@ def test_a_set_up_moved_between_recordings_is_named_unless_each_has_its_own_base
     assert not [c for c in found if c.name == 'set-up']
 
 
-@pytest.mark.parametrize(('size', 'named'), [(9e-4, True), (1.1e-3, False)])
+@pytest.mark.parametrize(('size', 'named'), [(9e-4, True), (1.3e-3, False)])
 def test_a_step_larger_than_any_gap_shows_did_not_happen(ur5, run, monkeypatch, size, named):
     case = Case(*asked(ur5, spoilt(run, np.full(run.measured.t.size, 5e-4)), align=()))
     step = Step(run.name, 5.0, size, 500.0)

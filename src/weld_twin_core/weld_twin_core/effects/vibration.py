@@ -46,10 +46,10 @@ class Vibration(MemoryEffect):
     stage = Stage.SERVO
     regime = 'acceleration'
     parameters = (
-        Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False, idealised=0.01),
+        Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False, idealised=0.015),
         Parameter('damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False,
-                  idealised=0.02),
-        Parameter('gain', '-', typical=0.3, idealised=0.02),
+                  idealised=0.03),
+        Parameter('gain', '-', typical=0.3, idealised=0.04),
     )
     needs = frozenset({'velocity', 'time'})
 

@@ -9,8 +9,9 @@ each with the features of the points gives both, whatever the points are.
 
 Along a smooth seam the features themselves are nearly dependent: as functions of the sample they
 span a dozen dimensions to rounding. Positions of *any* draw are linear in them, hence known from
-as many samples by one more matrix product. Those samples and that matrix come from a pivoted QR
-factorisation of the features [1]_, whose remainder bounds the error.
+as many samples by one matrix product; for so few the tool point is carried down the chain. Those
+samples and that matrix come from a pivoted QR factorisation of the features [1]_, whose remainder
+bounds the error.
 
 References
 ----------
@@ -42,7 +43,9 @@ _MIXTURES = 48
 BLOCK = 504
 """Draws whose weights are built at once."""
 POINTS = 8000
-"""Draws times samples worked on at once; a few of such arrays fit the processor's cache."""
+"""Draws times samples worked on at once; a few of such arrays fit the processor's cache..."""
+FOLLOWING = 16_000
+"""... and twice as many where samples follow from others."""
 SPLIT = 3
 """Rows of the near piece, the first included, whose turn drops out."""
 
@@ -101,44 +104,61 @@ class SeamDraws:
             if found is not None and 2 * len(found.samples) < len(q):
                 self.samples, self.spread, self.remainder = found
         self._near, self._far = (np.ascontiguousarray(f[:, self.samples]) for f in features)
+        self._phases = np.exp(1j * q[self.samples].T)[..., None]
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))
-        self._nominal = self._points(*self._pieces(nominal))
+        if self.spread is None:
+            self._nominal = self._points(*self._pieces(nominal))
+        else:
+            self._nominal = self._carried(nominal)
 
     def largest(self, draws: DhDraws) -> Array:
         """Return the largest distance from the nominal tool point along the seam, shape (D,)."""
-        out = np.empty(len(draws.theta))
-        step = max(1, POINTS // self._count)
-        for start, away in self._away(draws):
-            for k in range(0, away.shape[1], step):
-                part = away[:, k : k + step]
-                self._squares(part).max(axis=1, out=out[start + k : start + k + part.shape[1]])
-        return np.sqrt(out)
+        largest = [part.max(axis=1) for part in self._squares(draws)]
+        return np.asarray(np.sqrt(np.concatenate(largest)))
 
     def distances(self, draws: DhDraws) -> Array:
         """Return distances from the nominal tool point, shape (D, N) [m]."""
-        parts = [self._squares(away) for _, away in self._away(draws)]
-        return np.sqrt(np.concatenate(parts))
+        return np.asarray(np.sqrt(np.concatenate(list(self._squares(draws)))))
 
-    def _away(self, draws: DhDraws) -> Iterator[tuple[int, Array]]:
-        """Yield the first draw of a block and its deviations at the samples, (3, D, S) [m]."""
-        step = min(BLOCK, max(1, POINTS // len(self.samples)))
+    def _squares(self, draws: DhDraws) -> Iterator[Array]:
+        """Yield squared distances of some draws after the others, shape (some, N)."""
         for start in range(0, len(draws.theta), BLOCK):
             block = DhDraws(*(values[start : start + BLOCK] for values in draws))
-            pieces = self._pieces(block)
-            for k in range(0, len(block.theta), step):
-                away = self._points(*(piece[..., k : k + step] for piece in pieces))
-                away -= self._nominal
-                yield start + k, away
+            if self.spread is None:
+                yield from self._of_all(block)
+            else:
+                yield from self._of_few(block, self.spread)
 
-    def _squares(self, away: Array) -> Array:
-        """Return squared distances, shape (D, N), of deviations, which may be overwritten."""
-        if self.spread is not None:
-            away = away @ self.spread
-        away *= away
-        away[0] += away[1]
-        away[0] += away[2]
-        squares: Array = away[0]
-        return squares
+    def _of_all(self, draws: DhDraws) -> Iterator[Array]:
+        pieces = self._pieces(draws)
+        step = max(1, POINTS // self._count)
+        for k in range(0, len(draws.theta), step):
+            away = self._points(*(piece[..., k : k + step] for piece in pieces))
+            away -= self._nominal
+            yield _squared(away)
+
+    def _of_few(self, draws: DhDraws, spread: Array) -> Iterator[Array]:
+        away = self._carried(draws) - self._nominal
+        step = max(1, FOLLOWING // self._count)
+        for k in range(0, len(draws.theta), step):
+            yield _squared(spread @ away[..., k : k + step]).T
+
+    def _carried(self, draws: DhDraws) -> Array:
+        """
+        Return tool points as in `_points`, carried down the chain, shape (3, S, D).
+
+        Two coordinates are one complex number, which turns by one multiplication.
+        """
+        rows = _Rows(draws)
+        turns, twists = rows.cosine + 1j * rows.sine, rows.alpha_cosine + 1j * rows.alpha_sine
+        x, y, z = self.robot.T_flange_tool[:3, 3, None]
+        yz = _pair(y, z)
+        for i in range(self.robot.n - 1, -1, -1):
+            yz = yz * twists[i]
+            xy = _pair(x + rows.a[i], yz.real)
+            xy = xy * (self._phases[i] * turns[i] if i > 0 else turns[i])
+            x, yz = xy.real, _pair(xy.imag, yz.imag + rows.d[i])
+        return np.stack([x, yz.real, yz.imag])
 
     def _pieces(self, draws: DhDraws) -> tuple[Array, Array]:
         """Return the weights of both pieces: frames (3, F, 4, D) and tips (3, F, 1, D)."""
@@ -160,6 +180,21 @@ class SeamDraws:
             frame[:, k] *= tip[k]
             out += frame[:, k]
         return out
+
+
+def _pair(first: Array, second: Array) -> NDArray[np.complex128]:
+    out = np.empty(np.broadcast_shapes(first.shape, second.shape), dtype=np.complex128)
+    out.real, out.imag = first, second
+    return out
+
+
+def _squared(away: Array) -> Array:
+    """Return squared lengths of vectors, components first, which are overwritten."""
+    away *= away
+    away[0] += away[1]
+    away[0] += away[2]
+    squares: Array = away[0]
+    return squares
 
 
 def _turn(first: Array, second: Array, cosine: Array, sine: Array) -> None:
@@ -221,7 +256,7 @@ class _Determining(NamedTuple):
 
 def _determining(features: Array) -> _Determining | None:
     """
-    Return samples, and the matrix (S, N) that turns values there into values everywhere.
+    Return samples, and the matrix (N, S) that turns values there into values everywhere.
 
     The factorisation is of random mixtures of the features, which depend on each other as the
     features do; the remainder is that of the features themselves. None if they are too many.
@@ -235,7 +270,9 @@ def _determining(features: Array) -> _Determining | None:
     spread[:, order[rank:]] = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
     left = np.abs(features[:, order[:rank]] @ spread - features).max()
     remainder = float(left / np.abs(features).max())
-    return _Determining(order[:rank], spread, remainder) if remainder < _NEGLIGIBLE else None
+    if remainder > _NEGLIGIBLE:
+        return None
+    return _Determining(order[:rank], np.ascontiguousarray(spread.T), remainder)
 
 
 def _features(q: Array) -> Array:

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A fit started from the wrong mode or step still ends at the right one."""
+
+import numpy as np
+import pytest
+from diagnosis_cells import effect, known_scale, tiny
+
+from weld_twin_core.diagnosis.fit import fit
+from weld_twin_core.diagnosis.starts import started
+
+
+@pytest.mark.parametrize('frequency', [3.0, 9.0])
+@pytest.mark.parametrize('start', [1.5, 5.5, 20.0])
+def test_a_mode_is_found_from_any_frequency(frequency, start):
+    true = effect('vibration', joint='elbow_joint', frequency=frequency, damping=0.03, gain=3.0)
+    problem, model = tiny((true,), static=False, count=200)
+    scale = known_scale(problem)
+    wrong = effect('vibration', joint='elbow_joint', frequency=start, damping=0.05, gain=0.1)
+    best = started(problem, model, scale, wrong)
+    (found,) = fit(problem, model.with_found((best,)), scale).model.found
+    assert found.frequency == pytest.approx(frequency, rel=0.05)
+    assert found.gain == pytest.approx(3.0, rel=0.1)
+
+
+@pytest.mark.parametrize('step', [3.1e-4, 1.7e-3])
+def test_a_step_is_found_so_finely_that_stairs_stay_in_phase_far_from_zero(step):
+    true = effect('quantization', joint='elbow_joint', step=step)
+    problem, model = tiny((true,), static=False, count=400)
+    q = problem.recordings[0].joints.q[:, 2]
+    near = 1.0 / (1.0 / step + 0.3 / np.ptp(q))
+    wrong = effect('quantization', joint='elbow_joint', step=near)
+    best = started(problem, model, known_scale(problem), wrong)
+    # a hundredth of a stair at the largest position
+    assert abs(best.step - step) * np.abs(q).max() / step < 0.01 * step
+
+
+def test_an_effect_whose_fit_has_one_optimum_starts_where_it_is():
+    offset = effect('joint_offset', joint='elbow_joint', offset=1e-3)
+    problem, model = tiny((offset,))
+    assert started(problem, model, known_scale(problem), offset) is offset

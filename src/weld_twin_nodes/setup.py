@@ -15,7 +15,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
         ('share/' + NAME + '/launch', glob('launch/*.launch.py')),
-        ('share/' + NAME + '/config', glob('config/*.yaml')),
+        ('share/' + NAME + '/config', glob('config/*')),
     ],
     install_requires=['setuptools', 'numpy', 'PyYAML', 'rich', 'matplotlib'],
     extras_require={'cluster': ['distributed'], 'test': ['pytest']},
@@ -33,6 +33,7 @@ setup(
             'deviation_analyzer = weld_twin_nodes.deviation_analyzer:main',
             'recorder = weld_twin_nodes.recorder:main',
             'live_diagnosis = weld_twin_nodes.live_diagnosis:main',
+            'deviation_markers = weld_twin_nodes.markers:main',
         ]
     },
 )

@@ -14,7 +14,14 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py import convert
 from weld_twin_msgs_py.bags.store import TYPES, decode
-from weld_twin_msgs_py.cdr import READERS, JointStateDecoder, PoseEncoder, decoder
+from weld_twin_msgs_py.cdr import (
+    READERS,
+    JointStateDecoder,
+    JointStateEncoder,
+    PoseEncoder,
+    Vector3Encoder,
+    decoder,
+)
 from weld_twin_msgs_py.messages import bag_messages
 
 MAKE = bag_messages()
@@ -106,3 +113,21 @@ def test_an_encoded_pose_is_the_message_rosbags_reads(frame):
     assert convert.stamp_ns(message) == NS
     np.testing.assert_array_equal(position, [1.0, -2.0, 3e-9])
     np.testing.assert_allclose(rotation, TURN, rtol=0.0, atol=1e-15)
+
+
+def test_an_encoded_vector_is_the_message_rosbags_reads():
+    data = Vector3Encoder('base')(NS, np.array([1e-3, -2e-3, 3e-9]))
+    message = decode(data, 'geometry_msgs/msg/Vector3Stamped')
+    assert (message.header.frame_id, convert.stamp_ns(message)) == ('base', NS)
+    np.testing.assert_array_equal(convert.vector3(message), [1e-3, -2e-3, 3e-9])
+
+
+@given(st.lists(st.text('ab_c', min_size=1, max_size=9), unique=True, min_size=1, max_size=8))
+def test_encoded_joint_states_are_the_messages_rosbags_reads(names):
+    q = np.arange(len(names)) + 0.5
+    for qd in (None, -q):
+        message = decode(JointStateEncoder(names)(NS, q, qd), JOINTS)
+        assert (list(message.name), convert.stamp_ns(message)) == (names, NS)
+        np.testing.assert_array_equal(message.position, q)
+        np.testing.assert_array_equal(message.velocity, [] if qd is None else qd)
+        assert message.effort.size == 0

@@ -123,3 +123,22 @@ def test_running_metrics_are_those_of_the_whole_run():
     }.items():  # fmt: skip
         assert told[key] == pytest.approx(value, rel=1e-10), key
     assert told['D(t)'] == pytest.approx(np.linalg.norm(off[-1]))
+
+
+def test_after_a_jump_of_the_clock_the_tail_of_the_run_before_is_told_by_its_stamps():
+    order = Forward()
+    for stamp in (10, 20, 30):
+        assert not order.restarted_at(stamp)
+    order.reset()
+    with pytest.raises(DataError, match='before the clock jumped'):
+        order.restarted_at(40)
+    assert not order.restarted_at(10)
+    assert not order.restarted_at(40)
+    order.reset()
+    refused = 0
+    for stamp in range(50, 50 + RESTART_AFTER):
+        try:
+            order.restarted_at(stamp)
+        except DataError:
+            refused += 1
+    assert refused == RESTART_AFTER - 1

@@ -57,6 +57,8 @@ class Topic:
     offered: Qos
     requested: Qos
     meaning: str
+    steady: bool = True
+    """Messages come on a beat, so that silence means something."""
 
     def message_class(self) -> Any:
         """Return the rclpy message class; needs a ROS installation."""
@@ -71,14 +73,14 @@ def _stream(name: str, kind: str, depth: int, meaning: str) -> Topic:
     return Topic(name, kind, Qos(RELIABLE, depth), Qos(BEST_EFFORT, depth), meaning)
 
 
-def _result(name: str, kind: str, depth: int, meaning: str) -> Topic:
+def _result(name: str, kind: str, depth: int, meaning: str, *, steady: bool = True) -> Topic:
     """Return a topic that only this project's nodes publish."""
-    return Topic(name, kind, Qos(RELIABLE, depth), Qos(RELIABLE, depth), meaning)
+    return Topic(name, kind, Qos(RELIABLE, depth), Qos(RELIABLE, depth), meaning, steady)
 
 
 def _latched(name: str, kind: str, meaning: str) -> Topic:
     """Return a topic whose last message waits for whoever comes later."""
-    return Topic(name, kind, Qos(RELIABLE, 1, LATCHED), Qos(RELIABLE, 1, LATCHED), meaning)
+    return Topic(name, kind, Qos(RELIABLE, 1, LATCHED), Qos(RELIABLE, 1, LATCHED), meaning, False)
 
 
 JOINT_STATES = _stream(
@@ -111,11 +113,11 @@ DEVIATION = _result(
 )  # fmt: skip
 DEVIATION_METRICS = _result(
     '/deviation/metrics', 'diagnostic_msgs/msg/DiagnosticArray', 10,
-    'D(t), D_norm, D_cum, RMS, max, samples, dropped',
+    'D(t), D_norm, D_cum, RMS, max, samples, dropped', steady=False,
 )  # fmt: skip
 DIAGNOSIS = _result(
     '/diagnosis', 'diagnostic_msgs/msg/DiagnosticArray', 10,
-    'verdict over the last minute: status, effects found, gap before and after',
+    'verdict over the last minute: status, effects found, gap before and after', steady=False,
 )  # fmt: skip
 TOOL_WRENCH = _stream(
     '/tool_wrench', 'geometry_msgs/msg/WrenchStamped', 100,
@@ -138,11 +140,11 @@ ROBOT_DESCRIPTION = _latched(
 )  # fmt: skip
 JOINT_TRAJECTORY = _result(
     '/joint_trajectory', 'trajectory_msgs/msg/JointTrajectory', 10,
-    'motion the trajectory generator is to run, planned by somebody else',
+    'motion the trajectory generator is to run, planned by somebody else', steady=False,
 )  # fmt: skip
 PATH = _result(
     '/path', 'nav_msgs/msg/Path', 10,
-    'seam the trajectory generator is to plan and run, in the measuring frame',
+    'seam the trajectory generator is to plan and run, in the measuring frame', steady=False,
 )  # fmt: skip
 PLANNED_TRAJECTORY = _latched(
     '/planned/joint_trajectory', 'trajectory_msgs/msg/JointTrajectory',

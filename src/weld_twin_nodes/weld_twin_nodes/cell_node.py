@@ -71,7 +71,18 @@ class CellNode(Node):
 
     def every(self, period: float, action: Callable[[], None]) -> Any:
         """Return a timer [s] that runs on whether or not simulated time stands still."""
-        return self.create_timer(period, action, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        def guarded() -> None:
+            try:
+                action()
+            except Exception:
+                self._raise_unless_over()
+
+        return self.create_timer(period, guarded, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _raise_unless_over(self) -> None:
+        """Pass an exception on, except what a shutdown in the middle of a callback causes."""
+        if self.context.ok():
+            raise
 
     def offer(self, topic: Topic, *, awaited: bool = True) -> Any:
         """Return a publisher of a topic of the table; ``wait_for_subscribers`` is for awaited."""
@@ -103,7 +114,7 @@ class CellNode(Node):
             The node can do nothing without this input; health calls its absence stale.
 
         """
-        state = self.health.watch(topic.name, required=required)
+        state = self.health.watch(topic.name, required=required, steady=topic.steady)
         decode = (lambda data: data) if raw else decoder(topic.type)
 
         def guarded(data: bytes) -> None:
@@ -113,6 +124,8 @@ class CellNode(Node):
                 callback(decode(data))
             except TwinError as error:
                 self.refuse(topic.name, str(error))
+            except Exception:
+                self._raise_unless_over()
 
         def subscribe() -> None:
             wanted = topic.requested

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from weld_twin_msgs_py import convert
+from weld_twin_msgs_py.cdr import Vector3Encoder
 from weld_twin_msgs_py.topics import (
     DEVIATION,
     DEVIATION_METRICS,
@@ -44,6 +45,7 @@ class DeviationAnalyzer(CellNode):
             self.setting('buffer'), self.setting('max_gap'),
         )  # fmt: skip
         self._vector = self.offer(DEVIATION)
+        self._encode = Vector3Encoder(BASE)
         self._metrics = self.offer(DEVIATION_METRICS)
         self._stamp = 0
         self._seen = self._told = 0
@@ -72,7 +74,7 @@ class DeviationAnalyzer(CellNode):
 
     def _publish(self, deviations: Iterable[Deviation]) -> None:
         for stamp, vector in deviations:
-            self._vector.publish(self.messages.vector3(stamp, vector, BASE))
+            self._vector.publish(self._encode(stamp, vector))
             self._stamp = stamp
             if self._deviations.samples % self._every == 0:
                 self._publish_metrics()

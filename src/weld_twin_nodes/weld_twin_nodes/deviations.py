@@ -43,12 +43,13 @@ class Deviations:
         self, robot: Robot, path_length: float = 0.0, depth: int = 2000, max_gap: float = 0.5
     ) -> None:
         self._rotation_base_world = robot.T_world_base[:3, :3].T
-        self._depth, self._max_gap, self._path_length = depth, max_gap, path_length
-        self.reset()
+        self._pairing = Pairing(depth, max_gap)
+        self._path_length = path_length
+        self._metrics = RunningMetrics(path_length)
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock."""
-        self._pairing = Pairing(self._depth, self._max_gap)
+        self._pairing.reset()
         self._metrics = RunningMetrics(self._path_length)
 
     @property

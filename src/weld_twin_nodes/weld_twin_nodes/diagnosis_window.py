@@ -42,13 +42,15 @@ class Window:
         self._robot = robot
         self._duration = round(duration * convert.NANOSECONDS)
         self._wrench_frame = 'tool'
-        self.reset()
+        self._joints = JointStates(robot)
+        self._streams: dict[str, deque[Row]] = {}
+        self._orders: dict[str, Forward] = {}
 
     def reset(self) -> None:
         """Forget everything, as after a jump of the clock."""
-        self._joints = JointStates(self._robot)
-        self._streams: dict[str, deque[Row]] = {}
-        self._orders: dict[str, Forward] = {}
+        self._streams.clear()
+        for order in self._orders.values():
+            order.reset()
 
     @property
     def last(self) -> int | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from weld_twin_core.twin import Twin
+from weld_twin_msgs_py.cdr import JointStateEncoder, PoseEncoder
 from weld_twin_msgs_py.topics import ACTUAL_JOINT_STATES, MEASURED_POSE
 
 from .frames import WORLD
@@ -29,6 +30,8 @@ class ErrorInjector(ModelNode):
         super().__init__('error_injector', **kwargs)
         self._joints = self.offer(ACTUAL_JOINT_STATES)
         self._pose = self.offer(MEASURED_POSE)
+        self._encode_joints = JointStateEncoder(self.robot.joint_names)
+        self._encode_pose = PoseEncoder(WORLD)
         self._noise = Noise(self.stream.twin.effects, self.setting('seed'))
         self.start()
 
@@ -39,11 +42,10 @@ class ErrorInjector(ModelNode):
 
     def publish(self, sample: Sample) -> None:
         """Publish where the joints and the tool really are."""
-        names = self.robot.joint_names
-        self._joints.publish(self.messages.joint_state(sample.stamp, names, sample.q))
+        self._joints.publish(self._encode_joints(sample.stamp, sample.q))
         position = sample.poses.position + self._noise.draw(1)[0]
         self._pose.publish(
-            self.messages.pose(sample.pose_stamp, position, sample.poses.rotation, WORLD)
+            self._encode_pose(sample.pose_stamp, position, sample.poses.rotation)
         )
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from math import inf, isfinite
 
 from weld_twin_msgs_py.messages import Status
 
@@ -27,7 +28,8 @@ class Input:
     required : bool
         Whether the node can do nothing without it.
     patience : float [s]
-        Silence after which it is stale; five of its periods where that is longer.
+        Silence after which it is stale; five of its periods where that is longer. Infinite for
+        an input that comes when there is something to tell.
 
     """
 
@@ -78,7 +80,8 @@ class Input:
             return WARN, f'{lost} lost on the way'
         if self.publishers > 1 and not merging:
             return WARN, f'{self.publishers} publishers send the same'
-        if len(self._rates) >= 3 and n and not usual / RATE_CHANGE <= rate <= usual * RATE_CHANGE:
+        beats = isfinite(self._patience) and len(self._rates) >= 3 and n
+        if beats and not usual / RATE_CHANGE <= rate <= usual * RATE_CHANGE:
             return WARN, f'{rate:.0f}/s where {usual:.0f}/s is usual'
         return OK, f'{rate:.0f}/s'
 
@@ -94,9 +97,9 @@ class Health:
         self._said: list[str] = []
         self._said_in_all = 0
 
-    def watch(self, topic: str, *, required: bool) -> Input:
-        """Return a new input."""
-        self.inputs[topic] = Input(topic, required, self._patience)
+    def watch(self, topic: str, *, required: bool, steady: bool = True) -> Input:
+        """Return a new input; silence of one that is not steady means nothing."""
+        self.inputs[topic] = Input(topic, required, self._patience if steady else inf)
         return self.inputs[topic]
 
     def say(self, sentence: str) -> None:

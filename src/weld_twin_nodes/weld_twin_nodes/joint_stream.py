@@ -65,7 +65,7 @@ class JointStream:
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock; wrench and temperature hold."""
-        self._order = Forward()
+        self._order.reset()
         self._forget()
 
     def _forget(self) -> None:

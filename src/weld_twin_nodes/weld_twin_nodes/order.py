@@ -16,6 +16,19 @@ class Forward:
     def __init__(self) -> None:
         self.last: int | None = None
         self._behind: list[int] = []
+        self._ended: int | None = None
+        self._late = 0
+
+    def reset(self) -> None:
+        """
+        Begin anew, as after a jump of the clock.
+
+        What the run before still had under way is told by its stamps: they go on where it was.
+        """
+        self._ended = self._ended if self.last is None else self.last
+        self.last = None
+        self._behind.clear()
+        self._late = 0
 
     def restarted_at(self, stamp: int) -> bool:
         """
@@ -27,8 +40,12 @@ class Forward:
             The stamp is not after the last one.
 
         """
+        if self.last is None and self._ended is not None and stamp > self._ended:
+            self._late += 1
+            if self._late < RESTART_AFTER:
+                raise DataError(f'the stamp {stamp * 1e-9:.6f} s is of before the clock jumped')
         if self.last is None or stamp > self.last:
-            self.last = stamp
+            self.last, self._ended = stamp, None
             self._behind.clear()
             return False
         if self._behind and stamp <= self._behind[-1]:

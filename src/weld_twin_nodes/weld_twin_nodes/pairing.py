@@ -52,6 +52,14 @@ class Pairing:
         self.dropped = 0
         self.restarts = 0
 
+    def reset(self) -> None:
+        """Begin anew, as after a jump of the clock."""
+        self._twin.clear()
+        self._measured.clear()
+        self._twin_order.reset()
+        self._measured_order.reset()
+        self.dropped = 0
+
     @property
     def waiting(self) -> int:
         """Return how many measurements the twin has not passed yet."""

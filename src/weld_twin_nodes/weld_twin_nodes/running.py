@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 import sys
 from collections.abc import Callable
 
@@ -53,6 +54,9 @@ def spin(node: CellNode) -> None:
 
 def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     """Run a node until it is done or stopped; return the exit code, 2 for unusable settings."""
+    # rclpy ends the loop at Ctrl-C by itself; Python's exception on top of it would come anywhere,
+    # and a second one would cut the bag short that is being completed.
+    signal.signal(signal.SIGINT, lambda *_: None)
     rclpy.init(args=args)
     node = None
     try:

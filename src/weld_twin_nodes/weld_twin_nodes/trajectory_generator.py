@@ -13,6 +13,7 @@ from weld_twin_core.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py import convert
+from weld_twin_msgs_py.cdr import JointStateEncoder
 from weld_twin_msgs_py.topics import (
     BY_NAME,
     JOINT_STATES,
@@ -68,6 +69,7 @@ class TrajectoryGenerator(CellNode):
         self._robot = robot_of(self)
         self._law = self.setting('profile'), self.setting('rate'), self.setting('speed')
         self._playback = self.setting('playback')
+        self._encode = JointStateEncoder(self._robot.joint_names)
         self._publisher = self.offer(JOINT_STATES)
         self._planned = self.offer(PLANNED_TRAJECTORY, awaited=False)
         self._seam = self.offer(PLANNED_PATH, awaited=False)
@@ -148,9 +150,8 @@ class TrajectoryGenerator(CellNode):
     def _send(self) -> None:
         assert self._pump is not None
         for k in self._pump.due(self.get_clock().now().nanoseconds, BURST):
-            self._publisher.publish(self.messages.joint_state(
-                int(self._stamps[k]), self._robot.joint_names,
-                self._motion.q[k], self._motion.velocity[k],
+            self._publisher.publish(self._encode(
+                int(self._stamps[k]), self._motion.q[k], self._motion.velocity[k]
             ))  # fmt: skip
         if self._pump.done and self._rounds:
             self._turn()

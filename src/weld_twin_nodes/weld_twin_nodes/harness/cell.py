@@ -197,7 +197,7 @@ class Cell:
             topic.message_class(), topic.name, topic.offered.to_rclpy()
         )
         self.wait(lambda: out.get_subscription_count() > 0, f'a subscriber of {topic.name}')
-        self._meet()
+        self.meet()
         return out
 
     def feed(
@@ -283,7 +283,7 @@ class Cell:
                 raise CellTimeout(f'waited {limit:g} s for {what}' + ''.join(self._logs()))
             self._executor.spin_once(timeout_sec=0.02)
 
-    def _meet(self) -> None:
+    def meet(self) -> None:
         """
         Wait until the started nodes know what listens and publishes here.
 

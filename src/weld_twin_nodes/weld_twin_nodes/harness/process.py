@@ -22,6 +22,7 @@ MODULES = {
     'deviation_analyzer': 'weld_twin_nodes.deviation_analyzer',
     'recorder': 'weld_twin_nodes.recorder',
     'live_diagnosis': 'weld_twin_nodes.live_diagnosis',
+    'deviation_markers': 'weld_twin_nodes.markers',
 }
 GRACE = 20.0
 """Seconds a process has to end after SIGINT before it is killed."""
@@ -50,6 +51,7 @@ class NodeProcess:
     def __init__(
         self, node: str | Sequence[str], parameters: Mapping[str, Any], folder: Path
     ) -> None:
+        self._told = False
         self.known = isinstance(node, str)
         self.name = node if isinstance(node, str) else Path(node[0]).name
         self._log = folder / f'{self.name}.log'
@@ -69,6 +71,11 @@ class NodeProcess:
         return self._log.read_text(errors='replace')
 
     @property
+    def pid(self) -> int:
+        """Return the number of the process."""
+        return self._process.pid
+
+    @property
     def code(self) -> int | None:
         """Return the exit code, None while it runs."""
         return self._process.poll()
@@ -82,8 +89,9 @@ class NodeProcess:
         return self._process.wait(timeout)
 
     def interrupt(self) -> None:
-        """Send what Ctrl-C sends, if the process still runs."""
-        if self.code is None:
+        """Send what Ctrl-C sends, once, if the process still runs."""
+        if self.code is None and not self._told:
+            self._told = True
             self.signal(signal.SIGINT)
 
     def stop(self) -> int:

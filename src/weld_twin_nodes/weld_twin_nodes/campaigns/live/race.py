@@ -17,6 +17,7 @@ import numpy as np
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from weld_twin_msgs_py.cdr import HEADER
@@ -94,7 +95,7 @@ class Race:
     def __enter__(self) -> Race:
         """Start the contenders and what feeds them."""
         self._stack.enter_context(own_domain())
-        rclpy.init()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._stack.callback(rclpy.try_shutdown)
         self._runner = executor()
         node = Node('finish')

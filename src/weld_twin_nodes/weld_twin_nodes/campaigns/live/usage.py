@@ -24,3 +24,12 @@ def cpu_ns(pid: int) -> int:
 def rss_bytes(pid: int) -> int:
     """Return the memory of a process that is resident [bytes]."""
     return int((PROC / str(pid) / 'statm').read_text().split()[1]) * PAGE
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes a process has started and that still run."""
+    out: list[int] = []
+    for task in (PROC / str(pid) / 'task').iterdir():
+        with suppress(OSError):
+            out += map(int, (task / 'children').read_text().split())
+    return out

@@ -123,7 +123,9 @@ def test_a_chunk_with_a_flipped_bit_is_left_out_and_told(tmp_path, numbered, num
 
 
 @pytest.mark.parametrize('share', [0.6, 0.9])
-def test_a_bag_cut_anywhere_gives_what_lies_before_the_cut(tmp_path, storage, numbered, numbers, share):
+def test_a_bag_cut_anywhere_gives_what_lies_before_the_cut(
+    tmp_path, storage, numbered, numbers, share
+):
     bag = GrowingBag(tmp_path / 'bag', storage=storage).open()
     for number in range(FLUSHED):
         bag.write_cdr(*numbered(number))

@@ -19,6 +19,8 @@ from weld_twin_core.recording import Recording
 from weld_twin_core.robot import Robot
 from weld_twin_core.twin import Twin
 
+from .yaml_file import whole
+
 SCHEMA_PREFIX = 'weld_twin/diagnosis/'
 SIZE_LIMIT = 64_000_000
 """Bytes; a diagnosis of thousands of stations is some hundred kilobytes."""
@@ -39,7 +41,7 @@ def read_diagnosis(path: Path | str) -> dict[str, Any]:
             raw = file.read(SIZE_LIMIT + 1)
         if len(raw) > SIZE_LIMIT:
             raise ModelError(f"'{path}' is larger than any diagnosis")
-        data = json.loads(raw)
+        data = json.loads(raw, parse_int=lambda text: whole(int(text)))
     except OSError as error:
         raise ModelError(f"diagnosis '{path}' cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:

@@ -10,6 +10,7 @@ gigabytes.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Hashable
 from pathlib import Path
@@ -21,6 +22,8 @@ from weld_twin_core.errors import ModelError
 
 SIZE_LIMIT = 1_000_000
 """Bytes; robot and effects files are a few kilobytes."""
+
+MACHINE = 2**63
 
 
 class _Loader(yaml.SafeLoader):
@@ -49,6 +52,23 @@ _Loader.add_implicit_resolver(
     re.compile(r'^[-+]?[0-9]+(?:\.[0-9]*)?[eE][-+]?[0-9]+$'),
     list('-+0123456789'),
 )
+
+
+def whole(value: int) -> int | float:
+    """Return a number of a file; one that no machine integer holds as a float, maybe infinite."""
+    if abs(value) < MACHINE:
+        return value
+    try:
+        return float(value)
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def _construct_int(loader: Any, node: yaml.ScalarNode) -> int | float:
+    return whole(yaml.SafeLoader.construct_yaml_int(loader, node))
+
+
+_Loader.add_constructor('tag:yaml.org,2002:int', _construct_int)
 
 
 def read_text(path: Path | str, kind: str) -> str:

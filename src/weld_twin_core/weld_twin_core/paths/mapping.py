@@ -40,7 +40,7 @@ def from_mapping(data: Mapping[str, Any]) -> Path:
     if not isinstance(data, Mapping):
         raise PathError(f'a path must be a mapping of keys, got {type(data).__name__}')
     kind = data.get('kind')
-    if kind not in _KINDS:
+    if not isinstance(kind, str) or kind not in _KINDS:
         raise PathError(f"path 'kind' must be one of {', '.join(_KINDS)}, got {kind!r}")
     rest = {str(k): v for k, v in data.items() if k not in ('kind', 'weave', 'torch')}
     seam: Path = _build(_KINDS[kind], rest, f'path of kind {kind!r}')
@@ -69,5 +69,5 @@ def _build(cls: type[Any], values: dict[str, Any], what: str) -> Any:
         raise PathError(f'{what} needs the key {missing[0]!r}')
     try:
         return cls(**values)
-    except (DataError, TypeError, ValueError) as error:
+    except (DataError, TypeError, ValueError, OverflowError) as error:
         raise PathError(f'{what}: {error}') from None

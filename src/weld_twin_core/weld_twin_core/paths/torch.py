@@ -95,6 +95,8 @@ class Torch:
             A key is unknown or a value wrong.
 
         """
+        if not isinstance(data, Mapping):
+            raise PathError(f"'torch' must be a mapping of keys, got {type(data).__name__}")
         known = cls.__dataclass_fields__
         unknown = sorted(set(map(str, data)) - set(known))
         if unknown:

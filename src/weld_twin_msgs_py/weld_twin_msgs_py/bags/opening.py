@@ -18,6 +18,8 @@ from .segments import INFORMATION, METADATA
 PACKED = '.zstd'
 SIZE_LIMIT = 16_000_000
 """Bytes of metadata.yaml; a bag of a thousand files has some hundred kilobytes."""
+DEPTH_LIMIT = 50
+"""Levels of metadata.yaml; it has six."""
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
@@ -127,7 +129,21 @@ def _information(folder: Path) -> dict[str, Any]:
         return {}
     if file.stat().st_size > SIZE_LIMIT:
         raise ValueError(f'metadata.yaml is larger than {SIZE_LIMIT / 1e6:g} MB')
-    made = yaml.load(file.read_bytes(), Loader=_Loader)[INFORMATION]
+    data = file.read_bytes()
+    _refuse_deep(data)
+    made = yaml.load(data, Loader=_Loader)[INFORMATION]
     if not isinstance(made, dict):
         raise ValueError('metadata.yaml is no mapping')
     return made
+
+
+def _refuse_deep(data: bytes) -> None:
+    """Refuse nesting on which the fast loader would overflow the stack and end the process."""
+    depth = 0
+    for event in yaml.parse(data, Loader=_Loader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if depth > DEPTH_LIMIT:
+            raise ValueError('metadata.yaml is nested too deeply')

@@ -75,8 +75,8 @@ def _beside(path: Path) -> list[Path]:
 def _channels(base: sqlite3.Connection) -> dict[Any, Channel]:
     listed = base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
     tables = {name for (name,) in listed}
-    if not {'messages', 'topics'} <= tables:
-        return {}
+    if not {'messages', 'topics'} <= tables:  # a view of that name might never end
+        raise sqlite3.DatabaseError('it lacks the tables of a bag')
     texts: dict[str, str] = {}
     if 'message_definitions' in tables:
         texts = dict(base.execute(

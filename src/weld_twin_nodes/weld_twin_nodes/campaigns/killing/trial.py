@@ -9,7 +9,7 @@ import signal
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
@@ -162,7 +162,8 @@ def _feed_and_kill(cell: Cell, trial: Trial, recorder: BaseProcess) -> tuple[_Se
     if trial.closing:
         os.kill(recorder.pid, signal.SIGINT)
         time.sleep(trial.wait)
-    os.kill(recorder.pid, signal.SIGKILL)
+    with suppress(ProcessLookupError):  # it may have been quicker
+        os.kill(recorder.pid, signal.SIGKILL)
     recorder.join()
     return sent, moment
 

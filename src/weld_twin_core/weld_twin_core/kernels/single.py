@@ -11,6 +11,7 @@ their cross product.
 from __future__ import annotations
 
 from math import cos, sin
+from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,14 @@ class _Row(NamedTuple):
     cosine: float
     sine: float
 
+    @property
+    def link(self) -> tuple[float, float, float]:
+        """Return the slide along x and cosine and sine of the turn about it."""
+        return self.a, self.cosine, self.sine
+
+
+_PACKED = Struct('16d').pack
+
 
 class SinglePose:
     """
@@ -44,9 +53,17 @@ class SinglePose:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._rows = tuple(reversed(_rows(robot)))
-        columns = [robot.T_flange_tool[:3, k].tolist() for k in (0, 2, 3)]
-        self._tool = tuple(value for column in columns for value in column)
+        *rows, last = _rows(robot)
+        # The last link does not move against the tool; the joints come with the link before them.
+        a, cosine, sine = last.link
+        link = np.array([[1, 0, 0, a], [0, cosine, -sine, 0], [0, sine, cosine, 0], [0, 0, 0, 1]])
+        columns = (link @ robot.T_flange_tool)[:3, [0, 2, 3]].T
+        self._tool = tuple(columns.ravel().tolist())
+        onward = [*rows[1:], last]
+        self._rows = tuple(
+            (*row[:4], *before.link) for before, row in zip(rows[::-1], onward[::-1], strict=True)
+        )
+        self._first = (rows[0] if rows else last)[:4]
         plain = np.array_equal(robot.T_world_base, np.eye(4))
         self._base = None if plain else robot.T_world_base
 
@@ -60,22 +77,35 @@ class SinglePose:
             else:
                 angle += values[joint]
             c, s = cos(angle), sin(angle)
-            y = cosine * x1 - sine * x2
-            x2 = sine * x1 + cosine * x2
-            x0, x1 = c * x0 - s * y, s * x0 + c * y
-            y = cosine * z1 - sine * z2
-            z2 = sine * z1 + cosine * z2
-            z0, z1 = c * z0 - s * y, s * z0 + c * y
-            y = cosine * p1 - sine * p2
-            p2 = sine * p1 + cosine * p2 + d
-            p0 += a
-            p0, p1 = c * p0 - s * y, s * p0 + c * y
-        pose = np.array((
+            y = s * x0 + c * x1
+            x0 = c * x0 - s * x1
+            x1 = cosine * y - sine * x2
+            x2 = sine * y + cosine * x2
+            y = s * z0 + c * z1
+            z0 = c * z0 - s * z1
+            z1 = cosine * y - sine * z2
+            z2 = sine * y + cosine * z2
+            y = s * p0 + c * p1
+            p0 = c * p0 - s * p1 + a
+            p2 += d
+            p1 = cosine * y - sine * p2
+            p2 = sine * y + cosine * p2
+        joint, slides, angle, d = self._first
+        if slides:
+            d += values[joint]
+        else:
+            angle += values[joint]
+        c, s = cos(angle), sin(angle)
+        x0, x1 = c * x0 - s * x1, s * x0 + c * x1
+        z0, z1 = c * z0 - s * z1, s * z0 + c * z1
+        p0, p1, p2 = c * p0 - s * p1, s * p0 + c * p1, p2 + d
+        # Packed numbers become an array in less time than a tuple of them.
+        pose: Array = np.ndarray((4, 4), np.float64, bytearray(_PACKED(
             x0, z1 * x2 - z2 * x1, z0, p0,
             x1, z2 * x0 - z0 * x2, z1, p1,
             x2, z0 * x1 - z1 * x0, z2, p2,
             0.0, 0.0, 0.0, 1.0,
-        )).reshape(4, 4)  # fmt: skip
+        )))  # fmt: skip
         return pose if self._base is None else self._base @ pose
 
 

@@ -16,6 +16,7 @@ setup(
         ('share/' + NAME, ['package.xml']),
         ('share/' + NAME + '/launch', glob('launch/*.launch.py')),
         ('share/' + NAME + '/config', glob('config/*')),
+        ('share/' + NAME + '/security', glob('security/*.xml')),
     ],
     install_requires=['setuptools', 'numpy', 'PyYAML', 'rich', 'matplotlib'],
     extras_require={'cluster': ['distributed'], 'test': ['pytest']},

@@ -153,6 +153,7 @@ def test_a_step_a_database_was_in_is_undone(tmp_path, numbered, numbers):
     committed = file.read_bytes()
     bag.release()
     with closing(sqlite3.connect(file, isolation_level=None)) as base:
+        base.execute('PRAGMA journal_mode = DELETE')
         base.execute('PRAGMA cache_size = 1')
         base.execute('BEGIN')
         base.execute('UPDATE messages SET data = zeroblob(500)')

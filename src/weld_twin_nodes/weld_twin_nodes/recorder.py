@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent
-from rclpy.parameter_client import AsyncParameterClient
+from rcl_interfaces.srv import GetParameters
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -43,7 +43,7 @@ class Recorder(CellNode):
         Setting('out', '', 'path of the bag to write; must not exist'),
         Setting('storage', 'mcap', 'mcap or sqlite3'),
         Setting('topics', [topic.name for topic in TOPICS], 'what to record'),
-        Setting('flush_every', 0.5, 'longest time a message is only in memory [s]', 0.05, 60.0),
+        Setting('flush_every', 0.25, 'longest time a message is only in memory [s]', 0.05, 60.0),
         Setting('split_size', 1024.0, 'size of a file of the bag, 0 is any [MB]', 0.0, 1e6),
         Setting('split_duration', 3600.0, 'time a file of the bag spans, 0 is any [s]', 0.0, 1e7),
         Setting('buffer', 64.0, 'memory for messages a slow disk keeps waiting [MB]', 0.01, 1e4),
@@ -70,7 +70,9 @@ class Recorder(CellNode):
             topic = BY_NAME[name]
             self.listen(topic, partial(self._write, topic.name, topic.type), raw=True)
         self.create_timer(LOOK_EVERY, self._look)
-        self._unasked = {name: AsyncParameterClient(self, name) for name in ASKED}
+        self._unasked = {
+            name: self.create_client(GetParameters, f'/{name}/get_parameters') for name in ASKED
+        }
         self._changes: list[dict[str, Any]] = []
         self.create_subscription(ParameterEvent, '/parameter_events', self._changed, 10)
         self.create_service(Trigger, '~/counts', self._tell)
@@ -103,10 +105,11 @@ class Recorder(CellNode):
 
     def _ask(self) -> None:
         for name, client in list(self._unasked.items()):
-            if client.services_are_ready():
+            if client.service_is_ready():
                 del self._unasked[name]
                 asked = QUESTIONS + (['seed'] if name == 'error_injector' else [])
-                client.get_parameters(asked).add_done_callback(partial(self._told, name))
+                question = GetParameters.Request(names=asked)
+                client.call_async(question).add_done_callback(partial(self._told, name))
         if not self._unasked:
             self._asking.cancel()
 

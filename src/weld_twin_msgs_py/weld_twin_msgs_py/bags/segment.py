@@ -29,6 +29,7 @@ from rosbags.interfaces import (
     QosTime,
 )
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 
 from weld_twin_core.errors import DataError
 
@@ -46,6 +47,16 @@ _CRC_AT = 1 + 8 + 8 + 8 + 8
 """Where in a chunk record its checksum is: after opcode, length, two times and a size."""
 _NEVER = QosTime(9223372036, 854775807)
 _DEFAULT_QOS = TopicQos(RELIABLE, 10)
+
+
+class _Sqlite3Writer(Sqlite3Writer):
+    """Begins a file in one step instead of nine, and puts a second on the disk with one wait."""
+
+    SQLITE_SCHEMA = f'PRAGMA journal_mode = WAL; BEGIN; {Sqlite3Writer.SQLITE_SCHEMA} COMMIT;'
+
+
+class _Writer(Writer):
+    STORAGE_PLUGINS = {**Writer.STORAGE_PLUGINS, StoragePlugin.SQLITE3: _Sqlite3Writer}
 
 
 class Channel(NamedTuple):
@@ -97,7 +108,7 @@ class Segment:
         self._pending = 0
         self._unflushed = False
         self._connections: dict[tuple[str, str], Connection] = {}
-        self._writer = Writer(
+        self._writer = _Writer(
             folder, version=Writer.VERSION_LATEST, storage_plugin=STORAGES[storage]
         )
         self._writer.open()
@@ -151,6 +162,10 @@ class Segment:
         """Complete the file and write what is in it to a metadata.yaml beside it."""
         if self._unflushed:
             self._part()
+        storage: Any = self._writer.storage
+        if hasattr(storage, 'conn'):  # or whoever reads it must be able to write beside it
+            storage.conn.commit()
+            storage.conn.execute('PRAGMA journal_mode = DELETE')
         for key, value in custom.items():
             self._writer.set_custom_data(key, value)
         self._writer.close()

@@ -41,7 +41,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
             storage=('mcap', 'sqlite3')[k % 2],
             moment=float(rng.uniform(0.0, args.longest)),
             closing=bool(rng.random() < 0.2),
-            split_mb=float(rng.choice([0.0, 0.03, 0.2])),
+            split_mb=float(rng.choice([0.0, 0.1, 0.2])),
             wait=float(rng.uniform(0.0, 0.1)),
         )
         rows.append(try_once(trial))

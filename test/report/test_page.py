@@ -137,3 +137,30 @@ def test_the_picture_is_drawn_from_the_deviations_of_the_diagnosis():
     run = embedded(report_page(case))['runs'][0]
     path, before = (np.reshape(run[key], (-1, 3)) for key in ('path', 'before'))
     assert np.allclose(path + before, 1e6 * case.traces.measured[0], atol=0.11)
+
+
+def test_outliers_are_counted_and_not_drawn():
+    case = diagnoses.backlash()
+    traces = case.traces
+    wild = [np.array(part) for part in traces.before]
+    wild[0][7] = [0.05, 0.0, 0.0]
+    good = [np.ones(len(part), bool) for part in wild]
+    good[0][7] = False
+    spoilt = replace(traces, before=tuple(wild), trusted=tuple(good))
+    assert seam_data(replace(case, traces=spoilt))['top'] < 2.0 * seam_data(case)['top']
+    assert '(1 outlier not drawn)' in report_page(replace(case, traces=spoilt))
+    assert 'not drawn' not in report_page(case)
+
+
+def test_a_measurement_to_make_is_told_in_sentences_without_its_stations():
+    wanted = {
+        'kind': 'bidirectional', 'sentence': 'Measure base_pose anew.', 'reason': 'It shows.',
+        'expected_separation_sigma': 12.3, 'cost': 20.0,
+        'motion': {'static': True, 't': [0.125], 'q': [[0.625]]},
+    }  # fmt: skip
+    page = report_page(replace(diagnoses.ambiguous(), next_experiment=wanted))
+    part = page[page.index('id="next"'):page.index('id="checks"')]
+    assert 'Measure base pose error anew.' in part
+    assert 'about 20 min' in part
+    assert '12 standard deviations' in part
+    assert '0.625' not in part

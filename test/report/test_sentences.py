@@ -16,6 +16,7 @@ from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_nodes.report import print_summary
 from weld_twin_nodes.report.quantities import (
     millimetres,
+    odds,
     parameter_rows,
     percent,
     uncertain,
@@ -146,3 +147,21 @@ def test_brackets_in_names_do_not_confuse_the_terminal():
     odd = Candidate(Site('backlash', '[red]axis[/]'), 0.1, 1e-4, 0.5)
     print_summary(replace(case, candidates=(odd, odd)), Console(file=out, width=200))
     assert '[red]axis[/]' in out.getvalue()
+
+
+def test_what_only_turns_the_tool_is_told_in_angles():
+    robot = diagnoses.load('ur5')
+    turned = [{'effect': 'tool_pose', 'xyz': [0.0, 0.0, 0.0], 'rotvec': [0.0, 2e-3, 0.0]}]
+    told = diagnoses.diagnosis('identified', robot, turned, turned, [diagnoses.moving(robot)])
+    shrink = replace(told.shrink, ratio=1.0, rms_after_m=told.shrink.rms_before_m,
+                     orientation_rad=(2e-3, 5e-5))  # fmt: skip
+    first, second = map(plain, verdict(replace(told, shrink=shrink)))
+    assert first.startswith('The orientation gap of 0.400 mrad comes from tool pose error')
+    assert '2.000 mrad shrinks to 0.050 mrad' in second
+    assert 'stays as it is' in second
+
+
+def test_no_probability_is_told_as_certain():
+    assert plain(odds(1.0)) == '> 99 %'
+    assert plain(odds(0.0)) == '< 1 %'
+    assert plain(odds(0.6)) == '60 %'

@@ -210,19 +210,32 @@ class Recording:
         """Return the recording with other measurements beside the same motion."""
         return replace(self, measured=measured)
 
-    def thinned(self, most: int) -> Recording:
+    def thinned(self, measurements: int, joints: int) -> Recording:
         """
-        Return the recording with at most so many measurements, evenly over all of them.
+        Return the recording with about so many measurements and joint states at most.
 
-        The joint stream stays whole, for play and lag depend on every motion before; a note says
-        what was left out.
+        Both are taken evenly over the whole recording, each with a note: play, warm-up and drift
+        depend on all that went before, so no stretch is left out. Joint velocity is that of the
+        full stream. Stations stay whole.
         """
-        count = 0 if self.measured is None else self.measured.t.size
-        if self.measured is None or count <= most:
+        if self.joints.static:
             return self
-        index = np.unique(np.linspace(0, count - 1, most).round().astype(int))
-        note = (
-            f'{index.size} of {count} measurements are used, evenly over the whole recording; the '
-            'joint stream is used whole'
-        )
-        return replace(self, measured=self.measured.take(index), notes=(*self.notes, note))
+        out = self
+        if self.measured is not None and self.measured.t.size > measurements:
+            count = self.measured.t.size
+            index = np.unique(np.linspace(0, count - 1, measurements).round().astype(int))
+            note = f'{index.size} of {count} measurements are used, evenly over the recording'
+            thinned = self.measured.take(index)
+            out = replace(out, measured=thinned, notes=(*out.notes, note))
+        step = -(-self.joints.t.size // joints)
+        if step > 1:
+            motion = self.joints
+            index = np.append(np.arange(0, motion.t.size - 1, step), motion.t.size - 1)
+            kept = JointMotion(motion.t[index], motion.q[index], motion.velocity[index])
+            rate = 0.5 * (index.size - 1) / float(motion.t[-1] - motion.t[0])
+            note = (
+                f'{index.size} of {motion.t.size} joint states are used, evenly over the '
+                f'recording; motion above {rate:.0f} Hz is not seen'
+            )
+            out = replace(out, joints=kept, notes=(*out.notes, note))
+        return out

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from weld_twin_core.recording import Recording
     from weld_twin_nodes.report import InputFile
 
-MOST = 40_000
-"""Measurements diagnosed together; eleven minutes at 60 Hz."""
+MEASUREMENTS = 40_000
+"""Diagnosed together; eleven minutes at 60 Hz."""
+JOINT_STATES = 150_000
+"""The same; twenty minutes at 125 Hz."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,10 +91,21 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
 
 
 def _bounded(recordings: Sequence[Recording]) -> list[Recording]:
-    """Return the recordings, each with its share of the measurements that memory allows."""
-    sizes = [0 if r.measured is None else r.measured.t.size for r in recordings]
-    share = min(MOST / max(sum(sizes), 1), 1.0)
-    return [r.thinned(ceil(share * n)) for r, n in zip(recordings, sizes, strict=True)]
+    """Return the recordings, together within what memory allows; each says what was left out."""
+    moving = [r for r in recordings if r.measured is not None and not r.joints.static]
+    measured = sum(r.measured.t.size for r in moving if r.measured is not None)
+    states = sum(r.joints.t.size for r in moving)
+    return [
+        r.thinned(
+            _share(0 if r.measured is None else r.measured.t.size, measured, MEASUREMENTS),
+            _share(r.joints.t.size, states, JOINT_STATES),
+        )
+        for r in recordings
+    ]  # fmt: skip
+
+
+def _share(own: int, total: int, most: int) -> int:
+    return max(ceil(own * min(most / max(total, 1), 1.0)), 2)
 
 
 def _align(text: str) -> frozenset[str]:

@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Ripple lines of high order, and families of small errors, against hand-made truths."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
+
+from weld_twin_core.diagnosis.families import family_verdict, weighed
+from weld_twin_core.diagnosis.fit import fit
+from weld_twin_core.diagnosis.flexible import Structure
+from weld_twin_core.diagnosis.heldout import Unseen
+from weld_twin_core.diagnosis.lines import LINE, _Waves, with_lines
+from weld_twin_core.diagnosis.shrinkage import groups
+from weld_twin_core.diagnosis.verdict import Evidence
+from weld_twin_core.twin import Twin
+
+ELBOW = 2
+
+
+def ripple(joint, order, amplitude=0.0, phase=0.0):
+    return effect(
+        'transmission_ripple', joint=joint, amplitude=[amplitude], order=[order], phase=[phase]
+    )
+
+
+def dense(robot):
+    """Return the ripple that a search for lines adds to: one low order, of no size yet."""
+    return tuple(ripple(joint, 1.0) for joint in robot.joint_names)
+
+
+def lines_of(model):
+    """Return the orders above the dense ones, by joint."""
+    out = {e.joint: [n for n in np.atleast_1d(e.order) if n > 100] for e in model.found}
+    return {joint: orders for joint, orders in out.items() if orders}
+
+
+def test_two_narrow_lines_are_found_where_they_are_and_nowhere_else():
+    true = (ripple('elbow_joint', 256.0, 1.5e-4, 0.7), ripple('wrist_2_joint', 131.0, 3e-4, -2.0))
+    problem, model = tiny(true, count=400)
+    found = with_lines(problem, model.with_found(dense(model.robot)), known_scale(problem))
+    assert lines_of(found) == {'elbow_joint': [256.0], 'wrist_2_joint': [131.0]}
+
+
+def test_noise_alone_has_no_lines():
+    problem, model = tiny((), count=400, seed=3)
+    found = with_lines(problem, model.with_found(dense(model.robot)), known_scale(problem))
+    assert lines_of(found) == {}
+
+
+@pytest.mark.parametrize('turned', [True, False])
+def test_the_score_of_a_line_is_the_fall_of_least_squares(turned):
+    problem, model = tiny((ripple('elbow_joint', 150.0, 1e-4, 0.3),), count=120, turned=turned)
+    scale = known_scale(problem)
+    features = problem.features(model)
+    waves = _Waves.of(problem, features, scale, ELBOW, np.array([150.0]))
+    chi, joint, _, step = waves.peak(problem.residuals(model), np.ones(1, bool))
+    columns, target = by_differences(problem, model, 150.0), rows(problem.residuals(model)[0])
+    solved, left, *_ = np.linalg.lstsq(columns, target, rcond=None)
+    assert joint == ELBOW
+    assert chi == pytest.approx(float(target @ target - left[0]), rel=1e-4)
+    np.testing.assert_allclose(step, solved, rtol=1e-3)
+    assert chi > LINE
+
+
+def rows(part):
+    """Return a residual (c, M) in units of noise, one row after the other."""
+    unit = np.array([SIGMA] * 3 + [SIGMA_TURN] * 3)[: len(part)]
+    return (part / unit[:, None]).ravel()
+
+
+def by_differences(problem, model, order):
+    """Return what sine and cosine of an order do, by moving the twin a little, (rows, 2)."""
+    step, before = 1e-6, problem.residuals(model)[0]
+    out = []
+    for phase in (0.0, np.pi / 2.0):
+        moved = model.with_found((ripple('elbow_joint', order, step, phase),))
+        out.append(rows(before - problem.residuals(moved)[0]) / step)
+    return np.array(out).T
+
+
+def test_a_joint_that_hardly_moves_has_no_waves():
+    problem, model = tiny((), count=50, static=False)
+    features = problem.features(model)
+    travel = np.ptp(features[0].view.q, axis=0)
+    for joint in np.flatnonzero(travel < 1.0):
+        assert _Waves.of(problem, features, known_scale(problem), int(joint), np.ones(1)) is None
+    assert (travel < 1.0).any()
+
+
+def test_a_family_of_three_shares_a_size_and_a_pair_is_free():
+    names = ('shoulder_lift_joint', 'elbow_joint', 'wrist_1_joint')
+    found = (
+        *(effect('link_length', joint=name, da=1e-4) for name in names),
+        *(effect('joint_offset', joint=name, offset=1e-4) for name in names[:2]),
+        effect('transmission_ripple', joint='elbow_joint', amplitude=[1e-4] * 4,
+               order=[1.0, 2.0, 20.0, 300.0], phase=[0.0] * 4),
+    )  # fmt: skip
+    labels, scales = groups(found)
+    assert labels.shape == scales.shape == (3 + 2 + 8,)
+    assert len(set(labels[:3])) == 1
+    assert labels[0] >= 0
+    assert (labels[3:5] == -1).all()
+    low, middle, high = labels[5:9], labels[9:11], labels[11:]
+    assert len(set(low)) == 1
+    assert low[0] not in (-1, labels[0])
+    assert (middle == -1).all()
+    assert (high == -1).all()
+
+
+@pytest.fixture(scope='module')
+def families():
+    """Return a fit of two families of which one is at work, its unseen data, and the truth."""
+    names = ('shoulder_lift_joint', 'elbow_joint', 'wrist_1_joint')
+    true = tuple(
+        effect('link_length', joint=name, da=size)
+        for name, size in zip(names, (3e-4, -2e-4, 2.5e-4), strict=True)
+    )
+    problem, model = tiny(true, count=160)
+    trial = tuple(effect('link_length', joint=name, da=1e-5) for name in names)
+    trial += tuple(effect('link_twist', joint=name, dalpha=1e-6) for name in names)
+    scale = known_scale(problem)
+    result = fit(problem, model.with_found(trial), scale)
+    return problem, model, true, result, Unseen.of(problem, scale, result, np.zeros(0))
+
+
+def test_the_family_at_work_is_named_and_accounts_for_what_it_moves(families):
+    problem, model, true, result, unseen = families
+    told = {f.effect: f for f in weighed(SimpleNamespace(final=result), unseen)}
+    recording = problem.recordings[0]
+    t = recording.measured.t
+    moved = (Twin(model.robot, true).poses(recording, t).position
+             - Twin(model.robot).poses(recording, t).position)  # fmt: skip
+    assert told['link_length'].named
+    assert told['link_length'].rms_m == pytest.approx(
+        np.sqrt((moved**2).sum(axis=1).mean()), rel=0.05
+    )
+    assert 'link_twist' not in told or not told['link_twist'].named
+    assert [site.joint for site, _ in told['link_length'].members] == [
+        'shoulder_lift_joint', 'wrist_1_joint', 'elbow_joint',
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(('gain', 'status'), [(0.0, 'identified'), (0.9, 'unknown')])
+def test_families_are_no_explanation_while_structure_remains(families, gain, status):
+    result, unseen = families[3:]
+    loose = Structure(1e-4, gain, 9.0 if gain else 0.0, ('the angle of elbow_joint',))
+    given = Evidence((), loose, 4e-4, 1e-4, SIGMA * np.sqrt(3.0), 1e-4, False, ())
+    verdict = family_verdict(SimpleNamespace(final=result), unseen, given)
+    assert verdict.status == status
+    assert (verdict.confidence > 0.9) == (status == 'identified')
+    assert {site.effect for group in verdict.sets for site in group} == {'link_length'}

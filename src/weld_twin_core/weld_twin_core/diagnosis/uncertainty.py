@@ -77,14 +77,14 @@ def _variance(
     columns = columns[live]
     ridge = np.concatenate([np.zeros(live.size - count), prior])[live]
     size = np.sqrt((columns**2).sum(axis=1) + ridge)
-    columns = columns / size[:, None]
+    columns /= size[:, None]
     normal = columns @ columns.T + np.diag(ridge / size**2)
     inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
     residual = problem.whitened(problem.residuals(model), scale)
-    labels = problem.block_labels(BLOCKS)
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1])
-    scores = inverse @ np.add.reduceat(columns * residual, starts, axis=1)
-    blocks = max(starts.size, 2)
+    cuts = np.flatnonzero(np.diff(problem.block_labels(BLOCKS))) + 1
+    stretches = np.split(np.arange(residual.size), cuts)
+    scores = inverse @ np.stack([columns[:, s] @ residual[s] for s in stretches], axis=1)
+    blocks = max(len(stretches), 2)
     together = (scores**2).sum(axis=1) * blocks / (blocks - 1)
     out = np.full(live.size, np.nan)
     out[live] = np.maximum(np.diag(inverse) / share, together) / size**2

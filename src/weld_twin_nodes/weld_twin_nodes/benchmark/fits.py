@@ -122,14 +122,20 @@ def _inverse(count: int, peers: set[str]) -> Workload:
     def left(found: Array) -> float:
         return float(np.abs(forward(robot, found)[:, :3, 3] - poses[:, :3, 3]).max())
 
-    contenders = [Contender(OWN, own, count, left(own()))]
+    def all_postures() -> Array:
+        return solve_path(robot, poses).q
+
+    contenders = [
+        Contender(OWN, own, count, left(own())),
+        Contender(f'{OWN}, all postures', all_postures, count, left(all_postures())),
+    ]
     if 'pinocchio' in peers:
         newton = _newton(robot, poses, q[0])
         contenders.append(Contender('pinocchio', newton, count, left(newton())))
     return Workload(
         f'inverse kinematics along {count:,} points', 'point', contenders, CLOSED,
-        'weld_twin also looks at the other postures, limits and singularities; Pinocchio is '
-        "given Newton's method from point to point",
+        "from a posture to start with, unless all are looked at; Pinocchio is given Newton's "
+        'method from point to point',
     )  # fmt: skip
 
 

@@ -67,7 +67,7 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
     more = len(diagnosis.candidates) - sum(len(s[:_CANDIDATES]) for s in slots[:_SLOTS])
     note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
     if not diagnosis.effects:
-        title, lead = 'What fits best, though it explains nothing', _STAND_IN
+        title, lead = 'What fits best, though no cause is named', _STAND_IN
     else:
         title = 'Candidates and their probabilities'
         lead = 'A group for every cause: what was found, and what else it could be.'

@@ -61,7 +61,7 @@ def whole(value: int) -> int | float:
     try:
         return float(value)
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return math.inf if value > 0 else -math.inf
 
 
 def _construct_int(loader: Any, node: yaml.ScalarNode) -> int | float:

@@ -66,11 +66,11 @@ class Gram:
 
     def solve(self, index: Index, precision: Array | float = 0.0) -> Array:
         """Return the least-squares coefficients of some columns, shape (len(index),)."""
-        normal = self.normal[np.ix_(index, index)]
-        normal = normal + np.diag(np.broadcast_to(precision, index.shape))
-        size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        scaled = normal / np.outer(size, size)
-        scaled[np.diag_indices_from(scaled)] += 1e-11
+        scaled, each = self.normal[index[:, None], index], np.arange(index.size)
+        scaled[each, each] += precision
+        size = np.sqrt(np.maximum(scaled.diagonal(), 1e-300))
+        scaled /= size[:, None] * size
+        scaled[each, each] += 1e-11
         return np.asarray(np.linalg.solve(scaled, self.right[index] / size) / size)
 
     def gain(self, index: Index) -> float:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from .. import scan
 from ..arrays import Array
@@ -143,6 +142,7 @@ class Vibration(MemoryEffect):
 
         On evenly spaced stamps, on which the recursion is a plain filter.
         """
+        from scipy.signal import lfilter  # half a second that only a diagnosis has to wait for
         if zoom or view.static or view.t.size < 3:
             return None
         step = float(np.median(np.diff(view.t)))

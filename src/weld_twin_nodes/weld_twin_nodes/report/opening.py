@@ -10,7 +10,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .families import worth_doing
 from .html import Html, tag
-from .quantities import interval, millimetres, milliradians, odds, percent
+from .quantities import interval, millimetres, milliradians, odds, percent, turns_only
 from .words import STATUS, found_name, listed, verdict
 
 _SURE_OF = {
@@ -77,6 +77,8 @@ def _left(diagnosis: Diagnosis) -> str:
     shrink = diagnosis.shrink
     if not diagnosis.model.found:
         return 'on unseen data; no effect is in the twin'
+    if turns_only(diagnosis):
+        return 'on unseen data; what was found turns the tool'
     with_what = '' if diagnosis.effects else ', with what fits best'
     return f'{percent(shrink.ratio)} of it on unseen data{with_what} ({interval(shrink)})'
 

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .causes import leftover
 from .html import Html, section, tag
-from .quantities import interval, millimetres, percent
+from .quantities import interval, millimetres, milliradians, percent, turns_only
 from .seam import at_rest, trusted
 from .words import cause
 
@@ -65,6 +65,9 @@ def _judged(diagnosis: Diagnosis) -> str:
     shrink = diagnosis.shrink
     if not diagnosis.model.found:
         return f'No effect is in the twin, so nothing shrinks; judged on {shrink.held_out}.'
+    if shrink.orientation_rad is not None and turns_only(diagnosis):
+        before, after = map(milliradians, shrink.orientation_rad)
+        return f'The position gap stays; the orientation gap of {before} shrinks to {after}.'
     left = f'{percent(shrink.ratio)} of the gap is left ({interval(shrink)})'
     if not _apart(diagnosis):
         return f'Judged by {shrink.held_out}, {left}.'

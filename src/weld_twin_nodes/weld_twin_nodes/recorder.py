@@ -69,14 +69,14 @@ class Recorder(CellNode):
         for name in self.setting('topics'):
             topic = BY_NAME[name]
             self.listen(topic, partial(self._write, topic.name, topic.type), raw=True)
-        self.create_timer(LOOK_EVERY, self._look)
+        self.every(LOOK_EVERY, self._look)
         self._unasked = {
             name: self.create_client(GetParameters, f'/{name}/get_parameters') for name in ASKED
         }
         self._changes: list[dict[str, Any]] = []
         self.create_subscription(ParameterEvent, '/parameter_events', self._changed, 10)
         self.create_service(Trigger, '~/counts', self._tell)
-        self._asking = self.create_timer(ASK_EVERY, self._ask)
+        self._asking = self.every(ASK_EVERY, self._ask)
 
     def destroy_node(self) -> None:
         """Complete the bag."""

@@ -135,18 +135,23 @@ def _record(domain: int, parameters: dict[str, Any]) -> None:
     from weld_twin_nodes.recorder import main
 
     os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
-    words = ['--ros-args', '--log-level', 'error']
+    words = ['--ros-args', '--log-level', 'error', '-r', f'__node:={_name(os.getpid())}']
     for name, value in parameters.items():
         words += ['-p', f'{name}:={value}']
     raise SystemExit(main(words))
+
+
+def _name(pid: int) -> str:
+    """Return a name no other recorder in reach has, so that none answers in its place."""
+    return f'recorder_{pid}'
 
 
 def _feed_and_kill(cell: Cell, trial: Trial, recorder: BaseProcess) -> tuple[_Sent, float]:
     """Return what was sent, and the moment of the kill, or of being told to end [s]."""
     sent = _Sent()
     joints, poses = cell.publisher(JOINT_STATES), cell.publisher(MEASURED_POSE)
-    cell.trigger('/recorder/counts')
     assert recorder.pid is not None
+    cell.trigger(f'/{_name(recorder.pid)}/counts')
     make = cell.messages
     begin = time.monotonic()
     number = 0

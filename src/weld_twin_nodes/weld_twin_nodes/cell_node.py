@@ -15,7 +15,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from weld_twin_core.errors import TwinError
-from weld_twin_msgs_py.cdr import decoder
+from weld_twin_msgs_py.cdr import checked, decoder
 from weld_twin_msgs_py.messages import ros_messages
 from weld_twin_msgs_py.topics import DIAGNOSTICS, Topic
 
@@ -109,13 +109,13 @@ class CellNode(Node):
         callback : callable
             Takes an object that `weld_twin_msgs_py.convert` reads.
         raw : bool
-            Give it the serialised bytes instead.
+            Give it the serialised bytes instead, once they proved to be such a message.
         required : bool
             The node can do nothing without this input; health calls its absence stale.
 
         """
         state = self.health.watch(topic.name, required=required, steady=topic.steady)
-        decode = (lambda data: data) if raw else decoder(topic.type)
+        decode = checked(topic.type) if raw else decoder(topic.type)
 
         def guarded(data: bytes) -> None:
             state.received += 1

@@ -50,9 +50,7 @@ class Input:
         span = max(now - then, 1e-9)
         n, bad = self.received - received, self.refused - refused
         rate = n / span
-        level, message = self._judge(
-            now, n, bad, self.lost - lost, rate, merging=self.others > others
-        )
+        level, message = self._judge(now, n, bad, self.lost - lost, rate, self.others - others)
         if n > bad:
             self._rates.append(rate)
         self._before = (now, self.received, self.refused, self.lost, self.others)
@@ -65,7 +63,7 @@ class Input:
         return Status(f'{node}: {self.topic}', level, message, values)
 
     def _judge(
-        self, now: float, n: int, bad: int, lost: int, rate: float, *, merging: bool
+        self, now: float, n: int, bad: int, lost: int, rate: float, others: int
     ) -> tuple[int, str]:
         usual = sorted(self._rates)[len(self._rates) // 2] if self._rates else 0.0
         silent = now - self.last
@@ -76,9 +74,11 @@ class Input:
         if bad:
             level = ERROR if bad == n else WARN
             return level, f'{bad} of {n} refused: {self.last_reason}'
+        if n > 1 and others == n:
+            return WARN, f'none of {n} is about the joints of this robot'
         if lost:
             return WARN, f'{lost} lost on the way'
-        if self.publishers > 1 and not merging:
+        if self.publishers > 1 and not others:
             return WARN, f'{self.publishers} publishers send the same'
         beats = isfinite(self._patience) and len(self._rates) >= 3 and n
         if beats and not usual / RATE_CHANGE <= rate <= usual * RATE_CHANGE:

@@ -100,10 +100,6 @@ class JointStates:
     def _part(self, stamp: int, message: Any, present: tuple[str, ...]) -> JointSample | None:
         q = convert.joint_positions(message, present)
         qd = convert.joint_velocities(message, present)
-        self._spread.update(present)
-        if len(self._spread) < len(self._names):
-            convert.joint_positions(message, self._names)  # has the sentence
-        self.others += 1
         left, before = self._missing(self._parts), self._stamp
         if stamp != before:
             self._parts, self._stamp = {}, stamp
@@ -112,12 +108,18 @@ class JointStates:
             name: (float(a), float(b))
             for name, a, b in zip(present, q, unknown if qd is None else qd, strict=True)
         }
+        self._spread.update(present)
+        if len(self._spread) < len(self._names):
+            convert.joint_positions(message, self._names)  # has the sentence
         if stamp != before and 0 < len(left) < len(self._names):
             raise DataError(
                 f'joint {left[0]!r} never came with the stamp {before * 1e-9:.6f} s; publish all '
                 'joints in one message, or with equal stamps'
             )
-        return None if self._missing(self._parts) else self._whole()
+        if self._missing(self._parts):
+            self.others += 1
+            return None
+        return self._whole()
 
     def _missing(self, parts: Mapping[str, Any]) -> list[str]:
         return [name for name in self._names if name not in parts]

@@ -43,12 +43,14 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: args.cores])
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / 'bag'
-        with Soak(Path(folder) / 'cell', bag, args.rate, EFFECTS) as soak:
-            soak.run(args.minutes * 60.0, EVERY, tell)
+        with Soak(Path(folder) / 'cell', bag, args.rate, args.minutes * 60.0, EFFECTS) as soak:
+            soak.run(EVERY, tell)
             health, nodes = soak.health(), soak.usage(WARM)
-        lost = losses(bag, args.rate)
+            soak.finish()
+            lost = losses(bag, soak.sent)
     result = {
-        'minutes': args.minutes, 'rate_hz': args.rate, 'cores': args.cores,
+        'minutes': round(soak.sent / args.rate / 60.0, 2), 'rate_hz': args.rate,
+        'sent': soak.sent, 'cores': args.cores,
         'nodes': nodes, 'health': health, 'recorded': lost,
         'cpu_share_total': round(sum(node['cpu_share'] for node in nodes.values()), 3),
     }  # fmt: skip

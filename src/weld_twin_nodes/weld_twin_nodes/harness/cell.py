@@ -68,6 +68,7 @@ class Cell:
         self._stack = ExitStack()
         self.messages = ros_messages()
         self.processes: list[NodeProcess] = []
+        self._started = 0
         self._nodes: list[Node] = []
         self._services: dict[str, Client] = {}
 
@@ -112,7 +113,8 @@ class Cell:
 
         """
         assert self._folder is not None
-        folder = self._folder / f'{len(self.processes):02d}'
+        folder = self._folder / f'{self._started:02d}'
+        self._started += 1
         folder.mkdir(parents=True)
         self.processes.append(NodeProcess(node, parameters, folder))
         return self.processes[-1]

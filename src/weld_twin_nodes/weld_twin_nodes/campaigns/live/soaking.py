@@ -13,13 +13,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from weld_twin_core import catalog
+from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.bags import BagReader
 
 from ...harness import Cell
+from ...motions import plan_motion
 from .listener import HealthListener
 from .usage import children, cpu_ns, rss_bytes
 
 MIB = 2.0**20
+ROBOT, PATH = 'ur5', 'polyline'
+COMPLETE = 300.0
+"""Seconds the recorder has to complete its bag."""
+SPLIT = 300.0
+"""Seconds a file of the bag spans."""
 EACH = ('/joint_states', '/actual/joint_states', '/measured/tool_pose', '/twin/tool_pose')
 """Topics with one message for each joint state."""
 
@@ -35,9 +43,14 @@ class Usage(NamedTuple):
 class Soak:
     """A context manager with all nodes of a cell in processes of their own."""
 
-    def __init__(self, folder: Path, bag: Path, rate: float, effects: str) -> None:
+    def __init__(
+        self, folder: Path, bag: Path, rate: float, seconds: float, effects: str
+    ) -> None:
         self._cell = Cell(folder)
         self._bag, self._rate, self._effects = bag, rate, effects
+        samples = plan_motion(catalog.load(ROBOT), PATH, rate=rate).motion.t.size
+        self._rounds = max(round(seconds * rate / samples), 1)
+        self.sent = self._rounds * samples
         self.samples: dict[str, list[Usage]] = defaultdict(list)
         self._work: dict[int, Usage] = {}
 
@@ -52,27 +65,33 @@ class Soak:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End the nodes; the recorder completes its bag."""
+        """End the nodes."""
         self._cell.__exit__()
+
+    def finish(self) -> None:
+        """Let the recorder complete its bag, which takes it some time."""
+        recorder = self._cell.processes[0]
+        recorder.interrupt()
+        recorder.end(COMPLETE)
 
     def _start(self) -> None:
         cell, sure = self._cell, {'reliable_inputs': True}
         self._listener = HealthListener(cell.node)
-        cell.start('recorder', out=str(self._bag), **sure)
+        cell.start('recorder', out=str(self._bag), split_duration=SPLIT, **sure)
         cell.start('live_diagnosis', **sure)
         cell.start('deviation_markers', **sure)
         cell.start('deviation_analyzer', wait_for_subscribers=1, **sure)
         cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
         cell.start('error_injector', effects=self._effects, seed=1, wait_for_subscribers=1, **sure)
         cell.start(
-            'trajectory_generator', rate=self._rate, repeat=0, path='polyline',
+            'trajectory_generator', rate=self._rate, repeat=self._rounds, path=PATH, robot=ROBOT,
             wait_for_subscribers=4, **sure,
         )  # fmt: skip
         node = cell.node
         cell.wait(lambda: node.count_publishers('/diagnostics') == len(cell.processes), 'all')
 
-    def run(self, seconds: float, every: float, tell: Callable[[str], None]) -> None:
-        """Let the cell work; look at its processes now and then. Then stop the generator."""
+    def run(self, every: float, tell: Callable[[str], None]) -> None:
+        """Let the cell work to the end of the motion; look at its processes now and then."""
         heard = self._listener.values
         self._cell.wait(
             lambda: int(heard.get('recorder: /deviation', {}).get('received', 0)) > 0, 'the motion'
@@ -80,7 +99,7 @@ class Soak:
         begin = time.monotonic()
         self._listener.clear()
         due = every
-        while due <= seconds:
+        while due <= self.sent / self._rate:
             end = begin + due
             self._cell.wait(lambda: time.monotonic() >= end, 'the next look', every + 60.0)  # noqa: B023
             self._look(time.monotonic() - begin)
@@ -88,9 +107,18 @@ class Soak:
                 tell(self._line(due))
             due += every
         self._told = {name: list(entries) for name, entries in self._listener.told.items()}
-        self._cell.processes[-1].stop()
+        end = time.monotonic() + COMPLETE
+        self._cell.wait(
+            lambda: self._recorded() >= self.sent or time.monotonic() > end, 'the rest',
+            2.0 * COMPLETE,
+        )  # fmt: skip
         quiet = time.monotonic() + 3.0
-        self._cell.wait(lambda: time.monotonic() > quiet, 'the queues to empty')
+        self._cell.wait(lambda: time.monotonic() > quiet, 'the last word on health')
+
+    def _recorded(self) -> int:
+        """Return what the recorder has of the topic that has it least."""
+        heard = self._listener.values
+        return min(int(heard[f'recorder: {topic}']['received']) for topic in EACH)
 
     def _look(self, t: float) -> None:
         for process in self._cell.processes:
@@ -139,30 +167,26 @@ class Soak:
         return out
 
 
-def losses(bag: Path, rate: float) -> dict[str, dict[str, Any]]:
-    """Return of each topic with a message per joint state how many stamps are missing."""
-    out: dict[str, dict[str, Any]] = {}
-    last: dict[str, int] = {}
-    period = round(1e9 / rate)
-    with BagReader(bag) as reader:
-        for topic, stamp, _ in reader.stamps():
-            row = out.setdefault(topic, {'messages': 0, 'missing': 0})
-            row['messages'] += 1
-            if topic in EACH and topic in last:
-                row['missing'] += max(round((stamp - last[topic]) / period) - 1, 0)
-            last[topic] = stamp
-    return out
+def losses(bag: Path, sent: int) -> dict[str, Any]:
+    """Return how many messages of each topic the bag holds and lacks of those that were sent."""
+    try:
+        with BagReader(bag) as reader:
+            counts = {topic: count for topic, (_, count) in reader.topics.items()}
+    except TwinError as error:
+        return {'reason': str(error)}
+    return {
+        topic: {'messages': count, **({'missing': sent - count} if topic in EACH else {})}
+        for topic, count in counts.items()
+    }
 
 
 def verdict(result: dict[str, Any], flat: float) -> bool:
     """Tell whether nothing was lost or refused and every node's memory is flat."""
     inputs = result['health'].values()
-    wanted = 0.95 * result['minutes'] * 60.0 * result['rate_hz']
     return (
-        all(result['recorded'].get(topic, {}).get('messages', 0) > wanted for topic in EACH) and
-        all(node['rss_slope_mib_per_h'] <= flat for node in result['nodes'].values())
+        all(result['recorded'].get(topic, {}).get('missing') == 0 for topic in EACH)
+        and all(node['rss_slope_mib_per_h'] <= flat for node in result['nodes'].values())
         and all(row.get('lost', 0) == row.get('refused', 0) == 0 for row in inputs)
-        and all(row['missing'] == 0 for row in result['recorded'].values())
     )
 
 

@@ -25,7 +25,7 @@ from weld_twin_nodes.cli import main
 from weld_twin_nodes.path_file import read_path
 
 SEED = 7
-CASES = 25
+CASES = 15
 
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),

@@ -9,6 +9,7 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,7 @@ class Target:
     read: Callable[[Path], Any]
 
 
+@cache
 def targets() -> dict[str, Target]:
     """Return all kinds of files by name."""
     robots = [catalog.load(name) for name in ('ur5', 'franka_panda')]

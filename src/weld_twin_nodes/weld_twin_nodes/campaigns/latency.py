@@ -47,7 +47,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     worst = max(row['ratio'][key] for row in rates for key in COMPARED)
     return {
         'passed': worst <= LIMIT and all(row['twin']['lost'] == 0 for row in rates),
-        'limit': LIMIT, 'worst_ratio': worst, 'turns': args.turns, 'seconds': args.seconds,
+        'limit': LIMIT, 'worst_ratio': worst, 'turns': args.turns, 'turn_s': args.seconds,
         'rates': rates, 'beside_live_diagnosis': beside,
     }  # fmt: skip
 

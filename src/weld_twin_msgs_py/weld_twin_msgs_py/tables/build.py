@@ -65,6 +65,11 @@ def read_table(path: Path | str, robot: Robot, options: TableOptions | None = No
     except DataError as error:
         text = str(error)
         raise DataError(text if str(path) in text else f"table '{path}': {text}") from None
+    except (np.linalg.LinAlgError, OverflowError):
+        raise DataError(
+            f"table '{path}' holds numbers far beyond any robot's; look for slipped columns or "
+            'decimal signs'
+        ) from None
 
 
 def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) -> Table:

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the campaigns with live nodes count and judge, on cases where the answer is known."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+from weld_twin_nodes.campaigns import latency
+from weld_twin_nodes.campaigns.live.race import Contender
+from weld_twin_nodes.campaigns.live.soaking import EACH, losses, verdict
+from weld_twin_nodes.campaigns.live.usage import cpu_ns, rss_bytes
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / 'docs/results/robustness'
+
+
+def test_cpu_time_and_memory_of_this_process_agree_with_its_own_account():
+    before, own = cpu_ns(os.getpid()), time.process_time_ns()
+    ballast = bytearray(50_000_000)
+    ballast[::4096] = b'x' * len(ballast[::4096])
+    while time.process_time_ns() - own < 200_000_000:
+        pass
+    assert cpu_ns(os.getpid()) - before == pytest.approx(time.process_time_ns() - own, rel=0.2)
+    assert rss_bytes(os.getpid()) > len(ballast)
+
+
+def test_one_disturbed_turn_does_not_decide_a_race():
+    contender = Contender('x', 'm', None, ())
+    contender.turns = [[100_000] * 100, [110_000] * 100, [9_000_000] * 99]
+    contender.cpu, contender.sent = 30_000_000, 300
+    result = contender.result()
+    assert result['p50_us'] == result['p99_us'] == 110.0
+    assert result['p99_all_us'] == 9000.0
+    assert result['cpu_us'] == 100.0
+    assert result['lost'] == 1
+
+
+def soak(**change):
+    node = {'rss_slope_mib_per_h': 1.0}
+    result = {
+        'nodes': {'twin': node}, 'health': {'twin: /joint_states': {'lost': 0, 'refused': 0}},
+        'recorded': {topic: {'messages': 5, 'missing': 0} for topic in EACH},
+    }  # fmt: skip
+    for key, value in change.items():
+        result[key] = {**result[key], **value}
+    return result
+
+
+def test_a_soak_passes_only_flat_and_without_loss():
+    assert verdict(soak(), flat=20.0)
+    assert not verdict(soak(nodes={'twin': {'rss_slope_mib_per_h': 21.0}}), flat=20.0)
+    assert not verdict(soak(health={'x': {'lost': 1, 'refused': 0}}), flat=20.0)
+    assert not verdict(soak(health={'x': {'lost': 0, 'refused': 1}}), flat=20.0)
+    assert not verdict(soak(recorded={EACH[0]: {'messages': 4, 'missing': 1}}), flat=20.0)
+    assert not verdict({**soak(), 'recorded': {}}, flat=20.0)
+
+
+def test_what_a_bag_lacks_is_counted_by_topic():
+    lost = losses(ROOT / 'bags/elbow_play', 226)
+    assert lost['/twin/tool_pose'] == {'messages': 225, 'missing': 1}
+    assert lost['/deviation'] == {'messages': 225}
+    assert 'no bag' in losses(ROOT / 'nowhere', 1)['reason']
+
+
+def test_the_kept_latency_result_is_within_its_limit():
+    kept = json.loads((RESULTS / 'latency.json').read_text())
+    worst = max(row['ratio'][key] for row in kept['rates'] for key in latency.COMPARED)
+    assert [row['rate_hz'] for row in kept['rates']] == list(latency.RATES)
+    assert worst == kept['worst_ratio'] <= latency.LIMIT

@@ -133,6 +133,8 @@ def main() -> int:
     """Do one job from standard input."""
     from weld_twin_core.errors import TwinError
 
+    # A node may run in real time; what it can wait for must not.
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     os.nice(_NICENESS)
     answer_to = sys.stdout.buffer
     sys.stdout = sys.stderr

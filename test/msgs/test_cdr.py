@@ -14,14 +14,8 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py import convert
 from weld_twin_msgs_py.bags.store import TYPES, decode
-from weld_twin_msgs_py.cdr import (
-    READERS,
-    JointStateDecoder,
-    JointStateEncoder,
-    PoseEncoder,
-    Vector3Encoder,
-    decoder,
-)
+from weld_twin_msgs_py.cdr import READERS, JointStateDecoder, decoder
+from weld_twin_msgs_py.cdr_write import JointStateEncoder, PoseEncoder, Vector3Encoder
 from weld_twin_msgs_py.messages import bag_messages
 
 MAKE = bag_messages()

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Serialised messages to objects that `convert` reads, and poses to serialised messages.
+Serialised messages to objects that `convert` reads.
 
 A node reads its inputs here instead of in the middleware's typed take, for two reasons: bytes
 that are no message become a sentence with every length checked against what is there, and a
@@ -15,140 +15,34 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from struct import Struct, error, pack, unpack_from
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from struct import Struct, error, unpack_from
+from typing import Any
 
-from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from .convert import NANOSECONDS
-from .messages import quaternion
+from .cdr_types import (
+    Header,
+    JointState,
+    JointTrajectory,
+    Path,
+    PointStamped,
+    Pose,
+    PoseStamped,
+    String,
+    Temperature,
+    Time,
+    TrajectoryPoint,
+    Vector3Stamped,
+    Wrench,
+    WrenchStamped,
+    Xyz,
+    Xyzw,
+)
 
 HEADER = 4
 """Bytes of encapsulation before the first field; alignment counts from behind them."""
 _STAMP_END = HEADER + 8
-
-
-class Time(NamedTuple):
-    """builtin_interfaces/Time or Duration."""
-
-    sec: int
-    nanosec: int
-
-
-class Header(NamedTuple):
-    """std_msgs/Header."""
-
-    stamp: Time
-    frame_id: str
-
-
-class Xyz(NamedTuple):
-    """geometry_msgs/Point or Vector3."""
-
-    x: float
-    y: float
-    z: float
-
-
-class Xyzw(NamedTuple):
-    """geometry_msgs/Quaternion."""
-
-    x: float
-    y: float
-    z: float
-    w: float
-
-
-class Pose(NamedTuple):
-    """geometry_msgs/Pose."""
-
-    position: Xyz
-    orientation: Xyzw
-
-
-class PoseStamped(NamedTuple):
-    """geometry_msgs/PoseStamped."""
-
-    header: Header
-    pose: Pose
-
-
-class PointStamped(NamedTuple):
-    """geometry_msgs/PointStamped."""
-
-    header: Header
-    point: Xyz
-
-
-class Vector3Stamped(NamedTuple):
-    """geometry_msgs/Vector3Stamped."""
-
-    header: Header
-    vector: Xyz
-
-
-class Wrench(NamedTuple):
-    """geometry_msgs/Wrench."""
-
-    force: Xyz
-    torque: Xyz
-
-
-class WrenchStamped(NamedTuple):
-    """geometry_msgs/WrenchStamped."""
-
-    header: Header
-    wrench: Wrench
-
-
-class Temperature(NamedTuple):
-    """sensor_msgs/Temperature."""
-
-    header: Header
-    temperature: float
-    variance: float
-
-
-class JointState(NamedTuple):
-    """sensor_msgs/JointState without the effort."""
-
-    header: Header
-    name: tuple[str, ...]
-    position: tuple[float, ...]
-    velocity: tuple[float, ...]
-
-
-class TrajectoryPoint(NamedTuple):
-    """trajectory_msgs/JointTrajectoryPoint."""
-
-    positions: tuple[float, ...]
-    velocities: tuple[float, ...]
-    accelerations: tuple[float, ...]
-    effort: tuple[float, ...]
-    time_from_start: Time
-
-
-class JointTrajectory(NamedTuple):
-    """trajectory_msgs/JointTrajectory."""
-
-    header: Header
-    joint_names: tuple[str, ...]
-    points: tuple[TrajectoryPoint, ...]
-
-
-class Path(NamedTuple):
-    """nav_msgs/Path."""
-
-    header: Header
-    poses: tuple[PoseStamped, ...]
-
-
-class String(NamedTuple):
-    """std_msgs/String."""
-
-    data: str
 
 
 class _Cursor:
@@ -335,84 +229,3 @@ def checked(kind: str) -> Callable[[bytes], bytes]:
         return data
 
     return check
-
-
-class PoseEncoder:
-    """
-    Serialises PoseStamped messages of one frame.
-
-    Parameters
-    ----------
-    frame_id : str
-
-    """
-
-    def __init__(self, frame_id: str) -> None:
-        self._head, self._body = _stamped(frame_id, '7d')
-
-    def __call__(self, ns: int, position: Array, rotation: Array) -> bytes:
-        """Return the message of a stamp [ns], a position (3,) [m] and a rotation (3, 3)."""
-        return self._body.pack(
-            b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head,
-            *position.tolist(), *quaternion(rotation),
-        )  # fmt: skip
-
-
-class Vector3Encoder:
-    """
-    Serialises Vector3Stamped messages of one frame.
-
-    Parameters
-    ----------
-    frame_id : str
-
-    """
-
-    def __init__(self, frame_id: str) -> None:
-        self._head, self._body = _stamped(frame_id, '3d')
-
-    def __call__(self, ns: int, vector: Array) -> bytes:
-        """Return the message of a stamp [ns] and a vector (3,)."""
-        return self._body.pack(
-            b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *vector.tolist()
-        )
-
-
-class JointStateEncoder:
-    """
-    Serialises joint states of one set of joints, without frame or effort.
-
-    Parameters
-    ----------
-    joint_names : sequence of str
-
-    """
-
-    def __init__(self, joint_names: Sequence[str]) -> None:
-        head = pack('<I4sI', 1, b'', len(joint_names))
-        for name in joint_names:
-            text = name.encode() + b'\0'
-            head += pack(f'<I{len(text)}s', len(text), text)
-            head += bytes(-len(head) % 4)
-        n = len(joint_names)
-        head += pack('<I', n)
-        self._head = head + bytes(-len(head) % 8)
-        size = len(self._head)
-        self._both = Struct(f'<4siI{size}s{n}dI4x{n}dI')
-        self._alone = Struct(f'<4siI{size}s{n}dII')
-        self._count = n
-
-    def __call__(self, ns: int, q: Array, qd: Array | None = None) -> bytes:
-        """Return the message of a stamp [ns], positions (n,) and velocities (n,) if known."""
-        start = (b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *q.tolist())
-        if qd is None:
-            return self._alone.pack(*start, 0, 0)
-        return self._both.pack(*start, self._count, *qd.tolist(), 0)
-
-
-def _stamped(frame_id: str, values: str) -> tuple[bytes, Struct]:
-    """Return the serialised frame, padded for doubles behind it, and the whole message."""
-    frame = frame_id.encode() + b'\0'
-    head = pack(f'<I{len(frame)}s', len(frame), frame)
-    head += bytes(-len(head) % 8)  # the stamp before it takes eight
-    return head, Struct(f'<4siI{len(head)}s{values}')

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from weld_twin_msgs_py import convert
-from weld_twin_msgs_py.cdr import Vector3Encoder
+from weld_twin_msgs_py.cdr_write import Vector3Encoder
 from weld_twin_msgs_py.topics import (
     DEVIATION,
     DEVIATION_METRICS,

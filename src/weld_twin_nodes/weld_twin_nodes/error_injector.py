@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from weld_twin_core.twin import Twin
-from weld_twin_msgs_py.cdr import JointStateEncoder, PoseEncoder
+from weld_twin_msgs_py.cdr_write import JointStateEncoder, PoseEncoder
 from weld_twin_msgs_py.topics import ACTUAL_JOINT_STATES, MEASURED_POSE
 
 from .frames import WORLD

@@ -13,7 +13,7 @@ from weld_twin_core.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py import convert
-from weld_twin_msgs_py.cdr import JointStateEncoder
+from weld_twin_msgs_py.cdr_write import JointStateEncoder
 from weld_twin_msgs_py.topics import (
     BY_NAME,
     JOINT_STATES,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from weld_twin_msgs_py.cdr import PoseEncoder
+from weld_twin_msgs_py.cdr_write import PoseEncoder
 from weld_twin_msgs_py.topics import TWIN_POSE
 
 from .frames import WORLD

@@ -41,6 +41,8 @@ DEEP = 20_000
 """Samples a tap may be behind: what collects must not lose what the nodes keep up with."""
 LIMIT = 40.0
 """Seconds to wait for anything: on a crowded machine discovery alone has been seen to take ten."""
+AGAIN = 2.0
+"""Seconds after which a question is asked again."""
 BURST = 50
 FIRST_STAMP = 1_000_000_000
 """Stamp of the first sample fed [ns]."""
@@ -298,9 +300,23 @@ class Cell:
                 continue
             client = self.node.create_client(GetParameters, f'/{process.name}/get_parameters')
             self.wait(client.service_is_ready, f'the parameters of {process.name}')
-            answer = client.call_async(GetParameters.Request())
-            self.wait(answer.done, f'{process.name} to answer')
+            self.wait(self._asking(client), f'{process.name} to answer')
             self.node.destroy_client(client)
+
+    @staticmethod
+    def _asking(client: Client) -> Callable[[], bool]:
+        """Return whether a service has answered, asking again: one that was killed seems ready."""
+        answers = [client.call_async(GetParameters.Request())]
+        due = time.monotonic() + AGAIN
+
+        def answered() -> bool:
+            nonlocal due
+            if time.monotonic() > due:
+                answers.append(client.call_async(GetParameters.Request()))
+                due = time.monotonic() + AGAIN
+            return any(answer.done() for answer in answers)
+
+        return answered
 
     def _logs(self) -> Iterator[str]:
         for process in self.processes:

@@ -264,10 +264,6 @@ OTHER_FAULTS = (
     Fault('random bytes as measured pose',
           _beside(MEASURED_POSE, lambda b, k: np.random.default_rng(k).bytes(99)),
           ('deviation_analyzer', 'deviation_markers', 'live_diagnosis', 'recorder')),
-    Fault('an infinite wrench', _beside(
-        TOOL_WRENCH, lambda b, k: b.make.wrench(b.stamp, np.full(6, np.inf)))),
-    Fault('temperature in kelvin', _beside(
-        TEMPERATURE, lambda b, k: b.make.temperature(b.stamp, 294.0))),
     Fault('the clock goes back by a minute', _clock(-60 * S)),
     Fault('the clock goes on by an hour', _clock(HOUR), ()),
     Fault('the clock stands still', _frozen, ()),
@@ -280,4 +276,8 @@ OTHER_FAULTS = (
           _restart(signal.SIGTERM, ['deviation_markers', 'forward_kinematics_twin',
                                     'deviation_analyzer']), ()),
     Fault('discovery lost and found (twin hangs for 25 s)', _stopped, TAKE_JOINTS[1:]),
+    Fault('an infinite wrench', _beside(
+        TOOL_WRENCH, lambda b, k: b.make.wrench(b.stamp, np.full(6, np.inf)))),
+    Fault('temperature in kelvin', _beside(
+        TEMPERATURE, lambda b, k: b.make.temperature(b.stamp, 294.0))),
 )  # fmt: skip

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verdict on evidence given by hand, and what is left that no effect explains."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from diagnosis_cells import effect, known_scale, tiny
 
 from weld_twin_core.diagnosis.fit import fit
 from weld_twin_core.diagnosis.flexible import Structure, structure
+from weld_twin_core.diagnosis.glimpses import glimpsed
 from weld_twin_core.diagnosis.heldout import Unseen
 from weld_twin_core.diagnosis.library import build
 from weld_twin_core.diagnosis.problem import Problem
@@ -84,6 +86,23 @@ def test_what_does_not_carry_over_to_another_motion_is_unknown():
     assert 'held-out motion' in verdict.reasons[0]
 
 
+def test_less_than_a_period_of_ripple_is_any_smooth_curve():
+    ripple = Site('transmission_ripple', 'elbow_joint')
+    seen = evidence((slot((ripple, 1.0)),))
+    assert decide(seen).status == 'identified'
+    verdict = decide(replace(seen, glimpsed=('elbow_joint',)))
+    assert verdict.status == 'unknown'
+    assert 'less than a period' in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(('order', 'told'), [(1.0, ('elbow_joint',)), (40.0, ())])
+def test_periods_seen_are_counted_over_all_recordings(order, told):
+    problem, model = tiny(static=False)
+    ripple = effect('transmission_ripple', joint='elbow_joint', amplitude=1e-4, order=order,
+                    phase=0.0)  # fmt: skip
+    assert glimpsed(problem, model.with_found((ripple,))) == told
+
+
 def test_belief_falls_as_what_remains_stands_above_the_floor():
     beliefs = [decide(evidence((slot((PLAY, 1.0)),), after=a)).confidence
                for a in (3.5e-5, 3.8e-5, 4.4e-5, 5e-5)]  # fmt: skip
@@ -125,7 +144,7 @@ def test_effects_that_cancel_each_other_are_not_named():
 def test_doubt_in_each_effect_multiplies():
     one = decide(evidence((slot((PLAY, 0.9)),)))
     two = decide(evidence((slot((PLAY, 0.9)), slot((OFFSET, 0.9)))))
-    assert two.confidence == pytest.approx(0.9 * one.confidence)
+    assert two.confidence == pytest.approx(one.confidence**2)
 
 
 def with_bend(size):
@@ -195,3 +214,17 @@ def test_the_columns_of_a_unit_are_the_change_of_pose_its_effect_makes():
             problem.residuals(moved), scale)
         column = found.columns[unit.columns[0][0]]
         assert np.linalg.norm(column * step - change) < 1e-3 * np.linalg.norm(change)
+
+
+def test_a_tool_that_slipped_is_told_from_a_base_that_moved():
+    problem, model = tiny(count=400)
+    recording = problem.recordings[0]
+    measured = recording.measured
+    slip = measured.rotation @ np.array([3e-4, 0.0, 0.0])
+    slip[: measured.t.size // 2] = 0.0
+    slipped = Measurements(measured.t, measured.position + slip, measured.rotation)
+    problem = Problem((recording.with_measured(slipped),))
+    scale = known_scale(problem)
+    bare = fit(problem, model, scale)
+    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, [])
+    assert found.depends_on[0].endswith('seen from the tool')

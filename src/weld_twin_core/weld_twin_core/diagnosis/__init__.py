@@ -15,6 +15,7 @@ from .advice import actions, next_experiment
 from .alignment import initial_frames
 from .families import family_verdict
 from .flexible import structure
+from .glimpses import glimpsed
 from .heldout import TRUSTED, Unseen
 from .noise import noise_floor
 from .problem import Model, Problem, usable
@@ -102,6 +103,7 @@ def diagnose(
     evidence = Evidence(
         slots, loose, shrink.rms_before_m, shrink.rms_after_m, floor,
         unseen.rms(unseen.predict(kept)), independent, _parts(unseen),
+        glimpsed(found.problem, found.final.model),
     )  # fmt: skip
     verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
     baseline = Unseen.of(found.problem, found.scale, found.baseline, np.zeros(0))

@@ -9,10 +9,13 @@ import numpy as np
 from .heldout import Unseen
 from .result import Family, Site
 from .search import Search
-from .verdict import CALIBRATION, STRUCTURE, Evidence, Verdict
+from .verdict import STRUCTURE, Evidence, Verdict
 
 WORTH = 0.03
 """A family whose absence raises the squared unseen error by less than this is not named."""
+FAMILIES = 0.75
+"""Belief in the families named where nothing is left; a judgement, as dozens of errors at once are
+seldom put together on purpose."""
 CERTAIN = 2.0
 LEAST = 1e-6
 """A member that moves the tool by less [m] is nobody's concern."""
@@ -28,7 +31,7 @@ def family_verdict(found: Search, unseen: Unseen, evidence: Evidence) -> Verdict
         'many small errors act together; members of one family are fitted jointly and only their '
         'sum is certain',
     )
-    sure = CALIBRATION / (1.0 + (left / STRUCTURE) ** 3)
+    sure = FAMILIES / (1.0 + (left / STRUCTURE) ** 3)
     return Verdict(status, sure, sets, reasons, families)
 
 

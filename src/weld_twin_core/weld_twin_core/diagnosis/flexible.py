@@ -95,6 +95,10 @@ def _generic(
     yield 'time', _pose_group(problem, features, scale, _time)
     yield 'a step in time', _pose_group(problem, features, scale, _steps)
     yield 'the place in the workspace', _pose_group(problem, features, scale, _place)
+    yield 'time, seen from the tool', _pose_group(problem, features, scale, _time, of_tool=True)
+    yield 'a step in time, seen from the tool', _pose_group(
+        problem, features, scale, _steps, of_tool=True
+    )
 
 
 def _column_group(
@@ -114,14 +118,16 @@ def _column_group(
 
 
 def _pose_group(
-    problem: Problem, features: list[Features], scale: Scale, regressors: object
-) -> Array:
+    problem: Problem, features: list[Features], scale: Scale, regressors: object, *,
+    of_tool: bool = False,
+) -> Array:  # fmt: skip
     parts = []
     for k, maker in enumerate(features):
         values = regressors(maker)  # type: ignore[operator]
         block = np.zeros((3, values.shape[0], problem.rows[k], values.shape[1]))
+        axes = maker.run.poses.rotation if of_tool else np.eye(3)[None]
         for j in range(3):
-            block[j, :, j] = values
+            block[j, :, :3] = (axes[:, :, j].T)[None] * values[:, None, :]
         parts.append(block.reshape(-1, problem.rows[k], values.shape[1]))
     return _unit(problem.whitened(parts, scale))
 

@@ -39,8 +39,8 @@ CARRIED_SHARE = 0.1
 STACKED = 0.75
 """Belief left when two effects at rest sit on one joint; a judgement."""
 CALIBRATION = 0.95
-"""Belief left where all evidence agrees: no library is complete, and on some motions a cause that
-it lacks moves the tool exactly as one that it holds."""
+"""Belief left for every cause named where all evidence agrees: no library is complete, and on some
+motions a cause that it lacks moves the tool exactly as those that it holds."""
 DOUBTED = 0.75
 """Belief in 'unknown' where effects fit but are no plausible explanation; a judgement."""
 
@@ -65,6 +65,8 @@ class Evidence:
         Whether the floor was measured apart from any model.
     parts : tuple of float
         Squared contribution of every effect over the square of their sum.
+    glimpsed : tuple of str
+        Joints whose ripple was seen over less than a period.
 
     """
 
@@ -76,6 +78,7 @@ class Evidence:
     fitted: float
     independent: bool
     parts: tuple[float, ...]
+    glimpsed: tuple[str, ...] = ()
 
     @property
     def structured(self) -> bool:
@@ -97,7 +100,7 @@ class Evidence:
     def carried(self) -> bool:
         """Return whether the model does on a held-out motion what it does on those fitted."""
         return (
-            self.rise < ABOVE - 1.0
+            self.after < ABOVE * self.floor
             or self.after < CARRIED * self.fitted
             or self.share < CARRIED_SHARE
         )
@@ -105,8 +108,6 @@ class Evidence:
     @property
     def share(self) -> float:
         """Return what remains above the floor as a share of the gap."""
-        if not self.independent:
-            return 0.0
         gap = max(self.gap**2 - self.floor**2, 1e-18)
         return float(np.sqrt(max(self.after**2 - self.floor**2, 0.0) / gap))
 
@@ -154,7 +155,7 @@ def decide(evidence: Evidence) -> Verdict:
         for slot, chosen in zip(evidence.slots, sets, strict=True)
     ]
     complete = 1.0 / (1.0 + (left / STRUCTURE) ** 3)
-    confidence = float(np.prod(mass)) * complete * CALIBRATION
+    confidence = float(np.prod(mass)) * complete * CALIBRATION ** len(sets)
     if _stacked(sets):
         confidence *= STACKED
     confidence /= 1.0 + min(evidence.rise / RISE, evidence.share / SHARE) ** 2
@@ -186,6 +187,11 @@ def _doubt(evidence: Evidence) -> str | None:
         return (
             f'{count} separate effects would be needed at once: together they imitate a cause '
             'that is not in the library'
+        )
+    if evidence.glimpsed:
+        return (
+            f'a curve over the angle of {" and ".join(evidence.glimpsed)} is left, of which less '
+            'than a period was seen: it may be ripple, or anything else that depends on the angle'
         )
     if not evidence.carried:
         return (

@@ -39,7 +39,7 @@ def run_cell(folder, plan, robot, effects, seed=7):
         cell.start('deviation_analyzer', wait_for_subscribers=2, path_length=plan.length,
                    metrics_idle=0.3, **sure)  # fmt: skip
         cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
-        cell.start('error_injector', effects=effects, seed=seed, wait_for_subscribers=1, **sure)
+        cell.start('error_injector', effects=effects, seed=seed, wait_for_subscribers=2, **sure)
         metrics = cell.collect('/deviation/metrics')
         cell.start(
             'trajectory_generator', path='line', profile='aggressive', rate=RATE, playback=0.0,
@@ -49,8 +49,8 @@ def run_cell(folder, plan, robot, effects, seed=7):
         cell.wait(
             lambda: bool(metrics.messages)
             and convert.metrics(metrics.last)['samples'] >= plan.motion.t.size - delayed,
-            'the last metrics', limit=30.0,
-        )  # fmt: skip
+            'the last metrics',
+        )
         n = plan.motion.t.size
         cell.wait_recorded({
             '/joint_states': n, '/actual/joint_states': n, '/measured/tool_pose': n,

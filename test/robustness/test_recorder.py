@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import sys
 
@@ -14,6 +15,7 @@ import pytest
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
 from weld_twin_core import catalog
+from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.bags import recover
 from weld_twin_nodes.campaigns.killing.trial import Trial, try_once
@@ -31,6 +33,18 @@ def cell(tmp_path):
         yield cell
 
 
+def flushed(folder, numbers):
+    """Return how many messages a copy of the growing bag would be recovered with."""
+    for name in ('copy', 'copy.unfinished'):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    shutil.copytree(folder / 'bag.unfinished', folder / 'copy.unfinished')
+    try:
+        recover(folder / 'copy')
+    except DataError:  # nothing whole yet
+        return 0
+    return len(numbers(folder / 'copy'))
+
+
 def motion(samples):
     """Return a motion whose stamps are the numbers of its samples [ns]."""
     return JointMotion(np.arange(samples) * 1e-9, np.zeros((samples, ROBOT.n)))
@@ -45,10 +59,17 @@ def test_a_recorder_on_a_full_disk_ends_with_a_sentence_and_loses_nothing_flushe
     recorder = cell.start(['sh', '-c', f'ulimit -f {BLOCKS}; exec {command}'])
     publisher = cell.publisher()
     cell.trigger('/recorder/counts')
-    for number in range(900):  # fewer than the queues hold, more than the file may
-        publisher.publish(cell.messages.joint_state(
-            NUMBERED + number, ROBOT.joint_names, np.zeros(ROBOT.n)
-        ))  # fmt: skip
+
+    def publish(numbers):
+        for number in numbers:
+            publisher.publish(cell.messages.joint_state(
+                NUMBERED + number, ROBOT.joint_names, np.zeros(ROBOT.n)
+            ))  # fmt: skip
+
+    publish(range(150))
+    cell.wait_recorded({'/joint_states': 150})
+    cell.wait(lambda: flushed(tmp_path, numbers) >= 120, 'these to be flushed')
+    publish(range(150, 900))  # fewer than the queues hold, more than the file may
     assert recorder.end() == 2
     cell.processes.remove(recorder)
     assert 'cannot be written' in recorder.log

@@ -32,7 +32,7 @@ HEALTH_EVERY = 1.0
 
 SHARED = (
     Setting('wait_for_subscribers', 0,
-            'take no input before each output has this many subscribers [1]', 0, 100),
+            'take no input before the main outputs have this many subscribers [1]', 0, 100),
     Setting('reliable_inputs', False,
             'request reliable delivery; only for inputs whose publishers offer it'),
     Setting('stale_after', 1.0, 'silence after which an input counts as stale [s]', 0.05, 3600.0),

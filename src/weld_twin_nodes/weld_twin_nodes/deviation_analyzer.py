@@ -46,7 +46,7 @@ class DeviationAnalyzer(CellNode):
         )  # fmt: skip
         self._vector = self.offer(DEVIATION)
         self._encode = Vector3Encoder(BASE)
-        self._metrics = self.offer(DEVIATION_METRICS)
+        self._metrics = self.offer(DEVIATION_METRICS, awaited=False)
         self._stamp = 0
         self._seen = self._told = 0
         self._every = self.setting('metrics_every')

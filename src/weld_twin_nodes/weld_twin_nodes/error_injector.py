@@ -28,7 +28,7 @@ class ErrorInjector(ModelNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('error_injector', **kwargs)
-        self._joints = self.offer(ACTUAL_JOINT_STATES)
+        self._joints = self.offer(ACTUAL_JOINT_STATES, awaited=False)
         self._pose = self.offer(MEASURED_POSE)
         self._encode_joints = JointStateEncoder(self.robot.joint_names)
         self._encode_pose = PoseEncoder(WORLD)

@@ -135,7 +135,14 @@ class TrajectoryGenerator(CellNode):
         self.when_ready(self._begin)
 
     def _begin(self) -> None:
-        self._stamp(self.setting('start_stamp_ns') or self.get_clock().now().nanoseconds)
+        self._timer = self.every(TICK, self._begin_in_time)
+
+    def _begin_in_time(self) -> None:
+        start = self.setting('start_stamp_ns') or self.get_clock().now().nanoseconds
+        if start == 0:  # simulated time that nobody has told yet
+            return
+        self._timer.cancel()
+        self._stamp(start)
         # The look-out runs on the wall clock: under use_sim_time the time of the samples is the
         # simulator's, which may stand still.
         self._timer = self.every(TICK, self._send)

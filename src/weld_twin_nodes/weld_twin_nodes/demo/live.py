@@ -49,12 +49,12 @@ def _start(cell: Cell, job: Job) -> Tap:
     common = {'robot': job.robot.name, 'reliable_inputs': True}
     cell.start('recorder', out=str(job.bag), reliable_inputs=True)
     cell.start(
-        'deviation_analyzer', path_length=job.plan.length, wait_for_subscribers=1, **common
+        'deviation_analyzer', path_length=job.plan.length, wait_for_subscribers=2, **common
     )
     cell.start('forward_kinematics_twin', wait_for_subscribers=2, **common)
     effects = yaml_text([effect.to_mapping() for effect in job.effects])
     cell.start(
-        'error_injector', effects=effects, seed=job.seed, wait_for_subscribers=1, **common
+        'error_injector', effects=effects, seed=job.seed, wait_for_subscribers=2, **common
     )
     deviations = cell.collect('/deviation')
     cell.start(

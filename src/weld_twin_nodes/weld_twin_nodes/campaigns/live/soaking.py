@@ -82,7 +82,7 @@ class Soak:
         cell.start('deviation_markers', **sure)
         cell.start('deviation_analyzer', wait_for_subscribers=1, **sure)
         cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
-        cell.start('error_injector', effects=self._effects, seed=1, wait_for_subscribers=1, **sure)
+        cell.start('error_injector', effects=self._effects, seed=1, wait_for_subscribers=2, **sure)
         cell.start(
             'trajectory_generator', rate=self._rate, repeat=self._rounds, path=PATH, robot=ROBOT,
             wait_for_subscribers=4, **sure,

@@ -136,6 +136,7 @@ class TrajectoryGenerator(CellNode):
 
     def _begin(self) -> None:
         self._timer = self.every(TICK, self._begin_in_time)
+        self._begin_in_time()
 
     def _begin_in_time(self) -> None:
         start = self.setting('start_stamp_ns') or self.get_clock().now().nanoseconds

@@ -86,11 +86,15 @@ def test_what_does_not_carry_over_to_another_motion_is_unknown():
     assert 'held-out motion' in verdict.reasons[0]
 
 
-def test_less_than_a_period_of_ripple_is_any_smooth_curve():
-    ripple = Site('transmission_ripple', 'elbow_joint')
-    seen = evidence((slot((ripple, 1.0)),))
-    assert decide(seen).status == 'identified'
-    verdict = decide(replace(seen, glimpsed=('elbow_joint',)))
+def test_less_than_a_period_of_ripple_is_believed_less_and_beside_another_effect_not_at_all():
+    ripple = slot((Site('transmission_ripple', 'elbow_joint'), 1.0))
+    alone = evidence((ripple,))
+    glimpse = decide(replace(alone, glimpsed=('elbow_joint',)))
+    assert glimpse.status == 'identified'
+    assert glimpse.confidence < 0.7 < decide(alone).confidence
+    bent = evidence((ripple, slot((Site('gear_ratio', 'elbow_joint'), 1.0))))
+    assert decide(bent).status == 'identified'
+    verdict = decide(replace(bent, glimpsed=('elbow_joint',)))
     assert verdict.status == 'unknown'
     assert 'less than a period' in verdict.reasons[0]
 

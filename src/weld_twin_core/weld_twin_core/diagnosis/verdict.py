@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,8 @@ STACKED = 0.75
 CALIBRATION = 0.95
 """Belief left for every cause named where all evidence agrees: no library is complete, and on some
 motions a cause that it lacks moves the tool exactly as those that it holds."""
+GLIMPSED = 0.6
+"""Belief left in a ripple of which less than a period was seen; a judgement."""
 DOUBTED = 0.75
 """Belief in 'unknown' where effects fit but are no plausible explanation; a judgement."""
 
@@ -158,6 +161,8 @@ def decide(evidence: Evidence) -> Verdict:
     confidence = float(np.prod(mass)) * complete * CALIBRATION ** len(sets)
     if _stacked(sets):
         confidence *= STACKED
+    if evidence.glimpsed:
+        confidence *= GLIMPSED
     confidence /= 1.0 + min(evidence.rise / RISE, evidence.share / SHARE) ** 2
     reasons = tuple(_alike(slot, chosen) for slot, chosen in zip(evidence.slots, sets, strict=True)
                     if len(chosen) > 1)  # fmt: skip
@@ -188,10 +193,11 @@ def _doubt(evidence: Evidence) -> str | None:
             f'{count} separate effects would be needed at once: together they imitate a cause '
             'that is not in the library'
         )
-    if evidence.glimpsed:
+    bent = [joint for joint in evidence.glimpsed if _joints_at_rest(evidence).count(joint) > 1]
+    if bent:
         return (
-            f'a curve over the angle of {" and ".join(evidence.glimpsed)} is left, of which less '
-            'than a period was seen: it may be ripple, or anything else that depends on the angle'
+            f'less than a period of ripple was seen over the angle of {" and ".join(bent)}, and '
+            'with another effect on that joint it bends to anything that depends on the angle'
         )
     if not evidence.carried:
         return (
@@ -204,11 +210,20 @@ def _doubt(evidence: Evidence) -> str | None:
 
 def _stacked(sets: tuple[tuple[Site, ...], ...]) -> bool:
     """Return whether two effects that show at rest sit on one joint: two may stand for a third."""
-    at_rest = [
-        chosen[0].joint for chosen in sets
-        if chosen[0].joint and REGISTRY[chosen[0].effect].regime in ('static', 'load')
+    joints = _at_rest(chosen[0] for chosen in sets)
+    return len(joints) > len(set(joints))
+
+
+def _joints_at_rest(evidence: Evidence) -> list[str]:
+    return _at_rest(slot[0].site for slot in evidence.slots)
+
+
+def _at_rest(sites: Iterable[Site]) -> list[str]:
+    """Return the joints of the effects that show at rest."""
+    return [
+        site.joint for site in sites
+        if site.joint and REGISTRY[site.effect].regime in ('static', 'load')
     ]
-    return len(at_rest) > len(set(at_rest))
 
 
 def _orders(rival: Rival) -> int:

@@ -29,9 +29,9 @@ MANY = 8
 SEVERAL = 4
 """From this many on, the many are tried, and taken if they predict unseen stations better."""
 BETTER = 0.95
-MEMBER = 0.1
-"""Share of the largest one's size from which an effect counts as one of the many; a few large ones
-that small ones mend are one cause that the library lacks."""
+MEMBER = 0.3
+"""Share of what all of them leave from which an effect counts as one of the many; a few large ones
+that tiny ones mend are one cause that the library lacks."""
 SWAPS = 3
 HOPE = 0.3
 MISFIT = 0.012
@@ -151,8 +151,9 @@ def search(
     together = replace(sparse, scale=scale, final=final, precision=precision, slots=(), dense=True)
     if dense:
         return together
-    better = _unseen_rms(together) < BETTER * _unseen_rms(sparse)
-    return together if better and _members(together) >= MANY else sparse
+    left = _unseen_rms(together)
+    many = _members(together, left) >= MANY
+    return together if many and left < BETTER * _unseen_rms(sparse) else sparse
 
 
 def settled(
@@ -173,11 +174,11 @@ def settled(
     return now, tuple(slots)
 
 
-def _members(found: Search) -> int:
-    """Return how many effects move the tool by more than a share of what the largest does."""
+def _members(found: Search, left: float) -> int:
+    """Return how many effects move the tool by more than a share of what is left [m]."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
-    return int((sizes > MEMBER * sizes.max()).sum())
+    return int((sizes > MEMBER * left).sum())
 
 
 def _unseen_rms(found: Search) -> float:

@@ -42,13 +42,12 @@ class Watched:
         self.health = Health('twin', 1.0)
         self.input = self.health.watch('/joint_states', **{'required': True, **options})
 
-    def second(self, received=0, refused=0, lost=0, others=0, reason=''):
+    def second(self, received=0, refused=0, others=0, reason=''):
         self.clock[0] += 1.0
         if received:
             self.input.last = self.clock[0] - 0.01
         self.input.received += received
         self.input.refused += refused
-        self.input.lost += lost
         self.input.others += others
         self.input.last_reason = reason or self.input.last_reason
         status = self.health.statuses()[1]
@@ -63,7 +62,6 @@ def test_an_input_goes_from_nothing_over_good_and_bad_to_silence_and_back(clock)
         assert watched.second(500) == (OK, '500/s')
     assert watched.second(500, refused=100, reason='NaN') == (WARN, '100 of 500 refused: NaN')
     assert watched.second(500, refused=500) == (ERROR, '500 of 500 refused: NaN')
-    assert watched.second(500, lost=3) == (WARN, '3 lost on the way')
     assert watched.second(500, others=500)[0] == WARN
     assert watched.second(50) == (WARN, '50/s where 500/s is usual')
     assert watched.second(5000) == (WARN, '5000/s where 500/s is usual')

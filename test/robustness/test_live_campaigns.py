@@ -46,7 +46,7 @@ def test_one_disturbed_turn_does_not_decide_a_race():
 def soak(**change):
     node = {'rss_slope_mib_per_h': 1.0}
     result = {
-        'nodes': {'twin': node}, 'health': {'twin: /joint_states': {'lost': 0, 'refused': 0}},
+        'nodes': {'twin': node}, 'health': {'twin: /joint_states': {'refused': 0}},
         'recorded': {topic: {'messages': 5, 'missing': 0} for topic in EACH},
     }  # fmt: skip
     for key, value in change.items():
@@ -57,8 +57,7 @@ def soak(**change):
 def test_a_soak_passes_only_flat_and_without_loss():
     assert verdict(soak(), flat=20.0)
     assert not verdict(soak(nodes={'twin': {'rss_slope_mib_per_h': 21.0}}), flat=20.0)
-    assert not verdict(soak(health={'x': {'lost': 1, 'refused': 0}}), flat=20.0)
-    assert not verdict(soak(health={'x': {'lost': 0, 'refused': 1}}), flat=20.0)
+    assert not verdict(soak(health={'x': {'refused': 1}}), flat=20.0)
     assert not verdict(soak(recorded={EACH[0]: {'messages': 4, 'missing': 1}}), flat=20.0)
     assert not verdict({**soak(), 'recorded': {}}, flat=20.0)
 

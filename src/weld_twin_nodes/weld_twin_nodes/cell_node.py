@@ -134,8 +134,7 @@ class CellNode(Node):
             self.create_subscription(
                 topic.message_class(), topic.name, guarded, wanted.to_rclpy(), raw=True,
                 event_callbacks=qos_events.of_subscription(
-                    topic.name, wanted, partial(self._mismatch, topic.name),
-                    partial(_count_lost, state),
+                    topic.name, wanted, partial(self._mismatch, topic.name)
                 ),
             )  # fmt: skip
 
@@ -201,7 +200,3 @@ class CellNode(Node):
         self._diagnostics.publish(self.messages.statuses(
             self.get_clock().now().nanoseconds, self.health.statuses()
         ))  # fmt: skip
-
-
-def _count_lost(state: Input, count: int) -> None:
-    state.lost += count

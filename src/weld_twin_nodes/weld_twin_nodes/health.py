@@ -35,36 +35,34 @@ class Input:
 
     def __init__(self, topic: str, required: bool, patience: float) -> None:
         self.topic = topic
-        self.received = self.refused = self.lost = self.others = 0
+        self.received = self.refused = self.others = 0
         self.publishers = 0
         self.last_reason = ''
         self.last = 0.0
         self._required = required
         self._patience = patience
         self._rates: deque[float] = deque(maxlen=USUAL)
-        self._before = (time.monotonic(), 0, 0, 0, 0)
+        self._before = (time.monotonic(), 0, 0, 0)
 
     def status(self, node: str, now: float) -> Status:
         """Return what happened since the last look."""
-        then, received, refused, lost, others = self._before
+        then, received, refused, others = self._before
         span = max(now - then, 1e-9)
         n, bad = self.received - received, self.refused - refused
         rate = n / span
-        level, message = self._judge(now, n, bad, self.lost - lost, rate, self.others - others)
+        level, message = self._judge(now, n, bad, rate, self.others - others)
         if n > bad:
             self._rates.append(rate)
-        self._before = (now, self.received, self.refused, self.lost, self.others)
+        self._before = (now, self.received, self.refused, self.others)
         values = {
-            'received': self.received, 'refused': self.refused, 'lost': self.lost,
+            'received': self.received, 'refused': self.refused,
             'rate_hz': round(rate, 1), 'publishers': self.publishers,
             'age_s': round(now - self.last, 3) if self.received else 'never',
             'last_reason': self.last_reason,
         }  # fmt: skip
         return Status(f'{node}: {self.topic}', level, message, values)
 
-    def _judge(
-        self, now: float, n: int, bad: int, lost: int, rate: float, others: int
-    ) -> tuple[int, str]:
+    def _judge(self, now: float, n: int, bad: int, rate: float, others: int) -> tuple[int, str]:
         usual = sorted(self._rates)[len(self._rates) // 2] if self._rates else 0.0
         silent = now - self.last
         if not self.received:
@@ -76,8 +74,6 @@ class Input:
             return level, f'{bad} of {n} refused: {self.last_reason}'
         if n > 1 and others == n:
             return WARN, f'none of {n} is about the joints of this robot'
-        if lost:
-            return WARN, f'{lost} lost on the way'
         if self.publishers > 1 and not others:
             return WARN, f'{self.publishers} publishers send the same'
         beats = isfinite(self._patience) and len(self._rates) >= 3 and n

@@ -15,10 +15,13 @@ from weld_twin_msgs_py.topics import Qos
 Tell = Callable[[str], None]
 
 
-def of_subscription(
-    topic: str, wanted: Qos, mismatch: Tell, lost: Callable[[int], None]
-) -> SubscriptionEventCallbacks:
-    """Return callbacks that tell in a sentence why nothing arrives, and how much was lost."""
+def of_subscription(topic: str, wanted: Qos, mismatch: Tell) -> SubscriptionEventCallbacks:
+    """
+    Return callbacks that tell in a sentence why nothing arrives.
+
+    Lost messages are not asked for: taking that event while messages stream in has locked the
+    middleware up for good, reader and writer both.
+    """
     asks = f'{wanted.reliability}, {wanted.durability}'
     return SubscriptionEventCallbacks(
         incompatible_qos=lambda event: mismatch(
@@ -28,7 +31,6 @@ def of_subscription(
         incompatible_type=lambda event: mismatch(
             f'{topic}: a publisher sends another message type; nothing of it arrives'
         ),
-        message_lost=lambda event: lost(event.total_count_change),
     )
 
 

@@ -151,9 +151,10 @@ def search(
     together = replace(sparse, scale=scale, final=final, precision=precision, slots=(), dense=True)
     if dense:
         return together
-    left = _unseen_rms(together)
-    many = _members(together, left) >= MANY
-    return together if many and left < BETTER * _unseen_rms(sparse) else sparse
+    unseen = _unseen(together)
+    left = _unseen_rms(unseen)
+    many = _members(unseen, left) >= MANY
+    return together if many and left < BETTER * _unseen_rms(_unseen(sparse)) else sparse
 
 
 def settled(
@@ -174,16 +175,18 @@ def settled(
     return now, tuple(slots)
 
 
-def _members(found: Search, left: float) -> int:
+def _unseen(found: Search) -> Unseen:
+    return Unseen.of(found.problem, found.scale, found.final, found.precision)
+
+
+def _unseen_rms(unseen: Unseen) -> float:
+    return unseen.rms(unseen.predict(range(len(unseen.parts))))
+
+
+def _members(unseen: Unseen, left: float) -> int:
     """Return how many effects move the tool by more than a share of what is left [m]."""
-    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
     return int((sizes > MEMBER * left).sum())
-
-
-def _unseen_rms(found: Search) -> float:
-    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    return unseen.rms(unseen.predict(range(len(found.final.model.found))))
 
 
 def names(model: Model) -> list[tuple[str, str | None, int]]:

@@ -13,18 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from math import prod
 from threading import get_ident
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..chain import Channel
 from ..errors import ModelError
 from ..robot import Robot
-from .buffers import aligned
+from .buffers import aligned, unbuffered
 from .half_angle import DEGREE, HalfAngle
-from .weights import Piece, on_half_angles
+from .regions import ROWS, Division, Region
+from .weights import on_half_angles
 
 BLOCK = 1000
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
@@ -43,15 +44,11 @@ class BulkKernel:
     ----------
     robot : Robot
     channels : sequence of Channel
-        DH values whose screws `screws` gives, in the order of the rows: 'theta', 'alpha', 'beta'
-        and 'a' are turns about the axis that 'theta' and 'd', 'alpha', 'beta' and 'a' act on.
+        DH values whose screws `screws` gives: 'theta', 'alpha', 'beta' and 'a' are turns about
+        the axis that 'theta' and 'd', 'alpha', 'beta' and 'a' act on. Quickest in the order in
+        which they come along the chain.
     block : int
         Poses worked on at once; a multiple of 8 is best.
-
-    Raises
-    ------
-    ModelError
-        The channels are not in the order of the rows.
 
     Notes
     -----
@@ -63,18 +60,14 @@ class BulkKernel:
         self.robot = robot
         self.channels = tuple(channels)
         self.block = block
-        cut = (robot.n + 1) // 2
-        self.sizes = (cut, robot.n - cut)
-        near = Piece(robot, range(cut), robot.T_world_base, np.eye(4))
-        far = Piece(robot, range(cut, robot.n), np.eye(4), robot.T_flange_tool)
-        inner = [c for c in self.channels if c[1] < cut]
-        outer = [c for c in self.channels if c[1] >= cut]
-        if inner + outer != list(self.channels):
-            raise ModelError(f'channels must be in the order of the rows, got {self.channels}')
-        self.counts = (len(inner), len(outer))
+        division = Division(robot, self.channels)
+        inner, outer = division.inner(), division.outer()
+        self.sizes, self.counts = division.sizes, (len(inner), len(outer))
+        self._runs, self._ends = division.runs(), division.ends()
+        near, far = division.near, division.far
         self._weights = (
-            self._rows(_columns(near.poses()), *near.screws(inner), joints=cut),
-            self._rows(_columns(far.poses()), *far.velocities(outer), joints=robot.n - cut),
+            self._rows(_columns(near.poses()), *near.screws(inner), joints=self.sizes[0]),
+            self._rows(_columns(far.poses()), far.velocities(outer), joints=self.sizes[1]),
         )
         self._memory: dict[int, _Memory] = {}
 
@@ -101,8 +94,9 @@ class BulkKernel:
 
         """
         out = _poses_like(q, out)
-        for part in self._blocks(len(q)):
-            self._pose_block(q[part], out[part], POSE)
+        with unbuffered():
+            for part in self._blocks(len(q)):
+                self._pose_block(q[part], out[part], POSE)
         return out
 
     def screws(
@@ -118,9 +112,10 @@ class BulkKernel:
         """
         poses = _poses_like(q, poses)
         out = aligned(6, len(self.channels), len(q)) if out is None else out
-        for part in self._blocks(len(q)):
-            memory = self._pose_block(q[part], poses[part], None)
-            self._screw_block(memory, out[:, :, part])
+        with unbuffered():
+            for part in self._blocks(len(q)):
+                memory = self._pose_block(q[part], poses[part], None)
+                self._screw_block(memory, out[:, :, part])
         return poses, out
 
     def _blocks(self, count: int) -> list[slice]:
@@ -139,40 +134,40 @@ class BulkKernel:
                 self._memory.pop(next(k for k in self._memory if k != self.block))
             self._memory[n] = _Memory(self, n)
         memory = self._memory[n]
-        memory.fill(q, self.robot.prismatic)
+        memory.fill(q)
         for weights, features, piece in zip(
             self._weights, memory.features, memory.pieces, strict=True
         ):
             np.matmul(weights[:rows], features, out=piece[:rows])
         near, far = (piece[:POSE].reshape(4, 3, n) for piece in memory.pieces)
-        sums = memory.sums
-        np.multiply(far.swapaxes(0, 1)[:, :, None], near[:3, None], sums[:36].reshape(3, 4, 3, n))
-        sums[36:39] = near[3]
-        sums[39] = 1.0
-        np.matmul(sums.T, _GATHER, out=out.reshape(n, 16))
+        products = memory.products
+        np.multiply(far.swapaxes(0, 1)[:, :, None], near[:3, None], products)
+        pose = products[0]
+        pose += products[1]
+        pose += products[2]
+        pose[3] += near[3]
+        memory.pose[POSE] = 1.0
+        np.matmul(memory.pose.T, _SPREAD, out=out.reshape(n, 16))
         return memory
 
     def _screw_block(self, memory: _Memory, out: Array) -> None:
         near, far = memory.pieces
-        inner, outer = self.counts
-        n = near.shape[1]
-        if inner:
-            tip = memory.sums[9:12] + memory.sums[21:24]
-            tip += memory.sums[33:36]
-            tip += memory.sums[36:39]
-            moment, axis = near[POSE:].reshape(2, 3, inner, n)
-            _velocity(moment, axis, tip, out[:3, :inner], memory.spares(inner, n))
-            out[3:, :inner] = axis
-        if outer:
-            turn = near[:9].reshape(3, 3, 1, n)
-            total, part = memory.spares(3 * outer, n).reshape(2, 3, outer, n)
-            vectors = far[POSE:].reshape(2, 3, outer, n)
-            for vector, target in zip(vectors, (out[:3, inner:], out[3:, inner:]), strict=True):
-                np.multiply(turn[0], vector[0], total)
-                np.multiply(turn[1], vector[1], part)
-                np.add(total, part, total)
-                np.multiply(turn[2], vector[2], part)
-                np.add(total, part, target)
+        (inner, outer), n = self.counts, near.shape[1]
+        moments, axes = near[POSE:].reshape(2, 3, inner, n)
+        velocities = far[POSE:].reshape(3, 2, outer, n)
+        for region, channels, part in self._runs:
+            wanted = out[:, channels].reshape(2, 3, -1, n)
+            if region is Region.NEAR:
+                spare = memory.spare(2, part.stop - part.start, n)
+                _velocity(moments[:, part], axes[:, part], memory.pose[9:12], wanted[0], spare)
+                wanted[1] = axes[:, part]
+            elif region is Region.FAR:
+                spare = memory.spare(2, 3, 2, part.stop - part.start, n)
+                _turned(near[:9].reshape(3, 3, 1, 1, n), velocities[:, :, part],
+                        wanted.swapaxes(0, 1), spare)  # fmt: skip
+            else:
+                for k in range(channels.start, channels.stop):
+                    np.matmul(self._ends[k], memory.pose, out=out[:, k])
 
 
 def kernel_of(robot: Robot, channels: tuple[Channel, ...] = ()) -> BulkKernel:
@@ -213,18 +208,27 @@ def _velocity(moment: Array, axis: Array, tip: Array, out: Array, spare: Array) 
         np.add(moment[k], plus, out[k])
 
 
-def _gather() -> Array:
-    """Return the matrix that adds the products up to rows of a 4 x 4 matrix, shape (40, 16)."""
-    out: Array = np.zeros((40, 4, 4))
+def _turned(turn: Array, vectors: Array, out: Array, spare: Array) -> None:
+    """Write the turn, columns first, of vectors (3, 2, channels, N); spare has two such arrays."""
+    total, part = spare
+    np.multiply(turn[0], vectors[0], total)
+    np.multiply(turn[1], vectors[1], part)
+    np.add(total, part, total)
+    np.multiply(turn[2], vectors[2], part)
+    np.add(total, part, out)
+
+
+def _spread() -> Array:
+    """Return the matrix that puts the rows of a pose into a 4 x 4 matrix, shape (ROWS, 16)."""
+    out: Array = np.zeros((ROWS, 4, 4))
     for i in range(3):
         for j in range(4):
-            out[[12 * k + 3 * j + i for k in range(3)], i, j] = 1.0
-        out[36 + i, i, 3] = 1.0
-    out[39, 3, 3] = 1.0
-    return out.reshape(40, 16)
+            out[3 * j + i, i, j] = 1.0
+    out[POSE, 3, 3] = 1.0
+    return out.reshape(ROWS, 16)
 
 
-_GATHER = _gather()
+_SPREAD = _spread()
 
 
 class _Memory:
@@ -239,29 +243,31 @@ class _Memory:
     def __init__(self, kernel: BulkKernel, n: int) -> None:
         joints = kernel.robot.n
         self.sizes = kernel.sizes
+        self.sliding = np.flatnonzero(kernel.robot.prismatic)
         rows = [3**size for size in kernel.sizes]
-        spare = 6 * max(kernel.counts)
-        shared = aligned(max((DEGREE + 1) * joints, sum(rows), 40, spare), n)
+        spare = max(2 * kernel.counts[0], 12 * kernel.counts[1])
+        shared = aligned(max((DEGREE + 1) * joints, sum(rows), 3 * POSE, ROWS + spare), n)
         powers = shared[: (DEGREE + 1) * joints].reshape(DEGREE + 1, joints * n)
         self.half = HalfAngle(joints, n, powers=powers)
         self.own = aligned(2, joints, n)
         self.features = (shared[: rows[0]], shared[rows[0] : sum(rows)])
         self.pieces = tuple(aligned(len(w), n) for w in kernel._weights)
-        self.sums = shared[:40]
-        self._shared = shared
+        self.products = shared[: 3 * POSE].reshape(3, 4, 3, n)
+        self.pose = shared[:ROWS]
+        self._spare = shared[ROWS:].reshape(-1)
 
-    def spares(self, rows: int, n: int) -> Array:
-        """Return shared memory as two arrays of some rows, shape (2, rows, n)."""
-        return self._shared[: 2 * rows].reshape(2, rows, n)
+    def spare(self, *shape: int) -> Array:
+        """Return memory that is free once the pose is there."""
+        return self._spare[: prod(shape)].reshape(shape)
 
-    def fill(self, q: Array, prismatic: NDArray[np.bool_]) -> None:
+    def fill(self, q: Array) -> None:
         """Compute the products of (1, u, v) of the joints of each piece."""
         sine, cosine = self.half(q.T)
         np.multiply(cosine, sine, self.own[0])
         np.multiply(sine, sine, self.own[1])
-        if prismatic.any():
-            self.own[0, prismatic] = 0.5 * q.T[prismatic]  # stands in for sin x = 2 u
-            self.own[1, prismatic] = 0.0
+        for i in self.sliding:
+            self.own[0, i] = 0.5 * q[:, i]  # stands in for sin x = 2 u
+            self.own[1, i] = 0.0
         first = 0
         for size, features in zip(self.sizes, self.features, strict=True):
             features[0] = 1.0

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
-from ..chain import Channel
 from ..robot import Robot
 from ..rotation import skew
 
@@ -102,25 +101,24 @@ def adjoint(matrices: Array) -> Array:
 
 class Piece:
     """
-    A run of rows with what stands before and after them.
+    A run of factors with what stands before and after them.
 
     Parameters
     ----------
-    robot : Robot
-    rows : range
+    run : sequence of Factor
     before, after : array, shape (4, 4)
         Base or tool frame, where the piece begins or ends the chain.
 
     """
 
-    def __init__(self, robot: Robot, rows: range, before: Array, after: Array) -> None:
-        self._factors = [(i, factor) for i in rows for factor in factors(robot, i)]
+    def __init__(self, run: Sequence[Factor], before: Array, after: Array) -> None:
+        self._factors = list(run)
         self._before = before[None]
         self._upto = [self._before]
-        for _, factor in self._factors:
+        for factor in self._factors:
             self._upto.append(product(self._upto[-1], factor.matrices))
         self._onward = [after[None]]
-        for _, factor in reversed(self._factors):
+        for factor in reversed(self._factors):
             self._onward.append(product(factor.matrices, self._onward[-1]))
         self._onward.reverse()
 
@@ -128,38 +126,30 @@ class Piece:
         """Return the weights of the pose, shape (features, 4, 4)."""
         return product(self._upto[-1], self._onward[-1])
 
-    def velocities(self, channels: Sequence[Channel]) -> tuple[Array, Array]:
+    def velocities(self, turns: Sequence[tuple[int, int]]) -> Array:
         """
-        Return weights of the tip's velocity and of the axis, in the frame before the piece.
+        Return weights of the tip's velocity and of the axis, shape (features, 3, 2, turns).
 
-        Shape (features, 3, channels) both.
+        Both are in the frame before the piece; a turn is that of a coordinate axis before one of
+        the factors.
         """
-        moved, axes = [], []
-        for channel in channels:
-            k, axis = self._place(channel)
+        out = np.zeros((len(self._upto[-1]), 3, 2, len(turns)))
+        for t, (k, axis) in enumerate(turns):
             turned = self._upto[k] @ generator(axis)
-            moved.append(product(turned, self._onward[k][:, :, 3:])[:, :3, 0])
-            axes.append(self._axis(k, axis))
-        return _stack(moved), _stack(axes)
+            out[:, :, 0, t] = product(turned, self._onward[k][:, :, 3:])[:, :3, 0]
+            out[:, :, 1, t] = self._axis(k, axis)
+        return out
 
-    def screws(self, channels: Sequence[Channel]) -> tuple[Array, Array]:
-        """Return weights of the moment about the origin and of the axis; shapes as above."""
+    def screws(self, turns: Sequence[tuple[int, int]]) -> tuple[Array, Array]:
+        """Return weights of moment about the origin and axis, shape (features, 3, turns) both."""
         acting = [adjoint(self._before)]
-        for _, factor in self._factors:
+        for factor in self._factors:
             acting.append(product(acting[-1], adjoint(factor.matrices)))
-        moments, axes = [], []
-        for channel in channels:
-            k, axis = self._place(channel)
-            moments.append(self._all_features(acting[k][:, :3, 3 + axis]))
-            axes.append(self._axis(k, axis))
-        return _stack(moments), _stack(axes)
-
-    def _place(self, channel: Channel) -> tuple[int, int]:
-        """Return before which factor a channel acts, and about which axis."""
-        kind, row = channel
-        return next(
-            (k, f.axis) for k, (i, f) in enumerate(self._factors) if i == row and kind in f.kinds
-        )
+        moments, axes = np.zeros((2, len(self._upto[-1]), 3, len(turns)))
+        for t, (k, axis) in enumerate(turns):
+            moments[:, :, t] = self._all_features(acting[k][:, :3, 3 + axis])
+            axes[:, :, t] = self._axis(k, axis)
+        return moments, axes
 
     def _axis(self, place: int, axis: int) -> Array:
         return self._all_features(self._upto[place][:, :3, axis])
@@ -169,10 +159,6 @@ class Piece:
         out = np.zeros((len(weights), len(self._upto[-1]) // len(weights), weights.shape[1]))
         out[:, 0] = weights
         return out.reshape(-1, weights.shape[1])
-
-
-def _stack(parts: list[Array]) -> Array:
-    return np.stack(parts, axis=-1) if parts else np.zeros((0, 3, 0))
 
 
 def on_half_angles(weights: Array, joints: int) -> Array:

@@ -13,8 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 from math import prod
 from threading import get_ident
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,7 +33,8 @@ BLOCK = 1000
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
 
 POSE = 12
-"""Outputs that make up a pose; those of the channels follow."""
+"""Rows of a piece that make up its pose, the last; those of the channels come before."""
+SCREW = 6
 LENGTHS = 4
 """Lengths of blocks whose working memory a kernel keeps."""
 
@@ -66,16 +69,12 @@ class BulkKernel:
         self._runs, self._ends = division.runs(), division.ends()
         near, far = division.near, division.far
         self._weights = (
-            self._rows(_columns(near.poses()), *near.screws(inner), joints=self.sizes[0]),
-            self._rows(_columns(far.poses()), far.velocities(outer), joints=self.sizes[1]),
+            _on_features(self.sizes[0], near.screws(inner), near.poses()),
+            _on_features(self.sizes[1], far.velocities(outer), far.poses()),
         )
+        self._poses = [_pose_product(weights) for weights in self._weights]
+        self._every = [_every_product(weights) for weights in self._weights]
         self._memory: dict[int, _Memory] = {}
-
-    @staticmethod
-    def _rows(*weights: Array, joints: int) -> Array:
-        """Return weights with one row for every output, shape (outputs, features)."""
-        flat = [w.reshape(len(w), w[0].size) for w in weights if w.size]
-        return np.ascontiguousarray(on_half_angles(np.concatenate(flat, axis=1), joints).T)
 
     def poses(self, q: Array, out: Array | None = None) -> Array:
         """
@@ -96,7 +95,7 @@ class BulkKernel:
         out = _poses_like(q, out)
         with unbuffered():
             for part in self._blocks(len(q)):
-                self._pose_block(q[part], out[part], POSE)
+                self._pose_block(q[part], out[part])
         return out
 
     def screws(
@@ -114,7 +113,7 @@ class BulkKernel:
         out = aligned(6, len(self.channels), len(q)) if out is None else out
         with unbuffered():
             for part in self._blocks(len(q)):
-                memory = self._pose_block(q[part], poses[part], None)
+                memory = self._pose_block(q[part], poses[part], screws=True)
                 self._screw_block(memory, out[:, :, part])
         return poses, out
 
@@ -126,8 +125,8 @@ class BulkKernel:
             starts.append(count - size)
         return [slice(start, start + size) for start in starts]
 
-    def _pose_block(self, q: Array, out: Array, rows: int | None) -> _Memory:
-        """Write poses; of the weights only so many rows are used."""
+    def _pose_block(self, q: Array, out: Array, screws: bool = False) -> _Memory:
+        """Write poses, and leave what screws are made of in memory."""
         n = len(q)
         if n not in self._memory:
             if len(self._memory) == LENGTHS:
@@ -135,11 +134,12 @@ class BulkKernel:
             self._memory[n] = _Memory(self, n)
         memory = self._memory[n]
         memory.fill(q)
-        for weights, features, piece in zip(
-            self._weights, memory.features, memory.pieces, strict=True
+        for products, features, piece in zip(
+            self._every if screws else self._poses, memory.features, memory.pieces, strict=True
         ):
-            np.matmul(weights[:rows], features, out=piece[:rows])
-        near, far = (piece[:POSE].reshape(4, 3, n) for piece in memory.pieces)
+            for rows, weights in products:
+                np.matmul(weights, features[: weights.shape[1]], out=piece[rows])
+        near, far = (piece[-POSE:].reshape(4, 3, n) for piece in memory.pieces)
         products = memory.products
         np.multiply(far.swapaxes(0, 1)[:, :, None], near[:3, None], products)
         pose = products[0]
@@ -153,8 +153,9 @@ class BulkKernel:
     def _screw_block(self, memory: _Memory, out: Array) -> None:
         near, far = memory.pieces
         (inner, outer), n = self.counts, near.shape[1]
-        moments, axes = near[POSE:].reshape(2, 3, inner, n)
-        velocities = far[POSE:].reshape(3, 2, outer, n)
+        moments, axes = near[:-POSE].reshape(inner, 2, 3, n).transpose(1, 2, 0, 3)
+        velocities = far[:-POSE].reshape(outer, 2, 3, n).transpose(2, 1, 0, 3)
+        turn = near[-POSE:-3].reshape(3, 3, 1, 1, n)
         for region, channels, part in self._runs:
             wanted = out[:, channels].reshape(2, 3, -1, n)
             if region is Region.NEAR:
@@ -163,8 +164,7 @@ class BulkKernel:
                 wanted[1] = axes[:, part]
             elif region is Region.FAR:
                 spare = memory.spare(2, 3, 2, part.stop - part.start, n)
-                _turned(near[:9].reshape(3, 3, 1, 1, n), velocities[:, :, part],
-                        wanted.swapaxes(0, 1), spare)  # fmt: skip
+                _turned(turn, velocities[:, :, part], wanted.swapaxes(0, 1), spare)
             else:
                 for k in range(channels.start, channels.stop):
                     np.matmul(self._ends[k], memory.pose, out=out[:, k])
@@ -191,10 +191,42 @@ def _poses_like(q: Array, out: Array | None) -> Array:
     return out
 
 
-def _columns(poses: Array) -> Array:
-    """Return the columns x, y, z and origin of weights of poses, shape (features, 4, 3)."""
-    columns: Array = poses[:, :3].swapaxes(1, 2)
-    return columns
+def _on_features(joints: int, screws: Array, poses: Array) -> Array:
+    """
+    Return weights of a piece, one row for every output, shape (outputs, features).
+
+    Rows are those of the screws, then the columns of the pose. Features that leave the last joints
+    at 1 come first.
+    """
+    flat = [screws.reshape(len(screws), -1), poses[:, :3].swapaxes(1, 2).reshape(len(poses), -1)]
+    weights = on_half_angles(np.concatenate(flat, axis=1), joints).T
+    every = weights.reshape(-1, *[3] * joints)
+    reverse = (0, *range(joints, 0, -1))
+    return np.ascontiguousarray(every.transpose(reverse).reshape(weights.shape))
+
+
+class _Product(NamedTuple):
+    """Some rows of a piece, and their weights on as many features as these need."""
+
+    rows: slice
+    weights: Array
+
+
+def _pose_product(weights: Array) -> list[_Product]:
+    return [_Product(slice(-POSE, None), weights[-POSE:])]
+
+
+def _every_product(weights: Array) -> list[_Product]:
+    """Return products that give every row: the first channels depend on the first joints only."""
+    channels = weights[:-POSE].reshape(-1, SCREW, weights.shape[1])
+    used = [int(np.flatnonzero(one.any(axis=0))[-1]) + 1 for one in channels]
+    widths = np.repeat([*used, weights.shape[1]], [*[SCREW] * len(used), POSE])
+    steps = np.flatnonzero(np.diff(widths)) + 1
+    edges = [0, *map(int, steps), len(weights)]
+    return [
+        _Product(slice(i, j), np.ascontiguousarray(weights[i:j, : widths[i]]))
+        for i, j in pairwise(edges)
+    ]
 
 
 def _velocity(moment: Array, axis: Array, tip: Array, out: Array, spare: Array) -> None:
@@ -272,7 +304,7 @@ class _Memory:
         for size, features in zip(self.sizes, self.features, strict=True):
             features[0] = 1.0
             width = 1
-            for i in range(first + size - 1, first - 1, -1):
+            for i in range(first, first + size):
                 wide = features[width : 3 * width].reshape(2, width, -1)
                 np.multiply(self.own[:, i, None], features[:width], wide)
                 width *= 3

@@ -125,7 +125,7 @@ class Division:
 
     def _in_world(self, place: Place) -> Array:
         """Return the matrix of a screw that stands still in the world: m + axis x origin."""
-        moment, axis = (w[0, :, 0] for w in self.near.screws([(place.before, place.axis)]))
+        moment, axis = self.near.screws([(place.before, place.axis)])[0, 0]
         out = np.zeros((6, ROWS))
         out[:3, _ORIGIN] = np.cross(axis, np.eye(3)).T
         out[:3, 12], out[3:, 12] = moment, axis

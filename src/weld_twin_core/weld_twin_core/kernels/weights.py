@@ -128,28 +128,28 @@ class Piece:
 
     def velocities(self, turns: Sequence[tuple[int, int]]) -> Array:
         """
-        Return weights of the tip's velocity and of the axis, shape (features, 3, 2, turns).
+        Return weights of the tip's velocity and of the axis, shape (features, turns, 2, 3).
 
         Both are in the frame before the piece; a turn is that of a coordinate axis before one of
         the factors.
         """
-        out = np.zeros((len(self._upto[-1]), 3, 2, len(turns)))
+        out = np.zeros((len(self._upto[-1]), len(turns), 2, 3))
         for t, (k, axis) in enumerate(turns):
             turned = self._upto[k] @ generator(axis)
-            out[:, :, 0, t] = product(turned, self._onward[k][:, :, 3:])[:, :3, 0]
-            out[:, :, 1, t] = self._axis(k, axis)
+            out[:, t, 0] = product(turned, self._onward[k][:, :, 3:])[:, :3, 0]
+            out[:, t, 1] = self._axis(k, axis)
         return out
 
-    def screws(self, turns: Sequence[tuple[int, int]]) -> tuple[Array, Array]:
-        """Return weights of moment about the origin and axis, shape (features, 3, turns) both."""
+    def screws(self, turns: Sequence[tuple[int, int]]) -> Array:
+        """Return weights of moment about the origin and axis, shape (features, turns, 2, 3)."""
         acting = [adjoint(self._before)]
         for factor in self._factors:
             acting.append(product(acting[-1], adjoint(factor.matrices)))
-        moments, axes = np.zeros((2, len(self._upto[-1]), 3, len(turns)))
+        out = np.zeros((len(self._upto[-1]), len(turns), 2, 3))
         for t, (k, axis) in enumerate(turns):
-            moments[:, :, t] = self._all_features(acting[k][:, :3, 3 + axis])
-            axes[:, :, t] = self._axis(k, axis)
-        return moments, axes
+            out[:, t, 0] = self._all_features(acting[k][:, :3, 3 + axis])
+            out[:, t, 1] = self._axis(k, axis)
+        return out
 
     def _axis(self, place: int, axis: int) -> Array:
         return self._all_features(self._upto[place][:, :3, axis])

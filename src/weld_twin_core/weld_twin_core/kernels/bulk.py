@@ -29,7 +29,7 @@ from .half_angle import DEGREE, HalfAngle
 from .regions import ROWS, Division, Region
 from .weights import on_half_angles
 
-BLOCK = 1000
+BLOCK = 1200
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
 
 POSE = 12
@@ -182,7 +182,7 @@ def _kept(robot: Robot, channels: tuple[Channel, ...], thread: int) -> BulkKerne
 
 def _poses_like(q: Array, out: Array | None) -> Array:
     if out is None:
-        return np.empty((len(q), 4, 4))
+        return aligned(len(q), 4, 4)
     if out.shape != (len(q), 4, 4) or not out.flags.c_contiguous:
         raise ModelError(
             f'poses of {len(q)} joint positions need a contiguous array of shape '

@@ -24,6 +24,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from scipy.linalg import qr, solve_triangular
 from ..arrays import Array
 from ..errors import ModelError
 from ..robot import Robot
+from .buffers import aligned, unbuffered
 from .half_angle import sincos
 
 ROUNDING = 1e-14
@@ -107,41 +109,52 @@ class SeamDraws:
         self._phases = np.exp(1j * q[self.samples].T)[..., None]
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))
         if self.spread is None:
-            self._nominal = self._points(*self._pieces(nominal))
+            self._nominal = self._points(*self._pieces(nominal), aligned(5, 3 * len(q)))
         else:
             self._nominal = self._carried(nominal)
 
     def largest(self, draws: DhDraws) -> Array:
         """Return the largest distance from the nominal tool point along the seam, shape (D,)."""
-        largest = [part.max(axis=1) for part in self._squares(draws)]
-        return np.asarray(np.sqrt(np.concatenate(largest)))
+        out = np.empty(len(draws.theta))
+        with unbuffered():
+            for part, squares in self._squares(draws):
+                squares.max(axis=1, out=out[part])
+        return np.sqrt(out, out=out)
 
     def distances(self, draws: DhDraws) -> Array:
         """Return distances from the nominal tool point, shape (D, N) [m]."""
-        return np.asarray(np.sqrt(np.concatenate(list(self._squares(draws)))))
+        out = np.empty((len(draws.theta), self._count))
+        with unbuffered():
+            for part, squares in self._squares(draws):
+                np.sqrt(squares, out=out[part])
+        return out
 
-    def _squares(self, draws: DhDraws) -> Iterator[Array]:
-        """Yield squared distances of some draws after the others, shape (some, N)."""
+    def _squares(self, draws: DhDraws) -> Iterator[tuple[slice, Array]]:
+        """Yield which draws, and their squared distances (some, N), which the next overwrite."""
         for start in range(0, len(draws.theta), BLOCK):
             block = DhDraws(*(values[start : start + BLOCK] for values in draws))
-            if self.spread is None:
-                yield from self._of_all(block)
-            else:
-                yield from self._of_few(block, self.spread)
+            parts = self._of_all(block) if self.spread is None else self._of_few(block, self.spread)
+            for squares in parts:
+                yield slice(start, start + len(squares)), squares
+                start += len(squares)
 
     def _of_all(self, draws: DhDraws) -> Iterator[Array]:
         pieces = self._pieces(draws)
         step = max(1, POINTS // self._count)
+        memory = aligned(5, 3 * step * self._count)
         for k in range(0, len(draws.theta), step):
-            away = self._points(*(piece[..., k : k + step] for piece in pieces))
+            away = self._points(*(piece[..., k : k + step] for piece in pieces), memory)
             away -= self._nominal
             yield _squared(away)
 
     def _of_few(self, draws: DhDraws, spread: Array) -> Iterator[Array]:
-        away = self._carried(draws) - self._nominal
+        few = self._carried(draws) - self._nominal
         step = max(1, FOLLOWING // self._count)
-        for k in range(0, len(draws.theta), step):
-            yield _squared(spread @ away[..., k : k + step]).T
+        memory = aligned(3, self._count * step)
+        for k in range(0, few.shape[2], step):
+            some = few[..., k : k + step]
+            away = memory[:, : self._count * some.shape[2]].reshape(3, self._count, -1)
+            yield _squared(np.matmul(spread, some, out=away)).T
 
     def _carried(self, draws: DhDraws) -> Array:
         """
@@ -151,13 +164,16 @@ class SeamDraws:
         """
         rows = _Rows(draws)
         turns, twists = rows.cosine + 1j * rows.sine, rows.alpha_cosine + 1j * rows.alpha_sine
-        x, y, z = self.robot.T_flange_tool[:3, 3, None]
-        yz = _pair(y, z)
+        yz, xy, spin = np.empty((3, len(self._phases[0]), draws.theta.shape[0]), dtype=complex)
+        x, yz.real, yz.imag = self.robot.T_flange_tool[:3, 3]
         for i in range(self.robot.n - 1, -1, -1):
-            yz = yz * twists[i]
-            xy = _pair(x + rows.a[i], yz.real)
-            xy = xy * (self._phases[i] * turns[i] if i > 0 else turns[i])
-            x, yz = xy.real, _pair(xy.imag, yz.imag + rows.d[i])
+            yz *= twists[i]
+            np.add(x, rows.a[i], out=xy.real)
+            xy.imag = yz.real
+            xy *= np.multiply(self._phases[i], turns[i], out=spin) if i > 0 else turns[i]
+            x = xy.real
+            yz.real = xy.imag
+            yz.imag += rows.d[i]
         return np.stack([x, yz.real, yz.imag])
 
     def _pieces(self, draws: DhDraws) -> tuple[Array, Array]:
@@ -171,21 +187,19 @@ class SeamDraws:
         start[[0, 1, 2], 0, [0, 1, 2]] = 1.0
         return rows.linked(rows.carried(start, range(SPLIT - 1, 0, -1)), 0), far
 
-    def _points(self, near: Array, far: Array) -> Array:
-        """Return tool points after the first joint's turn was taken away, shape (3, D, S)."""
-        tip = _on_features(far, self._far)[:, 0]
-        frame = _on_features(near, self._near)
+    def _points(self, near: Array, far: Array, memory: Array) -> Array:
+        """
+        Return tool points after the first joint's turn was taken away, shape (3, D, S).
+
+        They lie in the memory, of which there must be five times as much.
+        """
+        tip = _on_features(far, self._far, memory[4])[:, 0]
+        frame = _on_features(near, self._near, memory[:4].reshape(-1))
         out = frame[:, 3]
         for k in range(3):
             frame[:, k] *= tip[k]
             out += frame[:, k]
         return out
-
-
-def _pair(first: Array, second: Array) -> NDArray[np.complex128]:
-    out = np.empty(np.broadcast_shapes(first.shape, second.shape), dtype=np.complex128)
-    out.real, out.imag = first, second
-    return out
 
 
 def _squared(away: Array) -> Array:
@@ -284,8 +298,9 @@ def _features(q: Array) -> Array:
     return out
 
 
-def _on_features(weights: Array, features: Array) -> Array:
+def _on_features(weights: Array, features: Array, memory: Array) -> Array:
     """Return weights (3, F, k, D) applied to features (F, S), shape (3, k, D, S)."""
     flat = weights.reshape(*weights.shape[:2], -1)
-    found: Array = flat.swapaxes(1, 2) @ features
+    shape = 3, flat.shape[2], features.shape[1]
+    found: Array = np.matmul(flat.swapaxes(1, 2), features, out=memory[: prod(shape)].reshape(shape))
     return found.reshape(3, *weights.shape[2:], -1)

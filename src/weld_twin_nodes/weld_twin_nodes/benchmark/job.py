@@ -29,8 +29,8 @@ from .studies import studies
 class Effort:
     """How much is done: sizes of the workloads and how long they are timed."""
 
-    rounds: int = 7
-    least: float = 0.1
+    rounds: int = 21
+    least: float = 0.05
     counts: tuple[int, ...] = (1000, 100_000)
     draws: int = 10_000
     base: int = 1024

@@ -63,8 +63,9 @@ def _one_by_one(way: Callable[[Array], Array], q: Array) -> Callable[[], object]
 def _poses(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
     q = random_positions(robot, count)
     wanted = forward(robot, q[:LOOPED])
-    kernel, out = BulkKernel(robot), np.empty((count, 4, 4))
-    gap = _gap(kernel.poses(q, out), wanted)
+    kernel = BulkKernel(robot)
+    out = kernel.poses(q)
+    gap = _gap(out, wanted)
     contenders = [Contender(OWN, lambda: kernel.poses(q, out), count, gap)]
     few = q[: chain_limit(count)]
     contenders.append(Contender(PLAIN, lambda: forward(robot, few), len(few)))
@@ -84,8 +85,7 @@ def chain_limit(count: int) -> int:
 def _jacobians(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
     q = random_positions(robot, count)
     kernel = BulkKernel(robot, [('theta', i) for i in range(robot.n)])
-    poses, out = np.empty((count, 4, 4)), np.empty((6, robot.n, count))
-    kernel.screws(q, poses, out)
+    poses, out = kernel.screws(q)
     found = out.transpose(2, 0, 1)
     ways = {name: peer for name, peer in peers.items() if peer.screws}
     wanted = ways['pinocchio'].screws(q[:LOOPED])[1] if 'pinocchio' in ways else found
@@ -104,8 +104,7 @@ def _jacobians(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
 def _derivatives(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
     q = random_positions(robot, count)
     kernel = BulkKernel(robot, [(key, i) for i in range(robot.n) for key in ('theta', 'alpha')])
-    poses, out = np.empty((count, 4, 4)), np.empty((6, 2 * robot.n, count))
-    kernel.screws(q, poses, out)
+    poses, out = kernel.screws(q)
     found = written_out(out[..., :LOOPED])
     ways = {name: peer for name, peer in peers.items() if peer.dh}
     wanted = ways['pinocchio'].dh(q[:LOOPED])[1] if 'pinocchio' in ways else found

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from threading import Thread
 
 import numpy as np
@@ -12,9 +13,10 @@ import pytest
 
 from weld_twin_core import chain
 from weld_twin_core.errors import ModelError
+from weld_twin_core.kernels import bulk
 from weld_twin_core.kernels.buffers import aligned
 from weld_twin_core.kernels.bulk import LENGTHS, BulkKernel, kernel_of
-from weld_twin_core.kernels.half_angle import COSINE, SINE, sincos
+from weld_twin_core.kernels.half_angle import COSINE, SINE, HalfAngle, sincos
 from weld_twin_core.kernels.single import SinglePose
 from weld_twin_core.robot import Robot
 
@@ -26,17 +28,25 @@ def positions(robot: Robot, count: int) -> np.ndarray:
     return np.random.default_rng(count).uniform(-3.2, 3.2, (count, robot.n))
 
 
-def test_sine_and_cosine_agree_with_libm_over_several_turns() -> None:
+both_ways = pytest.mark.parametrize('by_tangent', [True, False])
+
+
+@both_ways
+def test_sine_and_cosine_agree_with_libm_over_several_turns(by_tangent: bool) -> None:
     angles = np.random.default_rng(0).uniform(-7.0, 7.0, (3, 40_000))
-    sine, cosine = sincos(angles)
+    angles[0, :5] = 0.0, np.pi, -np.pi, np.nextafter(np.pi, 4.0), 2.0 * np.pi
+    sine, cosine = sincos(angles, by_tangent)
     assert np.abs(sine - np.sin(angles)).max() < 4e-15
     assert np.abs(cosine - np.cos(angles)).max() < 4e-15
 
 
+@both_ways
 @pytest.mark.parametrize('turns', [1.0, 1e3, 1e6])
-def test_far_out_sine_and_cosine_err_by_the_last_digit_of_the_angle(turns: float) -> None:
+def test_far_out_sine_and_cosine_err_by_the_last_digit_of_the_angle(
+    turns: float, by_tangent: bool
+) -> None:
     angles = 2.0 * np.pi * turns + np.random.default_rng(1).uniform(-3.0, 3.0, 1000)
-    sine, cosine = sincos(angles)
+    sine, cosine = sincos(angles, by_tangent)
     allowed = 4e-15 + 2.0 * np.spacing(angles.max())
     assert np.abs(sine - np.sin(angles)).max() < allowed
     assert np.abs(cosine - np.cos(angles)).max() < allowed
@@ -73,6 +83,16 @@ def test_every_sample_is_worked_on_whatever_their_number(
     out = np.full((count, 4, 4), np.nan)
     assert BulkKernel(robot).poses(q, out) is out
     assert np.abs(out - chain.forward(robot, q)).max(initial=0.0) < EXACT
+
+
+def test_poses_are_the_same_where_numpy_has_no_quick_tangent(
+    any_robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    q = positions(any_robot, 500)
+    usual = BulkKernel(any_robot).poses(q)
+    for by_tangent in (True, False):
+        monkeypatch.setattr(bulk, 'HalfAngle', partial(HalfAngle, by_tangent=by_tangent))
+        assert np.abs(BulkKernel(any_robot).poses(q) - usual).max() < EXACT
 
 
 def test_bulk_screws_are_the_columns_of_the_plain_chain(any_robot: Robot) -> None:

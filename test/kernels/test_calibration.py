@@ -57,7 +57,8 @@ def test_with_noise_it_ends_where_scipy_ends(make_robot: Callable[..., Robot]) -
         turn = angle_between(poses[:, :3, :3], found[:, :3, :3])
         return np.concatenate([poses[:, :3, 3] - found[:, :3, 3], turn], axis=1).ravel()
 
-    further = least_squares(gap, np.zeros(30), jac='3-point', x_scale='jac', xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    tight = dict.fromkeys(('xtol', 'ftol', 'gtol'), 1e-15)
+    further = least_squares(gap, np.zeros(30), jac='3-point', x_scale='jac', **tight)
     assert np.abs(further.x).max() < 1e-10
 
 

@@ -29,7 +29,7 @@ from .half_angle import DEGREE, HalfAngle
 from .regions import ROWS, Division, Region
 from .weights import on_half_angles
 
-BLOCK = 1200
+BLOCK = 1504
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
 
 POSE = 12
@@ -134,10 +134,9 @@ class BulkKernel:
             self._memory[n] = _Memory(self, n)
         memory = self._memory[n]
         memory.fill(q)
-        for products, features, piece in zip(
-            self._every if screws else self._poses, memory.features, memory.pieces, strict=True
-        ):
-            for rows, weights in products:
+        wanted = self._every if screws else self._poses
+        for steps, features, piece in zip(wanted, memory.features, memory.pieces, strict=True):
+            for rows, weights in steps:
                 np.matmul(weights, features[: weights.shape[1]], out=piece[rows])
         near, far = (piece[-POSE:].reshape(4, 3, n) for piece in memory.pieces)
         products = memory.products
@@ -267,23 +266,26 @@ class _Memory:
     """
     Working memory for blocks of one length.
 
-    The powers of the angles, the features made of them and the products of the pieces are needed
-    one after the other, so they share the same memory: what fits the cache counts for more than
-    what is computed.
+    What is needed one after the other shares memory, since what fits the cache counts for more
+    than what is computed: the powers of the angles, the features made of them and the products of
+    the pieces; sines and cosines, and the pieces.
     """
 
     def __init__(self, kernel: BulkKernel, n: int) -> None:
         joints = kernel.robot.n
         self.sizes = kernel.sizes
-        self.sliding = np.flatnonzero(kernel.robot.prismatic)
+        self.sliding = [int(i) for i in np.flatnonzero(kernel.robot.prismatic)]
         rows = [3**size for size in kernel.sizes]
+        outputs = [len(w) for w in kernel._weights]
         spare = max(2 * kernel.counts[0], 12 * kernel.counts[1])
-        shared = aligned(max((DEGREE + 1) * joints, sum(rows), 3 * POSE, ROWS + spare), n)
+        first = max((DEGREE + 1) * joints, sum(rows), 3 * POSE, ROWS + spare)
+        memory = aligned(first + max(3 * joints, sum(outputs)), n)
+        shared, rest = memory[:first], memory[first:]
         powers = shared[: (DEGREE + 1) * joints].reshape(DEGREE + 1, joints * n)
-        self.half = HalfAngle(joints, n, powers=powers)
-        self.own = aligned(2, joints, n)
+        own = rest[: 3 * joints].reshape(3, joints * n)
+        self.half = HalfAngle(joints, n, powers=powers, own=own)
         self.features = (shared[: rows[0]], shared[rows[0] : sum(rows)])
-        self.pieces = tuple(aligned(len(w), n) for w in kernel._weights)
+        self.pieces = (rest[: outputs[0]], rest[outputs[0] : sum(outputs)])
         self.products = shared[: 3 * POSE].reshape(3, 4, 3, n)
         self.pose = shared[:ROWS]
         self._spare = shared[ROWS:].reshape(-1)
@@ -294,18 +296,15 @@ class _Memory:
 
     def fill(self, q: Array) -> None:
         """Compute the products of (1, u, v) of the joints of each piece."""
-        sine, cosine = self.half(q.T)
-        np.multiply(cosine, sine, self.own[0])
-        np.multiply(sine, sine, self.own[1])
+        own = self.half(q.T)
         for i in self.sliding:
-            self.own[0, i] = 0.5 * q[:, i]  # stands in for sin x = 2 u
-            self.own[1, i] = 0.0
+            own[:, i] = 0.5 * q[:, i], np.zeros(len(q))  # stands in for sin x = 2 u
         first = 0
         for size, features in zip(self.sizes, self.features, strict=True):
             features[0] = 1.0
             width = 1
             for i in range(first, first + size):
                 wide = features[width : 3 * width].reshape(2, width, -1)
-                np.multiply(self.own[:, i, None], features[:width], wide)
+                np.multiply(own[:, i, None], features[:width], wide)
                 width *= 3
             first += size

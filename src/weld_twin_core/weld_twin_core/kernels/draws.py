@@ -133,7 +133,8 @@ class SeamDraws:
         """Yield which draws, and their squared distances (some, N), which the next overwrite."""
         for start in range(0, len(draws.theta), BLOCK):
             block = DhDraws(*(values[start : start + BLOCK] for values in draws))
-            parts = self._of_all(block) if self.spread is None else self._of_few(block, self.spread)
+            spread = self.spread
+            parts = self._of_all(block) if spread is None else self._of_few(block, spread)
             for squares in parts:
                 yield slice(start, start + len(squares)), squares
                 start += len(squares)
@@ -143,7 +144,8 @@ class SeamDraws:
         step = max(1, POINTS // self._count)
         memory = aligned(5, 3 * step * self._count)
         for k in range(0, len(draws.theta), step):
-            away = self._points(*(piece[..., k : k + step] for piece in pieces), memory)
+            near, far = (piece[..., k : k + step] for piece in pieces)
+            away = self._points(near, far, memory)
             away -= self._nominal
             yield _squared(away)
 
@@ -302,5 +304,6 @@ def _on_features(weights: Array, features: Array, memory: Array) -> Array:
     """Return weights (3, F, k, D) applied to features (F, S), shape (3, k, D, S)."""
     flat = weights.reshape(*weights.shape[:2], -1)
     shape = 3, flat.shape[2], features.shape[1]
-    found: Array = np.matmul(flat.swapaxes(1, 2), features, out=memory[: prod(shape)].reshape(shape))
+    found = memory[: prod(shape)].reshape(shape)
+    np.matmul(flat.swapaxes(1, 2), features, out=found)
     return found.reshape(3, *weights.shape[2:], -1)

@@ -1,17 +1,19 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Sine and cosine from multiplications and one small matrix product.
+Sine and cosine from half the angle, several times as fast as numpy's, which take one by one.
 
-numpy takes sine and cosine of doubles one by one. Here an angle is counted in turns, reduced to
-r in [-1/2, 1/2], and sin(pi r) = r S(r^2) and cos(pi r) = C(r^2), the sine and cosine of *half*
-the angle, are polynomials of degree 8: Chebyshev series, cut where what is left is below the last
-digit, written in powers. Products of the two give the angle itself::
+Two features do for everything that is linear in 1, sin x and cos x::
 
     u = sin(x/2) cos(x/2),  v = sin(x/2)^2,  sin x = 2 u,  cos x = 1 - 2 v
 
-and are the same for x + 2 pi, so that the sign lost in the reduction does not matter. The error
-is below 2e-15 for angles within a turn; further out it is that of the angle's own last digit.
+Where numpy has a vectorised tangent (AVX-512), t = tan(x/2) gives u = t / (1 + t^2) and v = t u.
+Elsewhere an angle is counted in turns, reduced to r in [-1/2, 1/2], and sin(pi r) = r S(r^2) and
+cos(pi r) = C(r^2) are polynomials of degree 8: Chebyshev series, cut where what is left is below
+the last digit, written in powers, so that they are array products and one small matrix product.
+Their products are the same for x + 2 pi, so that the sign lost in the reduction does not matter.
+The error is below 2e-15 for angles within a turn; further out it is that of the angle's own last
+digit.
 """
 
 from __future__ import annotations
@@ -44,7 +46,20 @@ COSINE = (
     4.149578027057121e-06,
 )
 DEGREE = len(COSINE) - 1
-_POLYNOMIALS = np.array([SINE, COSINE])
+_POLYNOMIALS = np.array([COSINE, SINE])
+
+
+def tangent_is_vectorised() -> bool:
+    """Tell whether this numpy, on this processor, takes many tangents at once."""
+    introspect = getattr(np.lib, 'introspect', None)  # since numpy 2.1
+    if introspect is None:
+        return False
+    found = introspect.opt_func_info(func_name='^tan$', signature='float64')
+    kernel = found.get('tan', {}).get('dd', {}).get('current', '')
+    return bool(kernel.startswith(('AVX512', 'X86_V4')))
+
+
+BY_TANGENT = tangent_is_vectorised()
 
 
 class HalfAngle:
@@ -56,24 +71,39 @@ class HalfAngle:
     *shape : int
         Shape of the angles.
     powers : array, shape (DEGREE + 1, size), optional
-        Memory that is free during a call and may be used otherwise between calls.
+    own : array, shape (3, size), optional
+        Memory that is free during a call and may be used otherwise between calls. Of the second
+        the result is part.
+    by_tangent : bool
 
     """
 
-    def __init__(self, *shape: int, powers: Array | None = None) -> None:
+    def __init__(
+        self, *shape: int, powers: Array | None = None, own: Array | None = None,
+        by_tangent: bool = BY_TANGENT,
+    ) -> None:  # fmt: skip
         self.shape = shape
         size = int(np.prod(shape))
-        self._turns = aligned(size)
         self._powers = aligned(DEGREE + 1, size) if powers is None else powers
-        self._half = aligned(2, size)
+        self._own = aligned(3, size) if own is None else own
+        self._fill = self._from_tangents if by_tangent else self._from_polynomials
 
-    def __call__(self, angles: Array) -> tuple[Array, Array]:
-        """
-        Return sin(x/2) and cos(x/2), up to a common sign, of angles [rad].
+    def __call__(self, angles: Array) -> Array:
+        """Return u and v of angles [rad], shape (2, *shape); the next call overwrites them."""
+        self._fill(angles)
+        return self._own[1:].reshape(2, *self.shape)
 
-        Both have the shape given at the start, and are overwritten by the next call.
-        """
-        r, power, half = self._turns, self._powers, self._half
+    def _from_tangents(self, angles: Array) -> None:
+        t, u, v = self._own
+        np.multiply(angles, 0.5, out=t.reshape(self.shape))
+        np.tan(t, out=t)
+        np.multiply(t, t, out=v)
+        v += 1.0
+        np.divide(t, v, out=u)
+        np.multiply(t, u, out=v)
+
+    def _from_polynomials(self, angles: Array) -> None:
+        power, (r, cosine, sine) = self._powers, self._own
         np.multiply(angles, 0.5 / np.pi, out=r.reshape(self.shape))
         power[0] = 1.0
         np.rint(r, out=power[1])
@@ -82,17 +112,16 @@ class HalfAngle:
         np.multiply(power[1], power[1], out=power[2])
         np.multiply(power[1:3], power[2], out=power[3:5])
         np.multiply(power[1:5], power[4], out=power[5:9])
-        np.matmul(_POLYNOMIALS, power, out=half)
-        np.multiply(half[0], r, out=half[0])
-        return half[0].reshape(self.shape), half[1].reshape(self.shape)
+        np.matmul(_POLYNOMIALS, power, out=self._own[1:])
+        np.multiply(sine, r, out=sine)
+        np.multiply(cosine, sine, out=cosine)
+        np.multiply(sine, sine, out=sine)
 
 
-def sincos(angles: Array) -> tuple[Array, Array]:
+def sincos(angles: Array, by_tangent: bool = BY_TANGENT) -> tuple[Array, Array]:
     """Return sine and cosine of angles of any shape [rad]."""
-    sine, cosine = HalfAngle(*angles.shape)(angles)
-    cosine *= sine
-    sine *= sine
-    cosine *= 2.0
-    sine *= -2.0
-    sine += 1.0
-    return cosine, sine
+    sine, cosine = HalfAngle(*angles.shape, by_tangent=by_tangent)(angles)
+    sine *= 2.0
+    cosine *= -2.0
+    cosine += 1.0
+    return sine, cosine

@@ -58,6 +58,7 @@ def test_a_soak_passes_only_flat_and_without_loss():
     assert verdict(soak(), flat=20.0)
     assert not verdict(soak(nodes={'twin': {'rss_slope_mib_per_h': 21.0}}), flat=20.0)
     assert not verdict(soak(health={'x': {'refused': 1}}), flat=20.0)
+    assert not verdict(soak(health={'x': {'received': 4, 'missing': 1}}), flat=20.0)
     assert not verdict(soak(recorded={EACH[0]: {'messages': 4, 'missing': 1}}), flat=20.0)
     assert not verdict({**soak(), 'recorded': {}}, flat=20.0)
 

@@ -30,6 +30,8 @@ SPLIT = 300.0
 """Seconds a file of the bag spans."""
 EACH = ('/joint_states', '/actual/joint_states', '/measured/tool_pose', '/twin/tool_pose')
 """Topics with one message for each joint state."""
+COUNTED = (*EACH, '/deviation')
+"""Inputs of which a node should have had as many messages as joint states were sent."""
 
 
 class Usage(NamedTuple):
@@ -155,13 +157,15 @@ class Soak:
         return out
 
     def health(self) -> dict[str, Any]:
-        """Return received and refused of each input, and what was told but ok."""
+        """Return received, refused and missing of each input, and what was told but ok."""
         out: dict[str, Any] = {}
         for name, values in sorted(self._listener.values.items()):
             told = [entry for entry in self._told.get(name, []) if entry[0] != 'ok']
+            row = {key: int(values[key]) for key in ('received', 'refused') if key in values}
+            if name.partition(': ')[2] in COUNTED:
+                row['missing'] = self.sent - row['received']
             out[name] = {
-                **{key: int(values[key]) for key in ('received', 'refused') if key in values},
-                'not_ok': len(told), 'worst': sorted({text for _, text in told})[:5],
+                **row, 'not_ok': len(told), 'worst': sorted({text for _, text in told})[:5],
             }  # fmt: skip
         return out
 
@@ -180,12 +184,12 @@ def losses(bag: Path, sent: int) -> dict[str, Any]:
 
 
 def verdict(result: dict[str, Any], flat: float) -> bool:
-    """Tell whether nothing was lost or refused and every node's memory is flat."""
+    """Tell whether no node lost or refused anything and every node's memory is flat."""
     inputs = result['health'].values()
     return (
         all(result['recorded'].get(topic, {}).get('missing') == 0 for topic in EACH)
         and all(node['rss_slope_mib_per_h'] <= flat for node in result['nodes'].values())
-        and all(row.get('refused', 0) == 0 for row in inputs)
+        and all(row.get('refused', 0) == row.get('missing', 0) == 0 for row in inputs)
     )
 
 

@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A campaign that is told to end takes the nodes it started with it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+LIMIT = 60.0
+NODES = 7
+
+
+def marked(mark: str) -> list[int]:
+    """Return the living processes that inherited a mark in their environment."""
+    found = []
+    for entry in Path('/proc').iterdir():
+        if entry.name.isdigit():
+            try:
+                if mark.encode() in (entry / 'environ').read_bytes():
+                    found.append(int(entry.name))
+            except OSError:  # it has just ended, or is somebody else's
+                continue
+    return found
+
+
+def until(condition, what: str) -> None:
+    end = time.monotonic() + LIMIT
+    while not condition():
+        assert time.monotonic() < end, f'waited in vain for {what}'
+        time.sleep(0.1)
+
+
+def test_sigterm_ends_the_nodes_too(tmp_path: Path) -> None:
+    out = tmp_path / 'soak.json'
+    words = ['campaign', 'soak', '--minutes', '5', '--rate', '50', '--out', str(out)]
+    mark = f'CAMPAIGN_OF={tmp_path}'
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'weld_twin_nodes', *words],
+        env={**os.environ, 'CAMPAIGN_OF': str(tmp_path)},
+    )
+    try:
+        until(lambda: len(marked(mark)) >= NODES + 1, 'the nodes')
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(LIMIT) == 130
+        until(lambda: not marked(mark), 'the nodes to end')
+    finally:
+        for pid in marked(mark):
+            os.kill(pid, signal.SIGKILL)
+    assert not out.exists()

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import json
 import math
+import sqlite3
+from contextlib import closing
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -56,6 +58,21 @@ def test_the_samples_the_broken_files_are_made_of_are_right(name, tmp_path):
         path = tmp_path / f'sample{k}{kind.suffix}'
         path.write_bytes(seed)
         kind.read(path)
+
+
+def test_a_topic_whose_type_is_no_text_makes_a_damaged_bag(tmp_path):
+    kind = targets()['sqlite3']
+    path = tmp_path / f'bag{kind.suffix}'
+    path.write_bytes(kind.seeds[0])
+    with closing(sqlite3.connect(path)) as base, base:
+        base.execute("UPDATE topics SET type = x'00ff' WHERE id = 1")
+    with pytest.raises(DataError, match=r'is damaged .*no text'):
+        kind.read(path)
+
+
+def test_a_list_as_key_is_refused_where_another_key_came_before():
+    with pytest.raises(ModelError, match='unhashable key'):
+        parse_yaml('a: 1\n? [1, 2]\n: 3\n', 'robot file')
 
 
 @pytest.mark.parametrize('name', [name for name in harms() if 'gigabyte' not in name])

@@ -155,6 +155,8 @@ class BagReader:
     def _list_topics(self) -> None:
         for reader in self._readers:
             for connection in reader.connections:
+                if not all(isinstance(x, str) for x in (connection.topic, connection.msgtype)):
+                    raise ValueError('name or type of a topic is no text')
                 count = self.topics.get(connection.topic, ('', 0))[1]
                 self.topics[connection.topic] = (connection.msgtype, count + connection.msgcount)
 

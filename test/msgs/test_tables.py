@@ -234,6 +234,8 @@ ROW = '0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9'
      + f'{ROW},1,2,3\n', 'several columns could serve (measured_x, measured_y, measured_z; '
      'laser_x, laser_y, laser_z); --position-columns decides'),
     (f'{HEAD}\n{ROW.replace("0.9", "")}\n', "table '{}' has no complete row"),
+    (f'{HEAD}\n{ROW}\n{ROW.replace("0.9", "-1e308")}\n',
+     "table '{}' line 3, column 'z': -1e+308 is far beyond any robot's"),
 ])  # fmt: skip
 def test_bad_tables_are_refused_in_one_sentence(tmp_path, ur5, text, words):
     path = tmp_path / 't.csv'
@@ -241,6 +243,14 @@ def test_bad_tables_are_refused_in_one_sentence(tmp_path, ur5, text, words):
     with pytest.raises(DataError, match=re.escape(words.format(path))) as caught:
         read_table(path, ur5)
     assert '\n' not in str(caught.value)
+
+
+def test_blank_lines_before_the_header_do_not_matter(data, tmp_path, ur5):
+    text = (data / 'ur5_like.csv').read_text()
+    (tmp_path / 'late.csv').write_text('\n' * 40 + text)
+    late, _ = read_table(tmp_path / 'late.csv', ur5)
+    usual, _ = read_table(data / 'ur5_like.csv', ur5)
+    np.testing.assert_array_equal(late.measured.position, usual.measured.position)
 
 
 def test_a_spreadsheet_is_no_table(tmp_path, ur5):

@@ -71,6 +71,28 @@ def test_what_cannot_be_paired_is_counted(twin, measured, why):
     assert (pairs, pairing.dropped) == ([], 1), why
 
 
+def test_nothing_is_interpolated_where_the_twin_lost_samples():
+    lost = range(100, 120)
+    twin = [k * MS for k in range(200) if k not in lost]
+    measured = [k * MS for k in range(20, 190)]
+    pairing, pairs = paired(twin, measured)
+    assert {pair.stamp // MS for pair in pairs} == set(range(20, 190)) - set(lost)
+    assert pairing.dropped == len(lost)
+
+
+def test_a_single_lost_sample_is_interpolated():
+    _, pairs = paired([k * MS for k in range(40) if k != 30], [30 * MS])
+    np.testing.assert_allclose(pairs[0].twin, parabola(30 * MS), rtol=0.0, atol=1e-14)
+
+
+def test_a_twin_that_has_become_slower_is_interpolated_again_soon():
+    slow = [100 * MS + 50 * MS * k for k in range(40)]
+    measured = [ns + 20 * MS for ns in slow[:-1]]
+    pairing, pairs = paired([*(k * MS for k in range(100)), *slow], measured)
+    assert 0 < pairing.dropped < 10
+    assert pairing.dropped + len(pairs) == len(measured)
+
+
 def test_the_buffer_is_bounded_and_what_falls_out_is_counted():
     pairing = Pairing(depth=5)
     for k in range(1, 9):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,10 @@ from weld_twin_core.arrays import Array
 from .order import Forward
 
 NANOSECOND = 1e-9
+USUAL = 16
+"""Twin poses from which the usual step between them is taken."""
+LONG = 4
+"""Usual steps beyond which a step is a break: samples were lost, or the motion rested."""
 
 
 class Pair(NamedTuple):
@@ -30,7 +35,8 @@ class Pairing:
 
     The twin is interpolated by the parabola through the two poses around a measurement and the
     one before them, by a straight line where there is none before: at 100 Hz and 1 m/s^2 a
-    straight line alone would be 12 um off. A measurement waits until the twin has passed it. One
+    straight line alone would be 12 um off. Nothing is interpolated across a break of the stream,
+    a step of more than four times the usual. A measurement waits until the twin has passed it. One
     that can never be paired is counted in `dropped`.
 
     Parameters
@@ -118,12 +124,19 @@ class Pairing:
             high -= 1
         if self._twin[high][0] == stamp:
             return self._twin[high][1]
-        if high == 0 or self._twin[high][0] - self._twin[high - 1][0] > self._max_gap:
+        if high == 0 or self._twin[high][0] - self._twin[high - 1][0] > self._longest(high):
             return None
         support = [self._twin[k] for k in range(max(high - 2, 0), high + 1)]
         if len(support) == 3 and support[1][0] - support[0][0] > self._max_gap:
             support = support[1:]
         return _through(support, stamp)
+
+    def _longest(self, high: int) -> int:
+        """Return the longest step up to a pose that is interpolated, by the steps before it."""
+        stamps = [self._twin[k][0] for k in range(max(high - USUAL, 0), high)]
+        steps = sorted(after - before for before, after in pairwise(stamps))
+        usual = steps[len(steps) // 2] if len(steps) > 2 else self._max_gap
+        return min(self._max_gap, LONG * usual)
 
 
 def _through(support: list[tuple[int, Array]], stamp: int) -> Array:

@@ -26,6 +26,8 @@ from .units import METRES, RADIANS, angle_unit, length_unit
 
 _FAR = 10.0
 """A row this many times farther off than the median row is pointed out."""
+_FARTHEST = 1e9
+"""A coordinate beyond this is a slip in any unit, and its square may be no number."""
 _WRONG = 0.05
 """A typical misfit beyond this share of the arm's reach means the table is misread."""
 
@@ -115,7 +117,8 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
     needed = columns.joints + columns.position + columns.target + columns.difference
     needed += columns.rotation + columns.sigma
     needed += () if columns.temperature is None else (columns.temperature,)
-    whole = np.isfinite(cells.stack(needed)).all(axis=1)
+    values = cells.stack(needed)
+    whole = np.isfinite(values).all(axis=1)
     asked = np.zeros(len(cells.rows), bool)
     for row in options.skip_rows:
         if not 1 <= row <= len(cells.rows):
@@ -128,6 +131,12 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
     keep = np.flatnonzero(whole & ~asked)
     if not keep.size:
         raise DataError(f"table '{cells.path}' has no complete row")
+    for k, j in np.argwhere(np.abs(values[keep]) > _FARTHEST)[:1]:
+        raise DataError(
+            f"table '{cells.path}' line {cells.lines[keep[k]]}, column {needed[j]!r}: "
+            f"{values[keep[k], j]:.3g} is far beyond any robot's; look for slipped columns or "
+            'decimal signs, or leave the row out with --skip-rows'
+        )
     return Cells(
         cells.path, cells.header, [cells.rows[k] for k in keep], [cells.lines[k] for k in keep],
         cells.decimal, cells.said,

@@ -141,7 +141,7 @@ def _spoken(delimiter: str) -> str:
 
 def _delimiter(path: Path, lines: list[str]) -> str:
     """Return the one delimiter that cuts the first lines into equally many cells."""
-    head = [line for line in islice(lines, _LOOK) if line.strip()]
+    head = list(islice((line for line in lines if line.strip()), _LOOK))
     even = []
     for sign in DELIMITERS:
         counts = {len(row) for row in csv.reader(head, delimiter=sign)}

@@ -117,9 +117,8 @@ def linearised(
 
     Frames are displaced along and about their own axes, the base's those of the world.
     """
-    turns = sorted(
-        {(_TURN_OF[key], i) for key, i in channels if key in _TURN_OF}, key=lambda c: c[1]
-    )
+    named = dict.fromkeys((_TURN_OF[key], i) for key, i in channels if key in _TURN_OF)
+    turns = sorted(named, key=lambda c: c[1])
     found, screws = BulkKernel(robot, turns).screws(q)
     columns = np.zeros((len(channels), 6, len(q)))
     frames = {'base': _base_frame(robot), 'tool': found[:, :3].transpose(2, 1, 0)}

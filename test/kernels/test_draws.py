@@ -54,6 +54,21 @@ def test_distances_of_draws_are_exact_on_a_smooth_seam(
     assert np.abs(seam.distances(draws) - rebuilt(robot, smooth_seam, draws)).max() < EXACT
 
 
+@pytest.mark.parametrize('size', [1e-6, 1e-3, 0.3])
+def test_the_largest_distance_is_that_of_all_samples(
+    make_robot: Callable[..., Robot], smooth_seam: np.ndarray, size: float
+) -> None:
+    robot = make_robot(6, beta=False)
+    seam = SeamDraws(robot, smooth_seam)
+    one_value_off = np.eye(4 * robot.n).reshape(-1, 4, robot.n).swapaxes(0, 1) * size
+    alone = DhDraws(
+        *(getattr(robot, k) + off for k, off in zip(DhDraws._fields, one_value_off, strict=True))
+    )
+    for draws in (some_draws(robot, 30, size), alone):
+        every = rebuilt(robot, smooth_seam, draws).max(axis=1)
+        assert np.abs(seam.largest(draws) - every).max() < 1e-14 + EXACT * size
+
+
 def test_distances_of_draws_are_exact_on_points_that_have_nothing_in_common(
     make_robot: Callable[..., Robot],
 ) -> None:

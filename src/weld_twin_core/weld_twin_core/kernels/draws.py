@@ -11,7 +11,8 @@ Along a smooth seam the features themselves are nearly dependent: as functions o
 span a dozen dimensions to rounding. Positions of *any* draw are linear in them, hence known from
 as many samples by one matrix product; for so few the tool point is carried down the chain. Those
 samples and that matrix come from a pivoted QR factorisation of the features [1]_, whose remainder
-bounds the error.
+bounds the error. Squared distances are linear in products of two features, which span some thirty
+dimensions: for the largest of them they too are worked out at a few samples only.
 
 References
 ----------
@@ -100,11 +101,13 @@ class SeamDraws:
         self.samples: NDArray[np.int_] = np.arange(len(q))
         self.spread: Array | None = None
         self.remainder = 0.0
+        self._of_squares: _Determining | None = None
         if smooth:
             both = (features[0][:, None] * features[1][None]).reshape(-1, len(q))
             found = _determining(both)
             if found is not None and 2 * len(found.samples) < len(q):
                 self.samples, self.spread, self.remainder = found
+                self._of_squares = _determining(_products(both))
         self._near, self._far = (np.ascontiguousarray(f[:, self.samples]) for f in features)
         self._phases = np.exp(1j * q[self.samples].T)[..., None]
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))
@@ -117,7 +120,7 @@ class SeamDraws:
         """Return the largest distance from the nominal tool point along the seam, shape (D,)."""
         out = np.empty(len(draws.theta))
         with unbuffered():
-            for part, squares in self._squares(draws):
+            for part, squares in self._squares(draws, self._of_squares):
                 squares.max(axis=1, out=out[part])
         return np.sqrt(out, out=out)
 
@@ -125,16 +128,26 @@ class SeamDraws:
         """Return distances from the nominal tool point, shape (D, N) [m]."""
         out = np.empty((len(draws.theta), self._count))
         with unbuffered():
-            for part, squares in self._squares(draws):
+            for part, squares in self._squares(draws, None):
                 np.sqrt(squares, out=out[part])
         return out
 
-    def _squares(self, draws: DhDraws) -> Iterator[tuple[slice, Array]]:
-        """Yield which draws, and their squared distances (some, N), which the next overwrite."""
+    def _squares(
+        self, draws: DhDraws, determining: _Determining | None
+    ) -> Iterator[tuple[slice, Array]]:
+        """
+        Yield which draws, and their squared distances (some, N), which the next overwrite.
+
+        From those at some samples, which is exact to rounding of the largest, or each by itself.
+        """
         for start in range(0, len(draws.theta), BLOCK):
             block = DhDraws(*(values[start : start + BLOCK] for values in draws))
-            spread = self.spread
-            parts = self._of_all(block) if spread is None else self._of_few(block, spread)
+            if self.spread is None:
+                parts = self._of_all(block)
+            elif determining is None:
+                parts = self._of_few(block, self.spread)
+            else:
+                parts = self._of_fewer(block, self.spread[determining.samples], determining.spread)
             for squares in parts:
                 yield slice(start, start + len(squares)), squares
                 start += len(squares)
@@ -157,6 +170,15 @@ class SeamDraws:
             some = few[..., k : k + step]
             away = memory[:, : self._count * some.shape[2]].reshape(3, self._count, -1)
             yield _squared(np.matmul(spread, some, out=away)).T
+
+    def _of_fewer(self, draws: DhDraws, spread: Array, squares: Array) -> Iterator[Array]:
+        few = self._carried(draws) - self._nominal
+        step = max(1, FOLLOWING // self._count)
+        memory = aligned(self._count * step)
+        for k in range(0, few.shape[2], step):
+            some = _squared(spread @ few[..., k : k + step])
+            every = memory[: self._count * some.shape[1]].reshape(self._count, -1)
+            yield np.matmul(squares, some, out=every).T
 
     def _carried(self, draws: DhDraws) -> Array:
         """
@@ -277,7 +299,8 @@ def _determining(features: Array) -> _Determining | None:
     The factorisation is of random mixtures of the features, which depend on each other as the
     features do; the remainder is that of the features themselves. None if they are too many.
     """
-    mixtures = np.random.default_rng(0).normal(size=(_MIXTURES, len(features))) @ features
+    mixing = np.random.default_rng(0).random((_MIXTURES, len(features))) - 0.5
+    mixtures = mixing @ features
     upper, order = qr(mixtures, mode='r', pivoting=True, check_finite=False)
     strength = np.abs(np.diagonal(upper))
     rank = int((strength > ROUNDING * strength[0]).sum())
@@ -289,6 +312,13 @@ def _determining(features: Array) -> _Determining | None:
     if remainder > _NEGLIGIBLE:
         return None
     return _Determining(order[:rank], np.ascontiguousarray(spread.T), remainder)
+
+
+def _products(features: Array) -> Array:
+    """Return products of two random mixtures of features, somewhat more than are factorised."""
+    mixing = np.random.default_rng(1).random((2, _MIXTURES + _MIXTURES // 4, len(features))) - 0.5
+    first, second = mixing @ features
+    return np.asarray(first * second)
 
 
 def _features(q: Array) -> Array:

@@ -103,8 +103,8 @@ def _sobol(robot: Robot, base: int, with_pinocchio: bool) -> Workload:
     q = smooth_motion(robot, POINTS)
 
     def own() -> tuple[Array, ...]:
-        first, second = (ndtri(part) for part in base_pair(inputs, base, seed=1))
-        draws = drawn(robot, mixed(first, second).reshape(runs, inputs))
+        pair = (np.hstack(drawn(robot, ndtri(part))) for part in base_pair(inputs, base, seed=1))
+        draws = DhDraws(*np.split(mixed(*pair).reshape(runs, inputs), len(DH_KEYS), axis=1))
         results = SeamDraws(robot, q).largest(draws).reshape(base, inputs + 2)
         rng = np.random.default_rng(1)
         return *sobol_estimates(results), *sobol_half_widths(results, CONFIDENCE, rng)

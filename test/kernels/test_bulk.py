@@ -161,6 +161,18 @@ def test_memory_that_poses_cannot_be_written_to_is_refused(
             kernel.poses(positions(kernel.robot, 5), out)
 
 
+def test_joint_positions_screws_and_channels_of_another_shape_are_refused(
+    make_robot: Callable[..., Robot],
+) -> None:
+    kernel = BulkKernel(make_robot(6), [('theta', 0), ('alpha', 3)])
+    with pytest.raises(ModelError, match=r'of shape \(N, 6\), got \(5, 1\)'):
+        kernel.poses(np.zeros((5, 1)))
+    with pytest.raises(ModelError, match=r'shape \(6, 2, 5\), got \(6, 3, 5\)'):
+        kernel.screws(np.zeros((5, 6)), out=np.empty((6, 3, 5)))
+    with pytest.raises(ModelError, match=r"channel \('theta', 6\) is no DH value"):
+        BulkKernel(kernel.robot, [('theta', 6)])
+
+
 def test_forward_of_many_is_forward_of_each(make_robot: Callable[..., Robot]) -> None:
     robot = make_robot(6)
     q = positions(robot, chain.MANY)

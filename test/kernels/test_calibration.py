@@ -11,10 +11,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from weld_twin_core import chain
-from weld_twin_core.kernels.calibration import calibrate, minimal_channels
+from weld_twin_core.kernels.calibration import calibrate, linearised, minimal_channels
 from weld_twin_core.robot import Robot
 from weld_twin_core.rotation import angle_between, rotation_matrix, transform
 
+EXACT = 1e-13
 KEYS = ('theta', 'd', 'a', 'alpha')
 
 
@@ -29,6 +30,28 @@ def measured(robot: Robot, q: np.ndarray, noise: float) -> np.ndarray:
     poses = chain.forward(robot, q)
     poses[:, :3, 3] += noise * np.random.default_rng(9).normal(size=(len(q), 3))
     return poses
+
+
+def test_columns_are_those_of_the_plain_chain(any_robot: Robot) -> None:
+    q = np.random.default_rng(1).uniform(-3.0, 3.0, (20, any_robot.n))
+    channels = [(key, i) for i in range(any_robot.n) for key in (*KEYS, 'beta')]
+    columns, _ = linearised(any_robot, q, chain.forward(any_robot, q), channels)
+    frames = chain.frames(any_robot, q)
+    for column, channel in zip(columns, channels, strict=True):
+        plain = chain.column(any_robot, frames, channel)
+        assert np.abs(column.reshape(6, -1) - plain).max() < EXACT, channel
+
+
+def test_a_calibration_of_modified_rows_with_hayati_angles_settles(
+    make_robot: Callable[..., Robot],
+) -> None:
+    robot = make_robot(4, 'modified')
+    q = np.random.default_rng(5).uniform(-3.0, 3.0, (60, 4))
+    channels = [(key, i) for key in ('a', 'd') for i in (1, 2)]
+    other = replace(robot, a=robot.a + [0.0, 0.01, 0.02, 0.0])
+    found = calibrate(robot, q, chain.forward(other, q), channels)
+    assert found.settled
+    assert np.abs(found.robot.a - other.a).max() < EXACT
 
 
 def test_thirty_numbers_bring_a_displaced_arm_back_to_rounding(

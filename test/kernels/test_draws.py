@@ -69,6 +69,18 @@ def test_the_largest_distance_is_that_of_all_samples(
         assert np.abs(seam.largest(draws) - every).max() < 1e-14 + EXACT * size
 
 
+def test_the_largest_distance_where_squares_need_all_samples(
+    make_robot: Callable[..., Robot], smooth_seam: np.ndarray
+) -> None:
+    robot = make_robot(6, beta=False)
+    q = (9.0 * (smooth_seam - smooth_seam.mean(axis=0)))[::4]
+    seam = SeamDraws(robot, q)
+    assert len(seam.samples) < len(q)
+    assert seam._of_squares is None
+    draws = some_draws(robot, 30, 1e-3)
+    assert np.abs(seam.largest(draws) - rebuilt(robot, q, draws).max(axis=1)).max() < EXACT
+
+
 def test_distances_of_draws_are_exact_on_points_that_have_nothing_in_common(
     make_robot: Callable[..., Robot],
 ) -> None:

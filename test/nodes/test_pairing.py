@@ -80,6 +80,31 @@ def test_nothing_is_interpolated_where_the_twin_lost_samples():
     assert pairing.dropped == len(lost)
 
 
+def test_what_was_before_a_break_does_not_bend_what_comes_after():
+    before, after = [10 * MS * k for k in range(20)], [600 * MS + 10 * MS * k for k in range(5)]
+    pairing, ns = Pairing(), 605 * MS
+    for stamp in before:
+        pairing.add_twin(stamp, parabola(stamp))
+    for stamp in after:
+        pairing.add_twin(stamp, parabola(stamp) + 0.5)
+    (pair,) = pairing.add_measured(ns, np.zeros(3))
+    straight = 0.5 * (parabola(600 * MS) + parabola(610 * MS)) + 0.5
+    np.testing.assert_allclose(pair.twin, straight, rtol=0.0, atol=1e-15)
+
+
+def test_at_the_start_too_nothing_is_interpolated_across_a_break():
+    pairing, pairs = paired([0, MS, 2 * MS, 302 * MS], [150 * MS])
+    assert (pairs, pairing.dropped) == ([], 1)
+
+
+@pytest.mark.parametrize('burst', [[1, 9], [1, 1, 20], [1, 1, 1, 1, 20]])
+def test_a_twin_that_comes_in_bursts_is_interpolated(burst):
+    twin = np.cumsum(np.tile(burst, 60)) * MS
+    measured = twin[20:-1] + MS // 2
+    pairing, pairs = paired([int(ns) for ns in twin], [int(ns) for ns in measured])
+    assert (len(pairs), pairing.dropped) == (measured.size, 0)
+
+
 def test_a_single_lost_sample_is_interpolated():
     _, pairs = paired([k * MS for k in range(40) if k != 30], [30 * MS])
     np.testing.assert_allclose(pairs[0].twin, parabola(30 * MS), rtol=0.0, atol=1e-14)

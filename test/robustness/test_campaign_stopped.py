@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -54,5 +55,7 @@ def test_sigterm_ends_the_nodes_too(tmp_path: Path) -> None:
         until(lambda: not marked(mark), 'the nodes to end')
     finally:
         for pid in marked(mark):
-            os.kill(pid, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # it has just ended
+                os.kill(pid, signal.SIGKILL)
+        process.wait()
     assert not out.exists()

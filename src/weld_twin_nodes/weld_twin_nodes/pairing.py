@@ -17,6 +17,8 @@ from .order import Forward
 NANOSECOND = 1e-9
 USUAL = 16
 """Twin poses from which the usual step between them is taken."""
+FEW = 4
+"""Steps up to which the longest is taken for usual."""
 LONG = 4
 """Usual steps beyond which a step is a break: samples were lost, or the motion rested."""
 
@@ -127,16 +129,22 @@ class Pairing:
         if high == 0 or self._twin[high][0] - self._twin[high - 1][0] > self._longest(high):
             return None
         support = [self._twin[k] for k in range(max(high - 2, 0), high + 1)]
-        if len(support) == 3 and support[1][0] - support[0][0] > self._max_gap:
+        if len(support) == 3 and support[1][0] - support[0][0] > self._longest(high - 1):
             support = support[1:]
         return _through(support, stamp)
 
     def _longest(self, high: int) -> int:
-        """Return the longest step up to a pose that is interpolated, by the steps before it."""
+        """
+        Return the longest step up to a pose that is interpolated, by the steps before it.
+
+        The usual step is the longest but two, so that poses may come in bursts and two breaks
+        among those steps do not make a third one usual.
+        """
         stamps = [self._twin[k][0] for k in range(max(high - USUAL, 0), high)]
         steps = sorted(after - before for before, after in pairwise(stamps))
-        usual = steps[len(steps) // 2] if len(steps) > 2 else self._max_gap
-        return min(self._max_gap, LONG * usual)
+        if not steps:
+            return self._max_gap
+        return min(self._max_gap, LONG * steps[-3 if len(steps) > FEW else -1])
 
 
 def _through(support: list[tuple[int, Array]], stamp: int) -> Array:

@@ -31,7 +31,7 @@ def aligned(*shape: int) -> Array:
 @contextmanager
 def unbuffered() -> Iterator[None]:
     """
-    Have numpy work on rows where they are.
+    Have numpy work on rows of more than a few hundred numbers where they are.
 
     Where operands are not one contiguous run, numpy 2 copies rows shorter than half its buffer of
     8192 numbers into it and back, though nothing has to be converted: four times the work. With a

@@ -4,9 +4,9 @@
 Poses, Jacobians and derivatives by DH values of many joint positions.
 
 The chain is cut in two pieces. Each is a small matrix product of constant `weights` with products
-of sines and cosines; nine multiplications for each output vector put them together. All of it
-runs over blocks of poses that stay in the processor's cache, in memory that is used again.
-`chain` says the same in plain form.
+of sines and cosines; nine multiplications for each vector put them together, where `regions` knows
+no shorter way. All of it runs over blocks of poses that stay in the processor's cache, in memory
+that is used again. `chain` says the same in plain form.
 """
 
 from __future__ import annotations
@@ -89,10 +89,10 @@ class BulkKernel:
         Raises
         ------
         ModelError
-            ``out`` is of another shape or not contiguous.
+            ``q`` or ``out`` are of another shape, or ``out`` is not contiguous.
 
         """
-        out = _poses_like(q, out)
+        out = self._poses_like(q, out)
         with unbuffered():
             for part in self._blocks(len(q)):
                 self._pose_block(q[part], out[part])
@@ -106,16 +106,40 @@ class BulkKernel:
 
         Velocity of the tool point [m/rad] first, then the axis. A channel that slides moves the
         tool point along the axis of its screw: what `chain.column` gives for 'd' is rows 3 to 5
-        of the screw of 'theta', and 'a' goes with 'alpha' likewise. ``poses`` and ``out`` are
-        where both are written to, as in `poses`.
+        of the screw of 'theta', and 'a' goes with 'alpha' likewise in standard rows. ``poses``
+        and ``out`` are where both are written to; ``out`` may be a view.
+
+        Raises
+        ------
+        ModelError
+            ``q``, ``poses`` or ``out`` are of another shape, or ``poses`` is not contiguous.
+
         """
-        poses = _poses_like(q, poses)
-        out = aligned(6, len(self.channels), len(q)) if out is None else out
+        poses = self._poses_like(q, poses)
+        shape = 6, len(self.channels), len(q)
+        out = aligned(*shape) if out is None else out
+        if out.shape != shape:
+            raise ModelError(f'screws need an array of shape {shape}, got {out.shape}')
         with unbuffered():
             for part in self._blocks(len(q)):
                 memory = self._pose_block(q[part], poses[part], screws=True)
                 self._screw_block(memory, out[:, :, part])
         return poses, out
+
+    def _poses_like(self, q: Array, out: Array | None) -> Array:
+        if q.ndim != 2 or q.shape[1] != self.robot.n:
+            raise ModelError(
+                f'joint positions of robot {self.robot.name!r} are of shape (N, {self.robot.n}), '
+                f'got {q.shape}'
+            )
+        if out is None:
+            return aligned(len(q), 4, 4)
+        if out.shape != (len(q), 4, 4) or not out.flags.c_contiguous:
+            raise ModelError(
+                f'poses of {len(q)} joint positions need a contiguous array of shape '
+                f'({len(q)}, 4, 4) to be written to, got {out.shape}'
+            )
+        return out
 
     def _blocks(self, count: int) -> list[slice]:
         """Return blocks of one length; the last overlaps the one before rather than be short."""
@@ -177,17 +201,6 @@ def kernel_of(robot: Robot, channels: tuple[Channel, ...] = ()) -> BulkKernel:
 @lru_cache(maxsize=8)
 def _kept(robot: Robot, channels: tuple[Channel, ...], thread: int) -> BulkKernel:
     return BulkKernel(robot, channels)
-
-
-def _poses_like(q: Array, out: Array | None) -> Array:
-    if out is None:
-        return aligned(len(q), 4, 4)
-    if out.shape != (len(q), 4, 4) or not out.flags.c_contiguous:
-        raise ModelError(
-            f'poses of {len(q)} joint positions need a contiguous array of shape '
-            f'({len(q)}, 4, 4) to be written to, got {out.shape}'
-        )
-    return out
 
 
 def _on_features(joints: int, screws: Array, poses: Array) -> Array:

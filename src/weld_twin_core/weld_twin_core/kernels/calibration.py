@@ -37,21 +37,22 @@ _SQUARED = 1e-10
 """Squared pivot of the scaled normal equations below which they are not trusted."""
 _DEPENDENT = 1e-10
 """Pivot of the scaled columns that counts as none; the shortest step is taken then."""
-_TURN_OF = {'theta': 'theta', 'd': 'theta', 'a': 'alpha', 'alpha': 'alpha', 'beta': 'beta'}
+_DH = ('theta', 'd', 'a', 'alpha', 'beta')
 
 
 class Calibration(NamedTuple):
     """
     What a calibration found.
 
-    The robot, the RMS of what was left before the last step [m and rad], the number of steps, and
-    whether any of them needed the QR factorisation.
+    The robot, the RMS of what was left before the last step [m and rad], the number of steps,
+    whether any of them needed the QR factorisation, and whether the last was as good as none.
     """
 
     robot: Robot
     rms: float
     steps: int
     by_qr: bool
+    settled: bool
 
 
 def minimal_channels(robot: Robot) -> tuple[Channel, ...]:
@@ -87,15 +88,16 @@ def calibrate(
 
     """
     wanted = tuple(channels) if channels is not None else minimal_channels(robot)
-    by_qr, steps, residual = False, 0, np.zeros(1)
+    by_qr, settled, steps, residual = False, False, 0, np.zeros(1)
     for steps in range(1, STEPS + 1):  # noqa: B007 - counted for the result
         columns, residual = linearised(robot, q, poses, wanted, length)
         step, qr = _solved(columns, residual)
         by_qr |= qr
         robot = moved(robot, wanted, step)
-        if np.abs(step).max() < SETTLED:
+        settled = bool(np.abs(step).max() < SETTLED)
+        if settled:
             break
-    return Calibration(robot, float(np.sqrt((residual * residual).mean())), steps, by_qr)
+    return Calibration(robot, float(np.sqrt((residual * residual).mean())), steps, by_qr, settled)
 
 
 def _residual(found: Array, poses: Array, length: float) -> Array:
@@ -117,7 +119,8 @@ def linearised(
 
     Frames are displaced along and about their own axes, the base's those of the world.
     """
-    named = dict.fromkeys((_TURN_OF[key], i) for key, i in channels if key in _TURN_OF)
+    turn_of = _turns(robot)
+    named = dict.fromkeys((turn_of[key], i) for key, i in channels if key in turn_of)
     turns = sorted(named, key=lambda c: c[1])
     found, screws = BulkKernel(robot, turns).screws(q)
     columns = np.zeros((len(channels), 6, len(q)))
@@ -126,13 +129,19 @@ def linearised(
         if key in frames:
             _frame_column(column, key, i, frames[key], found)
             continue
-        screw = screws[:, turns.index((_TURN_OF[key], i))]
+        screw = screws[:, turns.index((turn_of[key], i))]
         if key in ('d', 'a'):
             column[:3] = screw[3:]
         else:
             column[:] = screw
     columns[:, 3:] *= length
     return columns.reshape(-1, 6 * len(q)), _residual(found, poses, length).ravel()
+
+
+def _turns(robot: Robot) -> dict[str, str]:
+    """Return about whose axis a DH value turns or slides; beta parts a from alpha if modified."""
+    out = {key: key for key in _DH}
+    return out | {'d': 'theta'} | ({'a': 'alpha'} if robot.convention == 'standard' else {})
 
 
 def _base_frame(robot: Robot) -> Array:
@@ -168,7 +177,7 @@ def _solved(columns: Array, residual: Array) -> tuple[Array, bool]:
 
 def moved(robot: Robot, channels: Sequence[Channel], step: Array) -> Robot:
     """Return the robot with its channels displaced; see `linearised`."""
-    values: dict[str, Any] = {key: np.array(getattr(robot, key)) for key in _TURN_OF}
+    values: dict[str, Any] = {key: np.array(getattr(robot, key)) for key in _DH}
     small = {'base': np.zeros(6), 'tool': np.zeros(6)}
     for (key, i), change in zip(channels, step, strict=True):
         (small if key in small else values)[key][i] += change

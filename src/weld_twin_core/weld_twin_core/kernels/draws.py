@@ -11,8 +11,8 @@ Along a smooth seam the features themselves are nearly dependent: as functions o
 span a dozen dimensions to rounding. Positions of *any* draw are linear in them, hence known from
 as many samples by one matrix product; for so few the tool point is carried down the chain. Those
 samples and that matrix come from a pivoted QR factorisation of the features [1]_, whose remainder
-bounds the error. Squared distances are linear in products of two features, which span some thirty
-dimensions: for the largest of them they too are worked out at a few samples only.
+bounds the error. Squared distances are linear in products of two features, which often span hardly
+more: for the largest of them they too are worked out at a few samples only.
 
 References
 ----------
@@ -107,7 +107,9 @@ class SeamDraws:
             found = _determining(both)
             if found is not None and 2 * len(found.samples) < len(q):
                 self.samples, self.spread, self.remainder = found
-                self._of_squares = _determining(_products(both))
+                squares = _determining(_products(both))
+                if squares is not None and 2 * len(squares.samples) < len(q):
+                    self._of_squares = squares
         self._near, self._far = (np.ascontiguousarray(f[:, self.samples]) for f in features)
         self._phases = np.exp(1j * q[self.samples].T)[..., None]
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))

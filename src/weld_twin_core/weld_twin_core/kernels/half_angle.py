@@ -12,7 +12,7 @@ Elsewhere an angle is counted in turns, reduced to r in [-1/2, 1/2], and sin(pi 
 cos(pi r) = C(r^2) are polynomials of degree 8: Chebyshev series, cut where what is left is below
 the last digit, written in powers, so that they are array products and one small matrix product.
 Their products are the same for x + 2 pi, so that the sign lost in the reduction does not matter.
-The error is below 2e-15 for angles within a turn; further out it is that of the angle's own last
+The error is below 4e-15 for angles within a turn; further out it is that of the angle's own last
 digit.
 """
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..chain import Channel
+from ..errors import ModelError
 from ..robot import Robot
 from .weights import Piece, factors, generator
 
@@ -82,10 +83,13 @@ class Division:
 
     def _place(self, channel: Channel) -> Place:
         kind, row = channel
-        before, axis = next(
-            (k, f.axis) for k, (i, f) in enumerate(self._rows) if i == row and kind in f.kinds
+        for before, (i, factor) in enumerate(self._rows):
+            if i == row and kind in factor.kinds:
+                return Place(before, factor.axis, self._region(before))
+        raise ModelError(
+            f'channel {channel} is no DH value of robot {self._robot.name!r}, whose rows are 0 to '
+            f'{self._robot.n - 1}'
         )
-        return Place(before, axis, self._region(before))
 
     def _region(self, before: int) -> Region:
         if before <= self._moving[0]:

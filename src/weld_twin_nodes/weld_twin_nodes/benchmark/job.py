@@ -46,7 +46,8 @@ QUICK = Effort(3, 0.01, (1000,), 500, 16, 100, 100_000, (0.2, 0.5), True)
 
 def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
     """
-    Run everything; write ``benchmark.json``, ``benchmark.md`` and ``growth.png``.
+    Run everything; write ``benchmark.json``, two tables of it (``benchmark.md``, ``brief.md``) and
+    ``growth.png``.
 
     Raises
     ------
@@ -69,6 +70,7 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
         say(line)
     draw(curves, folder / 'growth.png')
     (folder / 'benchmark.md').write_text(table.page(outcomes), encoding='utf-8')
+    (folder / 'brief.md').write_text(table.brief(outcomes), encoding='utf-8')
     found = {
         'schema': 'weld_twin/benchmark/1', 'machine': _machine(), 'left_out': missing,
         'workloads': [outcome.as_dict() for outcome in outcomes], 'starts_s': starts,

@@ -14,6 +14,8 @@ from .race import Outcome
 
 UNITS = ((1.0, 's'), (1e-3, 'ms'), (1e-6, 'us'), (1e-9, 'ns'))
 MEGABYTE = 1e6
+LEFT_OUT = ('N = 1,000', 'arbitrary points')
+"""Ends of the titles that the brief table goes without."""
 
 
 def lines(outcome: Outcome) -> Iterator[str]:
@@ -42,6 +44,17 @@ def page(outcomes: list[Outcome]) -> str:
             f'| {load.title} | {duration(float(np.median(own)))} per {load.item} | '
             f'{reference}: **{times(outcome, OWN)}** | {", ".join(others)} |'
         )
+    return '\n'.join(rows) + '\n'
+
+
+def brief(outcomes: list[Outcome]) -> str:
+    """Return a shorter table, without ranges, small batches and draws on arbitrary points."""
+    rows = ['| one thread, in one run | times as fast |', '|---|---|']
+    for outcome in outcomes:
+        load, ratio = outcome.workload, outcome.ratio(OWN)
+        if ratio is not None and not load.title.endswith(LEFT_OUT):
+            reference = ' + '.join(load.reference)
+            rows.append(f'| {load.title} | {short(float(np.median(ratio)))} ({reference}) |')
     return '\n'.join(rows) + '\n'
 
 

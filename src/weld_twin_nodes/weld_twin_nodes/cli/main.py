@@ -28,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     """
     if argv is None:  # as a program: what it started ends with it
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, _end)
     words = sys.argv[1:] if argv is None else list(argv)
     args = _parser(words).parse_args(words)
     try:
@@ -43,6 +43,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print(f'weld-twin: {_one_line(error)}', file=sys.stderr)
         return USAGE_ERROR
+
+
+def _end(*_: object) -> None:
+    """End as by Ctrl-C; what ends the processes that were started is not interrupted again."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 def _names() -> list[str]:

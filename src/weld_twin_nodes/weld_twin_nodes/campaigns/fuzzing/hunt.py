@@ -85,9 +85,11 @@ def hunt(name: str, seed: int, cases: int, known: dict[str, Finding]) -> Tally:
         process = context.Process(target=_batch, args=(name, seed, done, last, there))
         process.start()
         there.close()
-        done = _follow(here, name, done, last, tally, known)
-        process.kill()
-        process.join()
+        try:
+            done = _follow(here, name, done, last, tally, known)
+        finally:
+            process.kill()
+            process.join()
     return tally
 
 

@@ -75,8 +75,9 @@ def try_one(name: str) -> str:
         outcome = here.recv() if here.poll(hunt.WALL_LIMIT) else 'hangs without computing'
     except EOFError:
         outcome = 'ends the process'
-    process.kill()
-    process.join()
+    finally:
+        process.kill()
+        process.join()
     return str(outcome)
 
 

@@ -111,16 +111,18 @@ class Soak:
         self._told = {name: list(entries) for name, entries in self._listener.told.items()}
         end = time.monotonic() + COMPLETE
         self._cell.wait(
-            lambda: self._recorded() >= self.sent or time.monotonic() > end, 'the rest',
+            lambda: self._least() >= self.sent or time.monotonic() > end, 'the rest',
             2.0 * COMPLETE,
         )  # fmt: skip
         quiet = time.monotonic() + 3.0
         self._cell.wait(lambda: time.monotonic() > quiet, 'the last word on health')
 
-    def _recorded(self) -> int:
-        """Return what the recorder has of the topic that has it least."""
-        heard = self._listener.values
-        return min(int(heard[f'recorder: {topic}']['received']) for topic in EACH)
+    def _least(self) -> int:
+        """Return how many messages came through where fewest did."""
+        return min(
+            int(values['received']) for name, values in self._listener.values.items()
+            if name.partition(': ')[2] in COUNTED
+        )  # fmt: skip
 
     def _look(self, t: float) -> None:
         for process in self._cell.processes:

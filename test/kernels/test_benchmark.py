@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The benchmark: that contenders do the same job, not how fast they are."""
+"""The benchmark: that contenders do the same job, and that pages show what was measured."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ from weld_twin_core import chain
 from weld_twin_core.errors import DataError
 from weld_twin_core.kernels.bulk import BulkKernel
 from weld_twin_nodes.benchmark.arms import DH_KEYS, calibrated_arm, links, random_positions
-from weld_twin_nodes.benchmark.kinematics import written_out
+from weld_twin_nodes.benchmark.kinematics import OWN, written_out
 from weld_twin_nodes.benchmark.peers import find_peers
 from weld_twin_nodes.benchmark.race import Contender, Outcome, Workload, race
+from weld_twin_nodes.benchmark.table import LEFT_OUT, short
 from weld_twin_nodes.cli import main
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_a_contender_that_disagrees_is_not_timed() -> None:
@@ -96,3 +99,23 @@ def test_the_command_writes_what_it_found(tmp_path: Path, capsys: pytest.Capture
         assert all(c['gap'] <= load['tolerance'] for c in load['contenders'].values())
     assert (tmp_path / 'speed' / 'growth.png').stat().st_size > 10_000
     assert (tmp_path / 'speed' / 'benchmark.md').read_text().count('\n') == 11
+    assert (tmp_path / 'speed' / 'brief.md').exists()
+
+
+@pytest.mark.parametrize(
+    ('page', 'table'), [('docs/speed.md', 'benchmark.md'), ('README.md', 'brief.md')]
+)
+def test_pages_show_the_tables_of_the_kept_run(page: str, table: str) -> None:
+    kept = (ROOT / 'docs/results/benchmark' / table).read_text()
+    assert kept in (ROOT / page).read_text()
+
+
+def test_the_kept_tables_are_those_of_the_kept_numbers() -> None:
+    folder = ROOT / 'docs/results/benchmark'
+    found = json.loads((folder / 'benchmark.json').read_text())
+    brief = (folder / 'brief.md').read_text()
+    for load in found['workloads']:
+        ratio = load['contenders'][OWN]['ratio']
+        if not load['title'].endswith(LEFT_OUT):
+            reference = ' + '.join(load['reference'])
+            assert f'| {load["title"]} | {short(np.median(ratio))} ({reference}) |' in brief

@@ -7,12 +7,14 @@ from __future__ import annotations
 import json
 import os
 import time
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
+from weld_twin_nodes import campaigns
 from weld_twin_nodes.campaigns import latency
 from weld_twin_nodes.campaigns.live.race import Contender
 from weld_twin_nodes.campaigns.live.soaking import EACH, losses, verdict
@@ -75,3 +77,11 @@ def test_the_kept_latency_result_is_within_its_limit():
     worst = max(row['ratio'][key] for row in kept['rates'] for key in latency.COMPARED)
     assert [row['rate_hz'] for row in kept['rates']] == list(latency.RATES)
     assert worst == kept['worst_ratio'] <= latency.LIMIT
+
+
+@pytest.mark.parametrize('name', campaigns.names())
+def test_the_page_shows_the_table_of_the_kept_result(name):
+    kept = json.loads((RESULTS / f'{name}.json').read_text())
+    table = import_module(f'{campaigns.__name__}.{name}').table(kept)
+    assert table.count('|') > 20
+    assert table in (ROOT / 'docs/robustness.md').read_text()

@@ -82,3 +82,29 @@ def _recorded(bag: Any) -> dict[str, Any]:
     except TwinError as error:
         return {'opens': False, 'messages': count, 'reason': str(error)}
     return {'opens': True, 'messages': count, 'reason': ''}
+
+
+COLUMNS = {
+    'forward_kinematics_twin': 'twin', 'error_injector': 'injector',
+    'deviation_analyzer': 'analyzer', 'deviation_markers': 'markers',
+    'live_diagnosis': 'diagnosis', 'recorder': 'recorder',
+}  # fmt: skip
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return what each node told under each fault, and what else there is to say."""
+    from weld_twin_nodes.campaign_file import markdown
+
+    rows = [
+        (
+            row['fault'], *(row['nodes'].get(name, {}).get('told', '') for name in COLUMNS),
+            sum(node['wrong'] for node in row['nodes'].values()), 'yes' if row['passed'] else 'no',
+        )
+        for row in result['faults']
+    ]  # fmt: skip
+    refused = sum(row['refused'] for row in result['parameters'])
+    return markdown(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows) + (
+        f'\nAbsurd parameter values refused in a sentence: {refused} of '
+        f'{len(result["parameters"])}. Messages in the bag of the whole campaign, all of which '
+        f'read: {result["bag"]["messages"]:,}.\n'
+    )

@@ -53,3 +53,15 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
         'cpu_limit_s': CPU_LIMIT, 'memory_limit_mb': MEMORY_LIMIT / 1e6, 'kinds': kinds,
         'findings': [asdict(finding) for finding in found.values()], 'malicious': malicious,
     }  # fmt: skip
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return a row for each kind of file."""
+    from weld_twin_nodes.campaign_file import markdown
+
+    kinds = [(name, row['right'], row['refused'], row['wrong'])
+             for name, row in result['kinds'].items()]  # fmt: skip
+    outcomes = result['malicious'].values()
+    refused = sum(text.startswith('refused') for text in outcomes)
+    kinds.append(('malicious', 0, refused, len(outcomes) - refused))
+    return markdown(('kind', 'read', 'refused', 'wrong'), *kinds)

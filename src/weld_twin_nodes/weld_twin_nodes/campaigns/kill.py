@@ -73,3 +73,16 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     whole = share(rows)
     passed = whole['faults'] == 0 and whole['missing_s']['max'] <= ALLOWED
     return {'passed': passed, 'allowed_s': ALLOWED, 'all': whole, **groups}
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return a row for each storage."""
+    from weld_twin_nodes.campaign_file import markdown
+
+    head = ('storage', 'kills', 'gaps, repeats, broken bags', 'missing, median', 'missing, worst')
+    rows = []
+    for name in ('mcap', 'sqlite3'):
+        row = result[name]
+        missing = (f'{row["missing_s"][key]:.2f} s' for key in ('median', 'max'))
+        rows.append((name, row['kills'], row['faults'], *missing))
+    return markdown(head, *rows)

@@ -112,3 +112,22 @@ def _job() -> Any:
     poses = Twin(robot, ()).poses(Recording('minute', motion))
     measured = Measurements(t, poses.position + 1e-3 * np.sin(3.0 * q[:, :3]), poses.rotation)
     return Job(Recording('minute', motion, measured), robot)
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return a row for each rate: latency in ms, CPU time in us."""
+    from weld_twin_nodes.campaign_file import markdown
+
+    def ms(row: dict[str, float]) -> str:
+        return f'{row["p50_us"] / 1e3:.2f} / {row["p99_us"] / 1e3:.2f}'
+
+    head = 'Hz', 'relay p50 / p99', 'raw relay', 'twin', 'twin / relay'
+    return markdown((*head, 'CPU relay / twin', 'ratio'), *(
+        (
+            f'{row["rate_hz"]:g}', ms(row['relay']), ms(row['raw_relay']), ms(row['twin']),
+            f'{row["ratio"]["p50_us"]:.2f} / {row["ratio"]["p99_us"]:.2f}',
+            f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}',
+            f'{row["ratio"]["cpu_us"]:.2f}',
+        )
+        for row in result['rates']
+    ))  # fmt: skip

@@ -56,3 +56,23 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     }  # fmt: skip
     picture(Path(args.out).with_suffix('.png'), soak.samples)
     return {'passed': verdict(result, FLAT), **result}
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return a row for each node; what it missed is over all its inputs."""
+    from weld_twin_nodes.campaign_file import markdown
+
+    def missed(node: str) -> int:
+        return sum(
+            row.get('missing', 0) for name, row in result['health'].items()
+            if name.partition(': ')[0] == node
+        )  # fmt: skip
+
+    head = ('node', 'share of a core', 'memory', 'its slope', 'messages missed')
+    return markdown(head, *(
+        (
+            name.replace('_', ' '), f'{100.0 * row["cpu_share"]:.0f} %',
+            f'{row["rss_mib"]:.0f} MiB', f'{row["rss_slope_mib_per_h"]:+.1f} MiB/h', missed(name),
+        )
+        for name, row in result['nodes'].items()
+    ))  # fmt: skip

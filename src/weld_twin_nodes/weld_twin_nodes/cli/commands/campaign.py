@@ -44,5 +44,6 @@ def run(args: argparse.Namespace) -> int:
     begin = time.monotonic()
     result: dict[str, Any] = module.run(args, lambda line: print(line, flush=True))
     write_result(args.out, args.campaign, time.monotonic() - begin, result)
+    print(module.table(result))
     print(f'{args.campaign}: {"passed" if result["passed"] else "FAILED"}, {args.out}')
     return 0 if result['passed'] else FAILED

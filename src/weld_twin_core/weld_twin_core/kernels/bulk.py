@@ -13,10 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import pairwise
 from math import prod
 from threading import get_ident
-from typing import NamedTuple
 
 import numpy as np
 
@@ -33,8 +31,7 @@ BLOCK = 1504
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
 
 POSE = 12
-"""Rows of a piece that make up its pose, the last; those of the channels come before."""
-SCREW = 6
+"""Rows that make up the pose of a piece; in the far piece those of its screws come before."""
 LENGTHS = 4
 """Lengths of blocks whose working memory a kernel keeps."""
 
@@ -64,16 +61,20 @@ class BulkKernel:
         self.channels = tuple(channels)
         self.block = block
         division = Division(robot, self.channels)
-        inner, outer = division.inner(), division.outer()
-        self.sizes, self.counts = division.sizes, (len(inner), len(outer))
+        outer = division.outer()
+        self.sizes, self.turned = division.sizes, len(outer)
         self._runs, self._ends = division.runs(), division.ends()
         near, far = division.near, division.far
-        self._weights = (
-            _on_features(self.sizes[0], near.screws(inner), near.poses()),
-            _on_features(self.sizes[1], far.velocities(outer), far.poses()),
-        )
-        self._poses = [_pose_product(weights) for weights in self._weights]
-        self._every = [_every_product(weights) for weights in self._weights]
+        self._near_pose = _on_features(self.sizes[0], _columns(near.poses()))
+        inner = division.inner()
+        near_screws = near.screws(list(inner.values()))
+        self._near_screws = {
+            k: _trimmed(_on_features(self.sizes[0], near_screws[:, t]))
+            for t, k in enumerate(inner)
+        }
+        self._far_pose = _on_features(self.sizes[1], _columns(far.poses()))
+        far_screws = _on_features(self.sizes[1], far.velocities(outer))
+        self._far = np.concatenate([far_screws, self._far_pose])
         self._memory: dict[int, _Memory] = {}
 
     def poses(self, q: Array, out: Array | None = None) -> Array:
@@ -122,7 +123,7 @@ class BulkKernel:
             raise ModelError(f'screws need an array of shape {shape}, got {out.shape}')
         with unbuffered():
             for part in self._blocks(len(q)):
-                memory = self._pose_block(q[part], poses[part], screws=True)
+                memory = self._pose_block(q[part], poses[part], out[:, :, part])
                 self._screw_block(memory, out[:, :, part])
         return poses, out
 
@@ -149,8 +150,12 @@ class BulkKernel:
             starts.append(count - size)
         return [slice(start, start + size) for start in starts]
 
-    def _pose_block(self, q: Array, out: Array, screws: bool = False) -> _Memory:
-        """Write poses, and leave what screws are made of in memory."""
+    def _pose_block(self, q: Array, out: Array, screws: Array | None = None) -> _Memory:
+        """
+        Write poses; if screws are wanted leave what they are made of in memory and in their place.
+
+        In the place of near screws that is the moment about the origin and the axis.
+        """
         n = len(q)
         if n not in self._memory:
             if len(self._memory) == LENGTHS:
@@ -158,11 +163,15 @@ class BulkKernel:
             self._memory[n] = _Memory(self, n)
         memory = self._memory[n]
         memory.fill(q)
-        wanted = self._every if screws else self._poses
-        for steps, features, piece in zip(wanted, memory.features, memory.pieces, strict=True):
-            for rows, weights in steps:
-                np.matmul(weights, features[: weights.shape[1]], out=piece[rows])
-        near, far = (piece[-POSE:].reshape(4, 3, n) for piece in memory.pieces)
+        features, (near_rows, far_rows) = memory.features, memory.pieces
+        np.matmul(self._near_pose, features[0], out=near_rows)
+        if screws is None:
+            np.matmul(self._far_pose, features[1], out=far_rows[-POSE:])
+        else:
+            np.matmul(self._far, features[1], out=far_rows)
+            for k, weights in self._near_screws.items():
+                np.matmul(weights, features[0][: weights.shape[1]], out=screws[:, k])
+        near, far = near_rows.reshape(4, 3, n), far_rows[-POSE:].reshape(4, 3, n)
         products = memory.products
         np.multiply(far.swapaxes(0, 1)[:, :, None], near[:3, None], products)
         pose = products[0]
@@ -175,16 +184,14 @@ class BulkKernel:
 
     def _screw_block(self, memory: _Memory, out: Array) -> None:
         near, far = memory.pieces
-        (inner, outer), n = self.counts, near.shape[1]
-        moments, axes = near[:-POSE].reshape(inner, 2, 3, n).transpose(1, 2, 0, 3)
-        velocities = far[:-POSE].reshape(outer, 2, 3, n).transpose(2, 1, 0, 3)
-        turn = near[-POSE:-3].reshape(3, 3, 1, 1, n)
+        n = near.shape[1]
+        velocities = far[:-POSE].reshape(self.turned, 2, 3, n).transpose(2, 1, 0, 3)
+        turn = near[:9].reshape(3, 3, 1, 1, n)
         for region, channels, part in self._runs:
             wanted = out[:, channels].reshape(2, 3, -1, n)
             if region is Region.NEAR:
                 spare = memory.spare(2, part.stop - part.start, n)
-                _velocity(moments[:, part], axes[:, part], memory.pose[9:12], wanted[0], spare)
-                wanted[1] = axes[:, part]
+                _add_velocity(wanted[1], memory.pose[9:12], wanted[0], spare)
             elif region is Region.FAR:
                 spare = memory.spare(2, 3, 2, part.stop - part.start, n)
                 _turned(turn, velocities[:, :, part], wanted.swapaxes(0, 1), spare)
@@ -203,53 +210,39 @@ def _kept(robot: Robot, channels: tuple[Channel, ...], thread: int) -> BulkKerne
     return BulkKernel(robot, channels)
 
 
-def _on_features(joints: int, screws: Array, poses: Array) -> Array:
-    """
-    Return weights of a piece, one row for every output, shape (outputs, features).
+def _columns(poses: Array) -> Array:
+    """Return the columns x, y, z and origin of weights of poses, shape (features, 4, 3)."""
+    columns: Array = poses[:, :3].swapaxes(1, 2)
+    return columns
 
-    Rows are those of the screws, then the columns of the pose. Features that leave the last joints
-    at 1 come first.
+
+def _on_features(joints: int, weights: Array) -> Array:
     """
-    flat = [screws.reshape(len(screws), -1), poses[:, :3].swapaxes(1, 2).reshape(len(poses), -1)]
-    weights = on_half_angles(np.concatenate(flat, axis=1), joints).T
-    every = weights.reshape(-1, *[3] * joints)
+    Return weights with one row for every output, shape (outputs, features).
+
+    Features that leave the last joints at 1 come first.
+    """
+    flat = on_half_angles(weights.reshape(len(weights), -1), joints).T
+    every = flat.reshape(-1, *[3] * joints)
     reverse = (0, *range(joints, 0, -1))
-    return np.ascontiguousarray(every.transpose(reverse).reshape(weights.shape))
+    return np.ascontiguousarray(every.transpose(reverse).reshape(flat.shape))
 
 
-class _Product(NamedTuple):
-    """Some rows of a piece, and their weights on as many features as these need."""
-
-    rows: slice
-    weights: Array
-
-
-def _pose_product(weights: Array) -> list[_Product]:
-    return [_Product(slice(-POSE, None), weights[-POSE:])]
+def _trimmed(weights: Array) -> Array:
+    """Return weights without the features behind the last they need."""
+    used = int(np.flatnonzero(weights.any(axis=0))[-1]) + 1
+    return np.ascontiguousarray(weights[:, :used])
 
 
-def _every_product(weights: Array) -> list[_Product]:
-    """Return products that give every row: the first channels depend on the first joints only."""
-    channels = weights[:-POSE].reshape(-1, SCREW, weights.shape[1])
-    used = [int(np.flatnonzero(one.any(axis=0))[-1]) + 1 for one in channels]
-    widths = np.repeat([*used, weights.shape[1]], [*[SCREW] * len(used), POSE])
-    steps = np.flatnonzero(np.diff(widths)) + 1
-    edges = [0, *map(int, steps), len(weights)]
-    return [
-        _Product(slice(i, j), np.ascontiguousarray(weights[i:j, : widths[i]]))
-        for i, j in pairwise(edges)
-    ]
-
-
-def _velocity(moment: Array, axis: Array, tip: Array, out: Array, spare: Array) -> None:
-    """Write moment + axis x tip; shapes (3, channels, N), tip (3, N), spare (2, channels, N)."""
+def _add_velocity(axis: Array, tip: Array, out: Array, spare: Array) -> None:
+    """Add axis x tip to moments; shapes (3, channels, N), tip (3, N), spare (2, channels, N)."""
     plus, minus = spare
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         np.multiply(axis[i], tip[j], plus)
         np.multiply(axis[j], tip[i], minus)
         np.subtract(plus, minus, plus)
-        np.add(moment[k], plus, out[k])
+        np.add(out[k], plus, out[k])
 
 
 def _turned(turn: Array, vectors: Array, out: Array, spare: Array) -> None:
@@ -289,8 +282,9 @@ class _Memory:
         self.sizes = kernel.sizes
         self.sliding = [int(i) for i in np.flatnonzero(kernel.robot.prismatic)]
         rows = [3**size for size in kernel.sizes]
-        outputs = [len(w) for w in kernel._weights]
-        spare = max(2 * kernel.counts[0], 12 * kernel.counts[1])
+        outputs = POSE, len(kernel._far)
+        near = len(kernel._near_screws)
+        spare = max(2 * near, 12 * kernel.turned)
         first = max((DEGREE + 1) * joints, sum(rows), 3 * POSE, ROWS + spare)
         memory = aligned(first + max(3 * joints, sum(outputs)), n)
         shared, rest = memory[:first], memory[first:]

@@ -98,12 +98,14 @@ class Division:
             return Region.LAST
         return Region.NEAR if before <= self._cut else Region.FAR
 
-    def inner(self) -> list[tuple[int, int]]:
-        """Return where in the near piece its channels act, and about which axes."""
-        return [(p.before, p.axis) for p in self.places if p.region is Region.NEAR]
+    def inner(self) -> dict[int, tuple[int, int]]:
+        """Return where in the near piece channels act, and about which axes, by their number."""
+        return {
+            k: (p.before, p.axis) for k, p in enumerate(self.places) if p.region is Region.NEAR
+        }
 
     def outer(self) -> list[tuple[int, int]]:
-        """Return the same of the far piece."""
+        """Return the same of the far piece, in the order of its channels."""
         return [(p.before - self._cut, p.axis) for p in self.places if p.region is Region.FAR]
 
     def runs(self) -> list[Run]:

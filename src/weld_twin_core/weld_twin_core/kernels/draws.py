@@ -207,7 +207,7 @@ class SeamDraws:
         count, n = draws.theta.shape
         rows = _Rows(draws)
         tool = self.robot.T_flange_tool[:3, 3]
-        tip = np.broadcast_to(tool[:, None, None, None], (3, 1, 1, count))
+        tip = np.repeat(tool[:, None, None, None], count, axis=3)
         far = rows.carried(tip, range(n - 1, SPLIT - 1, -1))
         start = np.zeros((3, 1, 4, count))
         start[[0, 1, 2], 0, [0, 1, 2]] = 1.0
@@ -239,12 +239,11 @@ def _squared(away: Array) -> Array:
 
 def _turn(first: Array, second: Array, cosine: Array, sine: Array) -> None:
     """Turn two components in their plane, in place."""
-    turned = cosine * first
-    turned -= sine * second
+    to_second, to_first = sine * first, sine * second
+    first *= cosine
+    first -= to_first
     second *= cosine
-    first *= sine
-    second += first
-    first[...] = turned
+    second += to_second
 
 
 class _Rows:
@@ -258,28 +257,25 @@ class _Rows:
 
     def linked(self, vectors: Array, i: int) -> Array:
         """
-        Apply Rz(theta) Tz(d) Tx(a) Rx(alpha) of row i, the joint at zero.
+        Apply Rz(theta) Tz(d) Tx(a) Rx(alpha) of row i, the joint at zero, in place.
 
         ``vectors`` are shape (3, features, k, D); the last of the k is a point, the others are
         directions.
         """
         x, y, z = vectors
-        c, s = self.alpha_cosine[i], self.alpha_sine[i]
-        out = np.empty_like(vectors)
-        np.subtract(c * y, s * z, out=out[1])
-        np.add(s * y, c * z, out=out[2])
-        out[2, 0, -1] += self.d[i]
-        out[0] = x
-        out[0, 0, -1] += self.a[i]
-        _turn(out[0], out[1], self.cosine[i], self.sine[i])
-        return out
+        _turn(y, z, self.alpha_cosine[i], self.alpha_sine[i])
+        z[0, -1] += self.d[i]
+        x[0, -1] += self.a[i]
+        _turn(x, y, self.cosine[i], self.sine[i])
+        return vectors
 
     def carried(self, vectors: Array, rows: range) -> Array:
         """Return vectors before some rows, on the features (1, c, s) of their joints."""
         for i in rows:
             x, y, z = self.linked(vectors, i)
             _, features, *rest = vectors.shape
-            vectors = np.zeros((3, 3, features, *rest))
+            vectors = np.empty((3, 3, features, *rest))
+            vectors[:2, 0] = vectors[2, 1:] = 0.0
             vectors[2, 0] = z
             vectors[0, 1], vectors[1, 1] = x, y
             np.negative(y, out=vectors[0, 2])

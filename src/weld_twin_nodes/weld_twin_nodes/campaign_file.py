@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Result files of the campaigns, and tables of what they hold."""
+"""Result files of the campaigns."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,13 +40,6 @@ def write_result(
         'seconds': round(seconds, 1),
     }  # fmt: skip
     write_text(path, json.dumps({**head, **result}, indent=1) + '\n', overwrite=True)
-
-
-def markdown(*rows: Sequence[object]) -> str:
-    """Return a table in Markdown; the first row is its head."""
-    lines = ['| ' + ' | '.join(map(str, row)) + ' |' for row in rows]
-    lines.insert(1, '|' + '---|' * len(rows[0]))
-    return '\n'.join(lines) + '\n'
 
 
 def refuse_foreign(path: Path | str, campaign: str) -> None:

@@ -72,9 +72,10 @@ class BulkKernel:
             k: _trimmed(_on_features(self.sizes[0], near_screws[:, t]))
             for t, k in enumerate(inner)
         }
-        self._far_pose = _on_features(self.sizes[1], _columns(far.poses()))
-        far_screws = _on_features(self.sizes[1], far.velocities(outer))
-        self._far = np.concatenate([far_screws, self._far_pose])
+        self._far = np.concatenate([
+            _on_features(self.sizes[1], far.velocities(outer)),
+            _on_features(self.sizes[1], _columns(far.poses())),
+        ])  # fmt: skip
         self._memory: dict[int, _Memory] = {}
 
     def poses(self, q: Array, out: Array | None = None) -> Array:
@@ -166,7 +167,7 @@ class BulkKernel:
         features, (near_rows, far_rows) = memory.features, memory.pieces
         np.matmul(self._near_pose, features[0], out=near_rows)
         if screws is None:
-            np.matmul(self._far_pose, features[1], out=far_rows[-POSE:])
+            np.matmul(self._far[-POSE:], features[1], out=far_rows[-POSE:])
         else:
             np.matmul(self._far, features[1], out=far_rows)
             for k, weights in self._near_screws.items():
@@ -190,10 +191,10 @@ class BulkKernel:
         for region, channels, part in self._runs:
             wanted = out[:, channels].reshape(2, 3, -1, n)
             if region is Region.NEAR:
-                spare = memory.spare(2, part.stop - part.start, n)
+                spare = memory.spare(2, wanted.shape[2], n)
                 _add_velocity(wanted[1], memory.pose[9:12], wanted[0], spare)
             elif region is Region.FAR:
-                spare = memory.spare(2, 3, 2, part.stop - part.start, n)
+                spare = memory.spare(2, 3, 2, wanted.shape[2], n)
                 _turned(turn, velocities[:, :, part], wanted.swapaxes(0, 1), spare)
             else:
                 for k in range(channels.start, channels.stop):

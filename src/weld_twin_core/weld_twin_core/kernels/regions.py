@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -110,18 +111,13 @@ class Division:
 
     def runs(self) -> list[Run]:
         """Return the channels as runs of one region each."""
-        out: list[Run] = []
-        counts = dict.fromkeys(Region, 0)
-        for k, place in enumerate(self.places):
-            region = place.region
-            at = counts[region]
-            counts[region] += 1
-            if out and out[-1].region is region:
-                run = out.pop()
-                out.append(Run(region, slice(run.channels.start, k + 1),
-                               slice(run.part.start, at + 1)))  # fmt: skip
-            else:
-                out.append(Run(region, slice(k, k + 1), slice(at, at + 1)))
+        out, first, met = [], 0, dict.fromkeys(Region, 0)
+        for region, places in groupby(place.region for place in self.places):
+            count = len(list(places))
+            part = slice(met[region], met[region] + count)
+            out.append(Run(region, slice(first, first + count), part))
+            first += count
+            met[region] += count
         return out
 
     def ends(self) -> dict[int, Array]:

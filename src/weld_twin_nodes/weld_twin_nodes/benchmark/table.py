@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import markdown
 from .kinematics import OWN
 from .race import Outcome
 
@@ -31,7 +32,7 @@ def lines(outcome: Outcome) -> Iterator[str]:
 
 def page(outcomes: list[Outcome]) -> str:
     """Return a table in Markdown: own time, and times as fast as the reference and the others."""
-    rows = ['| workload | time | times as fast as | and as the others |', '|---|---|---|---|']
+    rows = [('workload', 'time', 'times as fast as', 'and as the others')]
     for outcome in outcomes:
         load = outcome.workload
         own = outcome.seconds[OWN]
@@ -40,22 +41,22 @@ def page(outcomes: list[Outcome]) -> str:
             for c in load.contenders if c.name != OWN and c.name not in load.reference
         ]  # fmt: skip
         reference = ' + '.join(load.reference)
-        rows.append(
-            f'| {load.title} | {duration(float(np.median(own)))} per {load.item} | '
-            f'{reference}: **{times(outcome, OWN)}** | {", ".join(others)} |'
-        )
-    return '\n'.join(rows) + '\n'
+        rows.append((
+            load.title, f'{duration(float(np.median(own)))} per {load.item}',
+            f'{reference}: **{times(outcome, OWN)}**', ', '.join(others),
+        ))  # fmt: skip
+    return markdown.table(*rows)
 
 
 def brief(outcomes: list[Outcome]) -> str:
     """Return a shorter table, without ranges, small batches and draws on arbitrary points."""
-    rows = ['| one thread, in one run | times as fast |', '|---|---|']
+    rows = [('one thread, in one run', 'times as fast')]
     for outcome in outcomes:
         load, ratio = outcome.workload, outcome.ratio(OWN)
         if ratio is not None and not load.title.endswith(LEFT_OUT):
             reference = ' + '.join(load.reference)
-            rows.append(f'| {load.title} | {short(float(np.median(ratio)))} ({reference}) |')
-    return '\n'.join(rows) + '\n'
+            rows.append((load.title, f'{short(float(np.median(ratio)))} ({reference})'))
+    return markdown.table(*rows)
 
 
 def costs(starts: dict[str, float], memory: dict[str, Any], bag: dict[str, Any]) -> Iterator[str]:

@@ -13,6 +13,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
+from .. import markdown
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
@@ -93,8 +95,6 @@ COLUMNS = {
 
 def table(result: dict[str, Any]) -> str:
     """Return what each node told under each fault, and what else there is to say."""
-    from weld_twin_nodes.campaign_file import markdown
-
     rows = [
         (
             row['fault'], *(row['nodes'].get(name, {}).get('told', '') for name in COLUMNS),
@@ -103,7 +103,7 @@ def table(result: dict[str, Any]) -> str:
         for row in result['faults']
     ]  # fmt: skip
     refused = sum(row['refused'] for row in result['parameters'])
-    return markdown(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows) + (
+    return markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows) + (
         f'\nAbsurd parameter values refused in a sentence: {refused} of '
         f'{len(result["parameters"])}. Messages in the bag of the whole campaign, all of which '
         f'read: {result["bag"]["messages"]:,}.\n'

@@ -12,6 +12,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
+from .. import markdown
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
@@ -57,11 +59,9 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
 
 def table(result: dict[str, Any]) -> str:
     """Return a row for each kind of file."""
-    from weld_twin_nodes.campaign_file import markdown
-
     kinds = [(name, row['right'], row['refused'], row['wrong'])
              for name, row in result['kinds'].items()]  # fmt: skip
     outcomes = result['malicious'].values()
     refused = sum(text.startswith('refused') for text in outcomes)
     kinds.append(('malicious', 0, refused, len(outcomes) - refused))
-    return markdown(('kind', 'read', 'refused', 'wrong'), *kinds)
+    return markdown.table(('kind', 'read', 'refused', 'wrong'), *kinds)

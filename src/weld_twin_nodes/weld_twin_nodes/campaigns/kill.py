@@ -14,6 +14,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
+from .. import markdown
+
 ALLOWED = 1.0
 """Seconds of messages that a kill may cost."""
 
@@ -77,12 +79,10 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 def table(result: dict[str, Any]) -> str:
     """Return a row for each storage."""
-    from weld_twin_nodes.campaign_file import markdown
-
     head = ('storage', 'kills', 'gaps, repeats, broken bags', 'missing, median', 'missing, worst')
     rows = []
     for name in ('mcap', 'sqlite3'):
         row = result[name]
         missing = (f'{row["missing_s"][key]:.2f} s' for key in ('median', 'max'))
         rows.append((name, row['kills'], row['faults'], *missing))
-    return markdown(head, *rows)
+    return markdown.table(head, *rows)

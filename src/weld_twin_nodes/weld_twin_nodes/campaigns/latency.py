@@ -14,6 +14,8 @@ from collections.abc import Callable
 from copy import copy
 from typing import Any
 
+from .. import markdown
+
 RATES = (125.0, 500.0, 1000.0)
 LIMIT = 1.25
 """Largest ratio of the twin to the relay that passes."""
@@ -116,13 +118,11 @@ def _job() -> Any:
 
 def table(result: dict[str, Any]) -> str:
     """Return a row for each rate: latency in ms, CPU time in us."""
-    from weld_twin_nodes.campaign_file import markdown
-
     def ms(row: dict[str, float]) -> str:
         return f'{row["p50_us"] / 1e3:.2f} / {row["p99_us"] / 1e3:.2f}'
 
     head = 'Hz', 'relay p50 / p99', 'raw relay', 'twin', 'twin / relay'
-    return markdown((*head, 'CPU relay / twin', 'ratio'), *(
+    return markdown.table((*head, 'CPU relay / twin', 'ratio'), *(
         (
             f'{row["rate_hz"]:g}', ms(row['relay']), ms(row['raw_relay']), ms(row['twin']),
             f'{row["ratio"]["p50_us"]:.2f} / {row["ratio"]["p99_us"]:.2f}',

@@ -12,6 +12,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
+from .. import markdown
+
 EVERY = 5.0
 """Seconds between two looks at the processes."""
 WARM = 0.2
@@ -60,8 +62,6 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
 
 def table(result: dict[str, Any]) -> str:
     """Return a row for each node; what it missed is over all its inputs."""
-    from weld_twin_nodes.campaign_file import markdown
-
     def missed(node: str) -> int:
         return sum(
             row.get('missing', 0) for name, row in result['health'].items()
@@ -69,7 +69,7 @@ def table(result: dict[str, Any]) -> str:
         )  # fmt: skip
 
     head = ('node', 'share of a core', 'memory', 'its slope', 'messages missed')
-    return markdown(head, *(
+    return markdown.table(head, *(
         (
             name.replace('_', ' '), f'{100.0 * row["cpu_share"]:.0f} %',
             f'{row["rss_mib"]:.0f} MiB', f'{row["rss_slope_mib_per_h"]:+.1f} MiB/h', missed(name),

@@ -13,6 +13,7 @@ from weld_twin_core import catalog
 from weld_twin_core.robot import Robot
 from weld_twin_core.sensitivity.claims import CaseName, judge
 
+from .. import markdown
 from ..tasks import Runner, Task
 from .work import claim_case
 
@@ -59,15 +60,13 @@ def cases_csv(result: dict[str, Any]) -> str:
 
 def claims_markdown(result: dict[str, Any]) -> str:
     """Return the table for reading."""
-    lines = [
-        f'Measured on {len(result["robots"])} robots ({", ".join(result["robots"])}) and '
-        f'{len(result["seams"])} seams ({", ".join(result["seams"])}) each.', '',
-        '| Claim | In the paper | Holds as written | Verdict | Why, as measured |',
-        '|---|---|---|---|---|',
-    ]  # fmt: skip
+    rows = [('Claim', 'In the paper', 'Holds as written', 'Verdict', 'Why, as measured')]
     for c in result['claims']:
         held = f'{c["held"]} of {c["cases"]}'
-        cells = (c['statement'], c['where'], held, f'**{c["verdict"]}**', c['reason'])
+        rows.append((c['statement'], c['where'], held, f'**{c["verdict"]}**', c['reason']))
+    return (
+        f'Measured on {len(result["robots"])} robots ({", ".join(result["robots"])}) and '
+        f'{len(result["seams"])} seams ({", ".join(result["seams"])}) each.\n\n'
         # The bars of a norm would end a cell.
-        lines.append('| ' + ' | '.join(cell.replace('|', '‖') for cell in cells) + ' |')
-    return '\n'.join(lines) + '\n'
+        + markdown.table(*([cell.replace('|', '‖') for cell in row] for row in rows))
+    )

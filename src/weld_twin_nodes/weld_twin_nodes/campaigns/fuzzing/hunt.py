@@ -11,6 +11,8 @@ import signal
 import tempfile
 import traceback
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -77,20 +79,35 @@ def case_bytes(target: Target, seed: int, name: str, case: int) -> bytes:
 def hunt(name: str, seed: int, cases: int, known: dict[str, Finding]) -> Tally:
     """Read so many broken files of a kind; add what went wrong to what is known."""
     tally = Tally()
-    context = get_context('fork')
     done = 0
     while done < cases:
-        here, there = context.Pipe(duplex=False)
         last = min(done + BATCH, cases)
-        process = context.Process(target=_batch, args=(name, seed, done, last, there))
-        process.start()
-        there.close()
-        try:
+        with forked(_batch, name, seed, done, last) as here:
             done = _follow(here, name, done, last, tally, known)
-        finally:
-            process.kill()
-            process.join()
     return tally
+
+
+@contextmanager
+def forked(work: Callable[..., None], *given: Any) -> Iterator[Connection]:
+    """Yield what a process of its own sends; it gets the other end as its last argument."""
+    context = get_context('fork')
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=work, args=(*given, there))
+    process.start()
+    there.close()
+    try:
+        yield here
+    finally:
+        process.kill()
+        process.join()
+
+
+def next_outcome(here: Connection) -> str:
+    """Return what a process sends next, or why nothing came."""
+    try:
+        return str(here.recv()) if here.poll(WALL_LIMIT) else 'hangs without computing'
+    except EOFError:
+        return 'ends the process'
 
 
 def _follow(
@@ -98,10 +115,7 @@ def _follow(
 ) -> int:
     """Take the results of a process until it ends; return the next case."""
     while case < last:
-        try:
-            outcome = here.recv() if here.poll(WALL_LIMIT) else 'hangs without computing'
-        except EOFError:
-            outcome = 'ends the process'
+        outcome = next_outcome(here)
         if outcome == 'right':
             tally.right += 1
         elif outcome == 'refused':

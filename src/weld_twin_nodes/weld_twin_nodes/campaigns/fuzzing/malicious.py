@@ -10,7 +10,6 @@ import struct
 import tempfile
 from collections.abc import Callable
 from contextlib import closing
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -67,18 +66,8 @@ def try_all() -> dict[str, str]:
 
 def try_one(name: str) -> str:
     """Return 'refused' with the sentence, or what went wrong."""
-    here, there = get_context('fork').Pipe(duplex=False)
-    process = get_context('fork').Process(target=_attempt, args=(name, there))
-    process.start()
-    there.close()
-    try:
-        outcome = here.recv() if here.poll(hunt.WALL_LIMIT) else 'hangs without computing'
-    except EOFError:
-        outcome = 'ends the process'
-    finally:
-        process.kill()
-        process.join()
-    return str(outcome)
+    with hunt.forked(_attempt, name) as here:
+        return hunt.next_outcome(here)
 
 
 def _attempt(name: str, out: Connection) -> None:

@@ -105,11 +105,9 @@ class SeamDraws:
         if smooth:
             both = (features[0][:, None] * features[1][None]).reshape(-1, len(q))
             found = _determining(both)
-            if found is not None and 2 * len(found.samples) < len(q):
+            if found is not None:
                 self.samples, self.spread, self.remainder = found
-                squares = _determining(_products(both))
-                if squares is not None and 2 * len(squares.samples) < len(q):
-                    self._of_squares = squares
+                self._of_squares = _determining(_products(both))
         self._near, self._far = (np.ascontiguousarray(f[:, self.samples]) for f in features)
         self._phases = np.exp(1j * q[self.samples].T)[..., None]
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))
@@ -295,13 +293,16 @@ def _determining(features: Array) -> _Determining | None:
     Return samples, and the matrix (N, S) that turns values there into values everywhere.
 
     The factorisation is of random mixtures of the features, which depend on each other as the
-    features do; the remainder is that of the features themselves. None if they are too many.
+    features do; the remainder is that of the features themselves. None if the samples are half of
+    all or more.
     """
     mixing = np.random.default_rng(0).random((_MIXTURES, len(features))) - 0.5
     mixtures = mixing @ features
     upper, order = qr(mixtures, mode='r', pivoting=True, check_finite=False)
     strength = np.abs(np.diagonal(upper))
     rank = int((strength > ROUNDING * strength[0]).sum())
+    if 2 * rank >= features.shape[1]:
+        return None
     spread = np.empty((rank, features.shape[1]))
     spread[:, order[:rank]] = np.eye(rank)
     spread[:, order[rank:]] = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])

@@ -10,7 +10,7 @@ setup(
     name=NAME,
     version='0.1.0',
     packages=find_packages(),
-    package_data={NAME: ['**/*.yaml', '**/*.csv', '**/*.css', '**/*.js']},
+    package_data={NAME: ['py.typed', '**/*.yaml', '**/*.csv', '**/*.css', '**/*.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
@@ -28,13 +28,13 @@ setup(
     entry_points={
         'console_scripts': [
             'weld-twin = weld_twin_nodes.cli:main',
-            'trajectory_generator = weld_twin_nodes.trajectory_generator:main',
-            'error_injector = weld_twin_nodes.error_injector:main',
-            'forward_kinematics_twin = weld_twin_nodes.twin:main',
-            'deviation_analyzer = weld_twin_nodes.deviation_analyzer:main',
-            'recorder = weld_twin_nodes.recorder:main',
-            'live_diagnosis = weld_twin_nodes.live_diagnosis:main',
-            'deviation_markers = weld_twin_nodes.markers:main',
+            'trajectory_generator = weld_twin_nodes.live.trajectory_generator:main',
+            'error_injector = weld_twin_nodes.live.error_injector:main',
+            'forward_kinematics_twin = weld_twin_nodes.live.forward_kinematics_twin:main',
+            'deviation_analyzer = weld_twin_nodes.live.deviation_analyzer:main',
+            'recorder = weld_twin_nodes.live.recorder:main',
+            'live_diagnosis = weld_twin_nodes.live.live_diagnosis:main',
+            'deviation_markers = weld_twin_nodes.live.deviation_markers:main',
         ]
     },
 )

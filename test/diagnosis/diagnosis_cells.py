@@ -7,14 +7,14 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.catalog import load
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.diagnosis import diagnose
-from weld_twin_core.diagnosis.problem import Model, Problem, Scale
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
-from weld_twin_core.rotation import matrix_from_quaternion
-from weld_twin_core.twin import Twin
-from weld_twin_nodes.plant import Command, Tracker, run
+from weld_twin_core.twin.twin import Twin
+from weld_twin_lab.plant import Command, Tracker, run
 
 SIGMA = 2e-5
 SIGMA_TURN = 5e-5

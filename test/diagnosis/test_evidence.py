@@ -8,9 +8,9 @@ from diagnosis_cells import effect
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from weld_twin_core.diagnosis.gram import Gram
-from weld_twin_core.diagnosis.library import Unit
-from weld_twin_core.diagnosis.score import best_choice, effective_share, evidence
+from weld_twin_core.diagnosis.algebra.evidence_score import best_choice, effective_share, evidence
+from weld_twin_core.diagnosis.algebra.gram import Gram
+from weld_twin_core.diagnosis.hypotheses.library import Unit
 
 
 def wandering(rho, samples, components, seed=0):

@@ -9,7 +9,7 @@ import pytest
 from diagnosis_cells import SIGMA, effect, recorded, sites
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.catalog import load
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording

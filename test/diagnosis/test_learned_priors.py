@@ -8,8 +8,8 @@ from diagnosis_cells import effect, known_scale, tiny
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
-from weld_twin_core.diagnosis.fit import fit
-from weld_twin_core.diagnosis.shrinkage import groups, learned_precision, shrunk_fit
+from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.many.shrinkage import groups, learned_precision, shrunk_fit
 
 ROWS = 150
 

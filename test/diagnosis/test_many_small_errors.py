@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
-from weld_twin_core.diagnosis.families import family_verdict, weighed
-from weld_twin_core.diagnosis.fit import fit
-from weld_twin_core.diagnosis.flexible import Structure
-from weld_twin_core.diagnosis.heldout import Unseen
-from weld_twin_core.diagnosis.lines import LINE, _Waves, with_lines
-from weld_twin_core.diagnosis.shrinkage import groups
-from weld_twin_core.diagnosis.verdict import Evidence
-from weld_twin_core.twin import Twin
+from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.hypotheses.ripple_lines import LINE, _Waves, with_lines
+from weld_twin_core.diagnosis.many.family_verdict import family_verdict, weighed
+from weld_twin_core.diagnosis.many.shrinkage import groups
+from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
+from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
+from weld_twin_core.diagnosis.verdict.decision import Evidence
+from weld_twin_core.twin.twin import Twin
 
 ELBOW = 2
 

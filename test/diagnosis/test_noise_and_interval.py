@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA
 
-from weld_twin_core.diagnosis.noise import noise_floor
-from weld_twin_core.diagnosis.problem import Problem
-from weld_twin_core.diagnosis.validation import ratio_interval
+from weld_twin_core.diagnosis.algebra.noise_floor import noise_floor
+from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.unseen.held_out_shrink import ratio_interval
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 

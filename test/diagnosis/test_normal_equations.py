@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.gram import Gram, by_block
+from weld_twin_core.diagnosis.algebra.gram import Gram, by_block
 
 COUNT, ROWS = 7, 60
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from diagnosis_cells import effect, known_scale, tiny
 
-from weld_twin_core.diagnosis.fit import fit
-from weld_twin_core.diagnosis.starts import started
+from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.hypotheses.starts import started
 
 
 @pytest.mark.parametrize('frequency', [3.0, 9.0])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
-from weld_twin_core.diagnosis.fit import fit
-from weld_twin_core.diagnosis.heldout import TRUSTED, Unseen
-from weld_twin_core.diagnosis.problem import Scale
+from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.problem import Scale
+from weld_twin_core.diagnosis.unseen.unseen_stretches import TRUSTED, Unseen
 
 TRUE = (
     effect('joint_offset', joint='elbow_joint', offset=6e-4),

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from diagnosis_cells import effect, known_scale, tiny
 
-from weld_twin_core.diagnosis.fit import fit
-from weld_twin_core.diagnosis.flexible import Structure, structure
-from weld_twin_core.diagnosis.glimpses import glimpsed
-from weld_twin_core.diagnosis.heldout import Unseen
-from weld_twin_core.diagnosis.library import build
-from weld_twin_core.diagnosis.problem import Problem
+from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.hypotheses.library import build
+from weld_twin_core.diagnosis.hypotheses.rivals import Rival
 from weld_twin_core.diagnosis.result import Site
-from weld_twin_core.diagnosis.rivals import Rival
-from weld_twin_core.diagnosis.verdict import Evidence, decide
+from weld_twin_core.diagnosis.unseen.leftover_structure import Structure, structure
+from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
+from weld_twin_core.diagnosis.verdict.decision import Evidence, decide
+from weld_twin_core.diagnosis.verdict.partial_ripple import glimpsed
 from weld_twin_core.recording import Measurements
 
 PLAY, OFFSET = Site('backlash', 'elbow_joint'), Site('joint_offset', 'wrist_1_joint')

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, recorded, sites, solved
 
-from weld_twin_core.catalog import load
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
 
 SINGLE = {

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from weld_twin_core import catalog
+from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_nodes.cli import main
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..effects.base import Effect
+from ..effects.effect import Effect
 from ..recording import Recording
-from .problem import Model
+from .algebra.problem import Model
 
 SCHEMA = 'weld_twin/diagnosis/1'
 STATUSES = ('identified', 'ambiguous', 'unknown', 'none')

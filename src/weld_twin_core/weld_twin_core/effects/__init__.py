@@ -32,7 +32,7 @@ from . import (
     transmission_ripple,
     vibration,
 )
-from .base import Effect, MemoryEffect
+from .effect import Effect, MemoryEffect
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
 from .view import Parameter, Stage, View
 

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..arm.chain import Channel, Shift
 from ..arrays import Array
-from ..chain import Channel, Shift
-from .base import Effect
+from .effect import Effect
 from .view import Parameter, Stage, View, single
 
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from ..arm.chain import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
-from ..chain import Shift
 from ..errors import ModelError
-from ..robot import Robot
-from .base import Effect
+from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 

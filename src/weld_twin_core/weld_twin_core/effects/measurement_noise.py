@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arm.chain import Shift
 from ..arrays import Array
-from ..chain import Shift
-from .base import Effect
+from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 

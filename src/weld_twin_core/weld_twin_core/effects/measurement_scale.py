@@ -4,8 +4,8 @@
 
 from dataclasses import dataclass
 
-from ..chain import Shift
-from .base import Effect
+from ..arm.chain import Shift
+from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 

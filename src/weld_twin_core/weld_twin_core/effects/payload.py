@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arm.chain import Shift
+from ..arm.dynamics import payload_torque
 from ..arrays import Array
-from ..chain import Shift
-from ..dynamics import payload_torque
-from .base import Effect
+from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 

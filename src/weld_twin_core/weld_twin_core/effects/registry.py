@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..arm.robot import Robot
 from ..errors import DataError, ModelError
-from ..robot import Robot
-from .base import Effect, MemoryEffect
+from .effect import Effect, MemoryEffect
 from .view import Stage
 
 E = TypeVar('E', bound=Effect)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..recording import Recording
-from .base import Effect
+from .effect import Effect
 from .setup_settling import SetupSettling
 from .setup_step import SetupStep
 

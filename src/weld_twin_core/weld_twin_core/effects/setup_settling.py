@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arm.chain import Channel, Shift
 from ..arrays import Array
-from ..chain import Channel, Shift
-from .base import Effect
+from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View, single
 

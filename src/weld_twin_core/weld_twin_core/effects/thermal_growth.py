@@ -10,11 +10,11 @@ from numbers import Real
 
 import numpy as np
 
+from ..arm.chain import Channel, Shift
+from ..arm.robot import Robot
 from ..arrays import Array
-from ..chain import Channel, Shift
 from ..errors import DataError, ModelError
-from ..robot import Robot
-from .base import Effect
+from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arm.chain import Shift
 from ..arrays import Array
-from ..chain import Shift
 from ..errors import ModelError
-from .base import Effect
+from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 

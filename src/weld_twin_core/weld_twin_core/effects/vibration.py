@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import scan
+from ..arm.chain import Shift
 from ..arrays import Array
-from ..chain import Shift
-from .base import Effect, MemoryEffect
+from . import associative_scan
+from .effect import Effect, MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -77,7 +77,7 @@ class Vibration(MemoryEffect):
         dt, kick, (t, last, rate, z0) = self._kicks(view, q, state)
         pole, damped = self._mode()
         decay = np.exp(pole * dt)
-        z = scan.linear(decay, -decay * kick / damped, z0)
+        z = associative_scan.linear(decay, -decay * kick / damped, z0)
         return z, decay, dt, kick, (t, last, rate, z[..., -1])
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
@@ -104,7 +104,7 @@ class Vibration(MemoryEffect):
             (w * (-1.0 - 1j * zeta / root), -zeta / root**2),
         ):
             drive = decay * kick / damped * d_log_damped + dt * d_pole * z
-            out.append({('q', i): gain * scan.linear(decay, drive, np.zeros(z.shape[:-1])).imag})
+            out.append({('q', i): gain * associative_scan.linear(decay, drive, np.zeros(z.shape[:-1])).imag})
         return [*out, {('q', i): z.imag}]
 
     def push(self, view: View, tangent: Array) -> Array:
@@ -114,7 +114,7 @@ class Vibration(MemoryEffect):
         dt, kick, _ = self._kicks(view, tangent, None)
         pole, damped = self._mode()
         decay = np.exp(pole * dt)
-        z = scan.linear(decay, -decay * kick / damped, np.zeros(tangent.shape[:-1]))
+        z = associative_scan.linear(decay, -decay * kick / damped, np.zeros(tangent.shape[:-1]))
         pushed: Array = tangent + self.number('gain') * z.imag
         return pushed
 

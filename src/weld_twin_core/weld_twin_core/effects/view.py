@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ..arm.chain import Channel, Frames, Shift, frames
+from ..arm.robot import Robot
 from ..arrays import Array
-from ..chain import Channel, Frames, Shift, frames
-from ..robot import Robot
 
 Value = Any
 """A parameter: a number, a list of numbers, or the same with a leading axis of draws."""

@@ -24,10 +24,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 
+from ..arm.chain import Channel
+from ..arm.robot import Robot
+from ..arm.rotation import rotation_matrix, transform
 from ..arrays import Array
-from ..chain import Channel
-from ..robot import Robot
-from ..rotation import rotation_matrix, transform
 from .bulk import BulkKernel
 
 SETTLED = 1e-12

@@ -32,9 +32,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
+from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
-from ..robot import Robot
 from .buffers import aligned, unbuffered
 from .half_angle import sincos
 

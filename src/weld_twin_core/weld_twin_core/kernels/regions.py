@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arm.chain import Channel
+from ..arm.robot import Robot
 from ..arrays import Array
-from ..chain import Channel
 from ..errors import ModelError
-from ..robot import Robot
 from .weights import Piece, factors, generator
 
 ROWS = 13

@@ -2,25 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which tolerance to tighten: local and global sensitivity, the tolerance stack, advice."""
 
-from .advice import (
-    Placement,
-    PlacementResult,
-    ProfileResult,
-    Room,
-    advise,
-    compare_profiles,
-    expected_deviation,
-    expected_rms,
-)
 from .distribution import Distribution
 from .evaluate import Model, draws_at, exact_deviations, model
 from .local import LocalSensitivity, Posture, arc_weights, local_sensitivity, posture
 from .morris import MorrisDesign, Screening, morris_screening
 from .outcome import Outcomes, outcomes
 from .scenario import Sizes, cumulative, scenario_deviations, spread_of_passes
+from .seam_study import POINTS, Study, planned_study, recorded_study, study_of_plan, with_known
 from .sobol import SobolDesign, SobolIndices, sobol_indices
 from .stack import Probability, ToleranceStack, WeldTolerance, probabilities, tolerance_stack
-from .study import POINTS, Study, planned_study, recorded_study, study_of_plan, with_known
 from .sweep import Sweep, default_values, end_of_linearity, sweep, together
 from .tolerance import (
     FAMILIES,
@@ -29,6 +19,16 @@ from .tolerance import (
     scaled,
     tolerances_from_list,
     with_draws,
+)
+from .trajectory_advice import (
+    Placement,
+    PlacementResult,
+    ProfileResult,
+    Room,
+    advise,
+    compare_profiles,
+    expected_deviation,
+    expected_rms,
 )
 
 __all__ = [

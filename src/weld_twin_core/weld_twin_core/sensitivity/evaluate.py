@@ -13,7 +13,7 @@ from ..arrays import Array, readonly
 from ..errors import ModelError
 from .expansion import CHUNK, Expansion, expand, expandable
 from .outcome import Outcomes, joined, outcomes
-from .study import Study
+from .seam_study import Study
 from .tolerance import Tolerance, with_draws
 
 _CHECKED = 32

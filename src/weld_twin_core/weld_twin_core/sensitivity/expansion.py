@@ -19,13 +19,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arm.chain import jacobian
 from ..arrays import Array
-from ..chain import jacobian
 from ..effects import REGISTRY, Stage
-from ..twin import Twin
+from ..twin.twin import Twin
+from .memory_draws import MEMORY, Remembered, remembered
 from .outcome import Outcomes, joined, outcomes
-from .remembered import MEMORY, Remembered, remembered
-from .study import Study
+from .seam_study import Study
 from .tolerance import Tolerance, with_draws
 
 CHUNK = 30_000

@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
+from ..arm.chain import jacobian
 from ..arrays import Array
-from ..chain import jacobian
 from ..effects import REGISTRY
-from ..twin import Twin
+from ..twin.twin import Twin
 from .evaluate import exact_deviations
-from .remembered import MEMORY
-from .study import Study
+from .memory_draws import MEMORY
+from .seam_study import Study
 from .tolerance import Tolerance, with_draws
 
 _FORWARD = 1e-4

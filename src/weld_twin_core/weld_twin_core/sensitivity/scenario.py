@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects import Effect
 from ..effects.backlash import Backlash
 from ..effects.base_pose import BasePose
 from ..effects.joint_offset import JointOffset
 from ..effects.link_length import LinkLength
-from ..robot import Robot
-from .study import Study
+from .seam_study import Study
 from .sweep import DEGREE
 
 

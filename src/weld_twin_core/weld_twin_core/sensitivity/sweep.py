@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Array
 from .evaluate import exact_deviations
-from .study import Study
+from .seam_study import Study
 from .tolerance import Tolerance
 
 DEGREE = np.pi / 180.0

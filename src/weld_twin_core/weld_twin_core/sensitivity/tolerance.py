@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects import REGISTRY, Effect, Parameter, effect_from_mapping
 from ..errors import ModelError
-from ..robot import Robot
 from .distribution import Distribution
 
 FAMILIES = ('joint_offset', 'link_length', 'link_twist', 'backlash', 'base_pose')

@@ -3,11 +3,11 @@
 """Bags (mcap and sqlite3, directories and single files) in and out; nothing else opens one."""
 
 from .background import BackgroundBag
+from .contents import BagInfo, TopicInfo, bag_info
 from .from_bag import read_recording
 from .growing import GrowingBag
-from .info import BagInfo, TopicInfo, bag_info
 from .reader import BagReader, provenance
-from .recover import Recovery, recover
+from .rebuild import Recovery, recover
 from .to_bag import write_recording
 from .writer import BagWriter
 

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
-from weld_twin_core.robot import Robot
-from weld_twin_core.rotation import matrix_from_quaternion
 
-from .. import convert
-from ..topics import (
+from ..messages import from_messages
+from ..messages.topics import (
     JOINT_STATES,
     MEASURED_POINT,
     MEASURED_POSE,
@@ -27,9 +27,9 @@ from ..topics import (
     TOOL_WRENCH,
     TopicNames,
 )
+from .columns import Samples, Stream
 from .reader import BagReader
-from .stations import looks_static
-from .streams import Samples, Stream
+from .station_stamps import looks_static
 
 POSE_TYPES = (MEASURED_POSE.type, 'geometry_msgs/msg/PoseWithCovarianceStamped')
 _BASE_FRAMES = ('base', 'base_link', 'base_link_inertia', 'robot_base')
@@ -105,10 +105,10 @@ def _roles(
     roles = {
         names.joints: _Role((JOINT_STATES.type,), 2 * n, lambda m: _joint_row(m, joints)),
         names.pose: _Role(POSE_TYPES, 8, _pose_row),
-        names.point: _Role((MEASURED_POINT.type,), 3, convert.point),
-        names.sigma: _Role((MEASURED_SIGMA.type,), 3, convert.vector3),
-        names.wrench: _Role((TOOL_WRENCH.type,), 6, convert.wrench),
-        names.temperature: _Role((TEMPERATURE.type,), 1, lambda m: (convert.temperature(m),)),
+        names.point: _Role((MEASURED_POINT.type,), 3, from_messages.point),
+        names.sigma: _Role((MEASURED_SIGMA.type,), 3, from_messages.vector3),
+        names.wrench: _Role((TOOL_WRENCH.type,), 6, from_messages.wrench),
+        names.temperature: _Role((TEMPERATURE.type,), 1, lambda m: (from_messages.temperature(m),)),
     }
     defaults = set(vars(TopicNames()).values())
     for topic in list(roles):
@@ -131,8 +131,8 @@ def _roles(
 
 
 def _joint_row(message: Any, joints: tuple[str, ...]) -> Array:
-    q = convert.joint_positions(message, joints)
-    qd = convert.joint_velocities(message, joints)
+    q = from_messages.joint_positions(message, joints)
+    qd = from_messages.joint_velocities(message, joints)
     return np.concatenate([q, np.full(q.size, np.nan) if qd is None else qd])
 
 
@@ -140,7 +140,7 @@ def _pose_row(message: Any) -> list[float]:
     """Return position, quaternion and sigma (NaN when the message has none)."""
     inner = getattr(message.pose, 'pose', message.pose)
     p, q = inner.position, inner.orientation
-    sigma = None if inner is message.pose else convert.position_sigma(message)
+    sigma = None if inner is message.pose else from_messages.position_sigma(message)
     return [p.x, p.y, p.z, q.x, q.y, q.z, q.w, np.nan if sigma is None else sigma]
 
 
@@ -165,7 +165,7 @@ def _fill(
             continue
         stream.frames.add(message.header.frame_id)
         try:
-            stream.append(convert.stamp_ns(message), roles[topic].row(message))
+            stream.append(from_messages.stamp_ns(message), roles[topic].row(message))
         except DataError as error:
             raise DataError(f"message {len(stream)} of '{topic}': {error}") from None
     return passed

@@ -18,7 +18,7 @@ from typing import Any
 
 from weld_twin_core.errors import DataError
 
-from ..outputs import write_text
+from ..files.whole_files import write_text
 from .segment import Channel, check_storage, clear_write_errors, sync
 from .segments import Segments
 from .writer import custom_data

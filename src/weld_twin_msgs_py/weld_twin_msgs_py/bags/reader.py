@@ -23,9 +23,9 @@ from rosbags.rosbag2 import Reader
 
 from weld_twin_core.errors import DataError, TwinError
 
-from ..convert import NANOSECONDS
-from .opening import PACKED, look
-from .store import PROVENANCE_PREFIX, TYPES, decode
+from ..messages.from_messages import NANOSECONDS
+from .storage import PACKED, look
+from .typestore import PROVENANCE_PREFIX, TYPES, decode
 from .unpack import unpack_file, unzstd
 
 CDR_HEADER = 4

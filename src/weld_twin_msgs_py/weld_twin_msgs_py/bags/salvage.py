@@ -12,7 +12,7 @@ from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from .segment import Channel
-from .store import TYPES
+from .typestore import TYPES
 
 Found = tuple[Channel, int, bytes]
 """Channel, time of recording [ns] and serialised message."""

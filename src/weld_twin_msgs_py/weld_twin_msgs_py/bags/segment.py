@@ -33,9 +33,9 @@ from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 
 from weld_twin_core.errors import DataError
 
-from ..topics import BY_NAME, RELIABLE
-from ..topics import Qos as TopicQos
-from .store import TYPES
+from ..messages.topics import BY_NAME, RELIABLE
+from ..messages.topics import Qos as TopicQos
+from .typestore import TYPES
 
 STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
 SUFFIXES = ('.mcap', '.db3')

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core import __version__
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Measurements, Recording
-from weld_twin_core.robot import Robot
 
-from ..convert import NANOSECONDS
-from ..messages import Messages, bag_messages
-from ..topics import (
+from ..messages.from_messages import NANOSECONDS
+from ..messages.to_messages import Messages, bag_messages
+from ..messages.topics import (
     ACTUAL_JOINT_STATES,
     DEVIATION,
     JOINT_STATES,

@@ -19,9 +19,9 @@ from typing import Any
 
 from weld_twin_core.errors import DataError
 
-from ..convert import stamp_ns
+from ..messages.from_messages import stamp_ns
 from .segment import Channel, Segment, check_storage, clear_write_errors
-from .store import PROVENANCE_PREFIX, TYPES
+from .typestore import PROVENANCE_PREFIX, TYPES
 
 
 class BagWriter:

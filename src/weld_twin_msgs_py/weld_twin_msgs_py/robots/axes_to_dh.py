@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.arrays import Array
-from weld_twin_core.rotation import transform
 
 from .urdf_tree import turn
 

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from weld_twin_core import catalog
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError
-from weld_twin_core.robot import Robot
 
-from ..outputs import write_text
-from ..yaml_file import read_yaml, yaml_text
+from ..files.whole_files import write_text
+from ..files.yaml_file import read_yaml, yaml_text
 from .plausible import refuse_wrong_units
 from .urdf_read import read_urdf
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
-from weld_twin_core.robot import Robot
 
 TURN = 2.0 * np.pi + 1e-6
 MANY_TURNS = 60.0

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from weld_twin_core.arm.robot import STANDARD_GRAVITY, Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
-from weld_twin_core.robot import STANDARD_GRAVITY, Robot
 
 from .axes_to_dh import Axis, dh_rows, inverse
 from .plausible import refuse_wrong_units

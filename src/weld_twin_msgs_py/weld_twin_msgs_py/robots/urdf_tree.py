@@ -19,11 +19,11 @@ from defusedxml.ElementTree import fromstring
 from urdf_parser_py import urdf
 from urdf_parser_py.xml_reflection.core import Path as XmlPath
 
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.errors import DataError, ModelError
-from weld_twin_core.rotation import transform
 
-from ..yaml_file import read_text
+from ..files.yaml_file import read_text
 
 _KEPT = {
     'link': {'name'}, 'joint': {'name', 'type'}, 'inertial': set(), 'mass': {'value'},

@@ -9,11 +9,11 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.arrays import Array
-from weld_twin_core.robot import Robot
-from weld_twin_core.rotation import transform
 
-from ..outputs import write_text
+from ..files.whole_files import write_text
 from .urdf_tree import turn
 
 EFFORT = '1000.0'

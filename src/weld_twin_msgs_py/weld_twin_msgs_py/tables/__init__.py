@@ -3,6 +3,6 @@
 """Tables of joint angles and measured positions or poses, as laboratories leave them."""
 
 from .build import Table, read_table
-from .options import TableOptions
+from .table_options import TableOptions
 
 __all__ = ['Table', 'TableOptions', 'read_table']

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.chain import forward
-from weld_twin_core.robot import Robot
 
 _ROUNDS = 30
 

@@ -10,19 +10,19 @@ from zlib import crc32
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
-from weld_twin_core.robot import Robot
-from weld_twin_core.rotation import matrix_from_quaternion
 
 from .agreement import misfit
 from .cells import Cells, read_cells
-from .columns import Columns, find_columns
-from .options import TableOptions
+from .clock_column import stamps
+from .header import Columns, find_columns
 from .rotations import AGREES, disagreement, find_convention, rotations
-from .stamps import stamps
-from .units import METRES, RADIANS, angle_unit, length_unit
+from .table_options import TableOptions
+from .unit_guess import METRES, RADIANS, angle_unit, length_unit
 
 _FAR = 10.0
 """A row this many times farther off than the median row is pointed out."""

@@ -13,12 +13,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.chain import forward
 from weld_twin_core.errors import DataError
-from weld_twin_core.robot import Robot
 
-from .options import EULER_ORDERS, ROTATION_VECTOR
+from .table_options import EULER_ORDERS, ROTATION_VECTOR
 
 AGREES = np.radians(3.0)
 """RMS disagreement of relative angles an arm with unknown errors may show."""

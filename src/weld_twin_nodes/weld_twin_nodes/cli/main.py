@@ -9,12 +9,16 @@ import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from importlib.metadata import entry_points
 from inspect import getdoc
 from pathlib import Path
-from types import ModuleType
 
 USAGE_ERROR = 2
 INTERRUPTED = 130
+PROOFS = 'weld_twin.commands'
+"""Entry points under which other packages, such as weld_twin_lab, bring subcommands."""
+LAB = ('benchmark', 'blind', 'campaign', 'real-robots', 'lab')
+"""What weld_twin_lab brings; named here to say so where it is not installed."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -51,14 +55,15 @@ def _end(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-def _names() -> list[str]:
+def _commands() -> dict[str, str]:
+    """Return the module of every subcommand: own ones by file name, others by entry point."""
     folder = Path(__file__).parent / 'commands'
-    return sorted(p.stem.rstrip('_').replace('_', '-') for p in folder.glob('[!_]*.py'))
-
-
-def _module(name: str) -> ModuleType:
-    suffix = '_' if name == 'import' else ''
-    return import_module(f'{__package__}.commands.{name.replace("-", "_")}{suffix}')
+    own = {
+        path.stem.rstrip('_').replace('_', '-'): f'{__package__}.commands.{path.stem}'
+        for path in folder.glob('[!_]*.py')
+    }
+    proofs = {point.name: point.value for point in entry_points(group=PROOFS)}
+    return dict(sorted({**proofs, **own}.items()))
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
@@ -69,13 +74,17 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument('--version', action='version', version=_version())
     subparsers = parser.add_subparsers(required=True, metavar='COMMAND')
-    names = _names()
+    commands = _commands()
     chosen = next((word for word in words if not word.startswith('-')), None)
-    for name in [chosen] if chosen in names else names:
-        module = _module(str(name))
+    if chosen in LAB and chosen not in commands:
+        parser.error(
+            f"'{chosen}' is a proof, and the package weld_twin_lab that holds it is not installed"
+        )
+    for name in [chosen] if chosen in commands else commands:
+        module = import_module(commands[name])
         text = getdoc(module) or ''
         sub = subparsers.add_parser(
-            str(name), help=text.partition('\n')[0], description=text,
+            name, help=text.partition('\n')[0], description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )  # fmt: skip
         module.add_arguments(sub)

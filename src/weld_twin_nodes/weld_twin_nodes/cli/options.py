@@ -8,8 +8,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from weld_twin_core.robot import Robot
-    from weld_twin_msgs_py.topics import TopicNames
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_msgs_py.messages.topics import TopicNames
 
 TOPIC_OPTIONS = ('joint', 'pose', 'point', 'wrench', 'temperature')
 
@@ -40,7 +40,7 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
     """Return the names of the topics."""
-    from weld_twin_msgs_py.topics import TopicNames
+    from weld_twin_msgs_py.messages.topics import TopicNames
 
     given = {name: getattr(args, f'{name}_topic') for name in TOPIC_OPTIONS}
     given['joints'] = given.pop('joint')

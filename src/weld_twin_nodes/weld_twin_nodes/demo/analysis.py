@@ -7,13 +7,13 @@ from __future__ import annotations
 import numpy as np
 
 from weld_twin_core.errors import DataError
-from weld_twin_core.metrics import deviation_metrics
-from weld_twin_core.poses import Poses
-from weld_twin_core.seam import seam_components
-from weld_twin_core.twin import Twin
+from weld_twin_core.metrics.deviation import deviation_metrics
+from weld_twin_core.motion.seam_frame import seam_components
+from weld_twin_core.twin.poses import Poses
+from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import read_recording
 
-from .job import Job
+from .hand_over import Job
 
 
 def analyse(job: Job, _: object) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.metrics import deviation
+from weld_twin_core.metrics.deviation import deviation
 
-from .job import Job
+from .hand_over import Job
 
 SHOWN = 0.1
 """Part of the seam's extent that the largest magnified deviation takes."""

@@ -7,9 +7,9 @@ from __future__ import annotations
 import json
 
 from weld_twin_core.sensitivity import default_tolerances, local_sensitivity, study_of_plan
-from weld_twin_msgs_py.outputs import write_text
+from weld_twin_msgs_py.files.whole_files import write_text
 
-from .job import Job
+from .hand_over import Job
 
 FAMILIES = ('joint_offset', 'link_length', 'link_twist', 'backlash', 'base_pose')
 NAMED = 3

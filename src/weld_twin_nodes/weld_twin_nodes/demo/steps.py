@@ -15,18 +15,18 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from weld_twin_core import catalog
+from weld_twin_core.arm import catalog
 from weld_twin_core.effects import effects_from_list
 
-from ..motions import plan_motion
-from ..outputs import new_directory
+from ..offline.output_directory import new_directory
+from ..offline.seam_motion import plan_motion
 from .analysis import analyse
-from .job import Job, Step
-from .live import run_live
+from .demo_diagnosis import find_causes
+from .deviation_table import MARK, write_table
+from .hand_over import Job, Step
+from .live_run import run_live
 from .picture import draw
 from .ranking import rank
-from .table import MARK, write_table
-from .verdict import find_causes
 
 ROBOT = 'ur5'
 SEAM = 'polyline'

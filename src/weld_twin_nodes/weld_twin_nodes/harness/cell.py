@@ -26,14 +26,14 @@ from std_srvs.srv import Trigger
 
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import JointMotion
-from weld_twin_msgs_py import convert
 from weld_twin_msgs_py.bags import BagReader
-from weld_twin_msgs_py.messages import ros_messages
-from weld_twin_msgs_py.topics import BY_NAME, JOINT_STATES, Topic
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.to_messages import ros_messages
+from weld_twin_msgs_py.messages.topics import BY_NAME, JOINT_STATES, Topic
 
-from ..domain import own_domain
-from ..motions import stamps
-from ..pump import Pump
+from ..live.pacing import Pump
+from ..offline.seam_motion import stamps
+from .domain import own_domain
 from .process import NodeProcess
 from .tap import Tap
 
@@ -230,7 +230,7 @@ class Cell:
 
         def send() -> bool:
             if follow:
-                pump.answer(convert.stamp_ns(follow.last))
+                pump.answer(from_messages.stamp_ns(follow.last))
             for k in pump.due(time.monotonic_ns(), BURST):
                 publisher.publish(self.messages.joint_state(
                     int(marks[k]), joint_names, motion.q[k], motion.velocity[k]

@@ -16,13 +16,13 @@ import yaml
 from weld_twin_core.errors import TwinError
 
 MODULES = {
-    'trajectory_generator': 'weld_twin_nodes.trajectory_generator',
-    'error_injector': 'weld_twin_nodes.error_injector',
-    'forward_kinematics_twin': 'weld_twin_nodes.twin',
-    'deviation_analyzer': 'weld_twin_nodes.deviation_analyzer',
-    'recorder': 'weld_twin_nodes.recorder',
-    'live_diagnosis': 'weld_twin_nodes.live_diagnosis',
-    'deviation_markers': 'weld_twin_nodes.markers',
+    'trajectory_generator': 'weld_twin_nodes.live.trajectory_generator',
+    'error_injector': 'weld_twin_nodes.live.error_injector',
+    'forward_kinematics_twin': 'weld_twin_nodes.live.forward_kinematics_twin',
+    'deviation_analyzer': 'weld_twin_nodes.live.deviation_analyzer',
+    'recorder': 'weld_twin_nodes.live.recorder',
+    'live_diagnosis': 'weld_twin_nodes.live.live_diagnosis',
+    'deviation_markers': 'weld_twin_nodes.live.deviation_markers',
 }
 GRACE = 20.0
 """Seconds a process has to end after SIGINT before it is killed."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_msgs_py import convert
+from weld_twin_msgs_py.messages import from_messages
 
 
 class Tap:
@@ -37,4 +37,4 @@ class Tap:
     @property
     def stamps(self) -> np.ndarray:
         """Return the header stamps, int64 [ns]."""
-        return np.array([convert.stamp_ns(message) for message in self.messages], dtype=np.int64)
+        return np.array([from_messages.stamp_ns(message) for message in self.messages], dtype=np.int64)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A diagnosis as people read it: one self-contained page, and a summary for the terminal."""
 
-from .page import report_page
+from .diagnosis_page import report_page
 from .provenance import InputFile, hashed
 from .terminal import print_summary
 

@@ -9,10 +9,10 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from .causes import leftover
+from .cause_list import leftover
 from .html import Html, section, tag
 from .quantities import interval, millimetres, milliradians, percent, turns_only
-from .seam import at_rest, trusted
+from .seam_view import at_rest, trusted
 from .words import cause
 
 _STEPS = 12

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from .families import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows, worth_doing
+from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows, worth_doing
 from .quantities import change, millimetres, odds, parameter_rows
 from .words import STATUS, found_name, listed, site_name, verdict
 

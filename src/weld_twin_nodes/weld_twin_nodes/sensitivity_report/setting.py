@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import Effect
-from weld_twin_core.paths import Path, Torch
+from weld_twin_core.motion.paths import Path, Torch
 from weld_twin_core.recording import Recording
-from weld_twin_core.robot import Robot
 from weld_twin_core.sensitivity import (
     POINTS,
     Study,

@@ -10,7 +10,7 @@ import numpy as np
 
 from weld_twin_core import sensitivity
 from weld_twin_core.arrays import Array
-from weld_twin_core.metrics import root_mean_square
+from weld_twin_core.metrics.deviation import root_mean_square
 from weld_twin_core.sensitivity import (
     MorrisDesign,
     Outcomes,
@@ -20,7 +20,7 @@ from weld_twin_core.sensitivity import (
     ToleranceStack,
 )
 
-from ..tasks import Runner, Task
+from ..offline.task_pool import Runner, Task
 from . import work
 from .setting import RECORDED, Setting, recorded_deviations
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core import sensitivity
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.paths import Path, Torch, default_seam
-from weld_twin_core.robot import Robot
+from weld_twin_core.motion.paths import Path, Torch, default_seam
 from weld_twin_core.sensitivity import Model, Outcomes, Study, Tolerance
 from weld_twin_core.sensitivity.claims import measure_case
 
-from ..digest import digest
-from ..tasks import Runner, Task
+from ..offline.content_hash import digest
+from ..offline.task_pool import Runner, Task
 
 BLOCK = 8192
 """Runs of one task."""

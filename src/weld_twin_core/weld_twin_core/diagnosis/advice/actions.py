@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...effects.base import Effect
-from ...robot import Robot
-from .units import frame, metres, number, radians, size
+from ...arm.robot import Robot
+from ...effects.effect import Effect
+from .readable import frame, metres, number, radians, size
 
 Sentence = Callable[[Effect, Robot], str]
 

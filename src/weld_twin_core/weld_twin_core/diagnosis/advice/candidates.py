@@ -11,11 +11,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.stats import qmc
 
+from ...arm.robot import Robot
+from ...arm.rotation import transform
 from ...arrays import Array
 from ...recording import JointMotion, Recording, Signal
-from ...robot import Robot
-from ...rotation import transform
-from ..problem import Model, Problem
+from ..algebra.problem import Model, Problem
 
 NAME = 'next measurement'
 STATIONS = 60

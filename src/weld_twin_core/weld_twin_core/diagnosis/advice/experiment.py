@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array
-from ...effects.base import Effect
+from ...effects.effect import Effect
 from ...errors import TwinError
 from ...recording import JointMotion
-from ..problem import Model, Problem, Scale
+from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate, candidates
 from .inseparable import way
 from .separation import ahead, at_hand, separations

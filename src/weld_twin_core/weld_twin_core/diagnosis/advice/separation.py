@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Array
-from ...effects.base import Effect
+from ...effects.effect import Effect
 from ...recording import Measurements, Recording
-from ..fit import design, with_weights
-from ..problem import Model, Problem, Scale
+from ..algebra.fit import design, with_weights
+from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate
 
 ROWS = 1200

@@ -8,20 +8,20 @@ Each check is one function of a `Case` in one table; it finds, names and never m
 
 from __future__ import annotations
 
-from ..alignment import refined
-from ..problem import Model, Problem
+from ..algebra.problem import Model, Problem
+from ..frames.alignment import refined
 from ..result import Check
-from .case import Case, Checker
 from .clocks import clocks
+from .evidence import Case, Checker
 from .mixups import mixups
-from .motion import motion
 from .orientation import orientation
 from .outliers import outliers
 from .quantity import quantity
 from .repeats import repeats
-from .setup import Settling, Step, changes, moved_setup, settling, setup
+from .richness import motion
+from .setup_change import Settling, Step, changes, moved_setup, settling, setup
 from .source import source
-from .stamps import stamps
+from .stamp_regularity import stamps
 
 __all__ = ['CHECKS', 'Settling', 'Step', 'changes', 'check', 'moved_setup', 'settling']
 

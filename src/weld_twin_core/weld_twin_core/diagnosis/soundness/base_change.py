@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ...features import Features
-from ..fit import HUBER
-from ..problem import Model, Problem, Scale
-from ..score import effective_share
+from ...twin.features import Features
+from ..algebra.evidence_score import effective_share
+from ..algebra.fit import HUBER
+from ..algebra.problem import Model, Problem, Scale
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
 WIDE = 0.9

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...recording import Recording
-from .case import Case, Finding
+from .evidence import Case, Finding
 from .lag import Lag
 from .snapshot import measured
 

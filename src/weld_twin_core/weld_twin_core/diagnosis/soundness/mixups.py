@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..alignment import initial_frames, refined
-from .case import LARGE, Case, Finding, length
+from ..frames.alignment import initial_frames, refined
+from .evidence import LARGE, Case, Finding, length
 from .snapshot import Snapshot, gap
 from .suspicions import Suspicion, doubles, suspicions
 

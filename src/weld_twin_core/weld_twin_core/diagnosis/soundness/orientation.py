@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ...arm.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ...arrays import Array
-from ...rotation import matrix_from_quaternion, quaternion_from_matrix
-from ..problem import Model
-from .case import LARGE, Case, Finding
+from ..algebra.problem import Model
+from .evidence import LARGE, Case, Finding
 from .snapshot import Snapshot, gap
 
 WRONG = 0.05

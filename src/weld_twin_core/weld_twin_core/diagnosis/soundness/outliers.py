@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ...arrays import Array
-from .case import Case, Finding, distance, length
+from .evidence import Case, Finding, distance, length
 from .snapshot import measured
 
 WINDOW = 7

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...errors import DataError
-from .case import Case, Finding
+from .evidence import Case, Finding
 from .snapshot import measured
 
 STILL = 1e-5

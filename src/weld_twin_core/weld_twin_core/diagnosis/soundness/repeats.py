@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from ...arrays import Array
-from .case import Case, Finding
+from .evidence import Case, Finding
 from .snapshot import measured
 
 FROZEN = 0.02

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.joint_offset import JointOffset
 from ...errors import DataError
 from ...recording import JointMotion, Measurements, Recording
-from ...robot import Robot
-from ..alignment import refined, rough_frames
-from ..fit import fit, robust_scale
-from ..problem import Model, Problem
+from ..algebra.fit import fit, robust_scale
+from ..algebra.problem import Model, Problem
+from ..frames.alignment import refined, rough_frames
 
 SAMPLES = 60
 FRAMES = frozenset({'base', 'tool'})

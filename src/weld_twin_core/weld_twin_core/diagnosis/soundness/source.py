@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...recording import JointMotion
-from .case import Case, Finding
+from .evidence import Case, Finding
 
 SMOOTH = 2e-8
 """Noise of a joint position [rad, m] below which no encoder has seen it."""

@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ... import catalog
+from ...arm import catalog
 from ...arrays import Array
 from .snapshot import Snapshot
 

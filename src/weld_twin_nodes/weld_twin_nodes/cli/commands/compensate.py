@@ -24,9 +24,10 @@ def run(args: argparse.Namespace) -> int:
     """Write the commands and say what they gain by the model."""
     from dataclasses import replace
 
-    from weld_twin_core.compensation import compensate
+    from weld_twin_core.twin.compensation import compensate
     from weld_twin_msgs_py.bags import read_recording, write_recording
-    from weld_twin_nodes.models import build_twin
+
+    from ...offline.told_twin import build_twin
 
     twin = build_twin(robot_of(args), args.model)
     recording = read_recording(args.bag, twin.robot, topics_of(args))

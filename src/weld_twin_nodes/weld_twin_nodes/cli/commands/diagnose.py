@@ -19,7 +19,8 @@ from ..options import add_robot, add_topics, robot_of, topics_of
 if TYPE_CHECKING:
     from weld_twin_core.diagnosis import Diagnosis
     from weld_twin_core.recording import Recording
-    from weld_twin_nodes.report import InputFile
+
+    from ...report import InputFile
 
 MEASUREMENTS = 40_000
 """Diagnosed together; eleven minutes at 60 Hz."""
@@ -57,9 +58,9 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose, write the results, print the verdict."""
     from rich.console import Console
 
-    from weld_twin_nodes.outputs import new_directory
-    from weld_twin_nodes.report import print_summary
-    from weld_twin_nodes.report.files import PAGE, RESULT, write_results
+    from ...offline.output_directory import new_directory
+    from ...report import print_summary
+    from ...report.diagnosis_files import PAGE, RESULT, write_results
 
     with new_directory(args.out, mark=RESULT) as place:
         diagnosis = _diagnosis(args)
@@ -73,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
 def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.diagnosis import diagnose
     from weld_twin_msgs_py.bags import read_recording
-    from weld_twin_nodes.models import build_twin
+
+    from ...offline.told_twin import build_twin
 
     align, excluded = _align(args.align), _families(args.exclude_effect)
     twin = build_twin(robot_of(args), args.effects_known)
@@ -109,7 +111,7 @@ def _share(own: int, total: int, most: int) -> int:
 
 
 def _align(text: str) -> frozenset[str]:
-    from weld_twin_core.diagnosis.problem import FRAMES
+    from weld_twin_core.diagnosis.algebra.problem import FRAMES
     from weld_twin_core.errors import ModelError
 
     frames = frozenset(part.strip() for part in text.split(',') if part.strip())
@@ -132,7 +134,7 @@ def _families(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _inputs(args: argparse.Namespace) -> list[InputFile]:
-    from weld_twin_nodes.report import hashed
+    from ...report import hashed
 
     out = [hashed('recording', path) for path in args.bags]
     out += [hashed('held out', path) for path in args.holdout]

@@ -30,8 +30,9 @@ def run(args: argparse.Namespace) -> int:
     from tempfile import TemporaryDirectory
 
     from weld_twin_core.errors import DataError
-    from weld_twin_msgs_py.models import read_model
-    from weld_twin_nodes.exports import FORMATS
+    from weld_twin_msgs_py.files.diagnosis_model import read_model
+
+    from ...offline.exports import FORMATS
 
     model = read_model(robot_of(args), args.model)
     name, write = FORMATS[args.format]

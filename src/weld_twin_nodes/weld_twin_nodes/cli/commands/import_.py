@@ -49,8 +49,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the bag, say how the table was read and how far the nominal twin is off."""
     from dataclasses import fields
 
-    from weld_twin_core.metrics import deviation_metrics
-    from weld_twin_core.twin import Twin
+    from weld_twin_core.metrics.deviation import deviation_metrics
+    from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.bags import write_recording
     from weld_twin_msgs_py.tables import TableOptions, read_table
 
@@ -78,12 +78,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write_deviations(args: argparse.Namespace, recording: object, off: object) -> None:
-    from weld_twin_nodes import stations
+    from ...offline import station_table
 
     if args.table:
-        stations.write_table(args.table, recording, off)
+        station_table.write_table(args.table, recording, off)
     if args.picture:
-        stations.draw(args.picture, recording, off)
+        station_table.draw(args.picture, recording, off)
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -58,7 +58,7 @@ def _sentences(info: object) -> list[str]:
 
 
 def _print_robots() -> int:
-    from weld_twin_core import catalog
+    from weld_twin_core.arm import catalog
 
     for name in catalog.names():
         robot = catalog.load(name)

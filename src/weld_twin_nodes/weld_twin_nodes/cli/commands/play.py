@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Play the bag."""
-    from weld_twin_nodes.player import Playing, play
+    from ...live.bag_player import Playing, play
 
     how = Playing(args.rate, args.clock, args.topics, args.loop, args.subscribers, args.wait)
     count = play(args.bag, how, lambda line: print(line, file=sys.stderr, flush=True))

@@ -30,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the bag; say how far measured and twin are apart where something was measured."""
     from weld_twin_msgs_py.bags import read_recording
-    from weld_twin_nodes.prediction import prediction_twin, write_prediction
+
+    from ...offline.prediction import prediction_twin, write_prediction
 
     robot = robot_of(args)
     recording = read_recording(args.bag, robot, topics_of(args))

@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING
 from ..options import add_robot, add_topics, robot_of, topics_of
 
 if TYPE_CHECKING:
+    from weld_twin_core.arm.robot import Robot
     from weld_twin_core.recording import Recording
-    from weld_twin_core.robot import Robot
-    from weld_twin_nodes.sensitivity_report import Setting
+
+    from ...sensitivity_report import Setting
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,9 +72,9 @@ def _add_effort(group: argparse._ArgumentGroup) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the study and say where the page is."""
-    from weld_twin_nodes.sensitivity_report import make_figures, make_study
-    from weld_twin_nodes.sensitivity_report.files import study_directory
-    from weld_twin_nodes.tasks import pool_of
+    from ...offline.task_pool import pool_of
+    from ...sensitivity_report import make_figures, make_study
+    from ...sensitivity_report.study_files import study_directory
 
     setting = _setting(args)
     if args.figure:
@@ -95,11 +96,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _setting(args: argparse.Namespace) -> Setting | None:
     from weld_twin_core.errors import DataError
-    from weld_twin_core.paths import KINDS, default_seam
+    from weld_twin_core.motion.paths import KINDS, default_seam
     from weld_twin_core.sensitivity import WeldTolerance
-    from weld_twin_nodes.models import build_twin
-    from weld_twin_nodes.path_file import read_path
-    from weld_twin_nodes.sensitivity_report import Effort, Setting
+    from weld_twin_msgs_py.files.path_file import read_path
+
+    from ...offline.told_twin import build_twin
+    from ...sensitivity_report import Effort, Setting
 
     if not args.robot and not args.bag:
         if args.claims and not args.figure:
@@ -127,9 +129,9 @@ def _setting(args: argparse.Namespace) -> Setting | None:
 def _robot(args: argparse.Namespace) -> Robot:
     import numpy as np
 
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.arm.rotation import rotation_matrix, transform
     from weld_twin_core.errors import DataError
-    from weld_twin_core.robot import Robot
-    from weld_twin_core.rotation import rotation_matrix, transform
     from weld_twin_msgs_py.bags import provenance
 
     if args.robot:
@@ -148,7 +150,7 @@ def _robot(args: argparse.Namespace) -> Robot:
 def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple:
     from weld_twin_core.errors import ModelError
     from weld_twin_core.sensitivity import default_tolerances, tolerances_from_list
-    from weld_twin_msgs_py.yaml_file import read_yaml
+    from weld_twin_msgs_py.files.yaml_file import read_yaml
 
     if not args.tolerances:
         return default_tolerances(robot)
@@ -166,7 +168,8 @@ def _recording(args: argparse.Namespace, robot: Robot) -> Recording:
 
 def _claims_robots(args: argparse.Namespace) -> list[Robot]:
     from weld_twin_msgs_py.robots import load_robot
-    from weld_twin_nodes.sensitivity_report.claims import ROBOTS
+
+    from ...sensitivity_report.claims_table import ROBOTS
 
     return [load_robot(name) for name in args.claims_robots or ROBOTS] if args.claims else []
 
@@ -174,7 +177,7 @@ def _claims_robots(args: argparse.Namespace) -> list[Robot]:
 def _print_summary(place: Path) -> None:
     import json
 
-    from weld_twin_nodes.sensitivity_report.files import CLAIMS, RESULT
+    from ...sensitivity_report.study_files import CLAIMS, RESULT
 
     if (place / RESULT).is_file():
         for motion, found in json.loads((place / RESULT).read_text())['motions'].items():

@@ -39,10 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the bag and print the deviation."""
     from weld_twin_core.errors import DataError
-    from weld_twin_nodes.models import build_twin
-    from weld_twin_nodes.motions import plan_motion, stamps
-    from weld_twin_nodes.simulated_bag import write_simulation
-    from weld_twin_nodes.simulation import Simulation
+
+    from ...offline.seam_motion import plan_motion, stamps
+    from ...offline.simulated_bag import write_simulation
+    from ...offline.simulation import Simulation
+    from ...offline.told_twin import build_twin
 
     if args.start_stamp <= 0 or args.seed < 0:
         raise DataError('--start-stamp must be positive and --seed not negative')

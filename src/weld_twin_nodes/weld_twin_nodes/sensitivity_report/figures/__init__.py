@@ -9,7 +9,7 @@ from collections.abc import Callable
 from weld_twin_core.errors import DataError
 
 from ..setting import RECORDED, Setting
-from . import paths, seam, sizes, together
+from . import paths, posture, sizes, together
 from .canvas import Drawing
 
 __all__ = ['FIGURES', 'Drawing', 'draw', 'drawable']
@@ -17,7 +17,7 @@ __all__ = ['FIGURES', 'Drawing', 'draw', 'drawable']
 FIGURES: dict[str, Callable[[Setting], Drawing | None]] = {
     '6': paths.baseline, '7': paths.initialization, '8': paths.profiles, '9': paths.play,
     '10': sizes.angles, '11': together.combined, '12': sizes.joints, '13': sizes.widths,
-    '14': together.drift, 'posture': seam.standing, 'recorded': seam.recorded,
+    '14': together.drift, 'posture': posture.standing, 'recorded': posture.recorded,
 }  # fmt: skip
 """By the number the paper gives them, or a name."""
 _PLANNED_ONLY = ('6', '8')

@@ -11,8 +11,8 @@ from weld_twin_core.effects.backlash import Backlash
 from weld_twin_core.effects.base_pose import BasePose
 from weld_twin_core.effects.joint_offset import JointOffset
 from weld_twin_core.effects.servo_lag import ServoLag
-from weld_twin_core.plan import plan
-from weld_twin_core.profiles import Constant
+from weld_twin_core.motion.planned_motion import plan
+from weld_twin_core.motion.profiles import Constant
 from weld_twin_core.sensitivity import Sizes, Study, study_of_plan
 from weld_twin_core.sensitivity.sweep import DEGREE
 

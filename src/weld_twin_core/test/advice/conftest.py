@@ -1,0 +1,17 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Make the cells of the soundness tests importable here too."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from weld_twin_core.arm import catalog
+
+sys.path.insert(0, str(Path(__file__).parent.parent / 'soundness'))
+
+
+@pytest.fixture
+def ur5():
+    return catalog.load('ur5')

@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The next measurement separates what the data at hand do not, and says when none can."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measured_cells import asked, moving, recorded, stations
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.diagnosis.advice import experiment, next_experiment, separation
+from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.problem import Problem, Scale
+from weld_twin_core.effects import effects_from_list
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Recording, Signal
+
+NOISE = 2e-5
+
+
+def known_scale(problem):
+    return Scale(NOISE, 2.0 * NOISE, tuple(np.ones(m) for m in problem.samples))
+
+
+def at_hand(robot, kind=stations, align=('base', 'tool'), **options):
+    rng = np.random.default_rng(3)
+    return asked(robot, recorded(robot, kind(robot, rng, **options), rng), align=align)
+
+
+def proposed(robot, problem, model, *alternatives):
+    made = [effects_from_list([entry], robot) for entry in alternatives]
+    return next_experiment(problem, model, made, known_scale(problem))
+
+
+SPRING = {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 1e-5}
+OFFSET = {'effect': 'joint_offset', 'joint': 'shoulder_lift_joint', 'offset': 5e-4}
+FIRST = {'effect': 'joint_offset', 'joint': 'shoulder_pan_joint', 'offset': 1e-3}
+BASE = {'effect': 'base_pose', 'rotvec': [0.0, 0.0, 1e-3]}
+
+
+@pytest.mark.parametrize(
+    ('one', 'other', 'words'),
+    [
+        (FIRST, BASE, 'where the base stands'),
+        ({'effect': 'joint_offset', 'joint': 'wrist_3_joint', 'offset': 1e-3},
+         {'effect': 'tool_pose', 'rotvec': [0.0, 0.0, 1e-3]}, 'measure the tool by itself'),
+        ({'effect': 'link_offset', 'joint': 'shoulder_lift_joint', 'dd': 1e-3},
+         {'effect': 'link_offset', 'joint': 'elbow_joint', 'dd': 1e-3}, 'mends both'),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize('kind', [stations, moving])
+def test_what_no_motion_tells_apart_is_said_with_what_would(ur5, kind, one, other, words):
+    found = proposed(ur5, *at_hand(ur5, kind, align=()), one, other)
+    assert found['kind'] == 'outside' and found['motion'] is None
+    assert found['sentence'].startswith('No motion tells') and words in found['sentence']
+
+
+def test_spring_against_offset_asks_for_a_measurement_that_tells_them_apart(ur5):
+    # Stations within a few degrees: the load torque hardly changes, a spring looks like an offset.
+    problem, model = at_hand(ur5, size=0.05)
+    found = proposed(ur5, problem, model, SPRING, OFFSET)
+    assert found['expected_separation_sigma'] > 3.0
+    after, before = (left_by_the_wrong_one(ur5, p, m) for p, m in
+                     (with_motion(ur5, found), (problem, model)))  # fmt: skip
+    assert after > 3.0 > before
+
+
+def with_motion(robot, found):
+    """Return the proposed measurement made on an arm that has the spring."""
+    rng = np.random.default_rng(4)
+    motion = found['motion']
+    joints = JointMotion(np.array(motion['t']), np.array(motion['q']), static=motion['static'])
+    if found['kind'] == 'payload_swap':
+        robot = replace(robot, payload_mass=robot.payload_mass + 5.0)
+    return asked(robot, Recording('next', joints, recorded(robot, joints, rng).measured))
+
+
+def left_by_the_wrong_one(robot, problem, model):
+    """Return how much worse an offset fits than the spring that is there, in deviations."""
+    rng = np.random.default_rng(5)
+    truth = effects_from_list([SPRING], robot)
+    made = tuple(
+        recorded(model.robot, r.joints, rng, truth) if r.joints.static else
+        replace(r, measured=recorded(model.robot, r.joints, rng, truth).measured)
+        for r in problem.recordings
+    )  # fmt: skip
+    real = Problem(made, problem.align)
+    scale = known_scale(real)
+    costs = [
+        fit(real, model.with_found(effects_from_list([entry], robot)), scale).rss
+        for entry in (OFFSET, SPRING)
+    ]
+    return float(np.sqrt(max(costs[0] - costs[1], 0.0)))
+
+
+def test_effects_of_speed_ask_stations_for_motion(ur5):
+    late = {'effect': 'time_delay', 'delay': 5e-3}
+    lag = {'effect': 'servo_lag', 'joint': 'shoulder_lift_joint', 'time_constant': 5e-3}
+    found = proposed(ur5, *at_hand(ur5), late, lag)
+    assert found['kind'] == 'speed_sweep' and not found['motion']['static']
+
+
+def test_slow_creeping_against_nothing_asks_for_time(ur5):
+    creep = {'effect': 'drift', 'xyz_rate': [5e-9, 0.0, 0.0]}
+    found = proposed(ur5, *at_hand(ur5), creep, BASE)
+    assert found['kind'] == 'warm_up'
+
+
+@pytest.mark.parametrize(
+    ('kind', 'wanted'), [(stations, 'speed_sweep'), (moving, 'bidirectional')]
+)
+def test_an_unknown_cause_asks_for_data_of_the_other_kind(ur5, kind, wanted):
+    problem, model = at_hand(ur5, kind)
+    found = next_experiment(problem, model, [()], known_scale(problem))
+    assert found['kind'] == wanted and found['expected_separation_sigma'] is None
+
+
+@pytest.mark.parametrize('kind', [stations, moving])
+def test_what_needs_temperature_and_wrench_is_foreseen_with_those_recorded(ur5, kind):
+    problem, model = at_hand(ur5, kind)
+    t = problem.recordings[0].joints.t
+    sides = {
+        'temperature': Signal(t, np.linspace(25.0, 31.0, t.size)),
+        'wrench': Signal(t, np.tile([0.0, 0.0, -40.0, 0.0, 0.0, 0.0], (t.size, 1))),
+    }
+    problem = replace(problem, recordings=(replace(problem.recordings[0], **sides),))
+    found = proposed(
+        ur5, problem, model, {'effect': 'thermal_growth', 'coefficient': 1e-5},
+        {'effect': 'cartesian_compliance', 'compliance': [1e-6, 1e-6, 1e-6]},
+    )  # fmt: skip
+    assert found['motion'] is not None and 'skipped' not in found
+
+
+def test_a_measurement_that_cannot_be_foreseen_is_skipped_with_the_reason(ur5, monkeypatch):
+    def ahead(problem, candidate, *rest):
+        if candidate.kind == 'speed_sweep':
+            raise DataError('nothing is known of it')
+        return separation.ahead(problem, candidate, *rest)
+
+    monkeypatch.setattr(experiment, 'ahead', ahead)
+    late = {'effect': 'time_delay', 'delay': 5e-3}
+    found = proposed(ur5, *at_hand(ur5, moving), late, OFFSET)
+    assert found['kind'] != 'speed_sweep'
+    assert found['skipped'] == ['speed_sweep: nothing is known of it']
+
+
+@pytest.mark.parametrize('name', ['ur5', 'abb_irb120', 'franka_panda'])
+def test_motions_are_plain_numbers_within_the_limits_of_the_robot(name):
+    robot = catalog.load(name)
+    joint = robot.joint_names[1]
+    pairs = (
+        ({**SPRING, 'joint': joint}, {**OFFSET, 'joint': joint}),
+        ({'effect': 'time_delay', 'delay': 5e-3}, {**OFFSET, 'joint': joint}),
+    )
+    for one, other in pairs:
+        found = proposed(robot, *at_hand(robot), one, other)
+        motion = json.loads(json.dumps(found))['motion']
+        q = np.array(motion['q'])
+        assert q.shape == (len(motion['t']), robot.n) and len(q) <= 400
+        assert motion['joint_names'] == list(robot.joint_names)
+        robot.check_positions(q)
+        if not motion['static']:
+            rates = np.abs(np.diff(q, axis=0) / np.diff(motion['t'])[:, None])
+            assert (rates <= robot.max_velocity).all()

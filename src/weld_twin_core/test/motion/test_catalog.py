@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Bundled robots against Pinocchio, published URDFs, makers' drawings and finite differences."""
+
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import (
+    forward,
+    identification_channels,
+    identification_jacobian,
+    jacobian,
+)
+from weld_twin_core.arm.dynamics import gravity_torque
+from weld_twin_core.arm.rotation import angle_between
+from weld_twin_core.errors import ModelError
+
+UR = 'ur_description/urdf'
+URDFS = {
+    'ur5': (f'{UR}/ur5_robot.urdf', 'tool0', True),
+    'ur10': (f'{UR}/ur10_robot.urdf', 'tool0', True),
+    'franka_panda': ('panda_description/urdf/panda.urdf', 'panda_link8', False),
+}
+
+
+@pytest.fixture
+def urdf_model():
+    """Return a function that builds a Pinocchio model from a published URDF, without a hand."""
+    pin = pytest.importorskip('pinocchio')
+    try:
+        shared = {Path(file).as_posix(): file for file in files('example-robot-data') or ()}
+    except PackageNotFoundError:
+        pytest.skip('example-robot-data is not installed')
+
+    def build(path):
+        (file,) = (file for name, file in shared.items() if name.endswith(f'/robots/{path}'))
+        root = ElementTree.parse(file.locate()).getroot()
+        for element in list(root):
+            names = [element.get('name', '')] + [c.get('link', '') for c in element]
+            if any('hand' in name or 'finger' in name for name in names):
+                root.remove(element)
+        return pin.buildModelFromXML(ElementTree.tostring(root, encoding='unicode'))
+
+    return build
+
+
+def test_an_unknown_name_is_refused_with_the_known_ones():
+    with pytest.raises(ModelError, match=r"called 'ur7'; there are ur5, ur10, kuka"):
+        catalog.load('ur7')
+
+
+def test_every_robot_names_its_source_and_has_limits_and_masses(robot):
+    assert len(robot.source) > 50
+    for limit in (robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration):
+        assert np.isfinite(limit).all()
+    assert (robot.mass > 0.0).all()
+
+
+def test_the_file_form_round_trips(robot):
+    again = type(robot).from_mapping(robot.to_mapping())
+    q = np.linspace(0.1, 0.9, robot.n)
+    np.testing.assert_allclose(forward(again, q), forward(robot, q), atol=1e-15)
+
+
+def test_tool_pose_jacobian_and_gravity_are_those_of_pinocchio(
+    robot, pinocchio_model, configurations
+):
+    pin = pytest.importorskip('pinocchio')
+    model = pinocchio_model(robot.name)
+    data, tip = model.createData(), model.getFrameId('tip')
+    for q in configurations(robot):
+        pin.framesForwardKinematics(model, data, q)
+        np.testing.assert_allclose(forward(robot, q), data.oMf[tip].homogeneous, atol=1e-12)
+        expected = pin.computeFrameJacobian(
+            model, data, q, tip, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        np.testing.assert_allclose(jacobian(robot, q), expected, atol=1e-12)
+        # What gravity does to the joints is minus what the motors must hold.
+        held = pin.computeGeneralizedGravity(model, data, q)
+        np.testing.assert_allclose(gravity_torque(robot, q), -held, atol=1e-10)
+
+
+def test_the_identification_jacobian_is_the_finite_difference(robot, configurations):
+    q = configurations(robot, 5)
+    columns = identification_jacobian(robot, q)
+    step = 1e-6
+    for k, channel in enumerate(identification_channels(robot)):
+        high, low = (forward(robot, q, {channel: np.array(sign * step)}) for sign in (1, -1))
+        linear = (high[:, :3, 3] - low[:, :3, 3]) / (2 * step)
+        turn = angle_between(high[:, :3, :3], low[:, :3, :3]) / (2 * step)
+        expected = np.concatenate([linear, turn], axis=1)
+        np.testing.assert_allclose(columns[:, :, k], expected, atol=1e-8, err_msg=str(channel))
+
+
+@pytest.mark.parametrize('name', URDFS)
+def test_the_flange_is_where_the_published_urdf_has_it(name, urdf_model, configurations):
+    pin = pytest.importorskip('pinocchio')
+    path, tip, half_turn = URDFS[name]
+    robot, model = catalog.load(name), urdf_model(path)
+    # UR's controller base looks the other way than its URDF's base_link.
+    base = np.diag([-1.0, -1.0, 1.0, 1.0]) if half_turn else np.eye(4)
+    data = model.createData()
+    for q in configurations(robot):
+        pin.framesForwardKinematics(model, data, q)
+        expected = base @ data.oMf[model.getFrameId(tip)].homogeneous
+        np.testing.assert_allclose(forward(robot, q), expected, atol=1e-5)
+
+
+def test_the_gravity_torque_of_the_panda_is_that_of_its_urdf(urdf_model, configurations):
+    pin = pytest.importorskip('pinocchio')
+    robot, model = catalog.load('franka_panda'), urdf_model(URDFS['franka_panda'][0])
+    model.gravity.linear = robot.gravity
+    for q in configurations(robot):
+        held = pin.computeGeneralizedGravity(model, model.createData(), q)
+        np.testing.assert_allclose(gravity_torque(robot, q), -held, atol=1e-4)
+
+
+@pytest.mark.parametrize('name', ['abb_irb120', 'abb_irb1600', 'kuka_kr6_r900', 'fanuc_m10ia'])
+def test_the_flange_is_where_the_makers_joint_axes_put_it(name, drawing, configurations):
+    robot = catalog.load(name)
+    for q in configurations(robot):
+        np.testing.assert_allclose(forward(robot, q), drawing(name, q), atol=1e-12)
+
+
+def test_the_kuka_stands_upright_at_its_cannon_position():
+    # A2 = -90, A3 = 90 degrees: x = 25 + 420 + 80 mm, z = 400 + 455 + 35 mm.
+    q = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+    pose = forward(catalog.load('kuka_kr6_r900'), q)
+    np.testing.assert_allclose(pose[:3, 3], [0.525, 0.0, 0.89], atol=1e-12)
+    np.testing.assert_allclose(pose[:3, 2], [1.0, 0.0, 0.0], atol=1e-12)

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The analytic sensitivities against differences, of every parameter on every bundled robot."""
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.effects import REGISTRY, Stage
+from weld_twin_core.motion.paths import default_seam
+from weld_twin_core.sensitivity import (
+    arc_weights,
+    default_tolerances,
+    exact_deviations,
+    local_sensitivity,
+    planned_study,
+    posture,
+)
+
+POINTWISE = tuple(
+    name
+    for name, kind in REGISTRY.items()
+    if kind.stage in (Stage.JOINT, Stage.ELASTIC, Stage.LINK, Stage.POSE)
+    and name not in ('quantization', 'joint_coupling', 'thermal_growth')
+    and not kind.needs
+)
+
+
+@pytest.fixture(scope='module')
+def studies():
+    """Return a smooth and an aggressive motion of every bundled robot, made once."""
+    made = {}
+
+    def study(name, profile='smooth'):
+        if (name, profile) not in made:
+            robot = catalog.load(name)
+            made[name, profile] = planned_study(robot, default_seam(robot), profile, points=40)
+        return made[name, profile]
+
+    return study
+
+
+@pytest.mark.parametrize('name', catalog.names())
+def test_analytic_derivative_equals_the_central_difference_of_the_position(studies, name):
+    study = studies(name)
+    tolerances = default_tolerances(study.robot, POINTWISE)
+    found = local_sensitivity(study, tolerances)
+    step = np.array([1e-3 * t.distribution.std for t in tolerances])
+    ends = [exact_deviations(study, tolerances, sign * np.diag(step)) for sign in (1.0, -1.0)]
+    difference = (ends[0] - ends[1]) / (2.0 * step[:, None, None])
+    size = np.maximum(np.abs(difference).max(axis=(1, 2), keepdims=True), 1e-9)
+    np.testing.assert_allclose(found.vectors / size, difference / size, atol=2e-6)
+
+
+@pytest.mark.parametrize('name', catalog.names())
+def test_slope_of_the_deviation_equals_the_papers_difference(studies, name):
+    """At no error, where D is a cone, and at one tolerance, where it is smooth."""
+    study = studies(name)
+    found = local_sensitivity(study, default_tolerances(study.robot))
+    moving = found.peak > 1e-6
+    assert moving.sum() > 4 * study.robot.n
+    assert found.disagreement[moving].max() < 1e-4
+    assert found.offset_disagreement[moving].max() < 1e-4
+
+
+@pytest.mark.parametrize('name', ['ur5', 'franka_panda'])
+def test_slope_of_play_equals_the_difference_where_the_motion_reverses(studies, name):
+    study = studies(name, 'aggressive')
+    found = local_sensitivity(study, default_tolerances(study.robot, ('backlash',)))
+    slope, difference = found.analytic, found.forward
+    # A sample may fall so near a reversal that even the smallest gap is not crossed there.
+    agree = np.abs(slope - difference) <= 1e-4 * np.maximum(found.peak, 1e-9)[:, None]
+    assert agree.mean() > 0.98
+
+
+def test_slope_of_a_link_length_is_one_and_of_an_offset_its_lever_arm(studies):
+    study = studies('ur5')
+    found = local_sensitivity(study, default_tolerances(study.robot, ('link_length',)))
+    np.testing.assert_allclose(found.analytic, 1.0, rtol=1e-12)
+    offset = local_sensitivity(study, default_tolerances(study.robot, ('joint_offset',)))
+    # The first axis of a UR5 is the world's z: the lever arm is the distance from it.
+    lever = np.hypot(*study.nominal.position[:, :2].T)
+    np.testing.assert_allclose(offset.analytic[0], lever, rtol=1e-12)
+    np.testing.assert_allclose(offset.turns, 1.0, rtol=1e-12)
+
+
+def test_weights_of_arc_length_do_not_follow_the_time_law(studies):
+    smooth, aggressive = studies('ur5'), studies('ur5', 'aggressive')
+    for study in (smooth, aggressive):
+        assert arc_weights(study.s).sum() == pytest.approx(1.0)
+    # The mean place of a path that is covered evenly is its middle.
+    middle = (arc_weights(smooth.s) * smooth.s).sum()
+    assert middle == pytest.approx(0.5 * smooth.length, rel=1e-9)
+
+
+def test_groups_add_up_to_the_whole(studies):
+    study = studies('ur5')
+    found = local_sensitivity(study, default_tolerances(study.robot))
+    whole = (found.contribution**2).sum()
+    for by in ('effect', 'site'):
+        assert sum(v**2 for v in found.groups(by).values()) == pytest.approx(whole)
+
+
+def test_manipulability_is_the_product_of_the_singular_values(studies):
+    study = studies('kuka_kr6_r900')
+    stand = posture(study)
+    found = local_sensitivity(study, default_tolerances(study.robot, ('joint_offset',)))
+    jacobian = found.vectors[:, 0, :].T
+    square = np.linalg.det(jacobian @ jacobian.T)
+    assert stand.manipulability[0] == pytest.approx(np.sqrt(square), rel=1e-9)
+    assert stand.condition[0] == pytest.approx(np.linalg.cond(jacobian), rel=1e-9)

@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Sobol and Morris against functions whose indices are known on paper."""
+
+import numpy as np
+import pytest
+from SALib.sample import sobol
+from SALib.util import compute_groups_matrix
+from scipy.stats import norm
+
+from weld_twin_core.errors import DataError
+from weld_twin_core.sensitivity import MorrisDesign, SobolDesign, morris_screening, sobol_indices
+
+
+def ishigami(unit):
+    x = np.pi * (2.0 * unit - 1.0)
+    return np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+
+
+def ishigami_indices(a=7.0, b=0.1):
+    """Ishigami and Homma (1990), in closed form."""
+    v1 = 0.5 * (1.0 + b * np.pi**4 / 5.0) ** 2
+    v2 = a**2 / 8.0
+    v13 = 8.0 * b**2 * np.pi**8 / 225.0
+    total = v1 + v2 + v13
+    return np.array([v1, v2, 0.0]) / total, np.array([v1 + v13, v2, v13]) / total
+
+
+G_WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0])
+
+
+def sobol_g(unit):
+    return np.prod((np.abs(4.0 * unit - 2.0) + G_WEIGHTS) / (1.0 + G_WEIGHTS), axis=1)
+
+
+def sobol_g_indices():
+    """Saltelli and Sobol (1995), in closed form."""
+    part = 1.0 / (3.0 * (1.0 + G_WEIGHTS) ** 2)
+    whole = np.prod(1.0 + part) - 1.0
+    others = np.prod(1.0 + part) / (1.0 + part)
+    return part / whole, part * others / whole
+
+
+def inside(found, half, wanted):
+    # An index that is zero on paper may have an interval of no width at all.
+    return np.abs(found - wanted) <= half + 1e-3
+
+
+@pytest.mark.parametrize(
+    ('function', 'wanted', 'count'),
+    [(ishigami, ishigami_indices(), 3), (sobol_g, sobol_g_indices(), 5)],
+)
+def test_indices_lie_in_their_intervals_around_the_analytic_ones(function, wanted, count):
+    found = sobol_indices(function, [f'x{k}' for k in range(count)], 1024, seed=0)
+    first, total = wanted
+    assert inside(found.first, found.first_half, first).all()
+    assert inside(found.total, found.total_half, total).all()
+    assert found.total_half.max() < 0.1
+
+
+def test_first_order_index_of_a_linear_model_is_its_share_of_the_variance():
+    weights, std = np.array([3.0, -1.0, 0.5]), np.array([1.0, 2.0, 0.1])
+    found = sobol_indices(lambda u: norm.ppf(u) * std @ weights, 'abc', 1024)
+    share = (weights * std) ** 2 / ((weights * std) ** 2).sum()
+    np.testing.assert_allclose(found.first, share, atol=0.01)
+    np.testing.assert_allclose(found.total, share, atol=0.01)
+
+
+@pytest.mark.parametrize('groups', [None, ('g', 'h', 'g', 'f')])
+def test_the_design_is_the_one_salib_would_draw(groups):
+    problem = {'num_vars': 4, 'names': list('abcd'), 'bounds': [[0.0, 1.0]] * 4}
+    if groups:
+        problem['groups'] = list(groups)
+    wanted = sobol.sample(problem, 64, calc_second_order=False, seed=5)
+    found = SobolDesign(tuple('abcd'), 64, groups, 5)
+    np.testing.assert_array_equal(found.samples(), wanted)
+    _, names = compute_groups_matrix(list(groups or 'abcd'))
+    assert found.labels == tuple(names)
+
+
+def test_group_index_of_a_linear_model_is_the_share_of_the_group():
+    weights = np.array([1.0, 2.0, 3.0, 4.0])
+    groups = ('left', 'right', 'left', 'right')
+    found = sobol_indices(lambda u: u @ weights, 'abcd', 1024, groups=groups)
+    assert found.names == ('left', 'right')
+    np.testing.assert_allclose(found.total, [10.0 / 30.0, 20.0 / 30.0], atol=0.01)
+
+
+def test_seed_zero_is_a_seed():
+    first, second = (sobol_indices(ishigami, 'abc', 256, seed=0) for _ in range(2))
+    other = sobol_indices(ishigami, 'abc', 256, seed=1)
+    np.testing.assert_array_equal(first.total, second.total)
+    np.testing.assert_array_equal(first.total_half, second.total_half)
+    assert (first.total != other.total).any()
+    assert first.as_dict()['seed'] == 0
+
+
+def test_morris_keeps_to_seed_zero_as_well():
+    runs = [morris_screening(ishigami, 'abc', 20, seed=0).as_dict() for _ in range(2)]
+    assert runs[0] == runs[1]
+
+
+def test_results_that_are_not_numbers_are_counted_and_refused():
+    design = SobolDesign(('a', 'b'), 64)
+    results = design.samples() @ [1.0, 2.0]
+    results[[17, 40]] = np.nan, np.inf
+    with pytest.raises(DataError, match=r'2 of 256 .* run 17'):
+        design.indices(results)
+    morris = MorrisDesign(('a', 'b'), 4)
+    bad = np.full(12, 1.0)
+    bad[5] = np.nan
+    with pytest.raises(DataError, match='run 5'):
+        morris.screening(bad)
+
+
+def test_a_result_without_scatter_is_refused():
+    with pytest.raises(DataError, match='no scatter'):
+        sobol_indices(lambda u: np.ones(len(u)), 'ab', 64)
+
+
+def test_sample_count_that_is_no_power_of_two_is_refused():
+    with pytest.raises(DataError, match='power of two'):
+        SobolDesign(('a', 'b'), 1000)
+
+
+def test_convergence_tells_of_half_and_all_samples():
+    found = sobol_indices(ishigami, 'abc', 1024, seed=0)
+    assert found.runs == 1024 * 5
+    half = sobol_indices(ishigami, 'abc', 512, seed=0)
+    assert found.total_half.max() < half.total_half.max()
+    # The first half of a Sobol sequence is the shorter sequence.
+    assert found.change == pytest.approx(np.abs(found.total - half.total).max())
+    assert not sobol_indices(ishigami, 'abc', 16).converged
+
+
+def test_morris_of_a_linear_model_is_its_slope_without_scatter():
+    weights = np.array([3.0, -1.0, 0.0])
+    found = morris_screening(lambda u: u @ weights, 'abc', 10)
+    np.testing.assert_allclose(found.mu_star, np.abs(weights) * 0.96, rtol=1e-9)
+    np.testing.assert_allclose(found.sigma, 0.0, atol=1e-9)

@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Robots and recordings of the core's tests, and kinematics written a second time, plainly."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.recording import JointMotion, Recording, Signal
+
+UR5_ROWS = [
+    (0.0, np.pi / 2, 0.089159), (-0.425, 0.0, 0.0), (-0.39225, 0.0, 0.0),
+    (0.0, np.pi / 2, 0.10915), (0.0, -np.pi / 2, 0.09465), (0.0, 0.0, 0.0823),
+]  # fmt: skip
+
+
+def random_robot(seed, n=6, convention='standard', slides=(), frames=True):
+    """Return a robot with every number drawn, and masses on all links."""
+    rng = np.random.default_rng(seed)
+
+    def frame():
+        quat = rng.normal(size=4)
+        return {'xyz': rng.normal(scale=0.3, size=3), 'quat_xyzw': quat / np.linalg.norm(quat)}
+
+    joints = [
+        {
+            'name': f'j{i}', 'a': rng.normal(scale=0.3), 'alpha': rng.uniform(-2, 2),
+            'd': rng.normal(scale=0.3), 'theta_offset': rng.uniform(-2, 2),
+            'beta': rng.uniform(-0.5, 0.5), 'type': 'prismatic' if i in slides else 'revolute',
+        }
+        for i in range(n)
+    ]  # fmt: skip
+    links = [{'mass': rng.uniform(1, 5), 'com': rng.normal(scale=0.1, size=3)} for _ in range(n)]
+    data = {
+        'name': f'random{seed}', 'convention': convention, 'joints': joints, 'links': links,
+        'payload': {'mass': 2.0, 'com': [0.02, -0.03, 0.1]},
+    }  # fmt: skip
+    if frames:
+        data |= {'base': frame(), 'tool': frame()}
+    return Robot.from_mapping(data)
+
+
+def ur5():
+    """Return a UR5 with link masses."""
+    masses = [3.7, 8.393, 2.33, 1.219, 1.219, 0.1879]
+    coms = [
+        (0, -0.02561, 0.00193), (0.2125, 0, 0.11336), (0.15, 0, 0.0265), (0, -0.0018, 0.01634),
+        (0, 0.0018, 0.01634), (0, 0, -0.001159),
+    ]  # fmt: skip
+    return Robot.from_mapping({
+        'name': 'ur5',
+        'joints': [
+            {'name': f'j{i}', 'a': a, 'alpha': alpha, 'd': d}
+            for i, (a, alpha, d) in enumerate(UR5_ROWS)
+        ],
+        'links': [{'mass': m, 'com': c} for m, c in zip(masses, coms, strict=True)],
+    })  # fmt: skip
+
+
+ROBOTS = {
+    'ur5': ur5(),
+    'standard': random_robot(1),
+    'modified': random_robot(2, convention='modified'),
+    'seven joints': random_robot(3, n=7),
+    'gantry': random_robot(4, slides=(0, 3), convention='standard'),
+    'modified gantry': random_robot(5, slides=(1,), convention='modified'),
+}
+
+
+@pytest.fixture(params=ROBOTS, ids=str)
+def robot(request):
+    """Return each kind of robot in turn."""
+    return ROBOTS[request.param]
+
+
+@pytest.fixture
+def arm():
+    """Return the UR5."""
+    return ROBOTS['ur5']
+
+
+def elementary(axis, angle=0.0, slide=0.0):
+    """Return a turn about and a slide along one coordinate axis, shape (4, 4)."""
+    out = np.eye(4)
+    out[:3, :3] = Rotation.from_euler(axis, angle).as_matrix()
+    out['xyz'.index(axis), 3] = slide
+    return out
+
+
+def textbook_rows(robot, q, table=()):
+    """Return the matrices of all DH rows at one joint position."""
+    rows = {key: np.array(getattr(robot, key)) for key in ('a', 'alpha', 'd', 'theta', 'beta')}
+    for (key, i), value in dict(table).items():
+        rows[key][i] += value
+    out = []
+    for i in range(robot.n):
+        theta, d = rows['theta'][i], rows['d'][i]
+        if robot.prismatic[i]:
+            d = d + q[i]
+        else:
+            theta = theta + q[i]
+        along_z = elementary('z', theta) @ elementary('z', slide=d)
+        along_x, twist = elementary('x', slide=rows['a'][i]), elementary('x', rows['alpha'][i])
+        hayati = elementary('y', rows['beta'][i])
+        if robot.convention == 'standard':
+            out.append(along_z @ along_x @ twist @ hayati)
+        else:
+            out.append(twist @ hayati @ along_x @ along_z)
+    return out
+
+
+def turned_frame(frame, xyz, rotvec, side):
+    """Return a frame with its origin moved and turned from the left or from the right."""
+    turn = Rotation.from_rotvec(rotvec).as_matrix()
+    out = np.array(frame)
+    out[:3, 3] += xyz
+    out[:3, :3] = turn @ out[:3, :3] if side == 'left' else out[:3, :3] @ turn
+    return out
+
+
+def textbook_pose(robot, q, table=(), base=None, tool=None):
+    """Return T_world_tool by multiplying one matrix after the other."""
+    pose = robot.T_world_base if base is None else base
+    for row in textbook_rows(robot, q, table):
+        pose = pose @ row
+    return pose @ (robot.T_flange_tool if tool is None else tool)
+
+
+def potential_energy(robot, q, extra_mass=0.0, extra_com=(0.0, 0.0, 0.0)):
+    """Return the potential energy of links, payload and an extra payload [J]."""
+    gravity = robot.T_world_base[:3, :3] @ robot.gravity
+    energy, pose = 0.0, robot.T_world_base
+    for i, row in enumerate(textbook_rows(robot, q)):
+        pose = pose @ row
+        energy -= robot.mass[i] * gravity @ (pose[:3, :3] @ robot.com[i] + pose[:3, 3])
+    tool = pose @ robot.T_flange_tool
+    for mass, com in ((robot.payload_mass, robot.payload_com), (extra_mass, extra_com)):
+        energy -= mass * gravity @ (tool[:3, :3] @ np.asarray(com) + tool[:3, 3])
+    return energy
+
+
+def load_torque(robot, q, wrench=None, frame='tool', **extra):
+    """Return the load torque by virtual work, with central differences of textbook kinematics."""
+    step, out = 1e-6, np.zeros(robot.n)
+    here = textbook_pose(robot, q)
+    turn = here[:3, :3] if frame == 'tool' else robot.T_world_base[:3, :3]
+    for i, dq in enumerate(np.eye(robot.n) * step):
+        out[i] = -(potential_energy(robot, q + dq, **extra)
+                   - potential_energy(robot, q - dq, **extra)) / (2 * step)  # fmt: skip
+        if wrench is not None:
+            after, before = textbook_pose(robot, q + dq), textbook_pose(robot, q - dq)
+            velocity = (after[:3, 3] - before[:3, 3]) / (2 * step)
+            spin = Rotation.from_matrix(after[:3, :3] @ before[:3, :3].T).as_rotvec() / (2 * step)
+            out[i] += velocity @ turn @ wrench[:3] + spin @ turn @ wrench[3:]
+    return out
+
+
+@pytest.fixture
+def textbook():
+    """Return the second, plain formulation of the kinematics and statics."""
+    return SimpleNamespace(
+        pose=textbook_pose, rows=textbook_rows, load_torque=load_torque, frame=turned_frame
+    )
+
+
+def cubic_motion(n, seed=7):
+    """Return joint position and velocity as cubics in time: Hermite interpolation keeps them."""
+    rng = np.random.default_rng(seed)
+    spread = (0.6, 0.5, 0.2, 0.05)
+    polynomials = [np.polynomial.Polynomial(rng.normal(scale=spread)) for _ in range(n)]
+
+    def at(t):
+        return np.stack([p(np.asarray(t)) for p in polynomials], axis=-1)
+
+    def rate(t):
+        return np.stack([p.deriv()(np.asarray(t)) for p in polynomials], axis=-1)
+
+    return at, rate
+
+
+def wrench_at(t):
+    """Return a wrench that is straight in time, shape t.shape + (6,)."""
+    return np.stack([3.0 + 2.0 * k - (1.0 + k) * np.asarray(t) for k in range(6)], axis=-1)
+
+
+@pytest.fixture
+def make_recording():
+    """Return a maker of recordings with everything in them, on irregular stamps."""
+
+    def make(robot, count=60, seed=7, wrench_frame='tool', static=False, **more):
+        rng = np.random.default_rng(seed)
+        t = np.cumsum(rng.uniform(0.005, 0.08, size=count)) + 3.0
+        at, rate = cubic_motion(robot.n, seed)
+        ends = np.array([0.0, 20.0])
+        return Recording(
+            'test', JointMotion(t, at(t - 3.0), rate(t - 3.0), static=static),
+            wrench=Signal(ends, wrench_at(ends - 3.0)), wrench_frame=wrench_frame,
+            temperature=Signal(ends, 20.0 + 2.0 * ends), **more,
+        )  # fmt: skip
+
+    return make
+
+
+@pytest.fixture
+def motion_at():
+    """Return joint position at any time of the recordings, in closed form."""
+    return lambda robot, t, seed=7: cubic_motion(robot.n, seed)[0](np.asarray(t) - 3.0)
+
+
+@pytest.fixture
+def stamps():
+    """Return measurement stamps inside the recordings, off the joint stamps."""
+    return lambda recording, count=25: np.linspace(
+        recording.joints.t[0] + 0.11, recording.joints.t[-1] - 0.11, count
+    )

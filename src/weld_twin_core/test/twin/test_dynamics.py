@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Load torques against Pinocchio on chains built here, and against virtual work."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import dynamics
+from weld_twin_core.arm.chain import forward, frames, jacobian
+
+
+def positions(robot, count=4, seed=0):
+    return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, robot.n))
+
+
+def pinocchio_model(pin, robot):
+    """Build the chain joint by joint: constant parts of a row go before or after its joint."""
+
+    def turn(axis, angle):
+        return pin.SE3(pin.AngleAxis(angle, np.eye(3)['xyz'.index(axis)]).matrix(), np.zeros(3))
+
+    def slide(axis, length):
+        return pin.SE3(np.eye(3), length * np.eye(3)['xyz'.index(axis)])
+
+    model = pin.Model()
+    model.gravity = pin.Motion(robot.T_world_base[:3, :3] @ robot.gravity, np.zeros(3))
+    parent, after = 0, pin.SE3(robot.T_world_base)
+    for i in range(robot.n):
+        before = turn('x', robot.alpha[i]) * turn('y', robot.beta[i]) * slide('x', robot.a[i])
+        fixed = turn('z', robot.theta[i]) * slide('z', robot.d[i])
+        if robot.convention == 'standard':
+            place = after
+            fixed = (
+                fixed * slide('x', robot.a[i]) * turn('x', robot.alpha[i])
+                * turn('y', robot.beta[i])
+            )  # fmt: skip
+        else:
+            place = after * before
+        joint = pin.JointModelPZ() if robot.prismatic[i] else pin.JointModelRZ()
+        parent, after = model.addJoint(parent, joint, place, f'j{i}'), fixed
+        inertia = pin.Inertia(robot.mass[i], robot.com[i], np.zeros((3, 3)))
+        model.appendBodyToJoint(parent, inertia, fixed)
+    tool = after * pin.SE3(robot.T_flange_tool)
+    payload = pin.Inertia(robot.payload_mass, robot.payload_com, np.zeros((3, 3)))
+    model.appendBodyToJoint(parent, payload, tool)
+    model.addFrame(pin.Frame('tool', parent, tool, pin.FrameType.OP_FRAME))
+    return model
+
+
+def test_gravity_torque_is_the_negative_of_pinocchios_generalised_gravity(robot):
+    pin = pytest.importorskip('pinocchio')
+    model = pinocchio_model(pin, robot)
+    data = model.createData()
+    q = positions(robot)
+    found = dynamics.gravity_torque(robot, q)
+    for row, torque in zip(q, found, strict=True):
+        expected = -pin.computeGeneralizedGravity(model, data, row)
+        np.testing.assert_allclose(torque, expected, atol=1e-11)
+
+
+def test_pose_and_jacobian_agree_with_pinocchio(robot):
+    pin = pytest.importorskip('pinocchio')
+    model = pinocchio_model(pin, robot)
+    data = model.createData()
+    tool = model.getFrameId('tool')
+    q = positions(robot)
+    poses, columns = forward(robot, q), jacobian(robot, q)
+    for k, row in enumerate(q):
+        pin.framesForwardKinematics(model, data, row)
+        np.testing.assert_allclose(poses[k], data.oMf[tool].homogeneous, atol=1e-13)
+        expected = pin.computeFrameJacobian(
+            model, data, row, tool, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        np.testing.assert_allclose(columns[k], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize('frame', ['tool', 'base'])
+def test_wrench_torque_does_the_wrenchs_work(robot, textbook, frame):
+    wrench = np.array([5.0, -3.0, 2.0, 0.5, 0.3, -0.2])
+    q = positions(robot)
+    found = dynamics.wrench_torque(robot, frames(robot, q), np.tile(wrench, (4, 1)), frame)
+    for k, row in enumerate(q):
+        expected = textbook.load_torque(robot, row, wrench, frame)
+        weight = textbook.load_torque(robot, row)
+        np.testing.assert_allclose(found[:, k], expected - weight, atol=1e-6)
+
+
+def test_a_horizontal_arm_feels_its_weight_times_its_reach(arm):
+    # The arm lies along -x; a positive turn of the shoulder about -y lowers what lies at -x.
+    out = [0.425 - 0.2125, 0.425 + 0.39225 - 0.15, *[0.425 + 0.39225] * 3]
+    mass = [8.393, 2.33, 1.219, 1.219, 0.1879]
+    torque = dynamics.gravity_torque(arm, np.zeros(6))
+    assert torque[1] == pytest.approx(9.80665 * np.dot(mass, out), abs=1e-9)
+    assert torque[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_displaced_frames_give_the_torque_of_the_displaced_robot(robot, textbook):
+    rng = np.random.default_rng(4)
+    base, tool = 0.1 * rng.normal(size=6), 0.1 * rng.normal(size=6)
+    shift = {('base', k): base[k] for k in range(6)} | {('tool', k): tool[k] for k in range(6)}
+    shift |= {('beta', 1): 0.1 * np.ones((3, 1))}
+    q = positions(robot)
+    found = dynamics.gravity_torque(robot, q, shift)
+    beta = robot.beta + 0.1 * np.eye(robot.n)[1]
+    moved = dataclasses.replace(
+        robot, beta=beta,
+        T_world_base=textbook.frame(robot.T_world_base, base[:3], base[3:], 'left'),
+        T_flange_tool=textbook.frame(robot.T_flange_tool, tool[:3], tool[3:], 'right'),
+    )  # fmt: skip
+    assert found.shape == (3, 4, robot.n)
+    for k, row in enumerate(q):
+        expected = textbook.load_torque(moved, row)
+        np.testing.assert_allclose(found[:, k], np.tile(expected, (3, 1)), atol=1e-6)
+
+
+def test_payload_draws_are_a_loop_over_draws(robot):
+    # Three draws: as many as coordinates, where a wrong broadcast would go unnoticed.
+    view = frames(robot, positions(robot))
+    mass, com = np.array([0.5, 1.0, 2.0]), np.random.default_rng(5).normal(size=(3, 3))
+    together = dynamics.payload_torque(robot, view, mass[:, None], com[:, None, :])
+    assert together.shape == (robot.n, 3, 4)
+    for k in range(3):
+        alone = dynamics.payload_torque(robot, view, mass[k], com[k])
+        np.testing.assert_allclose(together[:, k], alone, atol=1e-13)

@@ -1,0 +1,354 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every effect against its definition, written a second time as loops over plain matrices."""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.effects import REGISTRY, effect_from_mapping
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.twin import Twin
+
+
+@dataclass
+class Cell:
+    """What one sample of the reference starts from; a definition changes it."""
+
+    robot: object
+    textbook: object
+    t: float
+    elapsed: float
+    temperature: float
+    wrench: np.ndarray
+    q: np.ndarray
+    table: dict = field(default_factory=dict)
+    base: np.ndarray | None = None
+    tool: np.ndarray | None = None
+    move: object = None
+
+    def pose(self):
+        pose = self.textbook.pose(self.robot, self.q, self.table, self.base, self.tool)
+        return pose if self.move is None else self.move(pose)
+
+
+SMALL = np.array([1e-3, -2e-3, 3e-3])
+TURN = np.array([0.1, 0.2, -0.3])
+
+
+def joint_offset(cell):
+    cell.q[1] += 2e-3
+
+
+def row(key):
+    def change(cell):
+        cell.table[(key, 2)] = 3e-3
+
+    return change
+
+
+def base_pose(cell):
+    cell.base = cell.textbook.frame(cell.robot.T_world_base, SMALL, TURN, 'left')
+
+
+def setup_settling(cell):
+    left = np.exp(-max(cell.t - 1.0, 0.0) / 2.0)
+    cell.base = cell.textbook.frame(cell.robot.T_world_base, SMALL * left, TURN * left, 'left')
+
+
+def setup_step(cell):
+    if cell.t < 2.0:
+        cell.base = cell.textbook.frame(cell.robot.T_world_base, SMALL, TURN, 'left')
+
+
+def tool_pose(cell):
+    cell.tool = cell.textbook.frame(cell.robot.T_flange_tool, SMALL, TURN, 'right')
+
+
+def gear_ratio(cell):
+    cell.q[1] *= 1.0 + 4e-3
+
+
+def transmission_ripple(cell):
+    theta = cell.q[1]
+    cell.q[1] += 1e-3 * np.sin(3 * theta + 0.3) + 2e-3 * np.sin(50 * theta - 0.2)
+
+
+def joint_coupling(cell):
+    cell.q[2] += 5e-3 * cell.q[1]
+
+
+def quantization(cell):
+    cell.q[1] = np.floor(cell.q[1] / 1e-2 + 0.5) * 1e-2
+
+
+def joint_compliance(cell):
+    torque = cell.textbook.load_torque(cell.robot, cell.q, cell.wrench)
+    cell.q[1] += 1e-4 * torque[1]
+
+
+def payload(cell):
+    extra = {'extra_mass': 1.5, 'extra_com': SMALL * 50}
+    torque = cell.textbook.load_torque(cell.robot, cell.q, cell.wrench, **extra)
+    cell.q[1] += 1e-4 * torque[1]
+
+
+def cartesian_compliance(cell):
+    def move(pose):
+        out = pose.copy()
+        out[:3, 3] += pose[:3, :3] @ np.diag([1e-4, 2e-4, 3e-4]) @ cell.wrench[:3]
+        return out
+
+    cell.move = move
+
+
+def thermal_growth(cell):
+    growth = 2e-4 * (cell.temperature - 20.0)
+    for key in ('a', 'd'):
+        for i in range(cell.robot.n):
+            cell.table[(key, i)] = growth * getattr(cell.robot, key)[i]
+
+
+def drift(cell):
+    def move(pose):
+        out = pose.copy()
+        out[:3, 3] += SMALL * cell.elapsed
+        return out
+
+    cell.move = move
+
+
+def measurement_scale(cell):
+    def move(pose):
+        out = pose.copy()
+        out[:3, 3] *= 1.0 + 2e-3
+        return out
+
+    cell.move = move
+
+
+def nothing(cell):
+    pass
+
+
+DEFINITIONS = {
+    'joint_offset': ({'joint': 'j1', 'offset': 2e-3}, joint_offset),
+    'link_length': ({'joint': 'j2', 'da': 3e-3}, row('a')),
+    'link_offset': ({'joint': 'j2', 'dd': 3e-3}, row('d')),
+    'link_twist': ({'joint': 'j2', 'dalpha': 3e-3}, row('alpha')),
+    'axis_parallelism': ({'joint': 'j2', 'dbeta': 3e-3}, row('beta')),
+    'base_pose': ({'xyz': SMALL, 'rotvec': TURN}, base_pose),
+    'setup_settling': (
+        {'xyz': SMALL, 'rotvec': TURN, 'time_constant': 2.0, 'start': 1.0}, setup_settling,
+    ),
+    'setup_step': ({'xyz': SMALL, 'rotvec': TURN, 'time': 2.0}, setup_step),
+    'tool_pose': ({'xyz': SMALL, 'rotvec': TURN}, tool_pose),
+    'gear_ratio': ({'joint': 'j1', 'scale': 4e-3}, gear_ratio),
+    'transmission_ripple': (
+        {'joint': 'j1', 'amplitude': [1e-3, 2e-3], 'order': [3, 50], 'phase': [0.3, -0.2]},
+        transmission_ripple,
+    ),
+    'joint_coupling': ({'joint': 'j2', 'source': 'j1', 'ratio': 5e-3}, joint_coupling),
+    'quantization': ({'joint': 'j1', 'step': 1e-2}, quantization),
+    'joint_compliance': ({'joint': 'j1', 'compliance': 1e-4}, joint_compliance),
+    'payload': ({'mass': 1.5, 'com': SMALL * 50}, payload),
+    'cartesian_compliance': ({'compliance': [1e-4, 2e-4, 3e-4]}, cartesian_compliance),
+    'thermal_growth': ({'coefficient': 2e-4}, thermal_growth),
+    'drift': ({'xyz_rate': SMALL}, drift),
+    'measurement_scale': ({'scale': 2e-3}, measurement_scale),
+    'measurement_noise': ({'sigma': 1e-3}, nothing),
+}  # fmt: skip
+IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay'}
+
+
+def effect(name, **values):
+    return effect_from_mapping({'effect': name, **values})
+
+
+def with_helpers(name, effects):
+    """Return the effects; a payload shows only through a spring."""
+    spring = [effect('joint_compliance', joint='j1', compliance=1e-4)]
+    return tuple(effects) + tuple(spring if name == 'payload' else [])
+
+
+def test_every_registered_effect_is_tested_here():
+    bundled = {name for name, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')}
+    assert bundled == set(DEFINITIONS) | IN_TIME
+
+
+@pytest.mark.parametrize('name', DEFINITIONS)
+def test_effect_does_what_its_definition_says(
+    name, robot, textbook, make_recording, motion_at, stamps
+):
+    values, definition = DEFINITIONS[name]
+    recording = make_recording(robot)
+    at = stamps(recording, 6)
+    found = Twin(robot, with_helpers(name, [effect(name, **values)])).poses(recording, at)
+    for k, t in enumerate(at):
+        cell = Cell(
+            robot, textbook, t, t - recording.joints.t[0], 20.0 + 2.0 * t,
+            recording.wrench.at(np.array(t)), motion_at(robot, t).copy(),
+        )  # fmt: skip
+        definition(cell)
+        expected = cell.pose()
+        np.testing.assert_allclose(found.position[k], expected[:3, 3], atol=1e-9)
+        np.testing.assert_allclose(found.rotation[k], expected[:3, :3], atol=1e-9)
+
+
+def test_a_wrench_in_the_base_frame_yields_along_the_tools_axes(arm, make_recording, stamps):
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_rotvec([0.4, 0.5, -0.6]).as_matrix()
+    arm = arm.with_frames(base=base)
+    recording = make_recording(arm, wrench_frame='base')
+    at = stamps(recording, 6)
+    nominal = Twin(arm).poses(recording, at)
+    found = Twin(arm, (effect('cartesian_compliance', compliance=[1e-4, 0, 0]),)).poses(
+        recording, at
+    )
+    for k, t in enumerate(at):
+        force = arm.T_world_base[:3, :3] @ recording.wrench.at(np.array(t))[:3]
+        x = nominal.rotation[k][:, 0]
+        np.testing.assert_allclose(
+            found.position[k] - nominal.position[k], 1e-4 * x * (x @ force), atol=1e-14
+        )
+
+
+def joint_under(arm, effects, recording, joint, at=None):
+    """Return the position of one joint behind the poses."""
+    return Twin(arm, tuple(effects)).joints(recording, at)[..., arm.index(joint)]
+
+
+def play_loop(q, width):
+    out, w = [], q[0]
+    for value in q:
+        if w > value + width / 2:
+            w = value + width / 2
+        elif w < value - width / 2:
+            w = value - width / 2
+        out.append(w)
+    return np.array(out)
+
+
+@pytest.mark.parametrize('width', [0.0, 1e-3, 0.3, 10.0])
+def test_backlash_is_play_as_a_loop_would_compute_it(arm, make_recording, width):
+    recording = make_recording(arm, 200)
+    found = joint_under(arm, [effect('backlash', joint='j2', width=width)], recording, 'j2')
+    np.testing.assert_allclose(found, play_loop(recording.joints.q[:, 2], width), atol=1e-15)
+
+
+def test_backlash_of_stations_follows_their_order(arm, make_recording):
+    recording = make_recording(arm, 30, static=True)
+    found = joint_under(arm, [effect('backlash', joint='j2', width=0.3)], recording, 'j2')
+    np.testing.assert_allclose(found, play_loop(recording.joints.q[:, 2], 0.3), atol=1e-15)
+
+
+def reversal_loop(q, width):
+    out, last = [q[0]], 0.0
+    for before, now in pairwise(q):
+        way = np.sign(now - before)
+        out.append(now - width if way * last < 0 else now)
+        last = way if way else last
+    return np.array(out)
+
+
+def test_the_literal_reversal_form_jumps_for_one_sample_only(arm, make_recording):
+    recording = make_recording(arm, 200)
+    q = recording.joints.q.copy()
+    q[:, 2] = np.round(np.sin(np.linspace(0, 20, 200)), 1)
+    recording = Recording('rests and reversals', JointMotion(recording.joints.t, q))
+    form = effect('backlash', joint='j2', width=1e-3, form='reversal')
+    expected = reversal_loop(q[:, 2], 1e-3)
+    assert (expected != q[:, 2]).sum() == 6
+    np.testing.assert_allclose(joint_under(arm, [form], recording, 'j2'), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize('tau', [1e-4, 0.02, 0.5])
+def test_servo_lag_solves_its_differential_equation(arm, make_recording, tau):
+    recording = make_recording(arm)
+    t, q = recording.joints.t, recording.joints.q[:, 3]
+
+    def law(now, y):
+        return (np.interp(now, t, q) - y) / tau
+
+    expected, y = [q[0]], [q[0]]
+    for start, end in pairwise(t):
+        run = solve_ivp(law, (start, end), y, method='Radau', rtol=1e-9, atol=1e-12)
+        y = run.y[:, -1]
+        expected.append(y[0])
+    found = joint_under(arm, [effect('servo_lag', joint='j3', time_constant=tau)], recording, 'j3')
+    np.testing.assert_allclose(found, expected, atol=2e-8)
+
+
+def test_vibration_solves_its_differential_equation(arm, make_recording):
+    recording = make_recording(arm)
+    t, q = recording.joints.t, recording.joints.q[:, 3]
+    omega, damping, gain = 2 * np.pi * 3.0, 0.07, 0.4
+    rate = np.diff(q) / np.diff(t)
+    # Between samples the command is straight and nothing drives; at a sample its rate jumps.
+    expected, state = [q[0]], np.zeros(2)
+    for k in range(len(rate)):
+        if k > 0:
+            state[1] -= gain * (rate[k] - rate[k - 1])
+        run = solve_ivp(
+            lambda _, x: [x[1], -2 * damping * omega * x[1] - omega**2 * x[0]],
+            (t[k], t[k + 1]), state, rtol=1e-10, atol=1e-13,
+        )  # fmt: skip
+        state = run.y[:, -1]
+        expected.append(q[k + 1] + state[0])
+    mode = effect('vibration', joint='j3', frequency=3.0, damping=damping, gain=gain)
+    np.testing.assert_allclose(joint_under(arm, [mode], recording, 'j3'), expected, atol=1e-9)
+
+
+def test_time_delay_shows_the_robot_as_it_was(robot, make_recording, motion_at, stamps, textbook):
+    recording = make_recording(robot)
+    at = stamps(recording, 6)
+    found = Twin(robot, (effect('time_delay', delay=0.05),)).poses(recording, at)
+    for k, t in enumerate(at):
+        expected = textbook.pose(robot, motion_at(robot, t - 0.05))
+        np.testing.assert_allclose(found.position[k], expected[:3, 3], atol=1e-12)
+
+
+def test_time_delay_means_nothing_to_stations(arm, make_recording):
+    recording = make_recording(arm, static=True)
+    late = Twin(arm, (effect('time_delay', delay=5.0),)).poses(recording, recording.joints.t)
+    np.testing.assert_array_equal(late.position, Twin(arm).poses(recording).position)
+
+
+@pytest.mark.parametrize('name', ['servo_lag', 'vibration'])
+def test_effects_of_motion_leave_stations_alone(arm, make_recording, name):
+    recording = make_recording(arm, static=True)
+    moving = REGISTRY[name]('j1', *(0.1 for _ in REGISTRY[name].parameters))
+    found = Twin(arm, (moving,)).poses(recording)
+    np.testing.assert_array_equal(found.position, Twin(arm).poses(recording).position)
+
+
+def test_a_warm_up_curve_stands_in_for_a_temperature(arm, make_recording):
+    recording = make_recording(arm)
+    warm = effect('thermal_growth', coefficient=1e-3, links=['j1'], warmup=[10.0, 2.0])
+    elapsed = recording.joints.t - recording.joints.t[0]
+    shift = warm.displace(Twin(arm).evaluate(recording).view)
+    assert set(shift) == {('a', 1)}
+    expected = -0.425 * 1e-3 * 10.0 * (1.0 - np.exp(-elapsed / 2.0))
+    np.testing.assert_allclose(shift['a', 1], expected, rtol=1e-12)
+
+
+def test_noise_has_the_deviation_it_is_given_on_every_coordinate():
+    drawn = effect('measurement_noise', sigma=1e-3).draw(20000, np.random.default_rng(0))
+    assert drawn.shape == (20000, 3)
+    np.testing.assert_allclose(drawn.std(axis=0), 1e-3, rtol=0.02)
+    np.testing.assert_allclose(np.corrcoef(drawn.T), np.eye(3), atol=0.03)
+
+
+def test_a_number_beside_lists_holds_for_every_order_of_a_ripple(arm, make_recording):
+    recording = make_recording(arm)
+    short = effect('transmission_ripple', joint='j1', amplitude=1e-3, order=[2, 5])
+    long = effect(
+        'transmission_ripple', joint='j1', amplitude=[1e-3, 1e-3], order=[2, 5], phase=[0, 0]
+    )
+    np.testing.assert_array_equal(
+        Twin(arm, (short,)).poses(recording).position, Twin(arm, (long,)).poses(recording).position
+    )

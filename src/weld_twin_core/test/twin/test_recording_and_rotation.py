@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Streams at other times, and rotations against scipy and their laws."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm import rotation
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Measurements, Signal
+
+vectors = st.tuples(*[st.floats(-1.7, 1.7)] * 3).map(np.array)
+
+
+def test_velocity_of_a_parabola_is_exact_on_irregular_stamps():
+    t = np.array([0.0, 0.1, 0.25, 0.3, 0.7])
+    motion = JointMotion(t, (t**2)[:, None])
+    np.testing.assert_allclose(motion.velocity[:, 0], 2 * t, atol=1e-12)
+
+
+def test_positions_between_samples_follow_the_measured_velocity():
+    t = np.linspace(0.0, 2.0, 9)
+    motion = JointMotion(t, np.sin(t)[:, None], np.cos(t)[:, None])
+    at = np.linspace(0.0, 2.0, 50)
+    q, qd = motion.at(at)
+    # Cubic Hermite: h^4 / 384 times the fourth derivative, h^3 / 72 sqrt(3) for the slope.
+    assert np.abs(q[:, 0] - np.sin(at)).max() < 0.25**4 / 384
+    assert np.abs(qd[:, 0] - np.cos(at)).max() < 0.25**3 / 72 * np.sqrt(3) * 1.01
+
+
+def test_outside_its_stamps_a_motion_rests_at_its_ends():
+    motion = JointMotion([0.0, 1.0], [[1.0], [2.0]], [[3.0], [3.0]])
+    q, qd = motion.at(np.array([-1.0, 0.0, 1.0, 5.0]))
+    np.testing.assert_array_equal(q[:, 0], [1.0, 1.0, 2.0, 2.0])
+    np.testing.assert_array_equal(qd[:, 0], [0.0, 3.0, 3.0, 0.0])
+
+
+@pytest.mark.parametrize('static', [True, False])
+def test_stations_and_single_samples_stand_still(static):
+    t = [0.0, 1.0, 2.0] if static else [0.0]
+    motion = JointMotion(t, np.arange(len(t))[:, None], np.ones((len(t), 1)), static=static)
+    q, qd = motion.at(np.array([[0.2, 1.9]]))
+    assert q.shape == (1, 2, 1)
+    np.testing.assert_array_equal(q[..., 0], [[0.0, 2.0 if static else 0.0]])
+    assert not qd.any()
+
+
+def test_signals_are_straight_between_samples_and_held_at_the_ends():
+    signal = Signal([0.0, 2.0], np.array([[0.0] * 6, [2.0] * 6]))
+    at = np.array([[-1.0, 0.5], [1.5, 9.0]])
+    np.testing.assert_allclose(signal.at(at)[..., 3], [[0.0, 0.5], [1.5, 2.0]])
+    np.testing.assert_allclose(Signal([0.0, 2.0], [5.0, 7.0]).at(at), [[5.0, 5.5], [6.5, 7.0]])
+
+
+def test_taken_measurements_keep_all_they_have():
+    whole = Measurements([0.0, 1.0, 2.0], np.eye(3), np.tile(np.eye(3), (3, 1, 1)), [1, 2, 3])
+    part = whole.take(np.array([True, False, True]))
+    np.testing.assert_array_equal(part.t, [0.0, 2.0])
+    np.testing.assert_array_equal(part.sigma, [1.0, 3.0])
+    assert part.rotation.shape == (2, 3, 3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(vectors, st.sampled_from([1.0, 1e-3, 1e-5, 1e-9, 0.0]))
+def test_rotation_matrix_is_the_matrix_exponential(vector, size):
+    v = vector * size
+    np.testing.assert_allclose(rotation.rotation_matrix(v), expm(rotation.skew(v)), atol=1e-14)
+    np.testing.assert_allclose(rotation.rotation_vector(rotation.rotation_matrix(v)), v,
+                               atol=1e-12)  # fmt: skip
+
+
+@settings(max_examples=60, deadline=None)
+@given(vectors, st.sampled_from([1.0, 1e-3, 1e-5, 0.0]))
+def test_left_jacobian_is_the_derivative_of_the_rotation(vector, size):
+    v, step = vector * size, 1e-6
+    found = rotation.left_jacobian(v)
+    for k, dv in enumerate(np.eye(3) * step):
+        after, before = Rotation.from_rotvec(v + dv), Rotation.from_rotvec(v - dv)
+        spin = (after * before.inv()).as_rotvec() / (2 * step)
+        np.testing.assert_allclose(found[:, k], spin, atol=1e-8)
+
+
+def test_quaternions_are_x_y_z_w_and_turn_back():
+    quarter = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
+    matrix = rotation.matrix_from_quaternion(quarter)
+    np.testing.assert_allclose(matrix @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(rotation.quaternion_from_matrix(matrix), quarter)
+    negative = rotation.matrix_from_quaternion(-np.array(quarter))
+    assert rotation.quaternion_from_matrix(negative)[3] > 0.0
+
+
+def test_rotations_are_batched_even_when_there_are_none():
+    for lead in ((), (0,), (2, 3)):
+        matrix = rotation.rotation_matrix(np.zeros((*lead, 3)))
+        assert rotation.rotation_vector(matrix).shape == (*lead, 3)
+        assert rotation.quaternion_from_matrix(matrix).shape == (*lead, 4)
+        assert rotation.angle_between(matrix, matrix).shape == (*lead, 3)
+        assert rotation.matrix_from_quaternion(np.ones((*lead, 4)) / 2).shape == (*lead, 3, 3)
+
+
+def test_a_quaternion_of_wrong_length_names_its_sample():
+    with pytest.raises(DataError, match=r'^pose 1 has length 2, a rotation needs 1; check the'):
+        rotation.matrix_from_quaternion([[0, 0, 0, 1], [0, 0, 0, 2]], 'pose')

@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Derivatives of the poses by every parameter against central differences."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.effects import REGISTRY, Effect, effect_from_mapping
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.twin import Twin
+
+ENTRIES = {
+    'joint_offset': {'joint': 'j2', 'offset': 1e-3},
+    'link_length': {'joint': 'j1', 'da': 1e-4},
+    'link_offset': {'joint': 'j1', 'dd': 1e-4},
+    'link_twist': {'joint': 'j1', 'dalpha': 1e-3},
+    'axis_parallelism': {'joint': 'j1', 'dbeta': 1e-3},
+    'base_pose': {'xyz': [1e-3, 2e-3, 0.0], 'rotvec': [1e-2, 0.2, 0.1]},
+    'tool_pose': {'xyz': [1e-3, 2e-3, 0.1], 'rotvec': [1e-2, 0.2, 0.1]},
+    'setup_settling': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time_constant': 2.0},
+    'setup_step': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
+    'gear_ratio': {'joint': 'j1', 'scale': 1e-3},
+    'transmission_ripple': {
+        'joint': 'j1', 'amplitude': [1e-4, 2e-4], 'order': [3, 50], 'phase': [0.3, 0.2],
+    },
+    'joint_coupling': {'joint': 'j3', 'source': 'j4', 'ratio': 1e-3},
+    'backlash': {'joint': 'j2', 'width': 1e-3},
+    'joint_compliance': {'joint': 'j1', 'compliance': 1e-5},
+    'cartesian_compliance': {'compliance': [1e-6, 2e-6, 3e-6]},
+    'payload': {'mass': 2.0, 'com': [0.01, 0.02, 0.03]},
+    'servo_lag': {'joint': 'j3', 'time_constant': 0.01},
+    'time_delay': {'delay': 0.01},
+    'thermal_growth': {'coefficient': 1e-5},
+    'drift': {'xyz_rate': [1e-6, 2e-6, 3e-6]},
+    'vibration': {'joint': 'j2', 'frequency': 4.0, 'damping': 0.05, 'gain': 0.3},
+    'measurement_scale': {'scale': 1e-4},
+}  # fmt: skip
+WITHOUT = {'quantization', 'measurement_noise'}
+# No product of two of these displacements exists, so the sum of their derivatives is exact.
+SEPARATE = [
+    'joint_offset', 'link_length', 'link_twist', 'base_pose', 'tool_pose', 'gear_ratio',
+    'transmission_ripple', 'backlash', 'servo_lag', 'vibration', 'thermal_growth',
+]  # fmt: skip
+
+
+def effect(name, **more):
+    return effect_from_mapping({'effect': name, **ENTRIES[name], **more})
+
+
+def differences(robot, effects, recording, at):
+    """Yield each component with the derivative of position and of orientation by it."""
+    twin = Twin(robot, tuple(effects))
+    for component in twin.components():
+        chosen = effects[component.effect]
+        place = [(p.name, i) for p, i in chosen.components()].index(
+            (component.parameter.name, component.index)
+        )
+        # A response rings through many periods, so it bends quickly with frequency.
+        step = component.parameter.typical * (1e-5 if component.parameter.unit == 'Hz' else 1e-4)
+        ends = []
+        for way in (step, -step):
+            vector = np.array(chosen.vector())
+            vector[place] += way
+            changed = list(effects)
+            changed[component.effect] = chosen.with_vector(vector)
+            ends.append(Twin(robot, tuple(changed)).poses(recording, at))
+        turn = ends[0].rotation @ np.swapaxes(ends[1].rotation, -1, -2)
+        spin = Rotation.from_matrix(turn).as_rotvec() / (2 * step)
+        yield component, (ends[0].position - ends[1].position) / (2 * step), spin
+
+
+def check(robot, effects, recording, at, relative, absolute=0.0):
+    """Compare; ``absolute`` [m] is what a derivative times the typical size may be off."""
+    poses, found = Twin(robot, tuple(effects)).linearise(recording, at)
+    assert found.shape == (len(at), 6, len(Twin(robot, tuple(effects)).components()))
+    np.testing.assert_array_equal(
+        poses.position, Twin(robot, tuple(effects)).poses(recording, at).position
+    )
+    for k, (component, position, spin) in enumerate(differences(robot, effects, recording, at)):
+        name = f'{effects[component.effect].name} {component.parameter.name} {component.index}'
+        room = absolute / component.parameter.typical
+        scale = np.abs(position).max()
+        np.testing.assert_allclose(
+            found[:, :3, k], position, rtol=0, atol=relative * scale + room + 1e-9, err_msg=name
+        )
+        np.testing.assert_allclose(
+            found[:, 3:, k], spin, rtol=0, atol=relative * max(1.0, scale) + room + 1e-6,
+            err_msg=name,
+        )  # fmt: skip
+
+
+def test_every_differentiable_effect_is_tested_here():
+    bundled = {name for name, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')}
+    assert bundled == set(ENTRIES) | WITHOUT
+
+
+@pytest.mark.parametrize('name', ENTRIES)
+def test_derivative_by_every_parameter_alone(name, robot, make_recording, stamps):
+    recording = make_recording(robot)
+    effects = [effect(name)]
+    if name == 'payload':
+        effects.append(effect('joint_compliance'))
+    check(robot, effects, recording, stamps(recording), 2e-6)
+
+
+def test_derivatives_of_effects_together_are_exact(robot, make_recording, stamps):
+    recording = make_recording(robot)
+    # The delay sees all other joint motion through its velocity.
+    effects = [effect(name) for name in SEPARATE if name != 'thermal_growth']
+    check(robot, [*effects, effect('time_delay')], recording, stamps(recording), 2e-5)
+
+
+def test_memory_effects_in_series_on_one_joint_pass_derivatives_on(arm, make_recording, stamps):
+    recording = make_recording(arm)
+    effects = [
+        effect(name, joint='j1')
+        for name in ('servo_lag', 'vibration', 'backlash', 'gear_ratio', 'transmission_ripple')
+    ]
+    check(arm, effects, recording, stamps(recording), 2e-5)
+
+
+def test_all_effects_together_are_off_by_products_of_small_displacements_only(
+    robot, make_recording, stamps
+):
+    recording = make_recording(robot)
+    check(
+        robot, [effect(name) for name in ENTRIES], recording, stamps(recording), 5e-3, 2e-7
+    )
+
+
+def test_while_a_wide_gap_is_crossed_the_derivative_stays_with_the_side_left(arm):
+    t = np.linspace(0.0, 20.0, 1003)
+    recording = Recording('slow', JointMotion(t, np.sin(t)[:, None] * np.ones(6)))
+    check(arm, [effect('backlash', width=0.3)], recording, t, 1e-6)
+
+
+def test_a_closed_gap_opens_to_the_side_it_trails(arm, make_recording, stamps):
+    recording = make_recording(arm, 200)
+    at = recording.joints.t
+    tiny = 1e-7
+    _, found = Twin(arm, (effect('backlash', width=0.0),)).linearise(recording, at)
+    opened = Twin(arm, (effect('backlash', width=tiny),)).poses(recording, at).position
+    nominal = Twin(arm).poses(recording, at).position
+    np.testing.assert_allclose(found[..., :3, 0], (opened - nominal) / tiny, atol=1e-5)
+
+
+@pytest.mark.parametrize('name', [name for name in ENTRIES if name != 'time_delay'])
+def test_a_numerical_derivative_stands_in_for_a_missing_closed_form(name, arm, make_recording):
+    twin = Twin(arm, (effect('joint_compliance'),))
+    recording = make_recording(arm)
+    memory = name in ('servo_lag', 'vibration', 'backlash')
+    view = twin.joint_view(recording) if memory else twin.evaluate(recording).view
+    closed, numerical = effect(name).gradient(view), Effect.gradient(effect(name), view)
+    assert len(closed) == len(numerical)
+    for ours, theirs in zip(closed, numerical, strict=True):
+        assert (ours is None) == (theirs is None)
+        for channel in ours or ():
+            scale = np.abs(ours[channel]).max()
+            np.testing.assert_allclose(
+                theirs[channel], np.broadcast_to(ours[channel], theirs[channel].shape),
+                atol=1e-5 * scale + 1e-8,
+            )  # fmt: skip
+
+
+def test_the_instants_of_the_joint_stamps_do_not_move_with_the_measurement_clock(
+    arm, make_recording
+):
+    recording = make_recording(arm)
+    _, found = Twin(arm, (effect('time_delay'), effect('joint_offset'))).linearise(recording)
+    assert found.shape[-1] == 2
+    assert not found[..., 0].any()
+    assert found[..., 1].any()

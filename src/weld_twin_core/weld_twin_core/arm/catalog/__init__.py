@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Bundled robots, each a module whose DATA is the mapping that a robot file holds."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from ...errors import ModelError
+from ..robot import Robot
+
+_NAMES = (
+    'ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb120', 'abb_irb1600', 'fanuc_m10ia', 'franka_panda',
+)  # fmt: skip
+
+
+def names() -> tuple[str, ...]:
+    """Return the names that `load` takes."""
+    return _NAMES
+
+
+def load(name: str) -> Robot:
+    """
+    Return a bundled robot.
+
+    Raises
+    ------
+    ModelError
+        There is no such robot; the message lists those there are.
+
+    """
+    if name not in _NAMES:
+        raise ModelError(f'no bundled robot is called {name!r}; there are ' + ', '.join(_NAMES))
+    return Robot.from_mapping(import_module(f'.{name}', __name__).DATA)

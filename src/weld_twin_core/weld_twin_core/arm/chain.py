@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The kinematic chain: poses, frames and the derivative of the pose by every channel.
+
+A *channel* is one scalar of the chain that an effect may displace: ``('q', i)``,
+``('theta' | 'd' | 'a' | 'alpha' | 'beta', i)``, ``('base' | 'tool' | 'pose', 0..5)`` or
+``('tau', i)``. A *shift* maps channels to displacements that broadcast with the samples.
+
+Inside, vectors are kept components first (see `vectors`); public results have the samples first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arrays import Array
+from .robot import Robot
+from .rotation import left_jacobian, rotation_matrix, transform
+from .vectors import components, cross, pad, samples_first
+
+Channel = tuple[str, int]
+Shift = Mapping[Channel, Array]
+ROW_CHANNELS = ('theta', 'd', 'a', 'alpha', 'beta')
+NO_SHIFT: Shift = {}
+MANY = 5000
+"""Joint positions from which `forward` leaves the work to `kernels.bulk`..."""
+MOST_JOINTS = 8
+"""... and joints up to which it does: there the work grows threefold with every other joint."""
+
+
+class RowAxes(NamedTuple):
+    """Axes of one DH row in the world frame, components first, shape (3, ...) each [-, m]."""
+
+    z: Array
+    z_point: Array
+    x: Array
+    x_point: Array
+    y: Array
+    y_point: Array
+
+
+class Frames(NamedTuple):
+    """
+    The chain at given joint positions; every field is in the world frame.
+
+    ``rotation`` is (..., 3, 3) and ``position`` (..., 3) of the tool; ``flange_rotation`` and
+    ``flange_point`` are those of the chain's end before the tool frame; ``base_rotation`` and
+    ``base_point`` those of the base.
+    """
+
+    rotation: Array
+    position: Array
+    rows: tuple[RowAxes, ...]
+    flange_rotation: Array
+    flange_point: Array
+    base_rotation: Array
+    base_point: Array
+
+
+def _six(shift: Shift, name: str) -> Array | None:
+    """Stack the six components of a frame channel, shape (..., 6), or None when untouched."""
+    if not any((name, k) in shift for k in range(6)):
+        return None
+    parts = [np.asarray(shift.get((name, k), 0.0), dtype=np.float64) for k in range(6)]
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def base_frame(robot: Robot, shift: Shift = NO_SHIFT) -> tuple[Array, Array]:
+    """Return rotation (..., 3, 3) and origin (..., 3) of the displaced base in the world."""
+    rotation, origin = robot.T_world_base[:3, :3], robot.T_world_base[:3, 3]
+    error = _six(shift, 'base')
+    if error is None:
+        return rotation, origin
+    return rotation_matrix(error[..., 3:]) @ rotation, origin + error[..., :3]
+
+
+def tool_frame(robot: Robot, shift: Shift = NO_SHIFT) -> tuple[Array, Array]:
+    """Return rotation (..., 3, 3) and origin (..., 3) of the displaced tool in the flange."""
+    rotation, origin = robot.T_flange_tool[:3, :3], robot.T_flange_tool[:3, 3]
+    error = _six(shift, 'tool')
+    if error is None:
+        return rotation, origin
+    return rotation @ rotation_matrix(error[..., 3:]), origin + error[..., :3]
+
+
+def _turn(first: Array, second: Array, angle: Array) -> tuple[Array, Array]:
+    """Turn the pair of axes (first, second) by an angle in their plane."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return first * cosine + second * sine, second * cosine - first * sine
+
+
+def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
+    """
+    Return the chain's frames.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : array, shape (..., n) [rad or m]
+        Joint positions; leading axes are draws and samples.
+    shift : mapping
+        Displaced channels; each value broadcasts with ``q[..., 0]``.
+
+    """
+    base_rotation, base_point = base_frame(robot, shift)
+    axes = max([q.ndim - 1, *(np.ndim(value) for value in shift.values())])
+    x, y, z, p = (
+        pad(components(v), axes) for v in (*(base_rotation[..., k] for k in range(3)), base_point)
+    )
+    row = _standard_row if robot.convention == 'standard' else _modified_row
+    rows = []
+    for i in range(robot.n):
+        values: dict[str, Any] = {key: getattr(robot, key)[i] for key in ROW_CHANNELS}
+        moved = 'd' if robot.prismatic[i] else 'theta'
+        values[moved] = values[moved] + q[..., i]
+        for key, channel in ((moved, ('q', i)), *((key, (key, i)) for key in ROW_CHANNELS)):
+            if channel in shift:
+                values[key] = values[key] + shift[channel]
+        x, y, z, p, row_axes = row(x, y, z, p, values)
+        rows.append(row_axes)
+    flange = np.stack([samples_first(v) for v in np.broadcast_arrays(x, y, z)], axis=-1)
+    tool_rotation, tool_point = tool_frame(robot, shift)
+    flange_point = samples_first(p)
+    position = flange_point + (flange @ tool_point[..., None])[..., 0]
+    return Frames(
+        flange @ tool_rotation, position, tuple(rows), flange, flange_point, base_rotation,
+        base_point,
+    )  # fmt: skip
+
+
+def _standard_row(
+    x: Array, y: Array, z: Array, p: Array, v: dict[str, Any]
+) -> tuple[Array, Array, Array, Array, RowAxes]:
+    z_row, z_point = z, p
+    x, y = _turn(x, y, v['theta'])
+    p = p + v['d'] * z + v['a'] * x
+    x_row, x_point = x, p
+    y, z = _turn(y, z, v['alpha'])
+    y_row, y_point = y, p
+    if np.ndim(v['beta']) or v['beta'] != 0.0:
+        z, x = _turn(z, x, v['beta'])
+    return x, y, z, p, RowAxes(z_row, z_point, x_row, x_point, y_row, y_point)
+
+
+def _modified_row(
+    x: Array, y: Array, z: Array, p: Array, v: dict[str, Any]
+) -> tuple[Array, Array, Array, Array, RowAxes]:
+    alpha_axis, start = x, p
+    y, z = _turn(y, z, v['alpha'])
+    y_row = y
+    if np.ndim(v['beta']) or v['beta'] != 0.0:
+        z, x = _turn(z, x, v['beta'])
+    p = p + v['a'] * x
+    # alpha turns about the x before beta and a moves along the x after it; the two differ only
+    # when beta is not zero, so RowAxes keeps alpha's axis and `column` rebuilds a's from y and z.
+    z_row, z_point = z, p
+    x, y = _turn(x, y, v['theta'])
+    p = p + v['d'] * z
+    return x, y, z, p, RowAxes(z_row, z_point, alpha_axis, start, y_row, start)
+
+
+def displaced_robot(robot: Robot, shift: Mapping[Channel, float]) -> Robot:
+    """Return the robot with displacements of rows, base and tool built in, one number each."""
+    rows = {key: getattr(robot, key).copy() for key in ROW_CHANNELS}
+    for (name, i), value in shift.items():
+        if name in rows:
+            rows[name][i] += value
+    arrays = {key: np.asarray(value) for key, value in shift.items()}
+    base, tool = base_frame(robot, arrays), tool_frame(robot, arrays)
+    return replace(
+        robot, **rows, T_world_base=transform(*base), T_flange_tool=transform(*tool)
+    )
+
+
+def forward(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
+    """
+    Return tool poses ``T_world_tool``, shape (..., 4, 4) [m].
+
+    The product of the paper's eq. for T_i^{i-1} over the rows, between base and tool frame.
+    """
+    if q.size >= MANY * robot.n and robot.n <= MOST_JOINTS and not shift:
+        from ..kernels.bulk import kernel_of
+        return kernel_of(robot).poses(q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 4, 4)
+    chain = frames(robot, q, shift)
+    return transform(chain.rotation, chain.position)
+
+
+def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIFT) -> Array:
+    """
+    Return d(pose) / d(channel), shape (6, ...): velocity of the tool point, then turn.
+
+    Screw columns as in Everett, Driels and Mooring (1987); 'base' and 'tool' turns use the left
+    Jacobian of the rotation vector, so the derivative is exact at any displacement.
+
+    Raises
+    ------
+    KeyError
+        The channel has no direct column ('tau' reaches the tool through a spring).
+
+    """
+    name, i = channel
+    if name == 'pose':
+        return _unit(i, chain.position.shape[:-1])
+    if name in ('base', 'tool'):
+        return _frame_column(robot, chain, name, i, shift)
+    row = chain.rows[i]
+    if name == 'q':
+        name = 'd' if robot.prismatic[i] else 'theta'
+    tip = components(chain.position)
+    match name:
+        case 'theta':
+            return _turn_column(row.z, row.z_point, tip)
+        case 'alpha':
+            return _turn_column(row.x, row.x_point, tip)
+        case 'beta':
+            return _turn_column(row.y, row.y_point, tip)
+        case 'd':
+            return _slide_column(row.z, tip)
+        case 'a':
+            along = row.x if robot.convention == 'standard' else cross(row.y, row.z)
+            return _slide_column(along, tip)
+    raise KeyError(channel)
+
+
+def _turn_column(axis: Array, point: Array, tip: Array) -> Array:
+    moment = cross(axis, tip - point)
+    return np.concatenate([moment, np.broadcast_to(axis, moment.shape)])
+
+
+def _slide_column(axis: Array, tip: Array) -> Array:
+    out = np.zeros((6,) + np.broadcast_shapes(axis.shape, tip.shape)[1:])
+    out[:3] = axis
+    return out
+
+
+def _unit(i: int, samples: tuple[int, ...]) -> Array:
+    out = np.zeros((6,) + samples)
+    out[i] = 1.0
+    return out
+
+
+def _frame_column(robot: Robot, chain: Frames, name: str, i: int, shift: Shift) -> Array:
+    samples = chain.position.shape[:-1]
+    if name == 'base' and i < 3:
+        return _unit(i, samples)
+    if name == 'tool' and i < 3:
+        return _slide_column(components(chain.flange_rotation[..., i]), components(chain.position))
+    error = _six(shift, name)
+    axis = left_jacobian(np.zeros(3) if error is None else error[..., 3:])[..., i - 3]
+    if name == 'base':
+        axis = np.broadcast_to(axis, samples + (3,))
+        point = np.broadcast_to(chain.base_point, samples + (3,))
+        return _turn_column(components(axis), components(point), components(chain.position))
+    turned = (chain.flange_rotation @ (robot.T_flange_tool[:3, :3] @ axis[..., None]))[..., 0]
+    out = np.zeros((6,) + samples)
+    out[3:] = components(turned)
+    return out
+
+
+def jacobian(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
+    """Return the geometric Jacobian at the tool, shape (..., 6, n), linear part first."""
+    chain = frames(robot, q, shift)
+    columns = [column(robot, chain, ('q', i), shift) for i in range(robot.n)]
+    return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), (0, 1), (-2, -1))
+
+
+def identification_channels(robot: Robot) -> tuple[Channel, ...]:
+    """Return every geometric channel: base, theta d a alpha beta of every row, tool."""
+    rows = tuple((key, i) for i in range(robot.n) for key in ROW_CHANNELS)
+    base = tuple(('base', k) for k in range(6))
+    return base + rows + tuple(('tool', k) for k in range(6))
+
+
+def identification_jacobian(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
+    """
+    Return d(pose) / d(every geometric channel), shape (..., 6, 12 + 5 n).
+
+    Columns follow `identification_channels`.
+    """
+    chain = frames(robot, q, shift)
+    columns = [column(robot, chain, key, shift) for key in identification_channels(robot)]
+    return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), (0, 1), (-2, -1))

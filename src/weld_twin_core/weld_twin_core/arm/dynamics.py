@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Load torque on the joints from gravity, payload and the wrench on the tool.
+
+A positive torque turns the joint in its positive direction; it is what the load does to the
+joint, the negative of what the motor must hold.
+"""
+
+import numpy as np
+
+from ..arrays import Array
+from .chain import NO_SHIFT, Frames, Shift, frames
+from .robot import Robot
+from .vectors import components, cross, dot, pad
+
+
+def point_force_torque(robot: Robot, chain: Frames, point: Array, force: Array) -> Array:
+    """
+    Return joint torques, shape (n, ...), of a force at a point carried by the tool.
+
+    Parameters
+    ----------
+    point, force : array, shape (3, ...) [m, N]
+        Components first, in the world frame.
+
+    """
+    axes = max(point.ndim, force.ndim, chain.position.ndim) - 1
+    point, force = pad(point, axes), pad(force, axes)
+    torques = []
+    for i, row in enumerate(chain.rows):
+        z = pad(row.z, axes)
+        way = z if robot.prismatic[i] else cross(z, point - pad(row.z_point, axes))
+        torques.append(dot(way, force))
+    return np.stack(np.broadcast_arrays(*torques))
+
+
+def gravity_direction(robot: Robot, chain: Frames) -> Array:
+    """Return gravity in the world frame, components first, shape (3, ...) [m/s^2]."""
+    return pad(components(chain.base_rotation @ robot.gravity), chain.position.ndim - 1)
+
+
+def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array) -> Array:
+    """Return load torques, shape (n, ...) [N m], of a mass at ``com`` (..., 3) of the tool."""
+    centre = chain.position + (chain.rotation @ np.asarray(com)[..., None])[..., 0]
+    weight = mass * pad(gravity_direction(robot, chain), np.ndim(mass))
+    return point_force_torque(robot, chain, components(centre), weight)
+
+
+def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool') -> Array:
+    """
+    Return load torques, shape (n, ...) [N m], of a wrench (..., 6) on the tool: J^T w.
+
+    ``frame`` says where force and torque are expressed: 'tool' or 'base'; both act at the tool
+    centre point.
+    """
+    rotation = chain.rotation if frame == 'tool' else chain.base_rotation
+    force = components((rotation @ wrench[..., :3, None])[..., 0])
+    moment = components((rotation @ wrench[..., 3:, None])[..., 0])
+    torque = point_force_torque(robot, chain, components(chain.position), force)
+    moment = pad(moment, torque.ndim - 1)
+    for i, row in enumerate(chain.rows):
+        if not robot.prismatic[i]:
+            torque[i] += dot(pad(row.z, torque.ndim - 1), moment)
+    return torque
+
+
+def gravity_torque(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
+    """
+    Return load torques, shape (..., n) [N m], of the links and the robot's own payload.
+
+    The negative of the generalised gravity of a rigid chain (Siciliano et al. 2009, eq. 7.39).
+    """
+    return np.moveaxis(chain_gravity_torque(robot, frames(robot, q, shift)), 0, -1)
+
+
+def chain_gravity_torque(robot: Robot, chain: Frames) -> Array:
+    """Return load torques, shape (n, ...) [N m], for frames already at hand."""
+    samples = chain.position.shape[:-1]
+    total = np.zeros((robot.n,) + samples)
+    if robot.mass is not None and robot.com is not None:
+        gravity = gravity_direction(robot, chain)
+        mass_beyond = 0.0
+        moment_beyond = np.zeros((3,) + samples)
+        for i in reversed(range(robot.n)):
+            moment_beyond = moment_beyond + robot.mass[i] * link_point(
+                robot, chain, i, robot.com[i]
+            )
+            mass_beyond += robot.mass[i]
+            row = chain.rows[i]
+            if robot.prismatic[i]:
+                total[i] = mass_beyond * dot(row.z, gravity)
+            else:
+                lever = moment_beyond - mass_beyond * row.z_point
+                total[i] = dot(cross(row.z, lever), gravity)
+    if robot.payload_mass:
+        total = total + payload_torque(robot, chain, robot.payload_mass, robot.payload_com)
+    return total
+
+
+def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
+    """Return a point (3,) of link i's DH frame in the world, components first (3, ...)."""
+    if i + 1 == robot.n:
+        return components(chain.flange_point + chain.flange_rotation @ point)
+    # The frame at the end of row i is where row i + 1 starts.
+    row, following = chain.rows[i], chain.rows[i + 1]
+    if robot.convention == 'standard':
+        origin, y, z = following.z_point, row.y, following.z
+        x = cross(y, z)
+    else:
+        origin, x, z = following.x_point, following.x, row.z
+        y = cross(z, x)
+    place: Array = origin + point[0] * x + point[1] * y + point[2] * z
+    return place

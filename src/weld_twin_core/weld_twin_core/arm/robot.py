@@ -1,0 +1,286 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot model: Denavit-Hartenberg rows between a base and a tool frame, with link masses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, readonly
+from ..errors import DataError, ModelError
+from .rotation import matrix_from_quaternion, quaternion_from_matrix, transform
+
+CONVENTIONS = ('standard', 'modified')
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
+_TOP_KEYS = {
+    'name', 'convention', 'gravity', 'base', 'tool', 'joints', 'links', 'payload', 'source',
+}  # fmt: skip
+_JOINT_KEYS = {
+    'name', 'type', 'a', 'alpha', 'd', 'theta_offset', 'beta', 'lower', 'upper', 'max_velocity',
+    'max_acceleration',
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """
+    A serial robot.
+
+    A standard row is Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta), the seed equation of the paper
+    with Hayati's beta at its end; a modified (Craig) row is
+    Rx(alpha) Ry(beta) Tx(a) Rz(theta) Tz(d). A joint moves ``theta`` (revolute) or ``d``
+    (prismatic).
+
+    Attributes
+    ----------
+    a, alpha, d, theta, beta : array, shape (n,) [m, rad]
+        DH values at joint position zero.
+    prismatic : array of bool, shape (n,)
+    lower, upper, max_velocity, max_acceleration : array, shape (n,) [rad or m, per s, per s^2]
+    T_world_base, T_flange_tool : array, shape (4, 4)
+    mass : array, shape (n,) [kg]; com : array, shape (n, 3) [m]
+        Link masses and centres in the DH frame at the end of each link.
+    payload_mass : float [kg]; payload_com : array, shape (3,) [m], in the tool frame
+    gravity : array, shape (3,) [m/s^2], in the base frame
+
+    References
+    ----------
+    .. [1] S. Hayati, "Robot arm geometric link parameter estimation", IEEE CDC 1983.
+
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    a: Array
+    alpha: Array
+    d: Array
+    theta: Array
+    beta: Array
+    prismatic: NDArray[np.bool_]
+    lower: Array
+    upper: Array
+    max_velocity: Array
+    max_acceleration: Array
+    convention: str = 'standard'
+    T_world_base: Array = field(default_factory=lambda: np.eye(4))
+    T_flange_tool: Array = field(default_factory=lambda: np.eye(4))
+    mass: Array | None = None
+    com: Array | None = None
+    payload_mass: float = 0.0
+    payload_com: Array = field(default_factory=lambda: np.zeros(3))
+    gravity: Array = field(default_factory=lambda: np.array(STANDARD_GRAVITY))
+    source: str = ''
+
+    def __post_init__(self) -> None:
+        n = len(self.joint_names)
+        if n == 0:
+            raise ModelError(f'robot {self.name!r} has no joints')
+        if len(set(self.joint_names)) != n:
+            raise ModelError(f'robot {self.name!r} uses a joint name twice: {self.joint_names}')
+        if self.convention not in CONVENTIONS:
+            raise ModelError(
+                f'convention of robot {self.name!r} must be one of {", ".join(CONVENTIONS)}, '
+                f'got {self.convention!r}'
+            )
+        shapes: dict[str, tuple[int | None, ...]] = {
+            **dict.fromkeys(('a', 'alpha', 'd', 'theta', 'beta'), (n,)),
+            'payload_com': (3,), 'gravity': (3,), 'T_world_base': (4, 4), 'T_flange_tool': (4, 4),
+        }  # fmt: skip
+        if self.mass is not None:
+            shapes |= {'mass': (n,), 'com': (n, 3)}
+        for key, shape in shapes.items():
+            self._set(key, readonly(getattr(self, key), shape, f'{key} of robot {self.name!r}'))
+        for key in ('lower', 'upper', 'max_velocity', 'max_acceleration'):
+            value = readonly(getattr(self, key), (n,), f'{key} of {self.name!r}', finite=False)
+            self._set(key, value)
+        prismatic = readonly(self.prismatic, (n,), f'prismatic of {self.name!r}').astype(bool)
+        prismatic.setflags(write=False)
+        self._set('prismatic', prismatic)
+        wrong = ~(self.lower < self.upper)
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            raise ModelError(f'joint {self.joint_names[k]!r}: lower limit is not below upper')
+        if self.mass is not None and (self.mass < 0.0).any():
+            raise ModelError(f'robot {self.name!r} has a link of negative mass')
+
+    def _set(self, key: str, value: Any) -> None:
+        object.__setattr__(self, key, value)
+
+    @property
+    def n(self) -> int:
+        """Return the number of joints."""
+        return len(self.joint_names)
+
+    def index(self, joint: str) -> int:
+        """
+        Return the position of a joint in the chain.
+
+        Raises
+        ------
+        ModelError
+            The robot has no such joint; the message lists those it has.
+
+        """
+        try:
+            return self.joint_names.index(joint)
+        except ValueError:
+            raise ModelError(
+                f'robot {self.name!r} has no joint {joint!r}; its joints are '
+                + ', '.join(self.joint_names)
+            ) from None
+
+    def with_frames(self, *, base: Array | None = None, tool: Array | None = None) -> Robot:
+        """Return the same arm with another base or tool frame, each shape (4, 4)."""
+        return replace(
+            self,
+            T_world_base=self.T_world_base if base is None else base,
+            T_flange_tool=self.T_flange_tool if tool is None else tool,
+        )
+
+    def check_positions(self, q: Array) -> None:
+        """
+        Refuse joint positions that look like degrees or lie outside the limits.
+
+        Raises
+        ------
+        DataError
+            Names the joint, the value and the likely reason.
+
+        """
+        values = np.asarray(q).reshape(-1, self.n)
+        slack = 1e-6
+        outside = (values < self.lower - slack) | (values > self.upper + slack)
+        if not outside.any():
+            return
+        k, j = (int(i) for i in np.argwhere(outside)[0])
+        value, name = values[k, j], self.joint_names[j]
+        hint = 'check the limits in the robot file'
+        if not self.prismatic[j] and np.abs(values[:, ~self.prismatic]).max() > 4.0 * np.pi:
+            hint = 'this looks like degrees in a radian field'
+        raise DataError(
+            f'joint {name!r} is at {value:.6g} in sample {k}, outside its limits '
+            f'[{self.lower[j]:.6g}, {self.upper[j]:.6g}]; {hint}'
+        )
+
+    @classmethod
+    def from_mapping(cls, data: Mapping[str, Any]) -> Robot:
+        """
+        Build a robot from the mapping a robot file holds.
+
+        Raises
+        ------
+        ModelError
+            A key is missing, unknown or has a wrong value.
+
+        """
+        if not isinstance(data, Mapping):
+            raise ModelError(f'a robot file must be a mapping of keys, got {type(data).__name__}')
+        _known(data, _TOP_KEYS, 'robot file')
+        name = str(data.get('name', 'robot'))
+        rows = data.get('joints')
+        if not isinstance(rows, Sequence) or isinstance(rows, str) or not rows:
+            raise ModelError(f"robot {name!r} needs a list 'joints' in chain order")
+        for k, row in enumerate(rows):
+            if not isinstance(row, Mapping) or 'name' not in row:
+                raise ModelError(f"joint {k} of robot {name!r} needs a 'name'")
+            _known(row, _JOINT_KEYS, f'joint {row["name"]!r}')
+            if row.get('type', 'revolute') not in ('revolute', 'prismatic'):
+                raise ModelError(
+                    f'joint {row["name"]!r}: type must be revolute or prismatic, '
+                    f'got {row["type"]!r}'
+                )
+        try:
+            return cls._from_rows(name, rows, data)
+        except (DataError, TypeError, ValueError, KeyError, AttributeError) as error:
+            raise ModelError(f'robot {name!r}: {error}') from None
+
+    @classmethod
+    def _from_rows(cls, name: str, rows: Sequence[Any], data: Mapping[str, Any]) -> Robot:
+        def column(key: str, default: Any = 0.0, rows: Sequence[Any] = rows) -> Any:
+            return [row.get(key, default) for row in rows]
+
+        links = data.get('links')
+        payload = data.get('payload') or {}
+        if links is not None and len(links) != len(rows):
+            raise ModelError(
+                f'robot {name!r} has {len(links)} links for {len(rows)} joints; give one per joint'
+            )
+        return cls(
+            name=name,
+            joint_names=tuple(str(row['name']) for row in rows),
+            a=column('a'), alpha=column('alpha'), d=column('d'),
+            theta=column('theta_offset'), beta=column('beta'),
+            prismatic=np.array([row.get('type', 'revolute') == 'prismatic' for row in rows]),
+            lower=column('lower', -np.inf), upper=column('upper', np.inf),
+            max_velocity=column('max_velocity', np.inf),
+            max_acceleration=column('max_acceleration', np.inf),
+            convention=str(data.get('convention', 'standard')),
+            T_world_base=_frame(data.get('base'), 'base'),
+            T_flange_tool=_frame(data.get('tool'), 'tool'),
+            mass=None if links is None else column('mass', rows=links),
+            com=None if links is None else column('com', (0.0, 0.0, 0.0), links),
+            payload_mass=float(payload.get('mass', 0.0)),
+            payload_com=payload.get('com', np.zeros(3)),
+            gravity=data.get('gravity', STANDARD_GRAVITY),
+            source=str(data.get('source', '')),
+        )  # fmt: skip
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the mapping that `from_mapping` reads: plain numbers, lists and strings."""
+        joints = []
+        for k, name in enumerate(self.joint_names):
+            row: dict[str, Any] = {'name': name, 'a': float(self.a[k])}
+            row |= {'alpha': float(self.alpha[k]), 'd': float(self.d[k])}
+            row['theta_offset'] = float(self.theta[k])
+            if self.beta[k] != 0.0:
+                row['beta'] = float(self.beta[k])
+            if self.prismatic[k]:
+                row['type'] = 'prismatic'
+            for key in ('lower', 'upper', 'max_velocity', 'max_acceleration'):
+                value = float(getattr(self, key)[k])
+                if np.isfinite(value):
+                    row[key] = value
+            joints.append(row)
+        out: dict[str, Any] = {
+            'name': self.name, 'convention': self.convention, 'gravity': self.gravity.tolist(),
+            'base': _pose_mapping(self.T_world_base), 'tool': _pose_mapping(self.T_flange_tool),
+            'joints': joints,
+        }  # fmt: skip
+        if self.mass is not None and self.com is not None:
+            out['links'] = [
+                {'mass': float(m), 'com': c.tolist()}
+                for m, c in zip(self.mass, self.com, strict=True)
+            ]
+        out['payload'] = {'mass': float(self.payload_mass), 'com': self.payload_com.tolist()}
+        if self.source:
+            out['source'] = self.source
+        return out
+
+
+def _known(mapping: Mapping[str, Any], keys: set[str], where: str) -> None:
+    unknown = sorted(set(map(str, mapping)) - keys)
+    if unknown:
+        raise ModelError(
+            f'{where} has the unknown key {unknown[0]!r}; known keys are '
+            + ', '.join(sorted(keys))
+        )
+
+
+def _frame(value: Any, name: str) -> Array:
+    if value is None:
+        return np.eye(4)
+    position = readonly(value.get('xyz', (0.0, 0.0, 0.0)), (3,), f'{name} xyz')
+    quaternion = value.get('quat_xyzw', (0.0, 0.0, 0.0, 1.0))
+    return transform(matrix_from_quaternion(quaternion, f'{name} quat_xyzw'), position)
+
+
+def _pose_mapping(matrix: Array) -> dict[str, list[float]]:
+    return {
+        'xyz': matrix[:3, 3].tolist(),
+        'quat_xyzw': quaternion_from_matrix(matrix[:3, :3]).tolist(),
+    }

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Rotations: vectors, matrices and quaternions (x y z w), batched over leading axes.
+
+References
+----------
+.. [1] J. Sola, J. Deray, D. Atchuthan, "A micro Lie theory for state estimation in robotics",
+   arXiv:1812.01537, eqs. 132-146.
+
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from ..arrays import Array, readonly
+from ..errors import DataError
+
+SMALL_ANGLE = 1e-4
+"""Below this angle [rad] the series of sin and cos are exact to rounding."""
+
+
+def skew(vector: Array) -> Array:
+    """Return the cross-product matrices, shape (..., 3, 3), of vectors, shape (..., 3)."""
+    x, y, z = np.moveaxis(vector, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(
+        vector.shape[:-1] + (3, 3)
+    )
+
+
+def _series(angle: Array) -> tuple[Array, Array, Array]:
+    """Return sin(a)/a, (1-cos a)/a^2 and (a-sin a)/a^3 without cancellation at zero."""
+    square = angle * angle
+    safe = np.where(angle < SMALL_ANGLE, 1.0, angle)
+    half = np.sin(0.5 * safe)
+    small = angle < SMALL_ANGLE
+    first = np.where(small, 1.0 - square / 6.0, np.sin(safe) / safe)
+    second = np.where(small, 0.5 - square / 24.0, 2.0 * half * half / (safe * safe))
+    third = np.where(small, 1.0 / 6.0 - square / 120.0, (safe - np.sin(safe)) / safe**3)
+    return first, second, third
+
+
+def rotation_matrix(rotvec: ArrayLike) -> Array:
+    """Return rotation matrices, shape (..., 3, 3), of rotation vectors, shape (..., 3) [rad]."""
+    vector = np.asarray(rotvec, dtype=np.float64)
+    cross = skew(vector)
+    sine, cosine, _ = _series(np.linalg.norm(vector, axis=-1)[..., None, None])
+    return np.eye(3) + sine * cross + cosine * (cross @ cross)
+
+
+def left_jacobian(rotvec: ArrayLike) -> Array:
+    """Return J with R(v + dv) = R(J dv) R(v) to first order; shape (..., 3, 3)."""
+    vector = np.asarray(rotvec, dtype=np.float64)
+    cross = skew(vector)
+    _, cosine, third = _series(np.linalg.norm(vector, axis=-1)[..., None, None])
+    return np.eye(3) + cosine * cross + third * (cross @ cross)
+
+
+def rotation_vector(matrix: Array) -> Array:
+    """Return rotation vectors, shape (..., 3) [rad], of rotation matrices, shape (..., 3, 3)."""
+    vectors = _rotations(matrix).as_rotvec() if matrix.size else np.zeros(0)
+    return np.reshape(vectors, matrix.shape[:-2] + (3,))
+
+
+def _rotations(matrix: Array) -> Rotation:
+    """Return scipy's rotations; before 1.12 it takes neither read-only arrays nor none at all."""
+    return Rotation.from_matrix(np.array(matrix).reshape(-1, 3, 3))
+
+
+def matrix_from_quaternion(quaternion: ArrayLike, name: str = 'quaternion') -> Array:
+    """
+    Return rotation matrices, shape (..., 3, 3), of quaternions x y z w, shape (..., 4).
+
+    Raises
+    ------
+    DataError
+        A quaternion is not finite or its length is not 1 within 1 %.
+
+    """
+    values = np.asarray(quaternion, dtype=np.float64)
+    flat = readonly(values.reshape(-1, 4), (None, 4), name)
+    length = np.linalg.norm(flat, axis=1)
+    if flat.size and (abs(length - 1.0) > 0.01).any():
+        k = int(np.argmax(abs(length - 1.0) > 0.01))
+        raise DataError(
+            f'{name} {k} has length {length[k]:.4g}, a rotation needs 1; '
+            'check the order (x y z w) and that it is not left at zero'
+        )
+    matrices = Rotation.from_quat(np.array(flat)).as_matrix() if flat.size else np.zeros(0)
+    return np.reshape(matrices, values.shape[:-1] + (3, 3))
+
+
+def quaternion_from_matrix(matrix: Array) -> Array:
+    """Return quaternions x y z w with w >= 0, shape (..., 4), of rotation matrices."""
+    values = _rotations(matrix).as_quat() if matrix.size else np.zeros((0, 4))
+    canonical = np.where(values[:, 3:] < 0.0, -values, values)
+    return np.reshape(canonical, matrix.shape[:-2] + (4,))
+
+
+def transform(rotation: Array, position: Array) -> Array:
+    """Return homogeneous transforms, shape (..., 4, 4)."""
+    out = np.zeros(np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1]) + (4, 4))
+    out[..., :3, :3] = rotation
+    out[..., :3, 3] = position
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def angle_between(first: Array, second: Array) -> Array:
+    """Return the rotation vectors, shape (..., 3) [rad], that turn ``second`` into ``first``."""
+    return rotation_vector(first @ np.swapaxes(second, -1, -2))

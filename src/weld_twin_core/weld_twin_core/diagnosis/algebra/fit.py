@@ -1,0 +1,227 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Nonlinear least squares of frames and effects together, robust to outliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from ...arrays import Array
+from .problem import Model, Problem, Scale
+
+HUBER = 3.0
+"""A sample this many robust deviations off starts to lose weight."""
+LEAST_TURN = 0.5
+"""
+Least noise of orientation per noise of position [rad/m]: no probe is wider than some metres.
+
+Exact orientations, as a simulated cell gives, would otherwise drown every position.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """
+    A fitted model.
+
+    Attributes
+    ----------
+    model : Model
+    residual : array, shape (rows,)
+        Whitened residual at the solution.
+    information : array, shape (P, P)
+        Normal matrix of frames and effect coordinates, prior included.
+    names : list of str
+        Frame columns first, then 'k.j' for coordinate j of found effect k.
+    coordinates : array, shape (K,)
+        Fit coordinates of all found effects.
+
+    """
+
+    model: Model
+    residual: Array
+    information: Array
+    names: list[str]
+    coordinates: Array
+
+    @property
+    def rss(self) -> float:
+        """Return the whitened sum of squares."""
+        return float(self.residual @ self.residual)
+
+    def covariance(self, inflation: float = 1.0) -> Array:
+        """Return the covariance of the effect coordinates, shape (K, K)."""
+        count = self.coordinates.size
+        if count == 0:
+            return np.zeros((0, 0))
+        size = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        scaled = self.information / np.outer(size, size)
+        inverse = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True) / np.outer(size, size)
+        return np.asarray(inflation * inverse[-count:, -count:])
+
+
+def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[str]]:
+    """Return the whitened columns of frames and found effects, shape (P, rows), and names."""
+    features = problem.features(model)
+    parts, names = problem.frame_columns(features)
+    columns = [problem.whitened(parts, scale)]
+    for k, effect in enumerate(model.found):
+        block = problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
+        columns.append(block)
+        names = names + [f'{k}.{j}' for j in range(block.shape[0])]
+    return np.concatenate(columns), names
+
+
+def stepped(problem: Problem, model: Model, step: Array) -> Model:
+    """Return the model after a step of frames and coordinates, in the order of `design`."""
+    at = 0
+    if 'base' in problem.align:
+        for k in range(len(problem.recordings)):
+            model = model.moved(k, step[at : at + 6])
+            at += 6
+    if 'tool' in problem.align:
+        model = model.retooled(step[at : at + 6])
+        at += 6
+    found = []
+    for effect in model.found:
+        now = effect.coordinates()
+        found.append(effect.with_coordinates(now + step[at : at + now.size]))
+        at += now.size
+    return model.with_found(tuple(found))
+
+
+def coordinates(model: Model) -> Array:
+    """Return the fit coordinates of all found effects, shape (K,)."""
+    return np.concatenate([np.zeros(0), *(effect.coordinates() for effect in model.found)])
+
+
+def fit(
+    problem: Problem,
+    model: Model,
+    scale: Scale,
+    precision: Array | None = None,
+    iterations: int = 12,
+    tolerance: float = 1e-5,
+) -> Fit:
+    """
+    Return the least-squares fit of nuisance frames and the found effects' coordinates.
+
+    Levenberg-Marquardt on column-scaled normal equations.
+
+    Parameters
+    ----------
+    problem, model, scale
+        ``model`` is the start; its known effects stay as they are.
+    precision : array, shape (K,), optional
+        Prior precision of every effect coordinate, about zero, in whitened units.
+    iterations : int
+    tolerance : float
+        Stops when the objective falls by less than this share.
+
+    """
+    residual = problem.whitened(problem.residuals(model), scale)
+    x = coordinates(model)
+    prior = np.zeros(x.size) if precision is None else precision
+    damping = 1e-9
+    cost = float(residual @ residual + prior @ x**2)
+    columns, names = design(problem, model, scale)
+    for _ in range(iterations):
+        frames = columns.shape[0] - x.size
+        ridge = np.concatenate([np.zeros(frames), prior])
+        normal = columns @ columns.T + np.diag(ridge)
+        right = columns @ residual - ridge * np.concatenate([np.zeros(frames), x])
+        improved = False
+        while damping < 1e6:
+            trial = stepped(problem, model, solve_scaled(normal, right, damping))
+            moved = problem.whitened(problem.residuals(trial), scale)
+            x_trial = coordinates(trial)
+            cost_trial = float(moved @ moved + prior @ x_trial**2)
+            if cost_trial <= cost:
+                improved = True
+                break
+            damping = max(damping * 100.0, 1e-6)
+        if not improved:
+            break
+        gain = (cost - cost_trial) / max(cost, 1e-300)
+        model, residual, x, cost = trial, moved, x_trial, cost_trial
+        damping = max(damping * 0.01, 1e-9)
+        columns, names = design(problem, model, scale)
+        if gain < tolerance:
+            break
+    frames = columns.shape[0] - x.size
+    information = columns @ columns.T + np.diag(np.concatenate([np.zeros(frames), prior]))
+    return Fit(model, residual, information, names, x)
+
+
+def solve_scaled(normal: Array, right: Array, damping: float) -> Array:
+    """Return the solution of damped, column-scaled normal equations; flat directions stay put."""
+    size = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    live = size > 1e-12 * max(size.max(initial=0.0), 1e-300)
+    out = np.zeros(right.size)
+    if not live.any():
+        return out
+    scaled = normal[np.ix_(live, live)] / np.outer(size[live], size[live])
+    scaled[np.diag_indices_from(scaled)] += max(damping, 1e-11)
+    wanted = right[live] / size[live]
+    try:
+        out[live] = cho_solve(cho_factor(scaled), wanted) / size[live]
+    except LinAlgError:
+        out[live] = np.linalg.lstsq(scaled, wanted, rcond=1e-12)[0] / size[live]
+    return out
+
+
+def robust_scale(
+    problem: Problem, residuals: list[Array], least: Scale | None = None, freedom: float = 0.0
+) -> Scale:
+    """
+    Return the noise of residuals by median absolute deviation, and Huber weights per sample.
+
+    Parameters
+    ----------
+    problem : Problem
+    residuals : list of array, shape (c, M)
+    least : Scale, optional
+        Never return less noise than this.
+    freedom : float
+        Coordinates that the residuals' own data determined; they took their share of the noise.
+
+    """
+    lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
+    position = np.concatenate([r[:3].ravel() for r in residuals])
+    turn = np.concatenate([r[3:].ravel() for r in residuals])
+    sigma = _spread(position) / lost
+    sigma_turn = _spread(turn) / lost if turn.size else 1.0
+    if least is not None:
+        sigma, sigma_turn = max(sigma, least.position), max(sigma_turn, least.orientation)
+    sigma = max(sigma, 1e-9)
+    sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
+    weights = []
+    for part in residuals:
+        off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma
+        if part.shape[0] > 3:
+            off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)
+        weights.append(np.minimum(1.0, (HUBER / np.maximum(off, 1e-12)) ** 2))
+    return Scale(sigma, sigma_turn, tuple(weights))
+
+
+def robust_fit(
+    problem: Problem, model: Model, scale: Scale, precision: Array | None = None, rounds: int = 2
+) -> tuple[Fit, Scale]:
+    """Return a fit and the noise and weights that go with it, by reweighting a few times."""
+    result = fit(problem, model, scale, precision)
+    for _ in range(rounds):
+        scale = robust_scale(problem, problem.residuals(result.model))
+        result = fit(problem, result.model, scale, precision, iterations=4)
+    return result, scale
+
+
+def _spread(values: Array) -> float:
+    return float(1.4826 * np.median(np.abs(values))) if values.size else 0.0
+
+
+def with_weights(scale: Scale, problem: Problem) -> Scale:
+    """Return the scale with unit weights for another problem's samples."""
+    return replace(scale, weights=tuple(np.ones(m) for m in problem.samples))

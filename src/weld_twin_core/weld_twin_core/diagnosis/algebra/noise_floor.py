@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The noise floor, estimated from the data: repeats, differences of neighbours, what is left."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from .problem import Problem
+
+SAME_STATION = 2e-3
+"""Stations closer than this in every joint [rad, m] are repeats of one pose."""
+ENOUGH = 12
+
+
+def noise_floor(problem: Problem, residuals: list[Array]) -> tuple[float, bool]:
+    """
+    Return the standard deviation of one measured coordinate, [m], and whether it is independent.
+
+    Independent means that repeats or differences in time showed it, not what a model left.
+
+    Parameters
+    ----------
+    problem : Problem
+    residuals : list of array, shape (c, M)
+        Of the best model at hand. What it leaves bounds the floor from above; repeated stations
+        and third differences in time, where the data have them, are not touched by its faults.
+
+    """
+    estimates = []
+    independent = True
+    for recording, part in zip(problem.recordings, residuals, strict=True):
+        position = part[:3]
+        left = 1.4826 * float(np.median(np.abs(position)))
+        static = recording.joints.static
+        direct = _repeats(recording.joints.q, position) if static else _differences(position)
+        if direct is None and recording.measured is not None:
+            sigma = recording.measured.sigma
+            direct = None if sigma is None else float(np.median(sigma))
+            independent = False
+        estimates.append((left if direct is None else min(direct, left), part.shape[1]))
+    values, counts = zip(*estimates, strict=True)
+    return float(np.average(values, weights=counts)), independent
+
+
+def _differences(position: Array) -> float | None:
+    """Return the noise that third differences of neighbouring samples show: 1, -3, 3, -1."""
+    if position.shape[1] < ENOUGH:
+        return None
+    third = np.diff(position, n=3, axis=1)
+    return 1.4826 * float(np.median(np.abs(third))) / float(np.sqrt(20.0))
+
+
+def _repeats(q: Array, position: Array) -> float | None:
+    """Return the noise that repeated stations show; None when too few were repeated."""
+    if q.shape[0] != position.shape[1]:
+        return None
+    order = np.lexsort(np.round(q / SAME_STATION).T)
+    close = np.abs(np.diff(q[order], axis=0)).max(axis=1) < SAME_STATION
+    if close.sum() < ENOUGH:
+        return None
+    change = np.diff(position[:, order], axis=1)[:, close]
+    return 1.4826 * float(np.median(np.abs(change))) / float(np.sqrt(2.0))

@@ -1,0 +1,244 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The diagnosis problem: recordings, the model believed so far, and residuals in one layout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arm.rotation import angle_between, rotation_matrix
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...errors import DataError
+from ...recording import Measurements, Recording
+from ...twin.features import Features
+from ...twin.twin import Twin
+
+FRAMES = ('base', 'tool')
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """
+    Noise that residuals are measured in: position [m], orientation [rad], weight per sample.
+
+    ``weights`` holds one array (M,) per recording, 1 for a good sample, less for an outlier.
+    """
+
+    position: float
+    orientation: float
+    weights: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """
+    What is believed: the robot with its tool frame, a base frame per recording, and effects.
+
+    Attributes
+    ----------
+    robot : Robot
+    bases : tuple of array, shape (4, 4)
+    known, found : tuple of Effect
+        Effects given by the user, and those this diagnosis put in.
+
+    """
+
+    robot: Robot
+    bases: tuple[Array, ...]
+    known: tuple[Effect, ...] = ()
+    found: tuple[Effect, ...] = ()
+
+    def twin(self, k: int) -> Twin:
+        """Return the twin of recording k."""
+        return Twin(self.robot.with_frames(base=self.bases[k]), self.known + self.found)
+
+    def moved(self, k: int, step: Array) -> Model:
+        """Return the model with the base of recording k moved by (xyz, rotvec)."""
+        bases = list(self.bases)
+        bases[k] = _moved(bases[k], step, left=True)
+        return replace(self, bases=tuple(bases))
+
+    def retooled(self, step: Array) -> Model:
+        """Return the model with the tool moved by (xyz, rotvec)."""
+        tool = _moved(self.robot.T_flange_tool, step, left=False)
+        return replace(self, robot=self.robot.with_frames(tool=tool))
+
+    def with_found(self, found: tuple[Effect, ...]) -> Model:
+        """Return the model with other found effects."""
+        return replace(self, found=found)
+
+
+def _moved(frame: Array, step: Array, *, left: bool) -> Array:
+    out = np.array(frame)
+    turn = rotation_matrix(step[3:])
+    out[:3, :3] = turn @ out[:3, :3] if left else out[:3, :3] @ turn
+    out[:3, 3] += step[:3]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """
+    Recordings to explain.
+
+    Attributes
+    ----------
+    recordings : tuple of Recording
+        Each with measurements inside its joint stream; see `usable`.
+    align : frozenset
+        Frames fitted as nuisance in every hypothesis: 'base' (one per recording), 'tool'.
+
+    """
+
+    recordings: tuple[Recording, ...]
+    align: frozenset[str] = field(default_factory=frozenset)
+
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """Return the scalar rows per sample of each recording: 6 for poses, 3 for points."""
+        return tuple(3 if _measured(r).rotation is None else 6 for r in self.recordings)
+
+    @property
+    def samples(self) -> tuple[int, ...]:
+        """Return the number of measurements of each recording."""
+        return tuple(_measured(r).t.size for r in self.recordings)
+
+    @property
+    def size(self) -> int:
+        """Return the number of scalar rows."""
+        return sum(c * m for c, m in zip(self.rows, self.samples, strict=True))
+
+    def residuals(self, model: Model) -> list[Array]:
+        """Return measured minus twin, one array (3 or 6, M) per recording [m, rad]."""
+        out = []
+        for k, recording in enumerate(self.recordings):
+            measured = _measured(recording)
+            poses = model.twin(k).poses(recording, measured.t)
+            parts = [(measured.position - poses.position).T]
+            if measured.rotation is not None:
+                parts.append(angle_between(measured.rotation, poses.rotation).T)
+            out.append(np.concatenate(parts))
+        return out
+
+    def features(self, model: Model) -> list[Features]:
+        """Return the feature makers of all recordings, taken at the model."""
+        return [
+            Features(model.twin(k), r, _measured(r).t) for k, r in enumerate(self.recordings)
+        ]
+
+    def whitened(self, parts: list[Array], scale: Scale) -> Array:
+        """
+        Return residual-like parts, each (..., c, M), as one array (..., rows) in units of noise.
+
+        Rows run over recordings, then samples, then components, so that a stretch of time is a
+        stretch of rows.
+        """
+        out = []
+        for part, weight in zip(parts, scale.weights, strict=True):
+            unit = np.full(part.shape[-2], 1.0 / scale.position)
+            unit[3:] = 1.0 / scale.orientation
+            turned = np.swapaxes(part, -1, -2)
+            scaled = np.empty(turned.shape)
+            np.multiply(turned, np.sqrt(weight)[:, None] * unit, out=scaled)
+            out.append(scaled.reshape(*part.shape[:-2], weight.size * unit.size))
+        return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
+
+    def frame_columns(self, features: list[Features]) -> tuple[list[Array], list[str]]:
+        """Return nuisance columns, one (P, c, M) array per recording, and their names."""
+        names: list[str] = []
+        if 'base' in self.align:
+            names += [f'base {k}.{j}' for k in range(len(self.recordings)) for j in range(6)]
+        if 'tool' in self.align:
+            names += [f'tool.{j}' for j in range(6)]
+        parts = []
+        for k, maker in enumerate(features):
+            block = np.zeros((len(names), self.rows[k], self.samples[k]))
+            for p, name in enumerate(names):
+                kind, _, j = name.partition('.')
+                if kind == f'base {k}' or kind == 'tool':
+                    block[p] = maker.column((kind.split()[0], int(j)))[: self.rows[k]]
+            parts.append(block)
+        return parts, names
+
+    def effect_columns(
+        self, features: list[Features], effect: Effect, *, atoms: bool = True
+    ) -> list[Array]:
+        """Return an effect's columns, one (P, c, M) array per recording."""
+        return [
+            maker.columns(effect, atoms)[:, : self.rows[k]] for k, maker in enumerate(features)
+        ]
+
+    def block_labels(self, blocks: int) -> Array:
+        """
+        Return a block number for every row: contiguous stretches, at least one per recording.
+
+        Recordings count by their length; a stretch never spans two recordings.
+        """
+        total = max(sum(self.samples), 1)
+        out, start = [], 0
+        for c, m in zip(self.rows, self.samples, strict=True):
+            count = max(1, round(blocks * m / total))
+            labels = start + (np.arange(m) * count) // max(m, 1)
+            out.append(np.repeat(labels, c))
+            start += count
+        return np.concatenate(out)
+
+    def thinned(self, most_rows: int) -> Problem:
+        """Return the problem with evenly fewer measurements when it has too many rows."""
+        factor = self.size / most_rows
+        if factor <= 1.0:
+            return self
+        out = []
+        for recording in self.recordings:
+            measured = _measured(recording)
+            count = max(2, round(measured.t.size / factor))
+            index = np.unique(np.linspace(0, measured.t.size - 1, count).round().astype(int))
+            out.append(recording.with_measured(measured.take(index)))
+        return replace(self, recordings=tuple(out))
+
+    def restricted(self, keep: list[Array]) -> Problem:
+        """Return the problem with a mask or index of measurements per recording."""
+        recordings = tuple(
+            r.with_measured(_measured(r).take(index))
+            for r, index in zip(self.recordings, keep, strict=True)
+        )
+        return replace(self, recordings=recordings)
+
+    def unit_scale(self) -> Scale:
+        """Return a scale before anything is known of the noise."""
+        return Scale(1e-4, 2e-4, tuple(np.ones(m) for m in self.samples))
+
+
+def usable(recording: Recording) -> Recording:
+    """
+    Return the recording with the measurements that lie inside its joint stream.
+
+    Raises
+    ------
+    DataError
+        Nothing was measured, or no measurement falls inside the joint stream.
+
+    """
+    measured, joints = recording.measured, recording.joints
+    if measured is None or measured.t.size == 0:
+        raise DataError(f'{recording.name} holds no measured poses or points')
+    if joints.static:
+        return recording
+    inside = (measured.t >= joints.t[0]) & (measured.t <= joints.t[-1])
+    if not inside.any():
+        raise DataError(
+            f'no measurement of {recording.name} lies inside its joint stream '
+            f'({joints.t[0]:.3f} to {joints.t[-1]:.3f} s against {measured.t[0]:.3f} to '
+            f'{measured.t[-1]:.3f} s); the two clocks differ'
+        )
+    return recording.with_measured(measured.take(inside))
+
+
+def _measured(recording: Recording) -> Measurements:
+    if recording.measured is None:
+        raise DataError(f'{recording.name} holds no measured poses or points')
+    return recording.measured

@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Standard errors of what was found.
+
+The largest of what four reasons give: the noise, as if rows were independent; scores that hang
+together within a stretch, or differ between stretches because the model is not quite the arm [1]_;
+other optima that fit nearly as well; and formulas that are idealised.
+
+References
+----------
+.. [1] H. White, "Maximum likelihood estimation of misspecified models", Econometrica 50, 1982.
+
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...effects.transmission_ripple import TransmissionRipple
+from ..hypotheses.starts import profile
+from .fit import coordinates, design
+from .problem import Model, Problem, Scale
+
+BLOCKS = 24
+UNSEEN = 1e-2
+"""A coordinate a thousand times its typical size must move some row by this much noise."""
+
+
+def standard_errors(
+    problem: Problem, model: Model, scale: Scale, precision: Array, share: float
+) -> list[dict[str, Any]]:
+    """
+    Return the standard errors of every found effect, in the shape of its parameters.
+
+    Parameters that are not fitted, that rest on a bound or that the data do not show have none.
+
+    Parameters
+    ----------
+    problem, model, scale
+        A model fitted to all measurements.
+    precision : array, shape (K,)
+        Of the prior of all fit coordinates, about zero.
+    share : float
+        Of the rows that count as independent.
+
+    """
+    if not model.found:
+        return []
+    variance = _variance(problem, model, scale, precision, share)
+    at, out = 0, []
+    for k, effect in enumerate(model.found):
+        size = effect.coordinates().size
+        own = np.sqrt(variance[at : at + size])
+        at += size
+        if not isinstance(effect, TransmissionRipple):
+            own = np.maximum(own, _elsewhere(problem, model, scale, k, share))
+            own = np.hypot(own, _idealised(effect))
+        out.append(_shaped(effect, own))
+    return out
+
+
+def _variance(
+    problem: Problem, model: Model, scale: Scale, precision: Array, share: float
+) -> Array:
+    """Return the variance of every fit coordinate, shape (K,); NaN where there is none."""
+    columns, _ = design(problem, model, scale)
+    count = coordinates(model).size
+    prior = precision if precision.size else np.zeros(count)
+    live = np.concatenate([np.ones(columns.shape[0] - count, bool), _free(model)])
+    live &= _visible(columns, model)
+    columns = columns[live]
+    ridge = np.concatenate([np.zeros(live.size - count), prior])[live]
+    size = np.sqrt((columns**2).sum(axis=1) + ridge)
+    columns /= size[:, None]
+    normal = columns @ columns.T + np.diag(ridge / size**2)
+    inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
+    residual = problem.whitened(problem.residuals(model), scale)
+    cuts = np.flatnonzero(np.diff(problem.block_labels(BLOCKS))) + 1
+    stretches = np.split(np.arange(residual.size), cuts)
+    scores = inverse @ np.stack([columns[:, s] @ residual[s] for s in stretches], axis=1)
+    blocks = max(len(stretches), 2)
+    together = (scores**2).sum(axis=1) * blocks / (blocks - 1)
+    out = np.full(live.size, np.nan)
+    out[live] = np.maximum(np.diag(inverse) / share, together) / size**2
+    return out[live.size - count :]
+
+
+def _free(model: Model) -> NDArray[np.bool_]:
+    """Return which fit coordinates are off their bounds, shape (K,)."""
+    out: list[bool] = []
+    for effect in model.found:
+        if isinstance(effect, TransmissionRipple):
+            out += [True] * effect.coordinates().size
+            continue
+        specs = [p for p, _ in effect.components() if p.differentiable]
+        out += [p.lower < value < p.upper
+                for p, value in zip(specs, effect.coordinates(), strict=True)]  # fmt: skip
+    return np.array(out, dtype=bool)
+
+
+def _visible(columns: Array, model: Model) -> NDArray[np.bool_]:
+    """Return which columns the data show, shape (P,)."""
+    scales = np.concatenate([effect.coordinate_scales() for effect in model.found])
+    reach = np.concatenate([np.ones(columns.shape[0] - scales.size), 1e3 * scales])
+    return np.asarray(np.abs(columns).max(axis=1) * reach > UNSEEN)
+
+
+def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: float) -> Array:
+    """Return how far instances that fit nearly as well spread about effect k, per coordinate."""
+    effect = model.found[k]
+    trials = profile(problem, model, scale, k)
+    if trials is None or not effect.coordinates().size:
+        return np.zeros(effect.coordinates().size)
+    others, worse = trials
+    weight = np.exp(-0.5 * share * np.maximum(worse, 0.0))
+    apart = np.array([other.coordinates() for other in others]) - effect.coordinates()
+    return np.asarray(np.sqrt(weight @ apart**2 / (1.0 + weight.sum())))
+
+
+def _idealised(effect: Effect) -> Array:
+    """Return how far real arms differ from the formulas, per coordinate."""
+    specs = [p for p, _ in effect.components() if p.differentiable]
+    return np.array([p.idealised for p in specs]) * np.abs(effect.coordinates())
+
+
+def _shaped(effect: Effect, std: Array) -> dict[str, Any]:
+    """Return standard errors by parameter, None for a component that has none."""
+    if isinstance(effect, TransmissionRipple):
+        return _ripple(effect, std)
+    out: dict[str, Any] = {}
+    values = iter(None if np.isnan(value) else float(value) for value in std)
+    for parameter, index in effect.components():
+        if not parameter.differentiable:
+            continue
+        if index is None:
+            out[parameter.name] = next(values)
+        else:
+            out.setdefault(parameter.name, []).append(next(values))
+    return {
+        name: value for name, value in out.items()
+        if value is not None and value != [None] * len(np.atleast_1d(value))
+    }  # fmt: skip
+
+
+def _ripple(effect: TransmissionRipple, std: Array) -> dict[str, Any]:
+    """Return the errors of amplitude and phase; sine and cosine are what was fitted."""
+    amplitude = np.atleast_1d(np.asarray(effect.amplitude))
+    spread = np.sqrt((std.reshape(-1, 2) ** 2).mean(axis=1))
+    phase = np.minimum(spread / np.maximum(amplitude, 1e-300), np.pi)
+    if np.ndim(effect.amplitude) > 0:
+        return {'amplitude': spread.tolist(), 'phase': phase.tolist()}
+    return {'amplitude': float(spread[0]), 'phase': float(phase[0])}

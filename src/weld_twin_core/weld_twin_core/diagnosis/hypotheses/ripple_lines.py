@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Narrow ripple lines of high order, looked for one by one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...effects.transmission_ripple import TransmissionRipple
+from ...twin.features import Features
+from ..algebra.problem import Model, Problem, Scale
+
+DENSE_ORDERS = 100
+"""One per tooth of a 100:1 gear, the highest order that a search takes one by one."""
+HIGHEST_ORDER = 420
+LINE = 25.0
+"""Chi-square of two degrees of freedom that a single line must reach: one false in 1e5 looks."""
+LINES = 40
+RANGE = 1.0
+"""A joint must travel this far [rad] for its ripple to be told from its neighbours' orders."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Waves:
+    """
+    Sine and cosine of every order of one joint, and what never changes from look to look.
+
+    Attributes
+    ----------
+    joint : int
+    columns : list of array, shape (c, M)
+        d pose / d joint of every recording.
+    masses : list of array, shape (c, M)
+        The same, weighted by the noise.
+    waves : list of array, shape (2 O, M)
+        Single precision: their sums over thousands of stations are good to 1e-6.
+    normal : array, shape (O, 2, 2)
+    apart : float
+        Half the resolution in orders that the range of motion allows.
+
+    """
+
+    joint: int
+    columns: list[Array]
+    masses: list[Array]
+    waves: list[np.ndarray]
+    normal: Array
+    apart: float
+
+    @classmethod
+    def of(
+        cls, problem: Problem, features: list[Features], scale: Scale, joint: int, orders: Array
+    ) -> _Waves | None:
+        """Return the waves of a joint, or None when it hardly moves."""
+        low = min(float(maker.view.q[:, joint].min()) for maker in features)
+        high = max(float(maker.view.q[:, joint].max()) for maker in features)
+        if high - low < RANGE:
+            return None
+        columns, masses, waves = [], [], []
+        normal = np.zeros((orders.size, 2, 2))
+        for r, maker in enumerate(features):
+            unit = np.full((problem.rows[r], 1), scale.position**-2)
+            unit[3:] = scale.orientation**-2
+            column = maker.column(('q', joint))[: problem.rows[r]]
+            mass = column * unit * scale.weights[r]
+            angle = orders[:, None] * maker.view.q[:, joint]
+            sine, cosine = np.sin(angle), np.cos(angle)
+            weight = (column * mass).sum(axis=0)
+            squares = sine**2 @ weight
+            cross = (sine * cosine) @ weight
+            terms = [squares, cross, cross, weight.sum() - squares]
+            normal += np.stack(terms, -1).reshape(-1, 2, 2)
+            columns.append(column)
+            masses.append(mass)
+            waves.append(np.concatenate([sine, cosine]).astype(np.float32))
+        normal += 1e-9 * np.eye(2) * np.trace(normal[0])
+        return cls(joint, columns, masses, waves, normal, float(np.ceil(np.pi / (high - low))))
+
+    def peak(self, residual: list[Array], free: Array) -> tuple[float, int, int, Array]:
+        """
+        Return the strongest order: chi-square, joint, its place among the orders, (sine, cosine).
+
+        ``free``, shape (O,), marks the orders that may enter.
+        """
+        pull = np.zeros(2 * free.size)
+        for mass, part, wave in zip(self.masses, residual, self.waves, strict=True):
+            pull += wave @ (mass * part).sum(axis=0).astype(np.float32)
+        right = np.where(free, pull.reshape(2, -1), 0.0).T
+        step = np.linalg.solve(self.normal, right[..., None])[..., 0]
+        chi = (right * step).sum(axis=-1)
+        k = int(np.argmax(chi))
+        return float(chi[k]), self.joint, k, step[k]
+
+
+def with_lines(problem: Problem, model: Model, scale: Scale) -> Model:
+    """
+    Return the model with narrow ripple lines above its dense orders.
+
+    The score statistic of sine and cosine at every order costs one small product per joint; the
+    strongest line enters, the residual it explains is taken off, and the look is repeated.
+    """
+    residual = problem.residuals(model)
+    features = problem.features(model)
+    orders = np.arange(DENSE_ORDERS + 1.0, HIGHEST_ORDER + 1.0)
+    each = [_Waves.of(problem, features, scale, i, orders) for i in range(model.robot.n)]
+    waves = {w.joint: w for w in each if w is not None}
+    free = {i: _free(model, w, orders) for i, w in waves.items()}
+    found = list(model.found)
+    for _ in range(LINES if waves else 0):
+        chi, i, k, step = max(
+            (w.peak(residual, free[i]) for i, w in waves.items()), key=lambda item: item[0]
+        )
+        if chi < LINE:
+            break
+        for r, maker in enumerate(features):
+            angle = orders[k] * maker.view.q[:, i]
+            wave = step[0] * np.sin(angle) + step[1] * np.cos(angle)
+            residual[r] = residual[r] - waves[i].columns[r] * wave
+        free[i] = free[i] & (np.abs(orders - orders[k]) >= waves[i].apart)
+        found = _with_order(found, model.robot.joint_names[i], float(orders[k]))
+    return model.with_found(tuple(found))
+
+
+def _free(model: Model, waves: _Waves, orders: Array) -> Array:
+    """Return which orders no ripple of the joint is too close to, shape (O,)."""
+    free = np.ones(orders.size, bool)
+    for effect in model.found:
+        here = effect.site == model.robot.joint_names[waves.joint]
+        if isinstance(effect, TransmissionRipple) and here:
+            for order in np.atleast_1d(effect.order):
+                free &= np.abs(orders - order) >= waves.apart
+    return free
+
+
+def _with_order(found: list[Effect], joint: str, order: float) -> list[Effect]:
+    out = []
+    for effect in found:
+        if isinstance(effect, TransmissionRipple) and effect.site == joint:
+            effect = replace(
+                effect,
+                amplitude=np.append(effect.amplitude, 0.0),
+                order=np.append(effect.order, order),
+                phase=np.append(effect.phase, 0.0),
+            )
+        out.append(effect)
+    return out

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Who else could have done it: for every effect found, the others that would do as well in its place.
+
+Probabilities come from the evidence of fitted alternatives. Families that share a subspace on
+these data tie, and are named together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..algebra.evidence_score import Choice, evidence
+from ..algebra.fit import Fit, fit
+from ..algebra.gram import Gram
+from ..result import Site
+from .selection import Workspace, fitted_with, ranking, without
+
+TEMPERATURE = 2.0
+"""Evidence is softened by this: real physics is a little richer than any model compared."""
+SHORTLIST = 7
+LISTED = 0.03
+"""A rival this probable is named beside the leader."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A unit in the place of a found effect: its evidence, and the fit with it."""
+
+    site: Site
+    nats: float
+    fit: Fit
+    probability: float = 0.0
+
+
+def rivals(
+    work: Workspace, now: Fit, k: int, effective: Callable[[Fit], float]
+) -> tuple[Rival, ...]:
+    """
+    Return found effect k and those that could take its place, most probable first.
+
+    Parameters
+    ----------
+    work : Workspace
+    now : Fit
+        The final fit, on the workspace's problem and scale.
+    k : int
+    effective : callable
+        Number of independent rows of a fit.
+
+    """
+    effect = now.model.found[k]
+    rest = fit(work.problem, without(now.model, k), work.scale, None, 4)
+    gram = work.conditioned(rest.model, rest.residual)
+    ranked = ranking(gram, work.library.units, effective(now))
+    own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
+    taken = {(e.name, e.site) for e in now.model.found}
+    choices = [c for c in ranked if c.unit.site not in taken and c.nats > 0.0]
+    reach = max(15.0, 0.35 * choices[0].nats) if choices else 0.0
+    close = [c for c in choices if c.nats > choices[0].nats - reach][:SHORTLIST]
+    fits = [fitted_with(work, rest.model, c.effect(gram)) for c in close]
+    # One count for all rivals: see `select`.
+    count = effective(min([now, *fits], key=lambda f: f.rss))
+    out = [Rival(Site(effect.name, effect.site), _nats(rest, now, count, own), now)]
+    for choice, other in zip(close, fits, strict=True):
+        out.append(Rival(Site(*choice.unit.site), _nats(rest, other, count, choice), other))
+    weights = np.exp((np.array([r.nats for r in out]) - max(r.nats for r in out)) / TEMPERATURE)
+    weights /= weights.sum()
+    weighed = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
+    return tuple(sorted(weighed, key=lambda r: -r.probability))
+
+
+def _nats(rest: Fit, full: Fit, count: float, choice: Choice | None) -> float:
+    """Return the evidence of a fit in the place of an effect, by the rule that holds for all."""
+    gram = Gram(np.zeros((0, 0)), np.zeros(0), rest.rss, rest.residual.size, np.zeros(0))
+    freedom = float(full.coordinates.size - rest.coordinates.size)
+    trials = 1.0
+    if choice is not None:
+        # Unused components of a vector effect buy nothing and cost nothing.
+        freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
+        trials = max(choice.unit.trials, 1.0)
+    return evidence(gram, rest.rss - full.rss, freedom, count) - float(np.log(trials))

@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From recordings to a fitted set of effects: baseline, selection, small errors, final fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Array
+from ..algebra.evidence_score import effective_share
+from ..algebra.fit import Fit, fit, robust_fit, robust_scale
+from ..algebra.problem import Model, Problem, Scale
+from ..many.small_errors import many_small
+from ..result import Site
+from ..unseen.unseen_stretches import Unseen
+from .library import Library, build
+from .rivals import Rival, rivals
+from .selection import Workspace, backward, consolidated, forward, without_negligible
+
+SEARCH_ROWS = 9000
+"""Rows a search works on: what is found there is fitted again on all."""
+FIT_ROWS = 30000
+ROUNDS = 3
+MANY = 8
+"""So many units found one by one on stations mean many small errors acting together."""
+SEVERAL = 4
+"""From this many on, the many are tried, and taken if they predict unseen stations better."""
+BETTER = 0.95
+MEMBER = 0.3
+"""Share of what all of them leave from which an effect counts as one of the many; a few large ones
+that tiny ones mend are one cause that the library lacks."""
+SWAPS = 3
+HOPE = 0.3
+MISFIT = 0.012
+"""Real edges are soft, springs harden, lags have a second pole: the model errs by this share."""
+MISFIT_DIRECTIONS = 30.0
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """
+    What a search found.
+
+    Attributes
+    ----------
+    problem, scale : Problem, Scale
+        All measurements, with the final noise and weights.
+    baseline : Fit
+        Frames and known effects only.
+    final : Fit
+    precision : array, shape (K,)
+        Prior precision of the final fit's coordinates.
+    work : Workspace
+        The library that rivals are drawn from.
+    small : Fit
+        The final fit on the workspace's measurements.
+    bare_rss : float
+        Sum of squares on the workspace's measurements without any found effect.
+    slots : tuple of tuple of Rival
+        For every found effect itself and its rivals; empty when many were fitted together.
+    dense : bool
+        Whether many small errors were fitted together.
+
+    """
+
+    problem: Problem
+    scale: Scale
+    baseline: Fit
+    final: Fit
+    precision: Array
+    work: Workspace
+    small: Fit
+    bare_rss: float
+    slots: tuple[tuple[Rival, ...], ...]
+    dense: bool
+
+    @property
+    def library(self) -> Library:
+        """Return the library searched."""
+        return self.work.library
+
+    def effective(self, found: Fit) -> float:
+        """Return the number of independent rows of a fit on the workspace's measurements."""
+        return effective_rows(self.work.problem, found, self.bare_rss)
+
+
+def effective_rows(
+    problem: Problem, found: Fit, bare_rss: float, trust: float = 1.0
+) -> float:
+    """
+    Return the number of independent rows that a fit's evidence may count.
+
+    Two things make a residual less telling than its count: autocorrelation, and physics richer
+    than the model. An explained sum of squares E leaves about `MISFIT`^2 E of misfit in some
+    `MISFIT_DIRECTIONS` directions, and any further column may pick that up by chance.
+
+    ``trust`` is how far to believe the autocorrelation, as its exponent: while causes are still
+    missing from the model, it is theirs.
+    """
+    share = effective_share(found.residual, problem.rows, problem.samples) ** trust
+    count = share * found.residual.size
+    explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
+    return float(count / (1.0 + MISFIT**2 * explained / MISFIT_DIRECTIONS))
+
+
+def search(
+    problem: Problem, start: Model, exclude: Sequence[str], progress: Progress
+) -> Search:
+    """Return the effects that earn their place, fitted on all measurements."""
+    full = problem.thinned(FIT_ROWS)
+    # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
+    baseline, scale = robust_fit(full, start, robust_scale(full, full.residuals(start)))
+    progress('baseline fitted')
+    small = problem.thinned(SEARCH_ROWS)
+    model, dense = baseline.model, False
+    work, now, bare = _workspace(small, model, exclude)
+    for _ in range(ROUNDS):
+        before = names(model)
+
+        def effective(found: Fit, bare: float = bare) -> float:
+            return effective_rows(small, found, bare)
+
+        def hopeful(found: Fit, bare: float = bare) -> float:
+            return effective_rows(small, found, bare, HOPE)
+
+        steps = forward(work, now, hopeful, MANY, progress)
+        dense = small.recordings[0].joints.static and len(steps) >= MANY
+        if steps:
+            now = steps[-1].fit
+        if steps and not dense:
+            now = backward(work, now, effective)
+            now = without_negligible(work, consolidated(work, now, effective))
+        model = now.model
+        if dense or names(model) == before:
+            break
+        work, now, bare = _workspace(small, model, exclude)
+    slots: tuple[tuple[Rival, ...], ...] = ()
+    if not dense:
+        now, slots = settled(work, now, lambda f: effective_rows(small, f, bare), progress)
+        model = now.model
+    final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
+    sparse = Search(full, scale, baseline, final, np.zeros(0), work, now, bare, slots, False)
+    if not (small.recordings[0].joints.static and len(model.found) >= SEVERAL):
+        return sparse
+    progress('many small errors at once: fitting them together')
+    final, scale, precision = many_small(full, model, exclude, progress)
+    together = replace(sparse, scale=scale, final=final, precision=precision, slots=(), dense=True)
+    if dense:
+        return together
+    unseen = _unseen(together)
+    left = _unseen_rms(unseen)
+    many = _members(unseen, left) >= MANY
+    return together if many and left < BETTER * _unseen_rms(_unseen(sparse)) else sparse
+
+
+def settled(
+    work: Workspace, now: Fit, effective: Callable[[Fit], float], progress: Progress
+) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
+    """Return the fit in which every effect is the best in its place, and its rivals."""
+    for attempt in range(SWAPS + 1):
+        slots = []
+        for k, effect in enumerate(now.model.found):
+            slots.append(rivals(work, now, k, effective))
+            progress(f'rivals of {Site(effect.name, effect.site)} weighed')
+            leader = slots[-1][0]
+            if leader.fit is not now and attempt < SWAPS:
+                now = backward(work, leader.fit, effective)
+                break
+        else:
+            break
+    return now, tuple(slots)
+
+
+def _unseen(found: Search) -> Unseen:
+    return Unseen.of(found.problem, found.scale, found.final, found.precision)
+
+
+def _unseen_rms(unseen: Unseen) -> float:
+    return unseen.rms(unseen.predict(range(len(unseen.parts))))
+
+
+def _members(unseen: Unseen, left: float) -> int:
+    """Return how many effects move the tool by more than a share of what is left [m]."""
+    sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
+    return int((sizes > MEMBER * left).sum())
+
+
+def names(model: Model) -> list[tuple[str, str | None, int]]:
+    """Return what tells one set of found effects from another."""
+    return sorted(
+        ((e.name, e.site, e.coordinates().size) for e in model.found),
+        key=lambda item: (item[0], item[1] or '', item[2]),
+    )
+
+
+def _workspace(
+    problem: Problem, model: Model, exclude: Sequence[str]
+) -> tuple[Workspace, Fit, float]:
+    """Return what selection works on, the fit it starts from, and the bare sum of squares."""
+    scale = robust_scale(problem, problem.residuals(model))
+    now = fit(problem, model, scale, None, 4)
+    bare = fit(problem, now.model.with_found(()), scale, None, 4).rss
+    return Workspace.of(problem, scale, build(problem, now.model, scale, exclude)), now, bare

@@ -1,0 +1,271 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which units belong in the model: forward by evidence, nonlinear fits between, then backward."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.effect import Effect
+from ..algebra.evidence_score import Choice, best_choice, evidence
+from ..algebra.fit import Fit, design, fit
+from ..algebra.gram import Gram
+from ..algebra.problem import Model, Problem, Scale
+from .library import Library, Unit
+from .starts import searched, started
+
+ENTER = 6.0
+"""Nats a unit must be worth to enter: odds of about 400 to 1, for a hundred or so candidates."""
+SHORTLIST = 4
+"""Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
+INVISIBLE = 0.12
+"""RMS in units of noise below which nothing is worth a name, however many rows vouch for it."""
+CONSOLIDATE_SLACK = 0.3
+NEGLIGIBLE = 0.25
+"""RMS in units of noise below which an effect is not told from a larger one's misfit."""
+SLACK = 0.15
+"""Share of the best gain within which a linear ranking is not trusted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """
+    What selection works on: the problem, its noise, the shared library and its Gram matrix.
+
+    ``shared`` is the library's normal matrix, computed once; residuals change, columns do not.
+    """
+
+    problem: Problem
+    scale: Scale
+    library: Library
+    shared: Array
+
+    @classmethod
+    def of(cls, problem: Problem, scale: Scale, library: Library) -> Workspace:
+        """Multiply the library out once."""
+        return cls(problem, scale, library, library.columns @ library.columns.T)
+
+    def conditioned(self, model: Model, residual: Array) -> Gram:
+        """Return the library's normal equations given a model: its frames and effects fitted."""
+        own, _ = design(self.problem, model, self.scale)
+        cross = own @ self.library.columns.T
+        normal = np.block([[self.shared, cross.T], [cross, own @ own.T]])
+        right = np.concatenate([self.library.columns @ residual, own @ residual])
+        gram = Gram(
+            normal, right, float(residual @ residual), residual.size,
+            np.maximum(np.diag(normal).copy(), 1e-300),
+        )  # fmt: skip
+        count = self.library.columns.shape[0]
+        return gram.without(np.arange(count, count + own.shape[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of a selection: the unit taken in, its evidence, and the fit with it."""
+
+    unit: Unit
+    nats: float
+    fit: Fit
+
+
+def forward(
+    work: Workspace,
+    start: Fit,
+    effective: Callable[[Fit], float],
+    most: int = 40,
+    tick: Callable[[str], None] = lambda text: None,
+) -> list[Step]:
+    """
+    Return the steps of a forward selection.
+
+    Parameters
+    ----------
+    work : Workspace
+    start : Fit
+        The baseline: frames and known effects.
+    effective : callable
+        Number of independent rows of a fit.
+    most : int
+        Stop after this many units.
+    tick : callable
+        Told what was found, for progress.
+
+    """
+    steps: list[Step] = []
+    now = start
+    taken = [(e.name, e.site) for e in start.model.found]
+    while len(steps) < most:
+        gram = work.conditioned(now.model, now.residual)
+        # Until the cause is in the model the residual is all signal and looks autocorrelated;
+        # only the fit with a choice tells how many rows were independent.
+        ranked = ranking(gram, work.library.units, float(now.residual.size))
+        ranked = [c for c in ranked if c.nats > ENTER and not _repeats(c, taken)]
+        if not ranked:
+            break
+        best = _refined(work, now, gram, ranked, effective)
+        if best is None:
+            break
+        steps.append(best)
+        taken.append(best.unit.site)
+        now = best.fit
+        tick(f'{best.unit} (+{best.nats:.0f} nats)')
+    return steps
+
+
+def ranking(gram: Gram, units: Sequence[Unit], effective: float) -> list[Choice]:
+    """Return every unit's best choice, most evidence first."""
+    found = [best_choice(gram, unit, effective) for unit in units]
+    return sorted((c for c in found if c is not None), key=lambda c: -c.nats)
+
+
+def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
+    """A unit may enter once; only a ripple has further orders to add."""
+    return choice.unit.site in taken and choice.unit.family != 'transmission_ripple'
+
+
+def _refined(
+    work: Workspace,
+    now: Fit,
+    gram: Gram,
+    ranked: list[Choice],
+    effective: Callable[[Fit], float],
+) -> Step | None:
+    """Return the best of the leading choices after a nonlinear fit of each."""
+    close = [c for c in ranked if c.nats > ranked[0].nats - max(8.0, SLACK * ranked[0].nats)]
+    tried = [(c, fitted_with(work, now.model, c.effect(gram))) for c in close[:SHORTLIST]]
+    # One count for all, that of the fit which leaves least: a worse model explains less and would
+    # otherwise be allowed more rows.
+    count = effective(min((f for _, f in tried), key=lambda f: f.rss))
+    before = replace(gram, rss=now.rss)
+    best: Step | None = None
+    for choice, result in tried:
+        freedom = result.coordinates.size - now.coordinates.size
+        nats = evidence(before, now.rss - result.rss, freedom, count)
+        nats -= float(np.log(choice.unit.trials))
+        if nats > ENTER and (best is None or nats > best.nats):
+            best = Step(choice.unit, nats, result)
+    return best
+
+
+def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
+    """Return the fit of a model with one more effect, merged where its kind can merge."""
+    effect = started(work.problem, model, work.scale, effect)
+    return fit(work.problem, model.with_found(merged(model.found, effect)), work.scale, None, 5)
+
+
+def merged(found: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
+    """Return the effects with one more; orders of one joint's ripple go into one effect."""
+    for k, other in enumerate(found):
+        if other.name == effect.name == 'transmission_ripple' and other.site == effect.site:
+            parts = {
+                p.name: np.append(getattr(other, p.name), getattr(effect, p.name))
+                for p in other.parameters
+            }
+            return (*found[:k], replace(other, **parts), *found[k + 1 :])
+    return (*found, effect)
+
+
+def without(model: Model, k: int) -> Model:
+    """Return the model without found effect k."""
+    return model.with_found(model.found[:k] + model.found[k + 1 :])
+
+
+def restarted(work: Workspace, now: Fit) -> Fit:
+    """
+    Return the fit after effects with many optima were searched for again beside all others.
+
+    The first to enter was found while the others were still in the residual.
+    """
+    for k, effect in enumerate(now.model.found):
+        if not searched(effect):
+            continue
+        rest = fit(work.problem, without(now.model, k), work.scale, None, 4)
+        again = fitted_with(work, rest.model, effect)
+        if again.rss < now.rss:
+            found = list(again.model.found)
+            found.insert(k, found.pop())
+            now = fit(work.problem, again.model.with_found(tuple(found)), work.scale, None, 4)
+    return now
+
+
+def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
+    """Return the fit with every effect dropped that is not worth its freedom given the others."""
+    now = restarted(work, now)
+    while now.model.found:
+        count = effective(now)
+        losses = []
+        for k in range(len(now.model.found)):
+            less = fit(work.problem, without(now.model, k), work.scale, None, 4)
+            gram = Gram(np.zeros((0, 0)), np.zeros(0), less.rss, now.residual.size, np.zeros(0))
+            freedom = now.coordinates.size - less.coordinates.size
+            losses.append((evidence(gram, less.rss - now.rss, freedom, count), less))
+        worst = min(losses, key=lambda item: item[0])
+        if worst[0] >= ENTER:
+            break
+        now = worst[1]
+    return now
+
+
+def without_negligible(work: Workspace, now: Fit) -> Fit:
+    """
+    Return the fit without effects far below the noise beside a larger one.
+
+    Thousands of rows make a micrometre significant; next to a larger cause it is more likely the
+    difference between that cause and its model.
+    """
+    while now.model.found:
+        sizes = []
+        for k in range(len(now.model.found)):
+            parts = work.problem.residuals(without(now.model, k))
+            change = work.problem.whitened(parts, work.scale) - now.residual
+            sizes.append(float(np.sqrt((change**2).mean())))
+        least = int(np.argmin(sizes))
+        if sizes[least] > (NEGLIGIBLE if len(sizes) > 1 else INVISIBLE):
+            break
+        now = fit(work.problem, without(now.model, least), work.scale, None, 4)
+    return now
+
+
+def consolidated(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
+    """
+    Return the fit with two effects replaced by one wherever one explains as much.
+
+    Selection one at a time can enter through a neighbour of the cause and then mend the rest
+    with a second effect.
+    """
+    improved = True
+    while improved and len(now.model.found) > 1:
+        improved = False
+        for a, b in combinations(range(len(now.model.found)), 2):
+            one = _one_for_two(work, now, a, b, effective)
+            if one is not None:
+                now, improved = one, True
+                break
+    return now
+
+
+def _one_for_two(
+    work: Workspace, now: Fit, a: int, b: int, effective: Callable[[Fit], float]
+) -> Fit | None:
+    rest = fit(work.problem, without(without(now.model, b), a), work.scale, None, 4)
+    gram = work.conditioned(rest.model, rest.residual)
+    count = effective(now)
+    ranked = ranking(gram, work.library.units, count)
+    taken = {(e.name, e.site) for e in rest.model.found}
+    pair = replace(gram, rss=rest.rss)
+    freedom = now.coordinates.size - rest.coordinates.size
+    wanted = evidence(pair, rest.rss - now.rss, freedom, count)
+    for choice in [c for c in ranked if c.unit.site not in taken][:SHORTLIST]:
+        if choice.nats < wanted - CONSOLIDATE_SLACK * abs(wanted):
+            break
+        one = fitted_with(work, rest.model, choice.effect(gram))
+        free = one.coordinates.size - rest.coordinates.size
+        nats = evidence(pair, rest.rss - one.rss, free, count) - float(np.log(choice.unit.trials))
+        if nats >= wanted:
+            return one
+    return None

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a local fit of an effect starts: the best of many instances, each with its best size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.effect import Effect, Stage
+from ...twin.features import Features
+from ...twin.resampling import Picker
+from ..algebra.fit import design
+from ..algebra.problem import Model, Problem, Scale
+
+MEMORY = (Stage.SERVO, Stage.PLAY)
+USUAL = 0.8
+"""Spread of the logarithm of a frequency or a damping about the typical one."""
+
+
+class Profile(NamedTuple):
+    """
+    Instances of an effect and what each explains.
+
+    Attributes
+    ----------
+    effects : list of Effect
+    gains : array, shape (D,)
+        Fall of the whitened sum of squares, frames and the other effects fitted anew.
+
+    """
+
+    effects: list[Effect]
+    gains: Array
+
+
+def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Effect:
+    """
+    Return the instance of an effect from which to fit it beside those a model has.
+
+    The effect itself where its kind has no need of a search.
+    """
+    if not searched(effect):
+        return effect
+    looker = _Looker.of(problem, model, scale)
+    zoom, found = 0, looker.profile(effect, 0)
+    while found is not None:
+        effect = found.effects[int(np.argmax(found.gains + _prior(found.effects)))]
+        zoom += 1
+        found = looker.profile(effect, zoom)
+    return effect
+
+
+def searched(effect: Effect) -> bool:
+    """Return whether an effect's kind needs a search for its start."""
+    return type(effect).starts is not Effect.starts
+
+
+def profile(
+    problem: Problem, model: Model, scale: Scale, k: int
+) -> tuple[list[Effect], Array] | None:
+    """
+    Return instances in the place of found effect k, and by how much each fits worse, (D,).
+
+    In whitened squares; None where the effect's kind has no need of a search.
+    """
+    effect = model.found[k]
+    if not searched(effect):
+        return None
+    others = model.with_found(model.found[:k] + model.found[k + 1 :])
+    looker = _Looker.of(problem, others, scale)
+    found = looker.profile(effect, 0)
+    if found is None:
+        return None
+    left = problem.whitened(problem.residuals(model), scale)
+    here = float(looker.residual @ looker.residual - left @ left)
+    return found.effects, here - found.gains
+
+
+def _prior(effects: list[Effect]) -> Array:
+    """Return how plausible instances are by the size of what bends them, shape (D,) [nats]."""
+    bent = [k for k, p in enumerate(effects[0].parameters) if not p.linear]
+    typical = np.array([effects[0].parameters[k].typical for k in bent])
+    values = np.array([effect.vector()[bent] for effect in effects])
+    return np.asarray(-0.5 * ((np.log(values / typical) / USUAL) ** 2).sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Looker:
+    """
+    What every look at a joint shares: the residual, and what must be fitted along.
+
+    Attributes
+    ----------
+    problem : Problem
+    scale : Scale
+    features : list of Features
+    residual : array, shape (rows,)
+        With frames and effects in the model fitted.
+    basis : array, shape (rows, P)
+        Orthonormal columns of those.
+
+    """
+
+    problem: Problem
+    scale: Scale
+    features: list[Features]
+    residual: Array
+    basis: Array
+
+    @classmethod
+    def of(cls, problem: Problem, model: Model, scale: Scale) -> _Looker:
+        """Take the residual and its columns at a model."""
+        columns = design(problem, model, scale)[0]
+        size = np.linalg.norm(columns, axis=1)
+        basis, _ = np.linalg.qr((columns[size > 0.0] / size[size > 0.0, None]).T)
+        residual = problem.whitened(problem.residuals(model), scale)
+        residual = residual - basis @ (basis.T @ residual)
+        return cls(problem, scale, problem.features(model), residual, basis)
+
+    def profile(self, effect: Effect, zoom: int) -> Profile | None:
+        """Return the instances of one zoom, each with its best linear parameter."""
+        at, joint = 0, self.features[0].twin.robot.index(str(effect.site))
+        found: list[Effect] = []
+        pull, mass, shared = (np.zeros(()) for _ in range(3))
+        for k, maker in enumerate(self.features):
+            view = maker.joint_view if effect.stage in MEMORY else maker.view
+            # The first recording says which instances; the others say what they do there.
+            trials = effect.starts(view, zoom)
+            if trials is None:
+                return None
+            found, moved = trials
+            if effect.stage in MEMORY:
+                moved = Picker(maker.recording.joints, maker.run.view.t).pick(moved)
+            rows = self.problem.rows[k] * self.problem.samples[k]
+            column = self._white(maker, joint, k)
+            own = slice(at, at + rows)
+            at += rows
+            residual = self.residual[own].reshape(column.shape)
+            basis = self.basis[own].reshape(*column.shape, -1)
+            pull = pull + moved @ (column * residual).sum(axis=1)
+            mass = mass + moved**2 @ (column**2).sum(axis=1)
+            shared = shared + moved @ np.einsum('mc,mcp->mp', column, basis)
+        left = np.maximum(mass - (shared**2).sum(axis=1), 1e-12 * mass + 1e-300)
+        return _sized(found, pull, left)
+
+    def _white(self, maker: Features, joint: int, k: int) -> Array:
+        """Return what one joint does in recording k, whitened, shape (M, c)."""
+        unit = np.full(self.problem.rows[k], 1.0 / self.scale.position)
+        unit[3:] = 1.0 / self.scale.orientation
+        column = maker.column(('q', joint))[: self.problem.rows[k]].T
+        return np.asarray(column * unit * np.sqrt(self.scale.weights[k])[:, None])
+
+
+def _sized(effects: list[Effect], pull: Array, mass: Array) -> Profile:
+    """Return the instances with their linear parameter fitted, where they have one."""
+    names = [p.name for p in effects[0].parameters if p.linear]
+    if not names:
+        return Profile(effects, 2.0 * pull - mass)
+    best = pull / mass
+    sized = [replace(e, **{names[0]: float(b)}) for e, b in zip(effects, best, strict=True)]
+    return Profile(sized, pull * best)

@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Many small errors at once: each kind's usual size is learned from the data, and each member is
+held to it.
+
+Fitted freely, dozens of small geometric errors or hundreds of ripple orders chase the noise. Here
+every group of like coordinates (a family; a joint's ripple within a band of orders) has a prior
+whose variance maximises the evidence; a group that the data do not need shrinks to nothing.
+
+References
+----------
+.. [1] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4, 1992.
+.. [2] M. E. Tipping, "Sparse Bayesian learning and the relevance vector machine", JMLR 1, 2001.
+
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dtrtri
+
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...effects.transmission_ripple import TransmissionRipple
+from ..algebra.fit import Fit, coordinates, design, fit, robust_scale, solve_scaled, stepped
+from ..algebra.problem import Model, Problem, Scale
+
+BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
+"""Ripple orders whose amplitudes are expected to be alike: up to a band's last order."""
+ROUNDS = 15
+FREE = 3
+"""A group of fewer coordinates than this is fitted freely: too few to learn a size from."""
+
+
+def groups(found: tuple[Effect, ...]) -> tuple[Array, Array]:
+    """
+    Return the group number and the typical size of every fit coordinate, shapes (K,).
+
+    Number -1 marks coordinates that are fitted freely.
+    """
+    labels: list[tuple[str, str, int]] = []
+    scales: list[Array] = []
+    for effect in found:
+        size = effect.coordinates().size
+        scales.append(effect.coordinate_scales())
+        if isinstance(effect, TransmissionRipple):
+            band = np.searchsorted(BANDS, np.repeat(np.atleast_1d(effect.order), 2))
+            labels += [(effect.name, str(effect.site), int(b)) for b in band]
+        else:
+            labels += [(effect.name, '', 0)] * size
+    names = {label: k for k, label in enumerate(dict.fromkeys(labels))}
+    numbers = np.array([names[label] for label in labels], dtype=int)
+    counts = np.bincount(numbers, minlength=len(names)) if numbers.size else np.zeros(0, int)
+    free = counts[numbers] < FREE if numbers.size else np.zeros(0, bool)
+    return np.where(free, -1, numbers), np.concatenate([np.zeros(0), *scales])
+
+
+def learned_precision(
+    normal: Array, right: Array, rss: float, rows: int, labels: Array, scales: Array
+) -> tuple[Array, float]:
+    """
+    Return the prior precision that maximises the evidence, shape (K,), and the freedom it leaves.
+
+    The freedom counts the coordinates that the data determine rather than the prior.
+
+    Parameters
+    ----------
+    normal, right, rss, rows
+        Normal equations of the coordinates with the nuisance frames projected out.
+    labels, scales : array, shape (K,)
+        As `groups` returns them.
+
+    """
+    # In units of the typical size, so that one variance serves a whole family.
+    normal = normal * np.outer(scales, scales)
+    right = right * scales
+    tied = labels >= 0
+    variance = np.ones(labels.max(initial=-1) + 1)
+    floor, noise = 1e-8, 1.0
+    for _ in range(ROUNDS):
+        precision = np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 1e-9)
+        system = normal / noise + np.diag(precision)
+        system[np.diag_indices_from(system)] *= 1.0 + 1e-12
+        factor = cho_factor(system, lower=True)
+        mean = cho_solve(factor, right / noise)
+        spread = (np.tril(dtrtri(factor[0], lower=1)[0]) ** 2).sum(axis=0)
+        determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
+        left = rss - 2.0 * right @ mean + mean @ normal @ mean
+        noise = max(left / max(rows - determined.sum(), 1.0), 1e-6)
+        for k in range(variance.size):
+            mine = labels == k
+            if mine.any():
+                share = max(float(determined[mine].sum()), 1e-3)
+                variance[k] = max(float((mean[mine] ** 2).sum()) / share, floor)
+    precision = np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 0.0) / scales**2
+    # The fit works in whitened rows, so a prior counts against the noise actually there.
+    return precision * noise, float(determined.sum())
+
+
+def shrunk_step(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Scale]:
+    """Return the model after one linear step with learned priors, and the noise it leaves."""
+    model, _, freedom = _learned(problem, model, scale)
+    return model, robust_scale(problem, problem.residuals(model), freedom=freedom)
+
+
+def shrunk_fit(problem: Problem, model: Model, scale: Scale) -> tuple[Fit, Array]:
+    """Return the fit with learned priors, and their precision, shape (K,)."""
+    model, precision, _ = _learned(problem, model, scale)
+    return fit(problem, model, scale, precision, iterations=1), precision
+
+
+def _learned(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Array, float]:
+    """Return the model after one linear step, the prior precision learned, and its freedom."""
+    residual = problem.whitened(problem.residuals(model), scale)
+    columns, _ = design(problem, model, scale)
+    normal, right = columns @ columns.T, columns @ residual
+    labels, scales = groups(model.found)
+    x = coordinates(model)
+    frames = right.size - x.size
+    target = _target(normal, right, float(residual @ residual), x)
+    precision, freedom = learned_precision(
+        *_projected(*target, frames), residual.size, labels, scales
+    )
+    ridge = np.concatenate([np.zeros(frames), precision])
+    pull = ridge * np.concatenate([np.zeros(frames), x])
+    step = solve_scaled(normal + np.diag(ridge), right - pull, 1e-9)
+    trial = stepped(problem, model, step)
+    moved, x_moved = problem.whitened(problem.residuals(trial), scale), coordinates(trial)
+    if moved @ moved + precision @ x_moved**2 > residual @ residual + precision @ x**2:
+        trial = fit(problem, model, scale, precision, iterations=2).model
+    return trial, precision, freedom + frames
+
+
+def _target(normal: Array, right: Array, rss: float, x: Array) -> tuple[Array, Array, float]:
+    """Return the normal equations with what the coordinates explain already put back."""
+    now = np.concatenate([np.zeros(right.size - x.size), x])
+    shift = normal @ now
+    return normal, right + shift, rss + float(2.0 * now @ right + now @ shift)
+
+
+def _projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Array, Array, float]:
+    """Return the normal equations with the leading frame columns projected out."""
+    if not frames:
+        return normal, right, rss
+    cross = normal[:frames, frames:]
+    wanted = np.column_stack([cross, right[:frames]])
+    solved = np.linalg.lstsq(normal[:frames, :frames], wanted, rcond=1e-12)[0]
+    left = normal[frames:, frames:] - cross.T @ solved[:, :-1]
+    pull = right[frames:] - cross.T @ solved[:, -1]
+    return left, pull, rss - float(right[:frames] @ solved[:, -1])

@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What every check looks at: the recordings, the aligned model, and what it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ...recording import Recording
+from ..algebra.problem import Model, Problem
+from ..frames.alignment import refined
+from .lag import Lag, lag
+from .snapshot import Snapshot, measured, snapshot
+
+LARGE = 5e-3
+"""Median gap [m] above which the data may be mixed up; what wears in an arm is smaller."""
+ENOUGH = 30
+"""Joint states from which a motion has a shape in time."""
+HINT = 0.8
+"""What the gap must fall to for a lag to be looked into, and"""
+EXPLAINED = 0.35
+"""for it to be believed once the frames are fitted with it."""
+
+
+class Finding(NamedTuple):
+    """What a check found: 'note' or 'warning', and a sentence for people."""
+
+    level: str
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """The problem, the model after alignment, and what several checks need, computed once."""
+
+    problem: Problem
+    model: Model
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """Return the recordings."""
+        return self.problem.recordings
+
+    @cached_property
+    def residuals(self) -> list[Array]:
+        """Return measured minus twin, one array (3 or 6, M) per recording."""
+        return self.problem.residuals(self.model)
+
+    @cached_property
+    def gap(self) -> float:
+        """Return the median distance between measured and twin [m]."""
+        return float(np.median(np.concatenate([distance(part) for part in self.residuals])))
+
+    @cached_property
+    def lags(self) -> list[Lag | None]:
+        """
+        Return how late the measurements are; None where no lag explains the gap.
+
+        Frames fitted at a wrong lag hide it, so they are fitted again with the lag undone.
+        """
+        first = self._lags(self.model)
+        late = [f if f is not None and f.after < HINT * f.before else None for f in first]
+        if not any(late):
+            return [None] * len(late)
+        shot = snapshot(self.problem, self.model, self._motions(late))
+        again = self._lags(refined(replace(shot.problem, align=self.problem.align), shot.model))
+        return [
+            new if old is not None and new is not None and new.after < EXPLAINED * old.before
+            else None
+            for old, new in zip(late, again, strict=True)
+        ]  # fmt: skip
+
+    def _lags(self, model: Model) -> list[Lag | None]:
+        out: list[Lag | None] = []
+        for k, recording in enumerate(self.recordings):
+            t, seen = recording.joints.t, measured(recording)
+            if recording.joints.static or t.size < ENOUGH:
+                out.append(None)
+                continue
+            path = model.twin(k).poses(recording, t).position
+            out.append(lag(t, path, seen.t, seen.position))
+        return out
+
+    def _motions(self, lags: Sequence[Lag | None]) -> list[Array]:
+        out = []
+        for recording, late in zip(self.recordings, lags, strict=True):
+            t = measured(recording).t
+            out.append(recording.joints.at(t if late is None else t - late.at(t))[0])
+        return out
+
+    @cached_property
+    def motions(self) -> list[Array]:
+        """Return joint positions at the measurements, lag undone, (M, n) per recording."""
+        return self._motions(self.lags)
+
+    @cached_property
+    def snapshot(self) -> Snapshot:
+        """Return a few samples of every recording as stations, for trials."""
+        return snapshot(self.problem, self.model, self.motions)
+
+
+Checker = Callable[[Case], Sequence[Finding]]
+
+
+def distance(part: Array) -> Array:
+    """Return the length of the position part of a residual, shape (M,) [m]."""
+    return np.asarray(np.linalg.norm(part[:3], axis=0))
+
+
+def length(value: float) -> str:
+    """Return a length [m] as people read it."""
+    if value >= 1.0:
+        return f'{value:.3g} m'
+    return f'{value * 1e3:.3g} mm' if value >= 1e-4 else f'{value * 1e6:.3g} um'
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list in a sentence."""
+    return ' and '.join([', '.join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Is there enough motion to see a cause, joint by joint, and to tell the frames apart?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from .evidence import Case, Finding, listed
+
+LITTLE = 0.02
+"""A joint that moves less [rad, m] shows next to nothing."""
+VISIBLE = (1e-3, 5e-3)
+"""A frame error [m, rad] that the data should show."""
+AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
+
+
+def motion(case: Case) -> Sequence[Finding]:
+    """Return joints that hardly move or never reverse, and frames that cannot be told apart."""
+    return [*_hardly(case), *_one_way(case), *_frames(case)]
+
+
+def _hardly(case: Case) -> Iterator[Finding]:
+    ranges = np.max([np.ptp(q, axis=0) for q in case.motions], axis=0)
+    robot = case.model.robot
+    names = [
+        f'{robot.joint_names[i]!r} ({_moved(ranges[i], bool(robot.prismatic[i]))})'
+        for i in np.flatnonzero(ranges < LITTLE)
+    ]
+    if names:
+        yield Finding(
+            'note',
+            f'{listed(names)} hardly move{"s" if len(names) == 1 else ""}; gear, play, ripple and '
+            'spring of such a joint cannot be seen, and its offset looks like one of its '
+            'neighbours or of a frame.',
+        )
+
+
+def _moved(distance: float, prismatic: bool) -> str:
+    return f'{distance * 1e3:.2g} mm' if prismatic else f'{np.degrees(distance):.2g} deg'
+
+
+def _one_way(case: Case) -> Iterator[Finding]:
+    if any(r.joints.static for r in case.recordings):
+        return
+    turned = np.zeros(case.model.robot.n, dtype=bool)
+    for q in case.motions:
+        moved = np.diff(q, axis=0)
+        travel = np.maximum(np.abs(moved).sum(axis=0), 1e-12)
+        one_way = np.abs(moved.sum(axis=0))
+        turned |= one_way < 0.999 * travel
+        turned |= travel < LITTLE
+    names = [repr(name) for name, t in zip(case.model.robot.joint_names, turned, strict=True)
+             if not t]  # fmt: skip
+    if names:
+        yield Finding('note', f'{listed(names)} never reverse{"s" if len(names) == 1 else ""}; '
+                      'play there looks like an offset.')  # fmt: skip
+
+
+def _frames(case: Case) -> Iterator[Finding]:
+    """Report directions of the frames in which an error would not show."""
+    problem = case.problem.thinned(3000)
+    parts, names = problem.frame_columns(problem.features(case.model))
+    columns = problem.whitened(parts, problem.unit_scale())
+    if not len(names):
+        return
+    size = np.array([VISIBLE[0] if int(n.split('.')[1]) < 3 else VISIBLE[1] for n in names])
+    live = np.abs(columns).max(axis=1) > 0.0
+    scaled = columns[live] * size[live, None]
+    strength, vectors = np.linalg.eigh(scaled @ scaled.T)
+    hidden = int((strength < 1.0).sum())
+    if hidden:
+        kept = [name for name, alive in zip(names, live, strict=True) if alive]
+        strongest = np.argsort(-np.abs(vectors[:, 0]))[:2]
+        pair = listed([_named(kept[i]) for i in sorted(strongest)])
+        yield Finding(
+            'note',
+            f'The motion leaves {hidden} of {len(kept)} directions of the aligned frames open '
+            f'(first of all {pair}); turn the tool more, about more axes, or align less.',
+        )
+
+
+def _named(name: str) -> str:
+    frame, axis = name.split('.')
+    return f'{frame.split()[0]} {AXES[int(axis)]}'

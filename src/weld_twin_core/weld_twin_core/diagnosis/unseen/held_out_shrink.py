@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far the gap shrinks on data that were not used for fitting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.setup_motion import of_the_robot, seen_from
+from ...recording import Recording
+from ..algebra.fit import fit, robust_scale
+from ..algebra.problem import Model, Problem, usable
+from ..hypotheses.search import Search
+from ..result import Shrink
+from .unseen_stretches import TRUSTED, Unseen
+
+LARGE = 300
+FARTHEST = 1.0
+"""Log of a ratio between two motions beyond which it tells of a model that fits neither."""
+MOVED = 5.0
+"""A held-out bag whose frame is this many times better refitted stems from another set-up."""
+
+
+def held_out_shrink(found: Search, unseen: Unseen, holdout: Sequence[Recording]) -> Shrink:
+    """Return the gap before and after, on the held-out bags or on stretches taking their turn."""
+    model = found.final.model
+    steps, alone = _waterfall(unseen, model)
+    first, last = unseen.predict([]), unseen.predict(range(len(model.found)))
+    before, after = unseen.squares(first), unseen.squares(last)
+    turned = (unseen.turn_rms(first), unseen.turn_rms(last))
+    labels, source, elsewhere = unseen.trusted_labels(), 'blocked cross-validation', None
+    if holdout:
+        elsewhere = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
+        before, after, labels = _on_bags(found, holdout)
+        source = ', '.join(r.name for r in holdout)
+    ratio, interval = ratio_interval(before, after, labels, elsewhere)
+    return Shrink(
+        float(np.sqrt(before.mean())), float(np.sqrt(after.mean())), ratio, interval, source,
+        steps, alone, None if turned[0] is None or turned[1] is None else (turned[0], turned[1]),
+    )  # fmt: skip
+
+
+def _waterfall(
+    unseen: Unseen, model: Model
+) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
+    """Return RMS on unseen stretches as families are added in turn, and with one mended alone."""
+    members: dict[str, list[int]] = {}
+    single = len(model.found) <= 8
+    for k, effect in enumerate(model.found):
+        name = f'{effect.name} of {effect.site}' if single and effect.site else effect.name
+        members.setdefault(name, []).append(k)
+    alone = {name: unseen.rms(unseen.predict(index)) for name, index in members.items()}
+    steps: list[tuple[str, float]] = []
+    kept: list[int] = []
+    rest = dict(members)
+    if unseen.columns.shape[0] > LARGE:
+        # Trying every family at every step costs too much here; how far each gets alone orders.
+        for name in sorted(members, key=lambda n: alone[n]):
+            kept += members[name]
+            steps.append((name, unseen.rms(unseen.predict(kept))))
+        return tuple(steps), tuple(alone.items())
+    while rest:
+        trials = {n: unseen.rms(unseen.predict(kept + index)) for n, index in rest.items()}
+        best = min(trials, key=lambda n: trials[n])
+        kept += rest.pop(best)
+        steps.append((best, trials[best]))
+    return tuple(steps), tuple(alone.items())
+
+
+def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array, Array]:
+    """Return squared errors before and after on held-out bags, and a stretch for every sample."""
+    before: list[Array] = []
+    after: list[Array] = []
+    labels: list[Array] = []
+    for recording in holdout:
+        problem = Problem((usable(recording),), frozenset({'base'}) & found.problem.align)
+        pair, good = [], np.ones(problem.samples[0], dtype=bool)
+        for model in (found.baseline.model, found.final.model):
+            parts = problem.residuals(_for_bag(problem, model, found.problem.recordings))
+            pair.append((parts[0][:3] ** 2).sum(axis=0))
+            # What is an outlier shows best against the better model, which comes last.
+            good = robust_scale(problem, parts).weights[0] >= TRUSTED
+        before.append(pair[0][good])
+        after.append(pair[1][good])
+        stretch = np.arange(good.sum()) * 8 // max(int(good.sum()), 1)
+        labels.append(stretch + 8 * len(labels))
+    return np.concatenate(before), np.concatenate(after), np.concatenate(labels)
+
+
+def _for_bag(problem: Problem, model: Model, recordings: Sequence[Recording]) -> Model:
+    """Return the model with the base whose set-up the bag matches, or the bag's own."""
+    recording = problem.recordings[0]
+    choices = [
+        Model(model.robot, (base,), model.known,
+              seen_from(model.found, own.epoch_ns, own.span_ns, recording))
+        for base, own in zip(model.bases, recordings, strict=True)
+    ]  # fmt: skip
+    sizes = [_size(problem, choice) for choice in choices]
+    best = choices[int(np.argmin(sizes))]
+    if 'base' in problem.align:
+        bare = best.with_found(())
+        frames = fit(problem, bare, problem.unit_scale()).model
+        own = Model(model.robot, frames.bases, model.known, of_the_robot(model.found))
+        if min(sizes) > MOVED * _size(problem, own):
+            return own
+    return best
+
+
+def _size(problem: Problem, model: Model) -> float:
+    return float(np.median(np.linalg.norm(problem.residuals(model)[0][:3], axis=0)))
+
+
+def ratio_interval(
+    before: Array, after: Array, labels: Array, elsewhere: float | None = None
+) -> tuple[float, tuple[float, float]]:
+    """
+    Return RMS after over before and its 95 % interval, by leaving out one stretch at a time.
+
+    Jackknife over stretches, so that neighbouring samples do not count as independent. Stretches
+    of one motion say little of another motion: how far the ratio is from that on the recordings
+    fitted, each stretch unseen, is one draw of that spread, and its square is added to the
+    variance.
+
+    Parameters
+    ----------
+    before, after : array, shape (samples,)
+        Squared errors on unseen data.
+    labels : array of int, shape (samples,)
+    elsewhere : float, optional
+        The same ratio on other recordings.
+
+    """
+    ratio = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
+    names = np.unique(labels)
+    if names.size < 3:
+        spread = ratio / np.sqrt(2.0 * max(before.size, 2))
+        return ratio, (max(ratio - 2.0 * spread, 0.0), ratio + 2.0 * spread)
+    logs = []
+    for name in names:
+        keep = labels != name
+        pair = (max(after[keep].mean(), 1e-300), max(before[keep].mean(), 1e-300))
+        logs.append(0.5 * np.log(pair[0] / pair[1]))
+    k = names.size
+    variance = float((k - 1) / k * ((np.array(logs) - np.mean(logs)) ** 2).sum())
+    if elsewhere is not None:
+        apart = np.log(max(elsewhere, 1e-300) / max(ratio, 1e-300))
+        variance += min(abs(float(apart)), FARTHEST) ** 2
+    reach = 2.36 * np.sqrt(variance)  # Student t, 7 degrees of freedom
+    return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))

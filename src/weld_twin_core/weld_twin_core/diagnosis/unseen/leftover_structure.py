@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Is something left that no named effect explains?
+
+Generic columns that know no physics (each joint bent by splines of its own angle, by its speed
+and acceleration; the frame moved by splines of time and by the place in the workspace) are given
+to the model. If they predict unseen stretches better, the residual has structure, and the columns
+that bring it say what it depends on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array
+from ...twin.features import Features
+from ..algebra.problem import Model, Problem, Scale
+from .unseen_stretches import Base, Unseen
+
+KNOTS = 8
+RIDGES = (1e-2, 1.0, 1e2, 1e4)
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """
+    What generic columns find.
+
+    Attributes
+    ----------
+    rms_m : float
+        RMS error on unseen stretches with them, [m].
+    gain : float
+        Share of the squared error on unseen stretches that they take away.
+    sure : float
+        The gain over its standard error between stretches.
+    depends_on : tuple of str
+
+    """
+
+    rms_m: float
+    gain: float
+    sure: float
+    depends_on: tuple[str, ...]
+
+
+def structure(unseen: Unseen, model: Model, kept: list[int]) -> Structure:
+    """Return what generic columns add to a model on stretches not used for fitting."""
+    base = unseen.base(kept)
+    before = unseen.squares(base.residual)
+    labels = unseen.trusted_labels()
+    found: list[tuple[float, float, str, Array]] = []
+    for name, columns in _generic(unseen.problem, model, unseen.scale):
+        gain, sure, squares = _best(base, columns, before, labels)
+        found.append((gain, sure, name, squares))
+    found.sort(key=lambda item: -item[0])
+    gain, sure, _, squares = found[0]
+    names = tuple(name for g, s, name, _ in found[:3] if g > 0.02 and s > 2.0)
+    return Structure(float(np.sqrt(squares.mean())), gain, sure, names)
+
+
+def _best(
+    base: Base, columns: Array, before: Array, labels: Array
+) -> tuple[float, float, Array]:
+    """Return gain, its certainty and the squared errors at the best of a few ridges."""
+    best: tuple[float, float, Array] | None = None
+    for residual in base.extended(columns, RIDGES):
+        after = base.unseen.squares(residual)
+        gain = 1.0 - float(after.mean() / before.mean())
+        if best is None or gain > best[0]:
+            names = np.unique(labels)
+            falls = np.array([(before - after)[labels == n].mean() for n in names])
+            error = float(falls.std(ddof=1) / np.sqrt(names.size)) if names.size > 1 else np.inf
+            best = (gain, float(falls.mean() / max(error, 1e-300)), after)
+    assert best is not None
+    return best
+
+
+def _generic(
+    problem: Problem, model: Model, scale: Scale
+) -> Iterator[tuple[str, Array]]:
+    """Yield named groups of whitened generic columns, (E, rows) of unit mean square."""
+    features = problem.features(model)
+    for i, joint in enumerate(model.robot.joint_names):
+        angle = _column_group(problem, features, scale, i, _angle)
+        if angle is not None:
+            yield f'the angle of {joint}', angle
+        motion = _column_group(problem, features, scale, i, _motion)
+        if motion is not None:
+            yield f'the speed and acceleration of {joint}', motion
+    yield 'time', _pose_group(problem, features, scale, _time)
+    yield 'a step in time', _pose_group(problem, features, scale, _steps)
+    yield 'the place in the workspace', _pose_group(problem, features, scale, _place)
+    yield 'time, seen from the tool', _pose_group(problem, features, scale, _time, of_tool=True)
+    yield 'a step in time, seen from the tool', _pose_group(
+        problem, features, scale, _steps, of_tool=True
+    )
+
+
+def _column_group(
+    problem: Problem, features: list[Features], scale: Scale, i: int, regressors: object
+) -> Array | None:
+    lows = min(float(m.run.view.q[:, i].min()) for m in features)
+    highs = max(float(m.run.view.q[:, i].max()) for m in features)
+    if highs - lows < 1e-4:
+        return None
+    parts = []
+    for k, maker in enumerate(features):
+        values = regressors(maker, i, lows, highs)  # type: ignore[operator]
+        if values.size == 0:
+            return None
+        parts.append(maker.column(('q', i))[None, : problem.rows[k]] * values[:, None, :])
+    return _unit(problem.whitened(parts, scale))
+
+
+def _pose_group(
+    problem: Problem, features: list[Features], scale: Scale, regressors: object, *,
+    of_tool: bool = False,
+) -> Array:  # fmt: skip
+    parts = []
+    for k, maker in enumerate(features):
+        values = regressors(maker)  # type: ignore[operator]
+        block = np.zeros((3, values.shape[0], problem.rows[k], values.shape[1]))
+        axes = maker.run.poses.rotation if of_tool else np.eye(3)[None]
+        for j in range(3):
+            block[j, :, :3] = (axes[:, :, j].T)[None] * values[:, None, :]
+        parts.append(block.reshape(-1, problem.rows[k], values.shape[1]))
+    return _unit(problem.whitened(parts, scale))
+
+
+def _unit(columns: Array) -> Array:
+    size = np.sqrt((columns**2).mean(axis=1, keepdims=True))
+    live = size[:, 0] > 1e-12
+    return np.asarray(columns[live] / size[live])
+
+
+def _bumps(x: Array, low: float, high: float, count: int = KNOTS) -> Array:
+    """Return smooth bumps over a range, shape (count, M)."""
+    width = (high - low) / (count - 1)
+    centres = np.linspace(low, high, count)[:, None]
+    return np.exp(-0.5 * ((x - centres) / width) ** 2)
+
+
+def _angle(maker: Features, i: int, low: float, high: float) -> Array:
+    return _bumps(maker.run.view.q[:, i], low, high)
+
+
+def _motion(maker: Features, i: int, low: float, high: float) -> Array:
+    view = maker.run.view
+    if view.static or view.t.size < 4:
+        step = np.sign(np.diff(view.q[:, i], prepend=view.q[:1, i]))
+        return np.stack([step])
+    speed = view.qd[:, i]
+    size = max(float(np.abs(speed).max()), 1e-12)
+    acceleration = np.gradient(speed, view.t)
+    direction = np.tanh(speed / (0.02 * size))
+    return np.stack([speed, np.abs(speed), direction, acceleration, speed * np.abs(speed)])
+
+
+def _time(maker: Features) -> Array:
+    t = maker.run.view.elapsed
+    return _bumps(t, float(t[0]), float(max(t[-1], t[0] + 1e-9)))
+
+
+def _steps(maker: Features) -> Array:
+    share = np.linspace(0.0, 1.0, maker.at.size)
+    return (share > np.linspace(0.08, 0.92, 12)[:, None]).astype(np.float64)
+
+
+def _place(maker: Features) -> Array:
+    p = maker.run.poses.position
+    x = ((p - p.mean(axis=0)) / np.maximum(p.std(axis=0), 1e-9)).T
+    pairs = [x[a] * x[b] for a in range(3) for b in range(a, 3)]
+    cubes = [x[a] ** 3 for a in range(3)]
+    return np.stack([*x, *pairs, *cubes])

@@ -1,0 +1,289 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What models with more or fewer effects predict on stretches they were not fitted on.
+
+The found effects are small, so around the final fit every smaller model is linear: the exact
+contribution of each effect is put back into the residual where it is left out, and the coordinates
+of those kept are fitted anew on the other stretches. Normal equations of every stretch are formed
+once; a model is a choice of columns and targets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
+
+from ...arrays import Array
+from ..algebra.fit import Fit, design
+from ..algebra.gram import Index
+from ..algebra.problem import Model, Problem, Scale
+
+BLOCKS = 8
+MANY = 200
+"""Columns from which on an inverse of all of them serves every choice of effects."""
+TRUSTED = 0.2
+"""A sample of less weight is an outlier: reported, and left out of every quoted RMS."""
+TETHER = 0.3
+"""A coordinate moves about this share of its size when the stretches that show it are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """
+    Predictions of the final model and its parts on unseen stretches.
+
+    Attributes
+    ----------
+    problem, scale : Problem, Scale
+    labels : array, shape (rows,)
+        Stretch of every row.
+    columns : array, shape (P, rows)
+        Frames, then the coordinates of every found effect.
+    parts : tuple of slice
+        Columns of every effect.
+    targets : array, shape (1 + K, rows)
+        The final residual, then what each effect takes off it, exactly.
+    precision, pull : array, shape (P,)
+        Prior precision of every column, and how hard it pulls from where the fit is now.
+    normals : array, shape (blocks, P, P);  rights : array, shape (blocks, P, 1 + K)
+
+    """
+
+    problem: Problem
+    scale: Scale
+    labels: Array
+    columns: Array
+    parts: tuple[slice, ...]
+    targets: Array
+    precision: Array
+    pull: Array
+    normals: Array
+    rights: Array
+
+    @classmethod
+    def of(cls, problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
+        """Prepare the parts of a fitted model."""
+        model = fit.model
+        columns, _ = design(problem, model, scale)
+        frames = columns.shape[0] - fit.coordinates.size
+        parts, at = [], frames
+        for effect in model.found:
+            size = effect.coordinates().size
+            parts.append(slice(at, at + size))
+            at += size
+        targets = [fit.residual] + [
+            problem.whitened(problem.residuals(_without(model, k)), scale) - fit.residual
+            for k in range(len(model.found))
+        ]
+        prior = np.zeros(columns.shape[0])
+        if precision.size:
+            prior[frames:] = precision
+        x = np.concatenate([np.zeros(frames), fit.coordinates])
+        # A learned prior holds a coordinate already; a tether would tell it of unseen stretches.
+        tether = np.where(prior > 0.0, 0.0, np.concatenate([np.zeros(frames), _tether(model)]))
+        labels = problem.block_labels(BLOCKS)
+        stacked = np.array(targets)
+        bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
+        spans = list(pairwise(bounds))
+        normals = np.array([columns[:, a:b] @ columns[:, a:b].T for a, b in spans])
+        rights = np.array([columns[:, a:b] @ stacked[:, a:b].T for a, b in spans])
+        return cls(
+            problem, scale, labels, columns, tuple(parts), stacked, prior + tether, prior * x,
+            normals, rights,
+        )  # fmt: skip
+
+    @property
+    def frames(self) -> int:
+        """Return the number of nuisance columns."""
+        return int(self.parts[0].start if self.parts else self.columns.shape[0])
+
+    def predict(self, kept: Sequence[int]) -> Array:
+        """Return the residual on every stretch of the model fitted on the others, (rows,)."""
+        if self.columns.shape[0] <= MANY:
+            return self.base(kept).residual
+        # With hundreds of columns an inverse per stretch serves every choice of effects.
+        index = self._index(kept)
+        gone = np.setdiff1d(np.arange(self.columns.shape[0]), index)
+        if gone.size > index.size:
+            return self.base(kept).residual
+        mix = np.ones(self.targets.shape[0])
+        mix[[1 + k for k in kept]] = 0.0
+        residual = mix @ self.targets
+        for b, (low, high) in enumerate(self._spans()):
+            inverse = self._inverses[b]
+            step = inverse @ self._right(b, mix)
+            if gone.size:
+                force = np.linalg.solve(inverse[np.ix_(gone, gone)], step[gone])
+                step = step - inverse[:, gone] @ force
+            residual[low:high] -= step @ self.columns[:, low:high]
+        return residual
+
+    @cached_property
+    def _inverses(self) -> list[Array]:
+        """Return the inverse normal matrix of all columns for every stretch left out."""
+        out, everything = [], np.arange(self.columns.shape[0])
+        for b in range(self.normals.shape[0]):
+            system = self._system(b, everything)
+            size = np.sqrt(np.maximum(np.diag(system), 0.0))
+            unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+            system *= np.outer(unit, unit)
+            system[np.diag_indices_from(system)] += 1e-11
+            half, _ = dpotri(cho_factor(system, lower=True)[0], lower=1)
+            out.append((np.tril(half) + np.tril(half, -1).T) * np.outer(unit, unit))
+        return out
+
+    def base(self, kept: Sequence[int]) -> Base:
+        """Return a model of some effects, fitted with each stretch left out in turn."""
+        index = self._index(kept)
+        mix = np.ones(self.targets.shape[0])
+        mix[[1 + k for k in kept]] = 0.0
+        target = mix @ self.targets
+        factors, residual = [], target.copy()
+        for b, (low, high) in enumerate(self._spans() if index.size else ()):
+            system = self._system(b, index)
+            size = np.sqrt(np.maximum(np.diag(system), 1e-300))
+            system /= np.outer(size, size)
+            system[np.diag_indices_from(system)] += 1e-11
+            factor = cho_factor(system, overwrite_a=True)
+            step = cho_solve(factor, self._right(b, mix)[index] / size) / size
+            residual[low:high] -= self._moved(step, index, low, high)
+            factors.append((factor, size))
+        return Base(self, index, target, factors, residual)
+
+    def _index(self, kept: Sequence[int]) -> Index:
+        """Return the columns of the frames and of some effects."""
+        parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in sorted(kept)]
+        return np.concatenate([np.arange(self.frames), *parts]).astype(int)
+
+    def _spans(self) -> list[tuple[int, int]]:
+        """Return first and last row of every stretch."""
+        bounds = np.searchsorted(self.labels, np.arange(self.normals.shape[0] + 1))
+        return list(zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))
+
+    @cached_property
+    def _total(self) -> Array:
+        return np.asarray(self.normals.sum(axis=0) + np.diag(self.precision))
+
+    def _system(self, b: int, index: Index) -> Array:
+        """Return the normal matrix of some columns on all stretches but one."""
+        if index.size == self.columns.shape[0]:
+            return np.asarray(self._total - self.normals[b])
+        at = np.ix_(index, index)
+        return np.asarray(self._total[at] - self.normals[b][at])
+
+    def _right(self, b: int, mix: Array) -> Array:
+        """Return the right-hand side of every column on all stretches but one."""
+        return np.asarray((self.rights.sum(axis=0) - self.rights[b]) @ mix - self.pull)
+
+    def _moved(self, step: Array, index: Index, low: int, high: int) -> Array:
+        """Return what a step of some columns takes off a stretch of rows, without a copy."""
+        whole = np.zeros(self.columns.shape[0])
+        whole[index] = step
+        return np.asarray(whole @ self.columns[:, low:high])
+
+    def squares(self, residual: Array) -> Array:
+        """Return the squared position error of every trusted sample, shape (samples,) [m^2]."""
+        out, at = [], 0
+        for c, m, weight in zip(
+            self.problem.rows, self.problem.samples, self.scale.weights, strict=True
+        ):
+            part = residual[at : at + c * m].reshape(m, c)[:, :3] * self.scale.position
+            at += c * m
+            out.append(((part**2).sum(axis=1) / weight)[weight >= TRUSTED])
+        return np.concatenate(out)
+
+    def rms(self, residual: Array) -> float:
+        """Return the RMS position error over trusted samples, [m]."""
+        return float(np.sqrt(self.squares(residual).mean()))
+
+    def turn_rms(self, residual: Array) -> float | None:
+        """Return the RMS orientation error over trusted samples [rad], None without any."""
+        out, at = [], 0
+        for c, m, weight in zip(
+            self.problem.rows, self.problem.samples, self.scale.weights, strict=True
+        ):
+            part = residual[at : at + c * m].reshape(m, c)[:, 3:] * self.scale.orientation
+            at += c * m
+            if c > 3:
+                out.append(((part**2).sum(axis=1) / weight)[weight >= TRUSTED])
+        return float(np.sqrt(np.concatenate(out).mean())) if out else None
+
+    def trusted_labels(self) -> Array:
+        """Return the stretch of every trusted sample."""
+        out, at = [], 0
+        for c, m, weight in zip(
+            self.problem.rows, self.problem.samples, self.scale.weights, strict=True
+        ):
+            out.append(self.labels[at : at + c * m : c][weight >= TRUSTED])
+            at += c * m
+        return np.concatenate(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """A model fitted with each stretch left out in turn, ready to be given further columns."""
+
+    unseen: Unseen
+    index: Index
+    target: Array
+    factors: list[tuple[tuple[Array, bool], Array]]
+    residual: Array
+
+    def extended(self, extra: Array, ridges: Sequence[float]) -> list[Array]:
+        """
+        Return the unseen residual with further columns, one array (rows,) for every ridge.
+
+        Parameters
+        ----------
+        extra : array, shape (E, rows)
+        ridges : sequence of float
+            Prior precision of the further columns.
+
+        """
+        own = self.unseen.columns
+        if self.index.size < own.shape[0]:
+            own = own[self.index]
+        spans = self.unseen._spans()
+        both = np.concatenate([extra, self.target[None]])
+        crosses = [own[:, a:b] @ both[:, a:b].T for a, b in spans]
+        squares = [extra[:, a:b] @ both[:, a:b].T for a, b in spans]
+        cross_all, square_all = sum(crosses), sum(squares)
+        outs = np.tile(self.target, (len(ridges), 1))
+        for b, (low, high) in enumerate(spans):
+            here, mine = extra[:, low:high], own[:, low:high]
+            cross, right = np.split(cross_all - crosses[b], [extra.shape[0]], axis=1)
+            square, pull = np.split(square_all - squares[b], [extra.shape[0]], axis=1)
+            right, pull = right[:, 0] - self.unseen.pull[self.index], pull[:, 0]
+            if self.index.size:
+                factor, size = self.factors[b]
+                solved = cho_solve(factor, np.column_stack([cross, right]) / size[:, None])
+                solved /= size[:, None]
+                square = square - cross.T @ solved[:, :-1]
+                pull = pull - cross.T @ solved[:, -1]
+            eye = np.eye(here.shape[0])
+            more = np.stack([np.linalg.solve(square + (r + 1e-9) * eye, pull) for r in ridges])
+            outs[:, low:high] -= more @ here
+            if self.index.size:
+                outs[:, low:high] -= (solved[:, -1] - more @ solved[:, :-1].T) @ mine
+        return list(outs)
+
+
+def _tether(model: Model) -> Array:
+    """
+    Return a weak prior precision, shape (K,), that keeps what a few stretches cannot show.
+
+    A vibration that only the first stretch excites has no frequency in the others.
+    """
+    sizes = [np.maximum(np.abs(e.coordinates()), e.coordinate_scales()) for e in model.found]
+    return 1.0 / (TETHER * np.concatenate([np.zeros(0), *sizes])) ** 2
+
+
+def _without(model: Model, k: int) -> Model:
+    return model.with_found(model.found[:k] + model.found[k + 1 :])

@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of an effect as fields, as one vector, as fit coordinates, as a file's entry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import ModelError
+from .view import Parameter
+
+P = TypeVar('P', bound='Parametric')
+
+
+@dataclass(frozen=True, eq=False)
+class Parametric:
+    """
+    Something with named parameters; see `weld_twin_core.effects.effect.Effect`.
+
+    Parameters may carry a leading axis of draws, shape (D,) or (D, size). A parameter of any
+    length (``size`` 0) is one number, a list (K,), or draws of a list (D, K).
+    """
+
+    name: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    options: ClassVar[tuple[str, ...]] = ()
+    """Fields that choose a variant and are never fitted."""
+
+    def __post_init__(self) -> None:
+        for parameter in self.parameters:
+            value = getattr(self, parameter.name)
+            if np.ndim(value):
+                object.__setattr__(self, parameter.name, self._frozen(parameter, value))
+
+    def _frozen(self, parameter: Parameter, value: Any) -> Array:
+        array: Array = np.array(self._numeric(parameter, value))
+        array.setflags(write=False)
+        return array
+
+    def _numeric(self, parameter: Parameter, value: Any) -> Array:
+        try:
+            return np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ModelError(
+                f'{self.name}: {parameter.name} must be a number, got {value!r}'
+            ) from None
+
+    def check_values(self) -> None:
+        """
+        Refuse parameters without physical meaning.
+
+        Raises
+        ------
+        ModelError
+            Wrong length, not a number, or outside the bounds.
+
+        """
+        for parameter in self.parameters:
+            value = self._numeric(parameter, getattr(self, parameter.name))
+            if parameter.size > 1 and (value.ndim == 0 or value.shape[-1] != parameter.size):
+                raise ModelError(
+                    f'{self.name}: {parameter.name} needs {parameter.size} numbers, '
+                    f'got shape {value.shape}'
+                )
+            if not np.isfinite(value).all():
+                raise ModelError(f'{self.name}: {parameter.name} is not finite')
+            if (value < parameter.lower).any() or (value > parameter.upper).any():
+                raise ModelError(
+                    f'{self.name}: {parameter.name} = {value} {parameter.unit} is outside '
+                    f'[{parameter.lower:g}, {parameter.upper:g}]'
+                )
+
+    def _is_number(self, parameter: Parameter) -> bool:
+        value = np.asarray(getattr(self, parameter.name))
+        return parameter.size == 1 or (parameter.size == 0 and value.ndim == 0)
+
+    def components(self) -> list[tuple[Parameter, int | None]]:
+        """Return every scalar component: its parameter and its index, None for a plain number."""
+        out: list[tuple[Parameter, int | None]] = []
+        for parameter in self.parameters:
+            if self._is_number(parameter):
+                out.append((parameter, None))
+            else:
+                count = np.shape(getattr(self, parameter.name))[-1]
+                out += [(parameter, k) for k in range(count)]
+        return out
+
+    def vector(self) -> Array:
+        """Return all components as one vector, shape (P,), or (D, P) with draws."""
+        parts = [
+            np.asarray(getattr(self, p.name), dtype=np.float64)[... if k is None else (..., k)]
+            for p, k in self.components()
+        ]
+        return np.stack(np.broadcast_arrays(*parts), axis=-1) if parts else np.zeros(0)
+
+    def with_vector(self: P, vector: Array) -> P:
+        """Return the same with other components, shape (P,) or draws (D, P)."""
+        wanted = np.asarray(vector, dtype=np.float64)
+        values: dict[str, Any] = {}
+        at = 0
+        for parameter in self.parameters:
+            number = self._is_number(parameter)
+            count = 1 if number else np.shape(getattr(self, parameter.name))[-1]
+            part = wanted[..., at : at + count]
+            # Draws of one number where a list is allowed stay draws of a list of one.
+            plain = number and (parameter.size == 1 or wanted.ndim == 1)
+            values[parameter.name] = part[..., 0] if plain else part
+            at += count
+        return replace(self, **values)
+
+    def number(self, name: str, k: int | None = None) -> Array:
+        """Return one component ready to broadcast with samples: scalar, or shape (D, 1)."""
+        value = np.asarray(getattr(self, name), dtype=np.float64)
+        if k is not None:
+            value = value[..., k]
+        return value[..., None] if value.ndim else value
+
+    # Fit coordinates: what a least-squares fit turns. Most effects fit their parameters; an effect
+    # whose parameters bend (amplitude and phase) gives coordinates in which it is straight.
+
+    def coordinates(self) -> Array:
+        """Return the fit coordinates, shape (K,)."""
+        return np.array([
+            value for (p, _), value in zip(self.components(), self.vector(), strict=True)
+            if p.differentiable
+        ])  # fmt: skip
+
+    def with_coordinates(self: P, values: Array) -> P:
+        """Return the same at other fit coordinates, kept inside the physical bounds."""
+        vector = np.array(self.vector())
+        specs = self.components()
+        free = [k for k, (p, _) in enumerate(specs) if p.differentiable]
+        for k, value in zip(free, values, strict=True):
+            vector[k] = min(max(float(value), specs[k][0].lower), specs[k][0].upper)
+        return self.with_vector(vector)
+
+    def coordinate_scales(self) -> Array:
+        """Return the typical size of every fit coordinate, shape (K,)."""
+        return np.array([p.typical for p, _ in self.components() if p.differentiable])
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the entry of an effects file that makes this effect."""
+        out: dict[str, Any] = {'effect': self.name}
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if value is None or (item.name in self.options and value == item.default):
+                continue
+            out[item.name] = np.asarray(value).tolist() if not isinstance(value, str) else value
+        return out

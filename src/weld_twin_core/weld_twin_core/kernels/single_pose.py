@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The pose of one joint position at a time, as a node needs it.
+
+For one pose a call into numpy costs more than the arithmetic it does. Plain numbers are faster:
+two axes and the tool point are carried from the tool back to the base, and the third axis is
+their cross product.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+from struct import Struct
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arm.robot import Robot
+from ..arrays import Array
+
+
+class _Row(NamedTuple):
+    """One turn and slide about z, then along and about x."""
+
+    joint: int
+    """Index of the joint that moves it, -1 for a fixed row."""
+    slides: bool
+    theta: float
+    d: float
+    a: float
+    cosine: float
+    sine: float
+
+    @property
+    def link(self) -> tuple[float, float, float]:
+        """Return the slide along x and cosine and sine of the turn about it."""
+        return self.a, self.cosine, self.sine
+
+
+_PACKED = Struct('16d').pack
+
+
+class SinglePose:
+    """
+    The chain of one robot, prepared for one joint position at a time.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        *rows, last = _rows(robot)
+        # The last link does not move against the tool; the joints come with the link before them.
+        a, cosine, sine = last.link
+        link = np.array([[1, 0, 0, a], [0, cosine, -sine, 0], [0, sine, cosine, 0], [0, 0, 0, 1]])
+        columns = (link @ robot.T_flange_tool)[:3, [0, 2, 3]].T
+        self._tool = tuple(columns.ravel().tolist())
+        onward = [*rows[1:], last]
+        self._rows = tuple(
+            (*row[:4], *before.link) for before, row in zip(rows[::-1], onward[::-1], strict=True)
+        )
+        self._first = (rows[0] if rows else last)[:4]
+        plain = np.array_equal(robot.T_world_base, np.eye(4))
+        self._base = None if plain else robot.T_world_base
+
+    def __call__(self, q: Array) -> Array:
+        """Return the tool pose ``T_world_tool``, shape (4, 4), of a joint position (n,)."""
+        values = [*q.tolist(), 0.0]
+        x0, x1, x2, z0, z1, z2, p0, p1, p2 = self._tool
+        for joint, slides, angle, d, a, cosine, sine in self._rows:
+            if slides:
+                d += values[joint]
+            else:
+                angle += values[joint]
+            c, s = cos(angle), sin(angle)
+            y = s * x0 + c * x1
+            x0 = c * x0 - s * x1
+            x1 = cosine * y - sine * x2
+            x2 = sine * y + cosine * x2
+            y = s * z0 + c * z1
+            z0 = c * z0 - s * z1
+            z1 = cosine * y - sine * z2
+            z2 = sine * y + cosine * z2
+            y = s * p0 + c * p1
+            p0 = c * p0 - s * p1 + a
+            p2 += d
+            p1 = cosine * y - sine * p2
+            p2 = sine * y + cosine * p2
+        joint, slides, angle, d = self._first
+        if slides:
+            d += values[joint]
+        else:
+            angle += values[joint]
+        c, s = cos(angle), sin(angle)
+        x0, x1 = c * x0 - s * x1, s * x0 + c * x1
+        z0, z1 = c * z0 - s * z1, s * z0 + c * z1
+        p0, p1, p2 = c * p0 - s * p1, s * p0 + c * p1, p2 + d
+        # Packed numbers become an array in less time than a tuple of them.
+        pose: Array = np.ndarray((4, 4), np.float64, bytearray(_PACKED(
+            x0, z1 * x2 - z2 * x1, z0, p0,
+            x1, z2 * x0 - z0 * x2, z1, p1,
+            x2, z0 * x1 - z1 * x0, z2, p2,
+            0.0, 0.0, 0.0, 1.0,
+        )))  # fmt: skip
+        return pose if self._base is None else self._base @ pose
+
+
+def _rows(robot: Robot) -> list[_Row]:
+    """Return the chain as rows of one kind, each link with the joint before it."""
+    rows: list[_Row] = []
+    for i in range(robot.n):
+        a, alpha, beta = float(robot.a[i]), float(robot.alpha[i]), float(robot.beta[i])
+        slides = bool(robot.prismatic[i])
+        joint = _Row(i, slides, float(robot.theta[i]), float(robot.d[i]), 0.0, 1.0, 0.0)
+        if robot.convention == 'standard':
+            parts = [joint, _link(a, alpha), *_turn_about_y(beta)]
+        elif beta == 0.0:
+            parts = [_link(a, alpha), joint]
+        else:
+            parts = [_link(0.0, alpha), *_turn_about_y(beta), _link(a, 0.0), joint]
+        for part in parts:
+            if rows and part.joint < 0 and part.theta == 0.0 and rows[-1][4:] == (0.0, 1.0, 0.0):
+                part = rows.pop()._replace(a=part.a, cosine=part.cosine, sine=part.sine)
+            rows.append(part)
+    return rows
+
+
+def _link(a: float, alpha: float) -> _Row:
+    return _Row(-1, False, 0.0, 0.0, a, cos(alpha), sin(alpha))
+
+
+def _turn_about_y(beta: float) -> list[_Row]:
+    """Return Ry(beta) as Rz(90 deg) Rx(beta) Rz(-90 deg)."""
+    if beta == 0.0:
+        return []
+    quarter = 0.5 * np.pi
+    first, last = _link(0.0, beta), _link(0.0, 0.0)
+    return [first._replace(theta=quarter), last._replace(theta=-quarter)]

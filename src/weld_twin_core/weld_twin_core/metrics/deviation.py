@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+r"""
+How far the tool is off: the paper's deviation metrics and those a weld shop asks for.
+
+The paper defines :math:`D_{norm}` twice: as the deviation of every instant over the path length
+(eq. II.vi, here `normalized_deviation`) and as the largest deviation over the path length (eq.
+III.iv, here `DeviationMetrics.d_norm`, the one meant wherever a single number is given).
+:math:`D_{cum}` is a sum over samples (eq. III.iv): it grows with the sample rate and compares only
+runs sampled alike; `DeviationMetrics.d_time_m_s`, the integral over time, does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arm.rotation import angle_between
+from ..arrays import Array, increasing, readonly
+from ..errors import DataError
+from ..motion.seam_frame import path_length, seam_components
+from ..twin.poses import Poses
+
+
+@dataclass(frozen=True)
+class DeviationMetrics:
+    """
+    Deviation of one run; entries are None where the data do not allow them.
+
+    Attributes
+    ----------
+    samples : int
+    rms_m, mean_m, p95_m, max_m : float [m]
+        Of the length of the deviation, D(t).
+    d_norm : float [-]
+        Largest deviation over path length; None for a path without length.
+    d_cum_m : float [m]
+        Sum of D over the samples.
+    d_time_m_s : float [m s]
+        Integral of D over time, by trapezoids; None without stamps.
+    path_length_m : float [m]
+    orientation_rms_rad, orientation_max_rad : float [rad]
+        Of the angle between measured and nominal orientation.
+    along_rms_m, across_rms_m, normal_rms_m : float [m]
+        Of the components on the seam axes.
+
+    """
+
+    samples: int
+    rms_m: float
+    mean_m: float
+    p95_m: float
+    max_m: float
+    d_norm: float | None
+    d_cum_m: float
+    d_time_m_s: float | None
+    path_length_m: float | None
+    orientation_rms_rad: float | None
+    orientation_max_rad: float | None
+    along_rms_m: float | None
+    across_rms_m: float | None
+    normal_rms_m: float | None
+
+    def as_dict(self) -> dict[str, float | int | None]:
+        """Return the fields as plain numbers."""
+        return asdict(self)
+
+
+def deviation(deviations: ArrayLike) -> Array:
+    """Return D, shape (...) [m]: the length of deviations actual minus nominal, shape (..., 3)."""
+    size: Array = np.linalg.norm(np.asarray(deviations, dtype=np.float64), axis=-1)
+    return size
+
+
+def normalized_deviation(deviations: ArrayLike, path_length_m: float) -> Array:
+    """
+    Return D(t) over the path length (paper, eq. II.vi), shape (...).
+
+    Raises
+    ------
+    DataError
+        The path has no length.
+
+    """
+    if not path_length_m > 0.0:
+        raise DataError(f'a path of length {path_length_m} m cannot normalise a deviation')
+    return deviation(deviations) / path_length_m
+
+
+def orientation_error(actual: Array, nominal: Array) -> Array:
+    """Return the angles, shape (...) [rad], between rotation matrices, shape (..., 3, 3)."""
+    angle: Array = np.linalg.norm(angle_between(actual, nominal), axis=-1)
+    return angle
+
+
+def root_mean_square(values: ArrayLike) -> float:
+    """Return the root of the mean square of all values."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def deviation_metrics(
+    actual: Poses | ArrayLike,
+    nominal: Poses | ArrayLike,
+    *,
+    t: ArrayLike | None = None,
+    path_length_m: float | None = None,
+    tangent: ArrayLike | None = None,
+    normal: ArrayLike | None = None,
+) -> DeviationMetrics:
+    """
+    Return the deviation metrics of one run.
+
+    Parameters
+    ----------
+    actual, nominal : Poses, or array_like of positions, shape (N, 3) [m]
+        Orientation is compared where both have it.
+    t : array_like, shape (N,), optional [s]
+    path_length_m : float, optional
+        Length of the seam; left out, that of the polyline through the nominal positions.
+    tangent, normal : array_like, shape (3,) or (N, 3), optional
+        Directions of the seam; both or none.
+
+    Raises
+    ------
+    DataError
+        No samples, samples that do not pair, or one seam direction without the other.
+
+    """
+    positions = [p.position if isinstance(p, Poses) else p for p in (actual, nominal)]
+    expected = readonly(positions[1], (None, 3), 'nominal positions')
+    if len(expected) == 0:
+        raise DataError('there are no samples to measure a deviation on')
+    off = readonly(positions[0], expected.shape, 'actual positions') - expected
+    size = deviation(off)
+    length = path_length(expected) if path_length_m is None else float(path_length_m)
+    turn = None
+    if isinstance(actual, Poses) and isinstance(nominal, Poses):
+        turn = orientation_error(actual.rotation, nominal.rotation)
+    return DeviationMetrics(
+        len(size), root_mean_square(size), float(size.mean()), float(np.percentile(size, 95.0)),
+        float(size.max()), float(size.max()) / length if length > 0.0 else None,
+        float(size.sum()), None if t is None else _over_time(size, t), length,
+        None if turn is None else root_mean_square(turn),
+        None if turn is None else float(turn.max()), *_on_seam(off, tangent, normal),
+    )  # fmt: skip
+
+
+def _over_time(size: Array, t: ArrayLike) -> float:
+    stamps = increasing(t, 'stamps of the deviation')
+    if stamps.shape != size.shape:
+        raise DataError(f'{size.size} deviations need as many stamps, got {stamps.size}')
+    return float((0.5 * (size[1:] + size[:-1]) * np.diff(stamps)).sum())
+
+
+def _on_seam(
+    off: Array, tangent: ArrayLike | None, normal: ArrayLike | None
+) -> tuple[float | None, float | None, float | None]:
+    if tangent is None and normal is None:
+        return None, None, None
+    if tangent is None or normal is None:
+        raise DataError('seam components need both the tangent and the normal of the seam')
+    along, across, out = seam_components(off, tangent, normal).T
+    return root_mean_square(along), root_mean_square(across), root_mean_square(out)

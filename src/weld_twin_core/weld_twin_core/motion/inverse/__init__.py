@@ -1,0 +1,10 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Inverse kinematics: of one pose, all branches; of a whole path, one branch all the way."""
+
+from .all_branches import solve
+from .along_path import PathSolution, solve_path
+from .closed_form import family
+from .newton import polish
+
+__all__ = ['PathSolution', 'family', 'polish', 'solve', 'solve_path']

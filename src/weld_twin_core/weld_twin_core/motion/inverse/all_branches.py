@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""All joint positions that bring the tool to one pose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...errors import ReachError
+from .closed_form import branches, family
+from .multi_start import CLOSED, search
+from .newton import polish
+from .whole_turns import centred
+
+OTHER_POSTURE = (
+    'the arm would have to change its posture on the way; '
+    'move the seam, turn the torch or sample the path more densely'
+)
+
+
+def solve(robot: Robot, pose: Array, seed: Array | None = None) -> Array:
+    """
+    Return every branch within the joint limits, shape (K, n) [rad or m].
+
+    Each revolute joint is given once, on the turn nearest the middle of its range. A chain with
+    more than six joints has no finite set; it gets a sample of postures.
+
+    Parameters
+    ----------
+    robot : Robot
+    pose : array, shape (4, 4)
+        ``T_world_tool``.
+    seed : array, shape (n,), optional
+        A further start where the solution is searched for numerically.
+
+    Raises
+    ------
+    ReachError
+        No joint positions within the limits reach the pose.
+
+    """
+    if family(robot) is None:
+        found, _ = search(robot, pose, seed)
+    else:
+        candidates = branches(robot, pose[None])[:, 0]
+        candidates = candidates[np.isfinite(candidates).all(axis=-1)]
+        poses = np.broadcast_to(pose, (len(candidates), 4, 4))
+        found, error = polish(robot, candidates, poses)
+        found = centred(robot, found)
+        inside = ((found >= robot.lower) & (found <= robot.upper)).all(axis=-1)
+        found = found[inside & (np.abs(error).max(axis=-1) < CLOSED)]
+    if not len(found):
+        raise ReachError(f'{robot.name} cannot reach {where(pose)}: {why_not(robot, pose)}')
+    return found
+
+
+def where(pose: Array) -> str:
+    """Return the position of a pose for a message."""
+    x, y, z = pose[:3, 3]
+    return f'({x:.3f}, {y:.3f}, {z:.3f}) m'
+
+
+def gap(missing: Array) -> str:
+    """Return how far a pose error, shape (6,), is for a message."""
+    away, turned = np.linalg.norm(missing[:3]), np.linalg.norm(missing[3:])
+    return f'{away:.3g} m and {np.degrees(turned):.3g} degrees away'
+
+
+def why_not(robot: Robot, pose: Array) -> str:
+    """Return why a pose is not reached: too far, or past a joint limit."""
+    found, missing = search(_without_limits(robot), pose)
+    if not len(found):
+        return f'the nearest the tool gets is {gap(missing)}; move the seam or turn the torch'
+    excess = np.maximum(robot.lower - found, found - robot.upper)
+    best = int(np.argmin(excess.max(axis=-1)))
+    if excess[best].max() <= 0.0:
+        return OTHER_POSTURE
+    joint = int(np.argmax(excess[best]))
+    return past_limit(robot, joint, found[best, joint])
+
+
+def past_limit(robot: Robot, joint: int, value: float) -> str:
+    """Return what is wrong with a joint position for a message."""
+    return (
+        f'joint {robot.joint_names[joint]!r} would have to be at {value:.3f}, outside '
+        f'[{robot.lower[joint]:.3f}, {robot.upper[joint]:.3f}]; move the seam or turn the torch'
+    )
+
+
+def _without_limits(robot: Robot) -> Robot:
+    lower = np.where(robot.prismatic, robot.lower, -np.inf)
+    return replace(robot, lower=lower, upper=np.where(robot.prismatic, robot.upper, np.inf))

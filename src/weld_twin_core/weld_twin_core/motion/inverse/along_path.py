@@ -1,0 +1,259 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint positions along a whole path on one branch: no jumps, within the limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ...arm.chain import forward, frames
+from ...arm.robot import Robot
+from ...arm.rotation import rotation_matrix, rotation_vector, transform
+from ...arrays import Array
+from ...errors import ReachError
+from ...kernels.bulk import kernel_of
+from .all_branches import OTHER_POSTURE, gap, past_limit, where, why_not
+from .closed_form import branches, family
+from .continuity import Mask, distances, joined, jumps, reach, travel
+from .following import follow
+from .multi_start import CLOSED, centring, null_space, search
+from .newton import chain_jacobian, polish
+from .whole_turns import TURN, turns_to_middle
+
+_KNOTS = 64
+"""Samples a numerical solution is followed over; between them a spline is the start."""
+_TRACKED = 6
+"""Postures at the first sample that are followed along the path."""
+_SINGULAR = 1e-8
+"""Determinant of the Jacobian below which a closed form loses digits."""
+_NUDGE = 1e-3
+_COMFORTABLE = 0.5
+"""Distance from a joint limit [rad] beyond which more of it is worth nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathSolution:
+    """
+    Joint positions along a path; how well the arm stands there is worked out when asked for.
+
+    Attributes
+    ----------
+    robot : Robot
+    poses : array, shape (N, 4, 4)
+        What was asked for.
+    q : array, shape (N, n) [rad or m]
+    method : str
+        'followed' from a seed, the family of the closed form, or 'search'.
+
+    References
+    ----------
+    .. [1] T. Yoshikawa, "Manipulability of robotic mechanisms", IJRR 4(2), 1985.
+
+    """
+
+    robot: Robot
+    poses: Array
+    q: Array
+    method: str
+
+    @cached_property
+    def residual(self) -> Array:
+        """Return what is missing to each pose, shape (N, 2) [m, rad]."""
+        return np.stack(distances(forward(self.robot, self.q), self.poses), axis=1)
+
+    @property
+    def condition(self) -> Array:
+        """
+        Return the condition number of the Jacobian with lengths over the arm's reach, shape (N,).
+
+        Large means near a singularity.
+        """
+        return self._posture[0]
+
+    @property
+    def manipulability(self) -> Array:
+        """Return Yoshikawa's measure, sqrt(det(J J^T)), of the same Jacobian, shape (N,) [1]_."""
+        return self._posture[1]
+
+    @property
+    def limit_margin(self) -> Array:
+        """Return the distance to the nearest joint limit, shape (N,) [rad or m]."""
+        return self._posture[2]
+
+    @cached_property
+    def _posture(self) -> tuple[Array, Array, Array]:
+        return _posture(self.robot, self.q)
+
+
+def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSolution:
+    """
+    Return joint positions on one branch along a path.
+
+    Of the branches that reach every sample within the limits and without a jump, the one with
+    most room to limits and singularities is taken, or the one that starts nearest the seed.
+
+    Parameters
+    ----------
+    robot : Robot
+    poses : array, shape (N, 4, 4)
+        ``T_world_tool``, close enough together that neighbours are one small motion apart.
+    seed : array, shape (n,), optional
+        Joint positions to start near.
+
+    Raises
+    ------
+    ReachError
+        Names the first sample out of reach, where it is and why.
+
+    """
+    poses = np.asarray(poses, dtype=np.float64)
+    if seed is not None:
+        q = follow(robot, poses, np.asarray(seed, dtype=np.float64))
+        if q is not None:
+            return PathSolution(robot, poses, q, 'followed')
+    kind = family(robot)
+    of_all = _followed if kind is None else _closed
+    tracks = of_all(robot, poses, seed)
+    failures = np.array([_first_failure(robot, q, poses) for q in tracks])
+    good = np.flatnonzero(failures == len(poses))
+    if not good.size:
+        raise ReachError(_explain(robot, tracks, failures, poses))
+    best = min(good, key=lambda k: _rank(robot, tracks[k], seed))
+    q = polish(robot, tracks[best], poses)[0]
+    return PathSolution(robot, poses, q, kind or 'search')
+
+
+def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
+    """Return every closed-form branch, shape (8, N, n), unwrapped and on its best turn."""
+    q = joined(_determined(robot, branches(robot, poses), poses))
+    for k, track in enumerate(q):
+        bad = ~np.isfinite(track).all(axis=-1)
+        if not bad.all():
+            q[k, ~bad] = _on_turn(robot, np.unwrap(track[~bad], axis=0), seed)
+    return q
+
+
+def _determined(robot: Robot, q: Array, poses: Array) -> Array:
+    """
+    Return branches (K, N, n) with samples on a singularity replaced by what they tend to.
+
+    There the pose leaves joints undetermined; a little way towards the next sample it does not.
+    The straight way there bends off the path, so the joints are right to a part of a step.
+    """
+    kernel = kernel_of(robot, tuple(('theta', i) for i in range(robot.n)))
+    screws = kernel.screws(np.nan_to_num(q).reshape(-1, robot.n))[1]
+    size = np.abs(np.linalg.det(screws.T)).reshape(q.shape[:2])
+    singular = np.flatnonzero((size < _SINGULAR).any(axis=0))
+    if singular.size and len(poses) > 1:
+        other = np.where(singular + 1 < len(poses), singular + 1, singular - 1)
+        q = q.copy()
+        q[:, singular] = branches(robot, _between(poses[singular], poses[other], _NUDGE))
+    return q
+
+
+def _between(start: Array, end: Array, part: float) -> Array:
+    """Return poses (N, 4, 4) a part of the way from one to the other."""
+    turn = rotation_vector(end[:, :3, :3] @ np.swapaxes(start[:, :3, :3], -1, -2))
+    rotation = rotation_matrix(part * turn) @ start[:, :3, :3]
+    return transform(rotation, start[:, :3, 3] + part * (end[:, :3, 3] - start[:, :3, 3]))
+
+
+def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:
+    if seed is not None:
+        shift = np.round((np.asarray(seed) - q[0]) / TURN)
+        near = q + TURN * np.where(robot.prismatic, 0.0, shift)
+        if ((near >= robot.lower) & (near <= robot.upper)).all():
+            return near
+    return q + TURN * turns_to_middle(robot, q.min(axis=0), q.max(axis=0))
+
+
+def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
+    """Return tracks, shape (K, N, n), followed from every posture found at the first sample."""
+    starts, missing = search(robot, poses[0], seed)
+    if not len(starts):
+        raise ReachError(
+            f'{robot.name} cannot reach sample 0 at {where(poses[0])}: the nearest the tool gets '
+            f'is {gap(missing)}; move the seam or turn the torch'
+        )
+    starts = np.array(sorted(starts, key=lambda q: _rank(robot, q[None], seed)))[:_TRACKED]
+    index = np.unique(np.linspace(0, len(poses) - 1, _KNOTS).round().astype(int))
+    knots = _track(robot, starts, poses[index])
+    if len(index) == len(poses):
+        return knots
+    along = travel(robot, poses)
+    spline = CubicSpline(along[index], np.where(np.isfinite(knots), knots, 0.0), axis=1)
+    tracks = spline(along)
+    lost: Mask = np.any(np.isnan(knots), axis=-1)
+    for k, track in enumerate(tracks):
+        tracks[k] = _on_turn(robot, polish(robot, track, poses)[0], seed)
+        if lost[k].any():
+            tracks[k, index[max(int(np.argmax(lost[k])) - 1, 0)] + 1 :] = np.nan
+    return np.asarray(tracks)
+
+
+def _track(robot: Robot, q: Array, poses: Array) -> Array:
+    """Follow postures q (K, n) over knots; NaN from where one is lost. Shape (K, M, n)."""
+    out = []
+    for pose in poses:
+        target = np.broadcast_to(pose, (len(q), 4, 4))
+        if robot.n > 6:
+            jacobian = chain_jacobian(robot, frames(robot, q))
+            q = q + 0.05 * null_space(jacobian, centring(robot, q))
+        q, error = polish(robot, q, target)
+        lost = ~(np.abs(error).max(axis=-1) < CLOSED)
+        out.append(np.where(lost[:, None], np.nan, q))
+    return np.stack(out, axis=1)
+
+
+def _first_failure(robot: Robot, q: Array, poses: Array) -> int:
+    """Return the first sample that is not reached, past a limit or after a jump; N if none."""
+    fails: Mask = np.any(np.isnan(q) | (q < robot.lower) | (q > robot.upper), axis=-1)
+    fails[1:] |= jumps(robot, q, poses)
+    return int(np.argmax(fails)) if fails.any() else len(q)
+
+
+def _rank(robot: Robot, q: Array, seed: Array | None) -> float:
+    """Return a number that is smaller for a better track."""
+    if seed is not None:
+        return float(np.linalg.norm(q[0] - seed))
+    some = q[:: max(1, len(q) // 100)]
+    condition, _, margin = _posture(robot, some)
+    room = min(float(margin.min()) / _COMFORTABLE, 1.0)
+    return -room / float(condition.max()) * (1.0 if _above_base(robot, some) else 0.1)
+
+
+def _above_base(robot: Robot, q: Array) -> bool:
+    """Tell whether every joint stays on the arm's side of the surface the base stands on."""
+    chain = frames(robot, q)
+    up, foot = chain.base_rotation[:, 2], chain.base_point
+    heights = [np.moveaxis(row.z_point, 0, -1) @ up - foot @ up for row in chain.rows]
+    return min(float(height.min()) for height in heights) > -1e-6
+
+
+def _posture(robot: Robot, q: Array) -> tuple[Array, Array, Array]:
+    """Return condition number, manipulability and distance to the nearest limit, (N,) each."""
+    jacobian = chain_jacobian(robot, frames(robot, q)).copy()
+    jacobian[:, :3] /= reach(robot)
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    condition = values[:, 0] / np.maximum(values[:, -1], 1e-300)
+    margin = np.minimum(q - robot.lower, robot.upper - q).min(axis=-1)
+    return condition, values.prod(axis=-1), margin
+
+
+def _explain(robot: Robot, tracks: Array, failures: Array, poses: Array) -> str:
+    """Return the sentence about the branch that gets farthest."""
+    best = int(np.argmax(failures))
+    k = int(failures[best])
+    text = f'{robot.name} cannot reach sample {k} at {where(poses[k])}: '
+    q = tracks[best, k]
+    if not np.isfinite(q).all():
+        return text + why_not(robot, poses[k])
+    outside = np.maximum(robot.lower - q, q - robot.upper)
+    joint = int(np.argmax(outside))
+    if outside[joint] > 0.0:
+        return text + past_limit(robot, joint, q[joint])
+    return text + OTHER_POSTURE

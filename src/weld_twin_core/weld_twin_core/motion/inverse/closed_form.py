@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Closed-form inverse kinematics of two families of six-joint arm, all branches, over samples.
+
+The family is read off the joint axes at position zero, so the DH convention and where its
+frames sit do not matter: *spherical wrist* (axes 4, 5, 6 meet in a point; 2 and 3 parallel;
+shoulder and elbow offsets allowed) and *three parallel* (axes 2, 3, 4 parallel; 5 and 6 meet).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arm.chain import forward, frames
+from ...arm.robot import Robot
+from ...arrays import Array
+from .subproblems import angle_onto, angle_to_distance, angle_to_height, turn, turn_matrix
+
+EXACT = 1e-9
+"""How far [m, rad] axes may be from meeting or parallel; an arm with errors is not exact."""
+
+
+@dataclass(frozen=True, eq=False)
+class Screws:
+    """Joint axes (6, 3), a point on each (6, 3) [m], and the tool pose (4, 4), all at q = 0."""
+
+    axis: Array
+    point: Array
+    home: Array
+
+
+Solver = Callable[[Screws, Array, Array], Array]
+
+
+def screws(robot: Robot) -> Screws:
+    """Return the joint axes of a robot at joint position zero, in the world frame."""
+    zero = np.zeros(robot.n)
+    rows = frames(robot, zero).rows
+    return Screws(
+        np.array([row.z for row in rows]),
+        np.array([row.z_point for row in rows]),
+        forward(robot, zero),
+    )
+
+
+def family(robot: Robot) -> str | None:
+    """Return 'spherical wrist', 'three parallel', or None where no closed form applies."""
+    if robot.n != 6 or robot.prismatic.any():
+        return None
+    arm = screws(robot)
+    wrist = _meeting(arm, 4, 5)
+    if wrist is None or not _parallel(arm, 1, 2):
+        return None
+    if _parallel(arm, 2, 3) and not _parallel(arm, 0, 1) and not _parallel(arm, 3, 4):
+        return 'three parallel'
+    if _off_axis(arm, 3, wrist) < EXACT and not _parallel(arm, 3, 4):
+        return 'spherical wrist'
+    return None
+
+
+def branches(robot: Robot, poses: Array) -> Array:
+    """
+    Return all branches, shape (8, N, 6) [rad], NaN where a branch does not reach a pose.
+
+    The index of a branch means the same arm posture at every sample. Angles are in (-pi, pi].
+
+    Parameters
+    ----------
+    robot : Robot
+        Of one of the two families.
+    poses : array, shape (N, 4, 4)
+        ``T_world_tool``.
+
+    """
+    arm = screws(robot)
+    solver = _SOLVERS[str(family(robot))]
+    rotation = poses[:, :3, :3] @ arm.home[:3, :3].T
+    wrist = _meeting(arm, 4, 5)
+    centre = np.asarray(wrist) - arm.home[:3, 3]
+    point = (rotation @ centre) + poses[:, :3, 3]
+    q = (solver(arm, rotation, point) + np.pi) % (2.0 * np.pi) - np.pi
+    # The nearest angle stands in where none exists; those samples do not close.
+    gap = np.abs(forward(robot, q) - poses).max(axis=(-2, -1))
+    return np.where((gap < 1e-6)[..., None], q, np.nan)
+
+
+def _spherical(arm: Screws, rotation: Array, point: Array) -> Array:
+    """Return q (8, N, 6): shoulder, elbow and wrist, each two ways."""
+    h, p = arm.axis, arm.point
+    centre = np.asarray(_meeting(arm, 4, 5))
+    out = []
+    for q1 in -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0])):
+        # Minus: it is the arm that turns back onto the point.
+        reach = turn(h[0], -q1, point - p[0]) - (p[1] - p[0])
+        length = np.linalg.norm(reach, axis=-1)
+        for q3 in angle_to_distance(p[2] - p[1], h[2], centre - p[2], length):
+            bent = p[2] - p[1] + turn(h[2], q3, np.broadcast_to(centre - p[2], reach.shape))
+            q2 = angle_onto(h[1], bent, reach)
+            arm_turn = turn_matrix(h[0], q1) @ turn_matrix(h[1], q2) @ turn_matrix(h[2], q3)
+            wrist = np.swapaxes(arm_turn, -1, -2) @ rotation
+            out += [
+                np.stack([q1, q2, q3, *angles], axis=-1)
+                for angles in _wrist(h[3], h[4], h[5], wrist)
+            ]
+    return np.stack(out)
+
+
+def _wrist(h4: Array, h5: Array, h6: Array, rotation: Array) -> list[tuple[Array, Array, Array]]:
+    """Return both (q4, q5, q6) with R(h4, q4) R(h5, q5) R(h6, q6) = rotation."""
+    last = rotation @ h6
+    out = []
+    for q5 in angle_to_height(h4, h5, np.broadcast_to(h6, last.shape), last @ h4):
+        q4 = angle_onto(h4, turn(h5, q5, np.broadcast_to(h6, last.shape)), last)
+        before = turn_matrix(h4, q4) @ turn_matrix(h5, q5)
+        out.append((q4, q5, _rest(h6, np.swapaxes(before, -1, -2) @ rotation)))
+    return out
+
+
+def _three_parallel(arm: Screws, rotation: Array, point: Array) -> Array:
+    """Return q (8, N, 6): shoulder, wrist and elbow, each two ways."""
+    h, p = arm.axis, arm.point
+    centre = np.asarray(_meeting(arm, 4, 5))
+    out = []
+    for q1 in -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0])):
+        turned = turn_matrix(h[0], -q1) @ rotation
+        last = turned @ h[5]
+        for q5 in angle_to_height(h[1], h[4], np.broadcast_to(h[5], last.shape), last @ h[1]):
+            # Turns about the parallel axes leave h2 alone, so h2 shows the wrist's turn.
+            seen = turn(h[4], -q5, np.broadcast_to(h[1], last.shape))
+            q6 = -angle_onto(h[5], seen, np.swapaxes(turned, -1, -2) @ h[1])
+            after = turn_matrix(h[4], q5) @ turn_matrix(h[5], q6)
+            total = _rest(h[1], turned @ np.swapaxes(after, -1, -2))
+            foot = turn(h[0], -q1, point - p[0]) - (p[1] - p[0])
+            foot = foot - turn(h[1], total, np.broadcast_to(centre - p[3], foot.shape))
+            out += [
+                np.stack([q1, *angles, q5, q6], axis=-1) for angles in _planar(arm, foot, total)
+            ]
+    return np.stack(out)
+
+
+def _planar(arm: Screws, foot: Array, total: Array) -> list[tuple[Array, Array, Array]]:
+    """Return both (q2, q3, q4) that put axis 4 at ``foot`` from axis 2 and turn by ``total``."""
+    h, upper, fore = arm.axis, arm.point[2] - arm.point[1], arm.point[3] - arm.point[2]
+    out = []
+    for q3 in angle_to_distance(upper, h[2], fore, np.linalg.norm(foot, axis=-1)):
+        bent = upper + turn(h[2], q3, np.broadcast_to(fore, foot.shape))
+        q2 = angle_onto(h[1], bent, foot)
+        signs = h[1] @ h[2], h[1] @ h[3]
+        out.append((q2, q3, signs[1] * (total - q2 - signs[0] * q3)))
+    return out
+
+
+def _rest(axis: Array, rotation: Array) -> Array:
+    """Return the angle of rotations (..., 3, 3) known to be about the axis."""
+    aside = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    return angle_onto(axis, np.broadcast_to(aside, rotation.shape[:-1]), rotation @ aside)
+
+
+def _parallel(arm: Screws, i: int, j: int) -> bool:
+    return bool(np.linalg.norm(np.cross(arm.axis[i], arm.axis[j])) < EXACT)
+
+
+def _off_axis(arm: Screws, i: int, point: Array) -> float:
+    return float(np.linalg.norm(np.cross(point - arm.point[i], arm.axis[i])))
+
+
+def _meeting(arm: Screws, i: int, j: int) -> Array | None:
+    """Return the point where two axes meet, or None when they are parallel or pass by."""
+    if _parallel(arm, i, j):
+        return None
+    directions = np.stack([arm.axis[i], -arm.axis[j]], axis=-1)
+    steps = np.linalg.lstsq(directions, arm.point[j] - arm.point[i], rcond=None)[0]
+    point = arm.point[i] + steps[0] * arm.axis[i]
+    return point if _off_axis(arm, j, point) < EXACT else None
+
+
+_SOLVERS: dict[str, Solver] = {
+    'spherical wrist': _spherical,
+    'three parallel': _three_parallel,
+}

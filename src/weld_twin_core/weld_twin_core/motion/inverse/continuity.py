@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What makes joint positions along a path one motion, and what is a jump between postures."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arm.chain import forward
+from ...arm.robot import Robot
+from ...arrays import Array
+
+Mask = NDArray[np.bool_]
+
+LEAP = 0.5
+"""Joint step [rad] between neighbours that calls for a second look."""
+_STEEP = 20.0
+"""Joint motion per motion of the tool (both in rad, lengths over reach) beyond which it flips."""
+
+_SUMS = np.array([[[0.0, 1.0]] * 3 + [[1.0, 0.0]]] * 3 + [[[0.0, 0.0]] * 4]).reshape(16, 2)
+"""Adds up the squares of a pose's position and of its rotation."""
+
+
+def reach(robot: Robot) -> float:
+    """Return the length of the stretched-out chain [m], an upper bound of the arm's reach."""
+    return float(np.hypot(robot.a, robot.d).sum() + np.linalg.norm(robot.T_flange_tool[:3, 3]))
+
+
+def travel(robot: Robot, poses: Array) -> Array:
+    """Return a strictly increasing measure of the way along the poses, shape (N,) [rad]."""
+    moved, turned = distances(poses[1:], poses[:-1])
+    return np.concatenate([[0.0], np.cumsum(moved / reach(robot) + turned + 1e-9)])
+
+
+def distances(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return how far poses (N, 4, 4) are apart, shape (N,) each [m, rad]."""
+    gap = (first - second).reshape(-1, 16)
+    gap *= gap
+    moved, turned = np.sqrt(gap @ _SUMS).T
+    # The chord between rotations, as long as 2 sqrt(2) sin(angle / 2).
+    return moved, 2.0 * np.arcsin(np.minimum(turned / np.sqrt(8.0), 1.0))
+
+
+def joined(tracks: Array) -> Array:
+    """
+    Return branches, shape (K, N, n), continued across singularities.
+
+    Where an arm passes a singularity, its motion goes on in what a closed form calls another
+    branch; there the branches change places.
+    """
+    tracks = tracks.copy()
+    steps = np.abs(_turned(np.diff(tracks, axis=1))).max(axis=-1)
+    for i in np.flatnonzero((steps > LEAP).any(axis=0)) + 1:
+        apart = np.abs(_turned(tracks[:, i] - tracks[:, i - 1, None])).max(axis=-1)
+        apart = np.where(np.isnan(apart), np.inf, apart)
+        order = np.where(np.isinf(apart).all(axis=1), np.arange(len(tracks)), apart.argmin(axis=1))
+        if len(set(order)) == len(order):
+            tracks[:, i:] = tracks[order, i:]
+    return tracks
+
+
+def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
+    """
+    Tell, shape (N - 1,), where the arm leaves the path between two samples.
+
+    Half way between two joint positions of one motion the tool is near both; half way between
+    two branches it is somewhere else, or the joints move much farther than the tool.
+    """
+    if len(q) < 2:
+        return np.zeros(0, dtype=bool)
+    halfway = forward(robot, np.nan_to_num(0.5 * (q[1:] + q[:-1])))
+    tool = np.diff(travel(robot, poses))
+    size, away = reach(robot), -3.0 * tool
+    for ends in (poses[:-1], poses[1:]):
+        moved, turned = distances(halfway, ends)
+        away += np.hypot(moved / size, turned)
+    joints = np.abs(np.diff(q, axis=0)).max(axis=-1)
+    return np.asarray((away > 1e-3) | ((joints > LEAP) & (joints > _STEEP * tool)))
+
+
+def _turned(angle: Array) -> Array:
+    """Return angles in [-pi, pi)."""
+    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One posture followed along a path, from a few of its poses: what most paths need, and quick.
+
+Newton's method closes a few knots. Polynomials through them, of the joint positions and of the
+matrix that turns a gap of the pose into a joint step, then serve all samples at once: a step of
+that matrix takes away all but the square of what the polynomial misses. Where that does not
+converge at once the path is halved, and in case of doubt nothing is returned.
+
+References
+----------
+.. [1] J.-P. Berrut, L. N. Trefethen, "Barycentric Lagrange interpolation", SIAM Review 46, 2004.
+
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arm.robot import Robot
+from ...arm.rotation import skew
+from ...arrays import Array
+from ...kernels.bulk import BulkKernel, kernel_of
+from .continuity import LEAP
+
+KNOTS = 16
+SHORT = 2 * KNOTS
+"""Samples below which polynomials through knots would say nothing about those between them."""
+_LONG = 2000
+"""Samples worked on at once."""
+_NEAR = 0.1
+"""Distance [rad or m] from the seed up to which no other posture is looked for."""
+_SMOOTH = 0.02
+"""Correction [rad or m] beyond which the polynomial is not taken for the posture's own."""
+_STIFF = 1e3
+"""Joint motion per motion of the tool that is too near a singularity."""
+_CLOSED = 1e-12
+_ROUGH = 1e-4
+"""Gap of a knot [m, rad] after which one more step is enough."""
+_ROUNDS = 8
+
+
+
+def follow(robot: Robot, poses: Array, seed: Array) -> Array | None:
+    """
+    Return joint positions, shape (N, 6), that start near the seed and go on without a jump.
+
+    None where they do not start there, reach a limit, come near a singularity, or leave any
+    other doubt; also for few samples, or an arm that does not have six joints.
+
+    Parameters
+    ----------
+    robot : Robot
+    poses : array, shape (N, 4, 4)
+        Evenly spaced, by and large: the polynomials are over the samples.
+    seed : array, shape (6,) [rad or m]
+
+    """
+    if robot.n != 6 or len(poses) < SHORT:
+        return None
+    kernel = kernel_of(robot, tuple(('theta', i) for i in range(6)))
+    q = _piece(kernel, poses, seed)
+    if q is None or (q < robot.lower).any() or (q > robot.upper).any():
+        return None
+    return q if np.abs(q[1:] - q[:-1]).max() < LEAP else None
+
+
+def _piece(kernel: BulkKernel, poses: Array, start: Array) -> Array | None:
+    """Follow a piece of the path, in halves where it does not go at once."""
+    half = len(poses) // 2
+    if len(poses) <= _LONG:
+        index, spread = _knots(len(poses))
+        found = _closed_knots(kernel, poses[index], start)
+        q = None if found is None else _corrected(kernel, poses, spread, *found)
+        if q is not None or half < SHORT:
+            return q
+    before = _piece(kernel, poses[: half + 1], start)
+    if before is None:
+        return None
+    after = _piece(kernel, poses[half:], before[-1])
+    return None if after is None else np.concatenate([before, after[1:]])
+
+
+@lru_cache(maxsize=16)
+def _knots(count: int) -> tuple[NDArray[np.intp], Array]:
+    """
+    Return which samples are knots, and the matrix (N, K) from values there to values everywhere.
+
+    The knots are nearest the extrema of a Chebyshev polynomial; the matrix is that of [1]_.
+    """
+    part = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, KNOTS))
+    index = np.unique(np.rint(part * (count - 1)).astype(int))
+    apart = (index[:, None] - index) * (4.0 / count)
+    np.fill_diagonal(apart, 1.0)
+    away = np.arange(float(count))[:, None] - index
+    away[index, np.arange(len(index))] = 1.0
+    spread = 1.0 / (away * apart.prod(axis=1))
+    spread /= spread.sum(axis=1, keepdims=True)
+    spread[index] = np.eye(len(index))
+    return index, spread
+
+
+def _closed_knots(kernel: BulkKernel, poses: Array, start: Array) -> tuple[Array, Array] | None:
+    """Return joint positions (K, 6) at the knots and their gains (K, 6, 12), if they close."""
+    q = np.zeros((len(poses), 6)) + start
+    for _ in range(_ROUNDS):
+        found, screws = kernel.screws(q)
+        twists = (found.reshape(-1, 16) @ _TWISTS).reshape(-1, 6, 12)
+        try:
+            gain = np.linalg.solve(screws.transpose(2, 0, 1), twists)
+        except np.linalg.LinAlgError:
+            return None
+        gap = _gap(found, poses)
+        q += _step(gain, gap)
+        if np.abs(gap).max() < _ROUGH:
+            near = np.abs(q[0] - start).max() < _NEAR and np.abs(gain).max() < _STIFF
+            return (q, gain) if near else None
+    return None
+
+
+def _corrected(
+    kernel: BulkKernel, poses: Array, spread: Array, knots: Array, gains: Array
+) -> Array | None:
+    """Return joint positions (N, 6) closed onto the poses, from those at the knots."""
+    guess = spread @ knots
+    gain = (spread @ gains.reshape(len(knots), -1)).reshape(-1, 6, 12)
+    q, left = guess, np.inf
+    for _ in range(_ROUNDS):
+        gap = _gap(kernel.poses(q), poses)
+        size = np.abs(gap).max()
+        if size < _CLOSED:
+            return q
+        if not size < 0.1 * left:
+            return None
+        left = size
+        q = q + _step(gain, gap)
+        if not np.abs(q - guess).max() < _SMOOTH:
+            return None
+    return None
+
+
+def _gap(found: Array, poses: Array) -> Array:
+    """Return what is missing to rotation and position, shape (N, 12)."""
+    return (poses - found)[:, :3].reshape(-1, 12)
+
+
+def _step(gain: Array, gap: Array) -> Array:
+    return (gain @ gap[..., None])[..., 0]
+
+
+def _twists() -> Array:
+    """Return the matrix (16, 72) that, applied to a pose, turns small gaps of it into twists."""
+    out = np.zeros((4, 4, 6, 3, 4))
+    for k in range(3):
+        out[3, 3, k, k, 3] = 1.0
+        # A small turn is half the sum of the crosses of each column with its gap.
+        out[:3, k, 3:, :, k] = 0.5 * skew(np.eye(3)).transpose(2, 0, 1)
+    return out.reshape(16, 72)
+
+
+_TWISTS = _twists()

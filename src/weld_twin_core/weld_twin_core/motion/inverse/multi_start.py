@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Inverse kinematics by damped least squares from many starts: any chain, all starts at once.
+
+References
+----------
+.. [1] S. Chan, P. Lawrence, "General inverse kinematics with the error damped pseudoinverse",
+   IEEE ICRA 1988.
+
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arm.chain import frames
+from ...arm.robot import Robot
+from ...arrays import Array
+from .newton import chain_jacobian, least_step, polish, pose_error
+from .whole_turns import centred, middle
+
+CLOSED = 1e-9
+"""Largest error [m, rad] of a solution."""
+_STARTS = 128
+_ROUNDS = 60
+_SAME = 1e-4
+
+
+def search(robot: Robot, pose: Array, seed: Array | None = None) -> tuple[Array, Array]:
+    """
+    Return distinct solutions within the limits, shape (K, n), and the smallest error, shape (6,).
+
+    The starts are the same for every call, so the answer is repeatable. A chain with more
+    than six joints gets from each start the solution nearest the middle of its range.
+
+    Parameters
+    ----------
+    pose : array, shape (4, 4)
+    seed : array, shape (n,), optional
+        One more start, tried first.
+
+    """
+    lower, upper = _range(robot)
+    rng = np.random.default_rng(0)
+    starts = rng.uniform(lower, upper, size=(_STARTS, robot.n))
+    if seed is not None:
+        starts = np.concatenate([np.asarray(seed)[None], starts])
+    poses = np.broadcast_to(pose, (len(starts), 4, 4))
+    q, error = polish(robot, _descend(robot, starts, poses), poses)
+    q = centred(robot, q)
+    size = np.abs(error).max(axis=-1)
+    inside = ((q >= robot.lower - CLOSED) & (q <= robot.upper + CLOSED)).all(axis=-1)
+    return _distinct(robot, q[(size < CLOSED) & inside]), error[int(np.argmin(size))]
+
+
+def _range(robot: Robot) -> tuple[Array, Array]:
+    """Return where to look: the limits, cut to one turn about their middle."""
+    half = np.where(robot.prismatic, 2.0, np.pi)
+    centre = middle(robot)
+    return np.maximum(robot.lower, centre - half), np.minimum(robot.upper, centre + half)
+
+
+def centring(robot: Robot, q: Array) -> Array:
+    """Return the joint motion, shape (..., n), towards the middle of the range."""
+    lower, upper = _range(robot)
+    width = upper - lower
+    return np.asarray((0.5 * (lower + upper) - q) / (width / width.max()) ** 2)
+
+
+def null_space(jacobian: Array, motion: Array) -> Array:
+    """Return the part of a joint motion, shape (..., n), that leaves the tool where it is."""
+    return motion - least_step(jacobian, (jacobian @ motion[..., None])[..., 0])
+
+
+def _descend(robot: Robot, q: Array, poses: Array) -> Array:
+    """Damped steps; the damping follows the error, so far starts move carefully."""
+    for _ in range(_ROUNDS):
+        chain = frames(robot, q)
+        error = pose_error(chain, poses)
+        size = np.linalg.norm(error, axis=-1)
+        jacobian = chain_jacobian(robot, chain)
+        step = least_step(jacobian, error, 1e-2 * np.minimum(size, 1.0) ** 2 + 1e-10)
+        if robot.n > 6:
+            step = step + 0.2 * null_space(jacobian, centring(robot, q))
+        largest = np.abs(step).max(axis=-1, keepdims=True)
+        q = q + step / np.maximum(1.0, largest / 0.5)
+        # A limit would only stall a turning joint, which may come round the other way; without a
+        # choice of turns, or with freedom to use, staying inside is what finds a solution.
+        bounded = robot.prismatic | (robot.n > 6)
+        q = np.where(bounded, np.clip(q, robot.lower, robot.upper), q)
+    return q
+
+
+def _distinct(robot: Robot, q: Array) -> Array:
+    """Drop solutions that are the same posture, whole turns apart or not."""
+    kept: list[Array] = []
+    for row in q:
+        gaps = [np.where(robot.prismatic, row - k, np.angle(np.exp(1j * (row - k)))) for k in kept]
+        if all(np.abs(gap).max() > _SAME for gap in gaps):
+            kept.append(row)
+    return np.array(kept).reshape(-1, robot.n)

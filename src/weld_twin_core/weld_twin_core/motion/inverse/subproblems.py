@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Paden-Kahan subproblems, batched: what angle about an axis brings a vector where it should be.
+
+Where no angle does, the nearest one is returned; the caller checks the closure.
+
+References
+----------
+.. [1] A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem
+   decomposition", Mechanism and Machine Theory 209, 2025.
+
+"""
+
+import numpy as np
+
+from ...arrays import Array
+
+
+def turn(axis: Array, angle: Array, vector: Array) -> Array:
+    """Return vectors (..., 3) turned by angles (...) about a fixed unit axis (3,)."""
+    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    along = (vector @ axis)[..., None] * axis
+    return along + cosine * (vector - along) + sine * np.cross(axis, vector)
+
+
+def turn_matrix(axis: Array, angle: Array) -> Array:
+    """Return rotation matrices (..., 3, 3) by angles (...) about a fixed unit axis (3,)."""
+    return np.stack([turn(axis, angle, unit) for unit in np.eye(3)], axis=-1)
+
+
+def angle_onto(axis: Array, start: Array, end: Array) -> Array:
+    """Return the angle about the axis that turns ``start`` onto ``end`` (..., 3)."""
+    sine = np.cross(start, end) @ axis
+    cosine = (start * end).sum(axis=-1) - (start @ axis) * (end @ axis)
+    return np.asarray(np.arctan2(sine, cosine))
+
+
+def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> Array:
+    """Return both angles, shape (2, ...), at which the turned ``start`` has a height along."""
+    level = (start @ axis)[..., None] * axis
+    cosine = ((start - level) * along).sum(axis=-1)
+    sine = (np.cross(axis, start) * along).sum(axis=-1)
+    wanted = height - (level * along).sum(axis=-1)
+    size = np.hypot(cosine, sine)
+    spread = np.arccos(np.clip(wanted / np.where(size > 0.0, size, 1.0), -1.0, 1.0))
+    middle = np.arctan2(sine, cosine)
+    return np.stack([middle + spread, middle - spread])
+
+
+def angle_to_distance(offset: Array, axis: Array, start: Array, distance: Array) -> Array:
+    """Return both angles, shape (2, ...), at which ``offset`` plus turned ``start`` is so long."""
+    height = 0.5 * (distance**2 - (offset**2).sum(axis=-1) - (start**2).sum(axis=-1))
+    return angle_to_height(offset, axis, start, height)

@@ -1,0 +1,18 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Weld seams in arc length, the torch on them, and seams from the mapping a path file holds."""
+
+from .arc import Arc, Circle
+from .bundled import KINDS, default_seam
+from .line import Line
+from .mapping import from_mapping
+from .polyline import Polyline
+from .seam_path import Path, SeamFrames
+from .spline import Spline
+from .torch import Torch
+from .weave import Weave
+
+__all__ = [
+    'KINDS', 'Arc', 'Circle', 'Line', 'Path', 'Polyline', 'SeamFrames', 'Spline', 'Torch',
+    'Weave', 'default_seam', 'from_mapping',
+]  # fmt: skip

@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A seam of each kind placed where a given robot works comfortably."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...errors import PathError, ReachError
+from ..inverse import solve_path
+from ..inverse.continuity import reach
+from .arc import Arc, Circle
+from .line import Line
+from .polyline import Polyline
+from .seam_path import Path
+from .spline import Spline
+from .torch import Torch
+from .weave import Weave
+
+_COMFORT_LIMIT = 0.15
+_COMFORT_CONDITION = 40.0
+
+
+class Place(NamedTuple):
+    """Where a seam lies: centre, direction, out of the work (world frame), and its size [m]."""
+
+    centre: Array
+    along: Array
+    normal: Array
+    size: float
+
+    def points(self, *plane: tuple[float, float]) -> Array:
+        """Return points given along and across the seam in units of its size, shape (M, 3)."""
+        across = np.cross(self.normal, self.along)
+        local = self.size * np.array(plane)
+        return self.centre + local[:, :1] * self.along + local[:, 1:] * across
+
+
+def _line(place: Place) -> Path:
+    start, end = place.points((-0.5, 0.0), (0.5, 0.0))
+    return Line(start, end, place.normal)
+
+
+def _arc(place: Place) -> Path:
+    start, middle, end = place.points((-0.45, -0.15), (0.0, 0.15), (0.45, -0.15))
+    return Arc(start, middle, end, place.normal)
+
+
+def _circle(place: Place) -> Path:
+    return Circle(place.centre, 0.2 * place.size, place.normal, place.along)
+
+
+def _polyline(place: Place) -> Path:
+    points = place.points((-0.4, -0.2), (-0.4, 0.2), (0.0, 0.0), (0.4, 0.2), (0.4, -0.2))
+    return Polyline(points, 0.03 * place.size, place.normal)
+
+
+def _spline(place: Place) -> Path:
+    points = place.points((-0.5, 0.0), (-0.25, 0.15), (0.0, 0.0), (0.25, -0.15), (0.5, 0.0))
+    return Spline(points, place.normal)
+
+
+def _weave(place: Place) -> Path:
+    return Weave(_line(place), 0.01 * place.size, 0.05 * place.size)
+
+
+_SHAPES: dict[str, Callable[[Place], Path]] = {
+    'line': _line, 'arc': _arc, 'circle': _circle, 'polyline': _polyline, 'spline': _spline,
+    'weave': _weave,
+}  # fmt: skip
+KINDS = tuple(_SHAPES)
+
+
+def default_seam(robot: Robot, kind: str = 'line', torch: Torch | None = None) -> Path:
+    """
+    Return a seam of a kind that the robot reaches with the torch upright on it.
+
+    Parameters
+    ----------
+    robot : Robot
+    kind : str
+        One of `KINDS`.
+    torch : Torch, optional
+        Angles the seam must be reachable with; left out, all zero.
+
+    Raises
+    ------
+    PathError
+        There is no such kind.
+    ReachError
+        None of the places tried is within reach.
+
+    """
+    if kind not in _SHAPES:
+        raise PathError(f'no bundled seam is of kind {kind!r}; there are ' + ', '.join(KINDS))
+    best: tuple[float, Path | None] = (-np.inf, None)
+    for place in _places(robot):
+        path = _SHAPES[kind](place)
+        comfort = _comfort(robot, path, torch or Torch())
+        if comfort > 1.0:
+            return path
+        if comfort > best[0]:
+            best = comfort, path
+    if best[1] is None:
+        raise ReachError(
+            f'{robot.name} reaches none of the places tried for a seam of kind {kind!r}; '
+            'describe a seam in its workspace'
+        )
+    return best[1]
+
+
+def _comfort(robot: Robot, path: Path, torch: Torch) -> float:
+    """Return a number above 1 where limits and singularities are far, -inf out of reach."""
+    frames = path.sample(np.linspace(0.0, path.length, 33))
+    try:
+        solution = solve_path(robot, torch.poses(frames))
+    except ReachError:
+        return -np.inf
+    room = float(solution.limit_margin.min()) / _COMFORT_LIMIT
+    return min(room, _COMFORT_CONDITION / float(solution.condition.max()))
+
+
+def _places(robot: Robot) -> Iterator[Place]:
+    """Yield places from the likeliest on, scaled with the robot."""
+    size = reach(robot)
+    base = robot.T_world_base
+    weight = float(np.linalg.norm(robot.gravity))
+    up = -robot.gravity / weight if weight > 0.0 else np.array([0.0, 0.0, 1.0])
+    # Hanging from a ceiling, the wire points away from the base and the work lies far from it.
+    heights = (0.15, 0.3, 0.05, 0.45, -0.1) if up[2] > -0.5 else (0.65, 0.55, 0.75, 0.45, 0.85)
+    for height in heights:
+        for distance in (0.5, 0.4, 0.6, 0.3):
+            for along in ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)):
+                flat = np.asarray(along) - (up @ along) * up
+                if np.linalg.norm(flat) < 0.5:
+                    continue
+                centre = base[:3, :3] @ [distance * size, 0.0, height * size] + base[:3, 3]
+                direction = base[:3, :3] @ (flat / np.linalg.norm(flat))
+                yield Place(centre, direction, base[:3, :3] @ up, 0.25 * size)

@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Seams from the mapping a path file holds: ``{'kind': 'line', 'start': [...], 'end': [...]}``.
+
+The other keys are the attributes of the seam's class; a key ``weave`` with ``amplitude``,
+``wavelength`` and ``form`` lays a weave over any kind. A key ``torch`` is left to the caller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from typing import Any
+
+from ...errors import DataError, PathError
+from .arc import Arc, Circle
+from .line import Line
+from .polyline import Polyline
+from .seam_path import Path
+from .spline import Spline
+from .weave import Weave
+
+_KINDS: dict[str, type[Any]] = {
+    'line': Line, 'arc': Arc, 'circle': Circle, 'polyline': Polyline, 'spline': Spline,
+    'points': Spline,
+}  # fmt: skip
+
+
+def from_mapping(data: Mapping[str, Any]) -> Path:
+    """
+    Return the seam a mapping describes.
+
+    Raises
+    ------
+    PathError
+        The kind is unknown, or a key is missing, unknown or has a wrong value.
+
+    """
+    if not isinstance(data, Mapping):
+        raise PathError(f'a path must be a mapping of keys, got {type(data).__name__}')
+    kind = data.get('kind')
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise PathError(f"path 'kind' must be one of {', '.join(_KINDS)}, got {kind!r}")
+    rest = {str(k): v for k, v in data.items() if k not in ('kind', 'weave', 'torch')}
+    seam: Path = _build(_KINDS[kind], rest, f'path of kind {kind!r}')
+    weave = data.get('weave')
+    if weave is None:
+        return seam
+    if not isinstance(weave, Mapping):
+        raise PathError(f"'weave' must be a mapping of keys, got {type(weave).__name__}")
+    woven: Path = _build(Weave, {'seam': seam, **weave}, "'weave'")
+    return woven
+
+
+def _build(cls: type[Any], values: dict[str, Any], what: str) -> Any:
+    known = {field.name: field for field in fields(cls)}
+    unknown = sorted(set(values) - set(known))
+    if unknown:
+        raise PathError(
+            f'{what} has the unknown key {unknown[0]!r}; known keys are ' + ', '.join(known)
+        )
+    missing = [
+        name
+        for name, field in known.items()
+        if field.default is MISSING and field.default_factory is MISSING and name not in values
+    ]
+    if missing:
+        raise PathError(f'{what} needs the key {missing[0]!r}')
+    try:
+        return cls(**values)
+    except (DataError, TypeError, ValueError, OverflowError) as error:
+        raise PathError(f'{what}: {error}') from None

@@ -1,0 +1,215 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A planned motion: a seam travelled by a time law, as joint motion within the robot's limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ..arm.chain import frames
+from ..arm.robot import Robot
+from ..arm.rotation import rotation_vector
+from ..arrays import Array
+from ..errors import PathError
+from ..recording import JointMotion
+from .inverse import PathSolution, solve_path
+from .inverse.newton import chain_jacobian, least_step, polish, pose_error
+from .paths import Path, SeamFrames, Torch
+from .profiles import Profile, Timing, named
+
+_DIFFERENCE = 1e-6
+"""Arc length [m] over which the pose is differentiated."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanReport:
+    """
+    What a plan asks of the robot.
+
+    Attributes
+    ----------
+    duration : float [s]
+    slowed : float
+        How much longer the motion takes than the profile wanted; 1 if as wanted.
+    velocity_use, acceleration_use : array, shape (n,)
+        Largest joint velocity and acceleration as part of the limit.
+    residual : float [m or rad]
+        Largest error of closure.
+    condition, manipulability, limit_margin : float
+        Worst along the seam; see `inverse.PathSolution`.
+    method : str
+        How the inverse kinematics was solved.
+
+    """
+
+    duration: float
+    slowed: float
+    velocity_use: Array
+    acceleration_use: Array
+    residual: float
+    condition: float
+    manipulability: float
+    limit_margin: float
+    method: str
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """
+    A planned motion.
+
+    Attributes
+    ----------
+    motion : JointMotion
+        With velocity.
+    poses : array, shape (N, 4, 4)
+        ``T_world_tool`` commanded.
+    seam : SeamFrames
+        The seam under each sample.
+    s : array, shape (N,) [m]
+        Arc length of each sample.
+    length : float [m]
+    report : PlanReport
+
+    """
+
+    motion: JointMotion
+    poses: Array
+    seam: SeamFrames
+    s: Array
+    length: float
+    report: PlanReport
+
+
+def plan(
+    robot: Robot,
+    path: Path,
+    profile: Profile | str = 'smooth',
+    rate_hz: float = 125.0,
+    *,
+    torch: Torch | None = None,
+    fit: bool = False,
+    seed: Array | None = None,
+) -> Plan:
+    """
+    Return the joint motion that travels a seam.
+
+    Parameters
+    ----------
+    robot : Robot
+    path : Path
+    profile : Profile or str
+        A time law, or the name of one with its default numbers.
+    rate_hz : float [1/s]
+    torch : Torch, optional
+        Left out, upright on the seam.
+    fit : bool
+        Slow the motion down until it is within the joint limits, instead of refusing it.
+    seed : array, shape (n,), optional
+        Joint positions near which the motion begins.
+
+    Raises
+    ------
+    ReachError
+        Part of the seam is out of reach.
+    PathError
+        A joint would have to be too fast; the message says which, when and by how much.
+
+    """
+    if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+        raise PathError(f'the sample rate must be positive, got {rate_hz!r} Hz')
+    law = named(profile) if isinstance(profile, str) else profile
+    line = _JointLine(robot, path, torch or Torch(), seed)
+    slowed, dt = 1.0, 1.0 / rate_hz
+    for _ in range(20):
+        timing = _slowed(law.sample(path.length, dt / slowed), slowed)
+        motion, residual = line.motion(timing)
+        velocity, acceleration = _use(robot, motion)
+        excess = max(velocity.max(), np.sqrt(acceleration.max()))
+        if excess <= 1.0 or not fit:
+            break
+        slowed *= 1.01 * excess
+    if excess > 1.0:
+        raise PathError(_too_fast(robot, motion, timing, velocity, acceleration))
+    solution = line.solution
+    report = PlanReport(
+        float(timing.t[-1]), slowed, velocity, acceleration, residual,
+        float(solution.condition.max()), float(solution.manipulability.min()),
+        float(solution.limit_margin.min()), solution.method,
+    )  # fmt: skip
+    seam = path.sample(timing.s)
+    return Plan(motion, line.poses(timing.s), seam, timing.s, path.length, report)
+
+
+class _JointLine:
+    """Joint positions as a function of arc length: the same place gives the same posture."""
+
+    def __init__(self, robot: Robot, path: Path, torch: Torch, seed: Array | None) -> None:
+        self.robot, self.path, self.torch = robot, path, torch
+        self._first = path.sample(np.zeros(1))
+        count = int(np.ceil(path.length / min(path.length / 256.0, path.detail / 24.0)))
+        grid = np.linspace(0.0, path.length, count + 1)
+        self.solution: PathSolution = solve_path(robot, self.poses(grid), seed)
+        self._spline = CubicSpline(grid, self.solution.q)
+
+    def poses(self, s: Array) -> Array:
+        """Return tool poses, shape (N, 4, 4), at arc lengths."""
+        return self.torch.poses(self.path.sample(s), self._first)
+
+    def motion(self, timing: Timing) -> tuple[JointMotion, float]:
+        """Return the motion and its largest error of closure."""
+        poses = self.poses(timing.s)
+        q, _ = polish(self.robot, self._spline(timing.s), poses)
+        rate = self._spline(timing.s, 1)
+        jacobian = chain_jacobian(self.robot, frames(self.robot, q))
+        missing = self._twist(timing.s) - (jacobian @ rate[..., None])[..., 0]
+        velocity = (rate + least_step(jacobian, missing)) * timing.sd[:, None]
+        # Rounded, so that a joint at rest is at rest and not reversing within the last digit.
+        q = q.round(12)
+        residual = float(np.abs(pose_error(frames(self.robot, q), poses)).max())
+        return JointMotion(timing.t, q, velocity.round(9)), residual
+
+    def _twist(self, s: Array) -> Array:
+        """Return d(pose)/ds, shape (N, 6), by central differences."""
+        before, after = self.poses(s - _DIFFERENCE), self.poses(s + _DIFFERENCE)
+        turn = rotation_vector(after[:, :3, :3] @ np.swapaxes(before[:, :3, :3], -1, -2))
+        change = np.concatenate([after[:, :3, 3] - before[:, :3, 3], turn], axis=1)
+        return change / (2.0 * _DIFFERENCE)
+
+
+def _slowed(timing: Timing, factor: float) -> Timing:
+    return Timing(timing.t * factor, timing.s, timing.sd / factor, timing.sdd / factor**2)
+
+
+def _accelerations(motion: JointMotion) -> Array:
+    if motion.t.size < 2:
+        return np.zeros_like(motion.q)
+    return np.gradient(motion.velocity, motion.t, axis=0)
+
+
+def _use(robot: Robot, motion: JointMotion) -> tuple[Array, Array]:
+    """Return the largest velocity and acceleration as part of the limits, shape (n,) each."""
+    velocity = np.abs(motion.velocity).max(axis=0) / robot.max_velocity
+    return velocity, np.abs(_accelerations(motion)).max(axis=0) / robot.max_acceleration
+
+
+def _too_fast(
+    robot: Robot, motion: JointMotion, timing: Timing, velocity: Array, acceleration: Array
+) -> str:
+    if velocity.max() > 1.0:
+        use, values, limits = velocity, motion.velocity, robot.max_velocity
+        what, unit = 'a velocity', '/s'
+    else:
+        use, values, limits = acceleration, _accelerations(motion), robot.max_acceleration
+        what, unit = 'an acceleration', '/s^2'
+    j = int(np.argmax(use))
+    k = int(np.argmax(np.abs(values[:, j])))
+    unit = ('m' if robot.prismatic[j] else 'rad') + unit
+    return (
+        f'joint {robot.joint_names[j]!r} would need {what} of {abs(values[k, j]):.3g} {unit} at '
+        f't = {timing.t[k]:.3f} s ({timing.s[k]:.3f} m along the seam), its limit is '
+        f'{limits[j]:.3g}; slow the profile down or let it be fitted to the limits'
+    )

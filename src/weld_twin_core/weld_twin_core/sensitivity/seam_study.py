@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a study looks at: a motion, the instants on it that count, and the seam under them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arm.robot import Robot
+from ..arrays import Array, readonly
+from ..effects import Effect
+from ..errors import DataError
+from ..motion.paths import Path, Torch
+from ..motion.planned_motion import Plan, plan
+from ..motion.profiles import Profile, named
+from ..motion.seam_frame import path_tangents, seam_axes
+from ..recording import Recording
+from ..twin.poses import Poses
+from ..twin.twin import Twin
+
+POINTS = 200
+"""Path points a study looks at unless it is told otherwise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """
+    A motion along a seam, sampled where the deviation is looked at.
+
+    Attributes
+    ----------
+    robot : Robot
+    recording : Recording
+        The commanded joint motion and the side signals.
+    at : array, shape (N,) [s], optional
+        Instants looked at; left out, the joint stamps.
+    s : array, shape (N,) [m]
+        Arc length travelled along the seam; falls where the motion goes back.
+    axes : array, shape (N, 3, 3)
+        Rows along, across and normal of the seam, in the world frame.
+    length : float [m]
+    known : tuple of Effect
+        Effects believed to act; deviations are counted from the twin that has them.
+    nominal : Poses
+        Of that twin, shape (N, 3) and (N, 3, 3).
+
+    """
+
+    robot: Robot
+    recording: Recording
+    at: Array | None
+    s: Array
+    axes: Array
+    length: float
+    known: tuple[Effect, ...]
+    nominal: Poses
+
+    @property
+    def samples(self) -> int:
+        """Return the number of path points N."""
+        return len(self.s)
+
+    @property
+    def t(self) -> Array:
+        """Return the instants looked at, shape (N,) [s]."""
+        return self.recording.joints.t if self.at is None else self.at
+
+    def on_seam(self, vectors: Array) -> Array:
+        """Return vectors (..., N, 3) of the world as along, across, normal, same shape."""
+        return (self.axes @ vectors[..., None])[..., 0]
+
+    def deviations(self, effects: tuple[Effect, ...]) -> Array:
+        """Return the deviations (..., N, 3) [m] that effects make, in seam axes."""
+        position = Twin(self.robot, effects).poses(self.recording, self.at).position
+        return self.on_seam(position - self.nominal.position)
+
+
+def planned_study(
+    robot: Robot,
+    path: Path,
+    profile: Profile | str = 'smooth',
+    *,
+    points: int = POINTS,
+    torch: Torch | None = None,
+    known: tuple[Effect, ...] = (),
+) -> Study:
+    """
+    Return the study of a seam travelled by a time law, slowed to the joint limits.
+
+    Raises
+    ------
+    ReachError, PathError
+        The seam cannot be travelled.
+    DataError
+        Fewer than two path points.
+
+    """
+    if points < 2:
+        raise DataError(f'a study needs at least 2 path points, got {points}')
+    law = named(profile) if isinstance(profile, str) else profile
+    duration = float(law.law(path.length).x[-1])
+    # A little fast, so that rounding cannot add a sample beyond the end.
+    rate = (points - 1) / (duration * (1.0 - 1e-12))
+    return study_of_plan(robot, plan(robot, path, law, rate, torch=torch, fit=True), known)
+
+
+def study_of_plan(robot: Robot, planned: Plan, known: tuple[Effect, ...] = ()) -> Study:
+    """Return the study of a planned motion, at its own samples."""
+    recording = Recording('planned', planned.motion)
+    axes = seam_axes(planned.seam.tangent, planned.seam.normal)
+    nominal = Twin(robot, known).poses(recording)
+    return Study(robot, recording, None, planned.s, axes, planned.length, known, nominal)
+
+
+def recorded_study(
+    robot: Robot,
+    recording: Recording,
+    *,
+    points: int = POINTS,
+    normal: Array | None = None,
+    known: tuple[Effect, ...] = (),
+) -> Study:
+    """
+    Return the study of a motion that was recorded, at instants evenly spread over it.
+
+    Parameters
+    ----------
+    robot : Robot
+    recording : Recording
+    points : int
+        At most as many as there are measurements, or joint states without any.
+    normal : array, shape (3,), optional
+        Direction out of the work; left out, against the tool's z at every sample.
+    known : tuple of Effect
+
+    Raises
+    ------
+    DataError
+        The tool does not move.
+
+    """
+    stamps = recording.joints.t if recording.measured is None else recording.measured.t
+    inside = stamps[(stamps >= recording.joints.t[0]) & (stamps <= recording.joints.t[-1])]
+    if inside.size < 2:
+        raise DataError(f'recording {recording.name!r} has fewer than two samples to study')
+    pick = np.unique(np.linspace(0, inside.size - 1, min(points, inside.size)).round().astype(int))
+    at = readonly(inside[pick], (None,), 'instants')
+    nominal = Twin(robot, known).poses(recording, at)
+    tangent = path_tangents(nominal.position)
+    out = _away(nominal.rotation, tangent) if normal is None else normal
+    steps = np.linalg.norm(np.diff(nominal.position, axis=0), axis=1)
+    s = np.concatenate([[0.0], np.cumsum(steps)])
+    return Study(robot, recording, at, s, seam_axes(tangent, out), float(s[-1]), known, nominal)
+
+
+def _away(rotation: Array, tangent: Array) -> Array:
+    """Return the direction against the wire, or against the tool's x where that is the travel."""
+    wire = -rotation[..., 2]
+    head_on = np.abs((wire * tangent).sum(axis=-1, keepdims=True)) > 0.99
+    return np.where(head_on, -rotation[..., 0], wire)
+
+
+def with_known(study: Study, known: tuple[Effect, ...]) -> Study:
+    """Return the study counted from a twin with other known effects."""
+    nominal = Twin(study.robot, known).poses(study.recording, study.at)
+    return replace(study, known=known, nominal=nominal)

@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Commands that put the real tool where the nominal model wanted it.
+
+Newton on the joint commands, all samples at once, with the nominal Jacobian: effects are small,
+so every round takes away all but some thousandths of what is left. Effects with memory couple
+the samples; for them the rounds are a fixed-point iteration on the whole motion, and a round that
+does not help (a resonance answers too much) is taken back and tried with half the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arm.chain import frames
+from ..arm.robot import Robot
+from ..arm.rotation import angle_between
+from ..arrays import Array
+from ..effects.effect import Effect, MemoryEffect, Stage
+from ..motion.inverse.newton import chain_jacobian, least_step
+from ..recording import JointMotion, Recording
+from .poses import Poses
+from .twin import Twin
+
+BEYOND_COMMANDS = frozenset({
+    'measurement_scale', 'measurement_noise', 'time_delay', 'drift', 'setup_step',
+    'setup_settling',
+})  # fmt: skip
+"""Effects of the measurement, or new in every run: no joint command mends them."""
+_CLOSED = 1e-12
+_LEAST_SHARE = 1e-3
+_SINGULAR = 1e-9
+"""Damping of a step [m^2]: invisible but within some tens of micrometres of a singularity."""
+
+
+@dataclass(frozen=True, eq=False)
+class Compensation:
+    """
+    Compensated commands and what they gain by the model.
+
+    Attributes
+    ----------
+    motion : JointMotion
+        Same stamps as the nominal commands.
+    before, after : array, shape (N, 6) [m, rad]
+        Tool minus wanted, linear part first, with the nominal and the compensated commands.
+    left_out : tuple of Effect
+        Effects of the model that no joint command can mend.
+
+    """
+
+    motion: JointMotion
+    before: Array
+    after: Array
+    left_out: tuple[Effect, ...]
+
+    @property
+    def rms(self) -> tuple[float, float]:
+        """Return the RMS distance of the tool from where it is wanted, before and after [m]."""
+        return _rms(self.before), _rms(self.after)
+
+
+def compensate(
+    robot: Robot, effects: Sequence[Effect], recording: Recording, rounds: int = 40
+) -> Compensation:
+    """
+    Return the commands under which an arm with effects goes where the arm without goes.
+
+    Parameters
+    ----------
+    robot : Robot
+        With the base and tool frames that hold for both.
+    effects : sequence of Effect
+        What acts on the real arm.
+    recording : Recording
+        Its joints are the nominal commands; wrench and temperature are used where effects do.
+    rounds : int
+        Most Newton rounds.
+
+    """
+    acting = tuple(e for e in effects if _commandable(e))
+    real, nominal = Twin(robot, acting), Twin(robot)
+    wanted = nominal.poses(recording)
+    motion = recording.joints
+    coupled = any(isinstance(effect, MemoryEffect) for effect in acting)
+    q, share = motion.q, np.ones((motion.t.size, 1))
+    error = before = _missing(wanted, real.poses(recording))
+    for _ in range(rounds):
+        live = (np.abs(error).max(axis=1, keepdims=True) > _CLOSED) & (share > _LEAST_SHARE)
+        if not live.any():
+            break
+        step = least_step(chain_jacobian(robot, frames(robot, q)), error, _SINGULAR)
+        trial = replace(recording, joints=_commands(motion, q + share * step))
+        left = _missing(wanted, real.poses(trial))
+        helps = np.linalg.norm(left, axis=1) < np.linalg.norm(error, axis=1)
+        if coupled:
+            helps[:] = _rms(left) < _rms(error)
+        q = np.where(helps[:, None], trial.joints.q, q)
+        error = np.where(helps[:, None], left, error)
+        share = np.where(helps[:, None], share, 0.5 * share)
+    left_out = tuple(e for e in effects if not _commandable(e))
+    return Compensation(_commands(motion, q), -before, -error, left_out)
+
+
+def _commandable(effect: Effect) -> bool:
+    return effect.name not in BEYOND_COMMANDS and effect.stage not in (Stage.CLOCK, Stage.NOISE)
+
+
+def _commands(nominal: JointMotion, q: Array) -> JointMotion:
+    """Return the motion through q, its velocity changed by as much as its position says."""
+    if nominal.static or nominal.qd is None or nominal.t.size < 2:
+        return JointMotion(nominal.t, q, None, nominal.static)
+    return JointMotion(nominal.t, q, nominal.qd + np.gradient(q - nominal.q, nominal.t, axis=0))
+
+
+def _missing(wanted: Poses, got: Poses) -> Array:
+    turn = angle_between(wanted.rotation, got.rotation)
+    return np.concatenate([wanted.position - got.position, turn], axis=-1)
+
+
+def _rms(error: Array) -> float:
+    return float(np.sqrt((error[:, :3] ** 2).sum(axis=1).mean()))

@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an effect that is not in the twin would do to the poses, to first order.
+
+One pass of the twin is shared by every effect looked at: its views, its interpolation and the
+derivative of the pose by each channel are computed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from ..arm.chain import Channel, Shift, column
+from ..arrays import Array
+from ..effects.effect import Effect, Stage, View
+from ..recording import Recording
+from .resampling import Picker
+from .twin import Evaluation, Twin, load_torque
+
+
+class Features:
+    """
+    First-order features of effects, for one recording and one set of stamps.
+
+    Parameters
+    ----------
+    twin : Twin
+        Where the features are taken: its effects act, the ones asked about come on top.
+    recording : Recording
+    at : array, shape (M,) [s]
+
+    """
+
+    def __init__(self, twin: Twin, recording: Recording, at: Array) -> None:
+        self.twin = twin
+        self.recording = recording
+        self.at = at
+        self._columns: dict[Channel, Array] = {}
+
+    @cached_property
+    def run(self) -> Evaluation:
+        """Return the twin's own pass."""
+        return self.twin.evaluate(self.recording, self.at)
+
+    @cached_property
+    def view(self) -> View:
+        """Return what pointwise effects see, with load torques."""
+        view = self.run.view
+        if any(channel[0] == 'tau' for channel in view.shift):
+            return view
+        return view.displaced(load_torque(view), keep_frames=True)
+
+    @cached_property
+    def joint_view(self) -> View:
+        """Return what effects with memory see: the joint stream on its own stamps."""
+        return self.twin.joint_view(self.recording)
+
+    def column(self, channel: Channel) -> Array:
+        """Return d pose / d channel, shape (6, M)."""
+        if channel not in self._columns:
+            run = self.run
+            self._columns[channel] = column(self.twin.robot, run.chain, channel, run.view.shift)
+        return self._columns[channel]
+
+    def pose_change(self, shift: Shift) -> Array:
+        """Return the change of pose, shape (6, M), that displaced channels make."""
+        total = np.zeros((6, self.at.size))
+        for channel, value in shift.items():
+            for direct, factor in self.twin.direct(channel):
+                total += (factor * value) * self.column(direct)
+        return total
+
+    def shifts(self, effect: Effect, atoms: bool = True) -> list[Shift]:
+        """Return the effect's linear features (or fit-coordinate derivatives) at the stamps."""
+        if effect.stage in (Stage.SERVO, Stage.PLAY):
+            view = self.joint_view
+            found = effect.atoms(view) if atoms else effect.coordinate_shifts(view)
+            pick = Picker(self.recording.joints, self.run.view.t).pick
+            return [{key: pick(value) for key, value in shift.items()} for shift in found]
+        return effect.atoms(self.view) if atoms else effect.coordinate_shifts(self.view)
+
+    def columns(self, effect: Effect, atoms: bool = True) -> Array:
+        """Return the effect's features as pose changes, shape (K, 6, M)."""
+        shifts = self.shifts(effect, atoms)
+        channels = list({channel for shift in shifts for channel in shift})
+        if len(channels) == 1 and channels[0][0] != 'tau':
+            # One joint's hundred ripple orders share its column.
+            sizes = [np.broadcast_to(s.get(channels[0], 0.0), self.at.shape) for s in shifts]
+            return np.stack(sizes)[:, None] * self.column(channels[0])
+        found = [self.pose_change(shift) for shift in shifts]
+        return np.stack(found) if found else np.zeros((0, 6, self.at.size))
+
+    def seeds(
+        self, kind: type[Effect], joint: str | None, residual: Array | None = None
+    ) -> tuple[list[Effect], float]:
+        """
+        Return the instances a search for this kind of effect starts from, and among how many.
+
+        ``residual``, shape (c, M), is what the search wants explained.
+        """
+        view = self.joint_view if kind.stage in (Stage.SERVO, Stage.PLAY) else self.view
+        pull = None
+        if joint is not None and residual is not None:
+            index = self.twin.robot.index(joint)
+            pull = (self.column(('q', index))[: residual.shape[0]] * residual).sum(axis=0)
+        seeds = list(kind.seeds(view, joint, pull))
+        return seeds, kind.trials(view, joint) or float(len(seeds))
+
+
+def sites(kind: type[Effect], joints: Sequence[str]) -> Sequence[str | None]:
+    """Return the joints an effect can sit on, or one None for effects of the whole robot."""
+    return joints if kind.of in ('joint', 'link') else (None,)

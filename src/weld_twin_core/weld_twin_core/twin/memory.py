@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects with memory over the joint stream, in series: each runs on what the last one left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..arm.chain import Shift
+from ..arrays import Array
+from ..effects.effect import Effect, MemoryEffect, Stage, View
+from ..recording import JointMotion
+
+Tangent = tuple[int, int, Shift]
+"""Effect, component, and the derivative of the channels by it."""
+
+
+def in_series(effects: Sequence[Effect]) -> list[tuple[int, MemoryEffect]]:
+    """Return the effects with memory and their place in the list, in the order they act."""
+    return [
+        (k, effect)
+        for stage in (Stage.SERVO, Stage.PLAY)
+        for k, effect in enumerate(effects)
+        if effect.stage == stage and isinstance(effect, MemoryEffect)
+    ]
+
+
+def run_all(
+    effects: Sequence[Effect], view: View, want: bool
+) -> tuple[Array | None, list[Tangent]]:
+    """
+    Return displacements of the joints, shape (..., N, n) or None, and their derivatives.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    view : View
+        The commanded motion on the joint stamps.
+    want : bool
+        Whether derivatives are wanted.
+
+    """
+    moved: Array | None = None
+    tangents: list[Tangent] = []
+    for k, effect in in_series(effects):
+        now = view if moved is None else replace(view, q=view.q + moved)
+        shift, _ = effect.run(now)
+        if want:
+            own = indexed(k, effect.gradient(now))
+            tangents = [(a, b, _pushed(effect, now, s)) for a, b, s in tangents] + own
+        moved = added(np.zeros(view.q.shape) if moved is None else moved, shift)
+    return moved, tangents
+
+
+def indexed(k: int, gradient: Sequence[Shift | None]) -> list[Tangent]:
+    """Return the tangents of effect k: those components that have a derivative."""
+    return [(k, c, shift) for c, shift in enumerate(gradient) if shift is not None]
+
+
+def added(joints: Array, shift: Shift) -> Array:
+    """Return joint values (..., N, n) with the ('q', i) displacements (..., N) on top."""
+    samples = np.broadcast_shapes(joints.shape[:-1], *(np.shape(v) for v in shift.values()))
+    out = np.array(np.broadcast_to(joints, samples + joints.shape[-1:]))
+    for (_, i), value in shift.items():
+        out[..., i] += value
+    return out
+
+
+def rates(motion: JointMotion, moved: Array) -> Array | float:
+    """Return how fast displacements (..., N, n) change along the joint stream [1/s]."""
+    if motion.static or motion.t.size < 2:
+        return 0.0
+    return np.gradient(moved, motion.t, axis=-2)
+
+
+def _pushed(effect: MemoryEffect, view: View, shift: Shift) -> dict[Any, Array]:
+    own = ('q', view.robot.index(str(effect.site)))
+    return {key: effect.push(view, v) if key == own else v for key, v in shift.items()}

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tool poses as a pair of arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..arm.rotation import rotation_matrix
+from ..arrays import Array
+
+if TYPE_CHECKING:
+    from ..effects.effect import View
+
+
+class Poses(NamedTuple):
+    """Tool poses in the world frame: position (..., M, 3) [m], rotation (..., M, 3, 3)."""
+
+    position: Array
+    rotation: Array
+
+
+def posed(view: View, chain: Poses | None = None) -> Poses:
+    """Return the poses of a chain, left out the view's own, displaced on 'pose' channels."""
+    if chain is None:
+        chain = Poses(view.frames.position, view.frames.rotation)
+    position, rotation = chain
+    error = [view.shift.get(('pose', k)) for k in range(6)]
+    if any(e is not None for e in error[:3]):
+        position = position + _stack(error[:3])
+    if any(e is not None for e in error[3:]):
+        rotation = rotation_matrix(_stack(error[3:])) @ rotation
+    return Poses(position, rotation)
+
+
+def _stack(parts: list[Any]) -> Array:
+    filled = [np.asarray(0.0 if part is None else part) for part in parts]
+    return np.stack(np.broadcast_arrays(*filled), axis=-1)

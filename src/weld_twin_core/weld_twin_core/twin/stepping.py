@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The twin one joint state at a time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..arm.chain import Channel, displaced_robot
+from ..arrays import Array
+from ..effects.effect import View
+from ..errors import DataError
+from ..kernels.single_pose import SinglePose
+from .memory import added, in_series
+from .poses import Poses, posed
+
+if TYPE_CHECKING:
+    from .twin import Twin
+
+
+BESIDE = ('tau', 'pose')
+"""Channels that act through the joints and behind the chain, not within it."""
+
+
+class LiveTwin:
+    """
+    The twin one joint state at a time, with the memory of its effects carried along.
+
+    Changing `twin` while running keeps the memory of every effect that is still there. The
+    poses belong to the joint stamps; a delay of the measurement clock is the caller's to add.
+    """
+
+    def __init__(self, twin: Twin) -> None:
+        self._twin = twin
+        self._single = SinglePose(twin.robot)
+        self._others: dict[Channel, float] | None = None
+        self._changed: SinglePose | None = None
+        self._states: dict[tuple[Any, ...], Any] = {}
+        self._start = 0.0
+        self._last = -np.inf
+
+    @property
+    def twin(self) -> Twin:
+        """Return the robot with its effects."""
+        return self._twin
+
+    @twin.setter
+    def twin(self, twin: Twin) -> None:
+        self._twin = twin
+        self._others = self._changed = None
+
+    def reset(self) -> None:
+        """Forget the motion so far, as after a jump back in time."""
+        self._states.clear()
+        self._last = -np.inf
+
+    def step(
+        self,
+        t: float,
+        q: Array,
+        qd: Array | None = None,
+        wrench: Array | None = None,
+        temperature: float | None = None,
+        wrench_frame: str = 'tool',
+    ) -> tuple[Array, Poses]:
+        """
+        Return the joint positions, shape (n,), and the pose, shapes (3,) and (3, 3).
+
+        Parameters
+        ----------
+        t : float [s]
+            Stamp; not before the one of the last call.
+        q, qd : array, shape (n,)
+        wrench : array, shape (6,), optional
+        temperature : float, optional [degC]
+
+        Raises
+        ------
+        DataError
+            The stamp goes back, or there is not one position for each joint.
+
+        """
+        q = self._checked(t, q)
+        if not self.twin.effects:
+            return q.copy(), self._nominal(q)
+        view = self._remembered(self._view(t, q, qd, wrench, temperature, wrench_frame))
+        view = self.twin.displaced(view)
+        joints = view.q[0].copy()
+        others = {}
+        for (name, i), value in view.shift.items():
+            if name == 'q':
+                joints[i] += np.ravel(value)[0]
+            elif name not in BESIDE:
+                others[name, i] = float(np.ravel(value)[0])
+        return joints, self._pose(view, joints, others)
+
+    def _pose(self, view: View, joints: Array, others: dict[Channel, float]) -> Poses:
+        """Return the pose; displacements that stay are built into the chain the second time."""
+        if others != self._others:
+            self._others, self._changed = others, None
+            chain = Poses(view.frames.position, view.frames.rotation)
+        else:
+            if self._changed is None:
+                self._changed = SinglePose(displaced_robot(self.twin.robot, others))
+            pose = self._changed(joints)[None]
+            chain = Poses(pose[:, :3, 3], pose[:, :3, :3])
+        poses = posed(view, chain)
+        return Poses(poses.position[0], poses.rotation[0])
+
+    def _checked(self, t: float, q: Array) -> Array:
+        robot = self.twin.robot
+        q = np.asarray(q, dtype=np.float64)
+        if q.shape != (robot.n,):
+            raise DataError(f'robot {robot.name!r} needs {robot.n} joint positions, got {q.shape}')
+        if t < self._last:
+            raise DataError(
+                f'the joint state at {t:.6f} s is {self._last - t:.6g} s before the one already '
+                'seen; reset the twin after a jump back in time'
+            )
+        if self._last == -np.inf:
+            self._start = t
+        self._last = t
+        return q
+
+    def _nominal(self, q: Array) -> Poses:
+        """Return the pose without effects, at a tenth of what the stages cost."""
+        if self._single.robot is not self.twin.robot:
+            self._single = SinglePose(self.twin.robot)
+        pose = self._single(q)
+        return Poses(pose[:3, 3], pose[:3, :3])
+
+    def _view(
+        self,
+        t: float,
+        q: Array,
+        qd: Array | None,
+        wrench: Array | None,
+        temperature: float | None,
+        wrench_frame: str,
+    ) -> View:
+        stamp = np.array([t])
+        return View(
+            self.twin.robot, stamp, stamp - self._start, q[None],
+            np.zeros_like(q)[None] if qd is None else np.asarray(qd)[None], False,
+            None if wrench is None else np.asarray(wrench)[None], wrench_frame,
+            None if temperature is None else np.array([temperature]),
+        )  # fmt: skip
+
+    def _remembered(self, view: View) -> View:
+        """Run the effects with memory, each on what the one before left, and keep their states."""
+        seen: Counter[tuple[str, ...]] = Counter()
+        for _, effect in in_series(self.twin.effects):
+            key = (seen[effect.key], *effect.key)
+            seen[effect.key] += 1
+            shift, self._states[key] = effect.run(view, self._states.get(key))
+            view = replace(view, q=added(view.q, shift))
+        return view

@@ -1,0 +1,274 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The twin: a robot and effects in, poses and their derivatives out; in bulk or live."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arm.chain import Channel, Frames, Shift, column, forward
+from ..arm.dynamics import chain_gravity_torque, wrench_torque
+from ..arm.robot import Robot
+from ..arrays import Array
+from ..effects.effect import Effect, Parameter, Stage, View
+from ..errors import ModelError
+from ..recording import JointMotion, Recording
+from .memory import Tangent, indexed, rates, run_all
+from .poses import Poses, posed
+from .resampling import Picker
+from .stepping import LiveTwin
+
+__all__ = ['Component', 'Evaluation', 'LiveTwin', 'Poses', 'Twin', 'load_torque']
+
+POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
+
+
+@dataclass(frozen=True)
+class Component:
+    """One differentiable scalar of one effect."""
+
+    effect: int
+    parameter: Parameter
+    index: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Everything one pass through the stages found out; `Twin` turns it into results."""
+
+    view: View
+    chain: Frames
+    poses: Poses
+    tangents: tuple[Tangent, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Twin:
+    """
+    A robot with the effects that are believed to act on it.
+
+    Attributes
+    ----------
+    robot : Robot
+    effects : tuple of Effect
+        Stages decide the order; only effects with memory on one joint and of one stage run in
+        the order given. Effects with parameter draws give every result a leading draw axis.
+
+    """
+
+    robot: Robot
+    effects: tuple[Effect, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'effects', tuple(self.effects))
+        for effect in self.effects:
+            effect.check(self.robot)
+        counts = {effect.vector().shape[:-1] for effect in self.effects} - {(), (1,)}
+        if len(counts) > 1:
+            raise ModelError(
+                'the effects carry different numbers of draws: '
+                f'{sorted(count for (count,) in counts)}; give all the same'
+            )
+
+    @property
+    def draws(self) -> tuple[int, ...]:
+        """Return the draw axis of the effects' parameters: (D,), or () for plain numbers."""
+        return np.broadcast_shapes(*(effect.vector().shape[:-1] for effect in self.effects))
+
+    # Results ---------------------------------------------------------------------------------
+
+    def poses(self, recording: Recording, at: Array | None = None) -> Poses:
+        """
+        Return tool poses.
+
+        Parameters
+        ----------
+        recording : Recording
+        at : array, shape (M,) [s], optional
+            Stamps of the measurement clock; left out, the instants of the joint stamps.
+
+        """
+        if not self.effects:
+            motion = recording.joints
+            poses = forward(self.robot, motion.q if at is None else motion.at(at)[0])
+            return Poses(poses[..., :3, 3], poses[..., :3, :3])
+        return self._full(self._evaluate(recording, at, False))
+
+    def joints(self, recording: Recording, at: Array | None = None) -> Array:
+        """Return the joint positions behind the poses, shape (..., M, n)."""
+        view = self._evaluate(recording, at, False).view
+        parts = [
+            np.asarray(view.q[..., i] + view.shift.get(('q', i), 0.0)) for i in range(self.robot.n)
+        ]
+        return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+    def components(self) -> tuple[Component, ...]:
+        """Return the differentiable scalars, in the order of the columns of `linearise`."""
+        return tuple(
+            Component(k, parameter, index)
+            for k, effect in enumerate(self.effects)
+            for parameter, index in effect.components()
+            if parameter.differentiable
+        )
+
+    def linearise(self, recording: Recording, at: Array | None = None) -> tuple[Poses, Array]:
+        """
+        Return the poses and d pose / d components, shape (..., M, 6, P), linear part first.
+
+        Exact for each effect and for effects of different kinds together, but for products of
+        two small displacements (a spring's torque at the displaced joint, the scale of a
+        displaced point).
+        """
+        run = self._evaluate(recording, at, True)
+        poses = self._full(run)
+        out = np.empty((6, len(run.tangents), *poses.position.shape[:-1]))
+        for k, (_, _, shift) in enumerate(run.tangents):
+            out[:, k] = self.pose_change(run, shift)
+        return poses, np.moveaxis(out, (0, 1), (-2, -1))
+
+    @property
+    def delay(self) -> float:
+        """Return how late the measurement stamps are, in total [s]."""
+        return float(sum(effect.vector()[0] for effect in self._of(Stage.CLOCK)))
+
+    def _full(self, run: Evaluation) -> Poses:
+        """Return the poses with every draw written out, whether it moves the tool or not."""
+        samples = (*self.draws, run.view.t.shape[-1])
+        return Poses(
+            np.broadcast_to(run.poses.position, (*samples, 3)),
+            np.broadcast_to(run.poses.rotation, (*samples, 3, 3)),
+        )
+
+    def pose_change(self, run: Evaluation, shift: Shift) -> Array:
+        """Return the change of pose, shape (6, ...), that a small change of channels makes."""
+        total = np.zeros((6, *run.chain.position.shape[:-1]))
+        for channel, value in shift.items():
+            for direct, factor in self.direct(channel):
+                total = total + factor * value * column(
+                    self.robot, run.chain, direct, run.view.shift
+                )
+        return total
+
+    def direct(self, channel: Channel) -> list[tuple[Channel, Any]]:
+        """Resolve a load torque into the joint motion its springs make of it."""
+        if channel[0] != 'tau':
+            return [(channel, 1.0)]
+        return [
+            (('q', channel[1]), effect.number('compliance'))
+            for effect in self._of(Stage.ELASTIC)
+            if self.robot.index(str(effect.site)) == channel[1]
+        ]
+
+    def _of(self, stage: Stage) -> list[Effect]:
+        return [effect for effect in self.effects if effect.stage == stage]
+
+    # Evaluation ------------------------------------------------------------------------------
+
+    def evaluate(self, recording: Recording, at: Array | None = None) -> Evaluation:
+        """Return one pass through the stages, without derivatives."""
+        return self._evaluate(recording, at, False)
+
+    def joint_view(self, recording: Recording) -> View:
+        """Return what effects with memory see: the commanded motion on its own stamps."""
+        motion = recording.joints
+        return _view(self.robot, recording, motion.t, motion.q, motion.velocity)
+
+    def _evaluate(self, recording: Recording, at: Array | None, want: bool) -> Evaluation:
+        view, tangents = self._sampled(recording, at, want)
+        return self.pointwise(view, tangents if want else None)
+
+    def _sampled(
+        self, recording: Recording, at: Array | None, want: bool
+    ) -> tuple[View, list[Tangent]]:
+        motion = recording.joints
+        moved, tangents = run_all(self.effects, self.joint_view(recording), want)
+        if at is None:
+            t, q, qd = motion.t, motion.q, motion.velocity
+            picker = None
+        else:
+            t = np.asarray(at, dtype=np.float64)
+            for effect in self._of(Stage.CLOCK):
+                t = t - effect.displace(_clock_view(self.robot, motion))[('clock', 0)][..., :1]
+            q, qd = motion.at(t)
+            picker = Picker(motion, t)
+        if moved is not None:
+            q = q + (moved if picker is None else picker.take(moved))
+            qd = qd + (rates(motion, moved) if picker is None else picker.rates(moved))
+        view = _view(self.robot, recording, t, q, qd)
+        if not want:
+            return view, []
+        picked: list[Tangent] = [
+            (k, c, {key: v if picker is None else picker.pick(v) for key, v in shift.items()})
+            for k, c, shift in tangents
+        ]
+        for k, effect in enumerate(self.effects):
+            if effect.stage == Stage.CLOCK:
+                gradient = effect.gradient(view)
+                # The instants of the joint stamps do not move with the measurement clock.
+                picked += indexed(k, gradient if at is not None else [{}] * len(gradient))
+        return view, picked
+
+    def pointwise(self, view: View, tangents: Sequence[Tangent] | None = None) -> Evaluation:
+        """
+        Run the stages without memory.
+
+        ``tangents`` are the derivatives of what came before; left out, none are computed.
+        """
+        view, ordered = self._stages(view, tangents)
+        return Evaluation(view, view.frames, posed(view), ordered)
+
+    def displaced(self, view: View) -> View:
+        """Run the stages without memory and leave the poses to the caller."""
+        return self._stages(view, None)[0]
+
+    def _stages(
+        self, view: View, tangents: Sequence[Tangent] | None
+    ) -> tuple[View, tuple[Tangent, ...]]:
+        slopes: dict[Channel, Any] = {}
+        own: list[Tangent] = []
+        for stage in POINTWISE:
+            effects = [(k, e) for k, e in enumerate(self.effects) if e.stage == stage]
+            if stage == Stage.LOAD and (effects or self._of(Stage.ELASTIC)):
+                view = view.displaced(load_torque(view), keep_frames=True)
+            if tangents is not None:
+                for k, effect in effects:
+                    own += indexed(k, effect.gradient(view))
+                    for key, value in effect.slope(view).items():
+                        slopes[key] = slopes.get(key, 0.0) + value
+            for shift in [effect.displace(view) for _, effect in effects]:
+                view = view.displaced(shift, keep_frames=stage in (Stage.LOAD, Stage.POSE))
+        before = [(k, c, _sloped(shift, slopes)) for k, c, shift in tangents or ()]
+        return view, tuple(sorted(before + own, key=lambda item: item[:2]))
+
+    def live(self) -> LiveTwin:
+        """Return a stepper that gives the same poses one joint state at a time."""
+        return LiveTwin(self)
+
+
+def load_torque(view: View) -> Shift:
+    """Return the load torque of every joint: links, declared payload and tool wrench."""
+    chain = view.frames
+    torque = chain_gravity_torque(view.robot, chain)
+    if view.wrench is not None:
+        torque = torque + wrench_torque(view.robot, chain, view.wrench, view.wrench_frame)
+    return {('tau', i): torque[i] for i in range(view.robot.n)}
+
+
+def _view(robot: Robot, recording: Recording, t: Array, q: Array, qd: Array) -> View:
+    return View(
+        robot, t, t - recording.joints.t[0], q, qd, recording.joints.static,
+        None if recording.wrench is None else recording.wrench.at(t), recording.wrench_frame,
+        None if recording.temperature is None else recording.temperature.at(t),
+    )  # fmt: skip
+
+
+def _clock_view(robot: Robot, motion: JointMotion) -> View:
+    return View(robot, motion.t[:1], motion.t[:1], motion.q[:1], motion.q[:1], motion.static)
+
+
+def _sloped(shift: Shift, slopes: dict[Channel, Any]) -> Shift:
+    return {key: value * (1.0 + slopes.get(key, 0.0)) for key, value in shift.items()}

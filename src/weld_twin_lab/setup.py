@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+from setuptools import find_packages, setup
+
+NAME = 'weld_twin_lab'
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    packages=find_packages(),
+    package_data={NAME: ['py.typed', '**/*.css']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
+        ('share/' + NAME, ['package.xml']),
+    ],
+    install_requires=['setuptools', 'numpy', 'scipy', 'PyYAML', 'matplotlib'],
+    extras_require={'test': ['pytest']},
+    zip_safe=False,
+    maintainer='weld_twin contributors',
+    maintainer_email='maintainers@example.org',
+    description='Proof of the welding robot digital twin: blind check, plant, benchmarks, campaigns.',
+    license='Apache-2.0',
+    entry_points={
+        'weld_twin.commands': [
+            'benchmark = weld_twin_lab.cli.benchmark',
+            'blind = weld_twin_lab.cli.blind',
+            'campaign = weld_twin_lab.cli.campaign',
+            'real-robots = weld_twin_lab.cli.real_robots',
+        ]
+    },
+)

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The benchmark: that contenders do the same job, and that pages show what was measured."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import chain
+from weld_twin_core.errors import DataError
+from weld_twin_core.kernels.bulk import BulkKernel
+from weld_twin_lab.benchmark.arms import DH_KEYS, calibrated_arm, links, random_positions
+from weld_twin_lab.benchmark.kinematics import OWN, written_out
+from weld_twin_lab.benchmark.peers import find_peers
+from weld_twin_lab.benchmark.race import Contender, Outcome, Workload, race
+from weld_twin_lab.benchmark.race_table import LEFT_OUT, short
+from weld_twin_nodes.cli import main
+
+ROOT = Path(__file__).parents[4]
+
+
+def test_a_contender_that_disagrees_is_not_timed() -> None:
+    calls: list[int] = []
+    wrong = Contender('wrong', lambda: calls.append(1), gap=1e-3)
+    with pytest.raises(DataError, match='wrong differs from the others'):
+        race(Workload('sums', 'sum', [wrong], 1e-9), 3, 0.001)
+    unknown = Contender('no number', lambda: calls.append(1), gap=float('nan'))
+    with pytest.raises(DataError, match='no number differs'):
+        race(Workload('sums', 'sum', [unknown], 1e-9), 3, 0.001)
+    assert not calls
+
+
+def test_contenders_take_turns_and_a_slow_one_has_one() -> None:
+    order: list[str] = []
+    contenders = [
+        Contender(name, lambda name=name: order.append(name), once=name == 'c') for name in 'abc'
+    ]
+    outcome = race(Workload('turns', 'turn', contenders, 0.0), 4, 1e-6)
+    assert [outcome.seconds[name].size for name in 'abc'] == [4, 4, 1]
+    runs = ''.join(a for a, b in zip(order, [*order[1:], ''], strict=True) if a != b)
+    assert runs.endswith('abcababab')
+
+
+def test_a_ratio_is_taken_round_by_round_and_to_all_who_share_the_job() -> None:
+    load = Workload('study', 'run', [], 0.0, reference=('model', 'design'))
+    seconds = {'model': np.array([4.0, 6.0]), 'design': np.array([2.0, 2.0]),
+               'own': np.array([2.0, 4.0])}  # fmt: skip
+    assert Outcome(load, seconds).ratio('own') == pytest.approx([3.0, 2.0])
+    assert Outcome(load, {'own': seconds['own']}).ratio('own') is None
+
+
+def test_the_links_the_peers_are_told_are_those_of_the_chain() -> None:
+    robot = calibrated_arm()
+    first, *rest = links(robot)
+    for q in random_positions(robot, 5):
+        pose = first
+        for angle, link in zip(q, rest, strict=True):
+            c, s = np.cos(angle), np.sin(angle)
+            turn = np.eye(4)
+            turn[:2, :2] = [[c, -s], [s, c]]
+            pose = pose @ turn @ link
+        assert np.abs(pose - chain.forward(robot, q)).max() < 1e-14
+
+
+def test_peers_that_are_installed_have_the_same_arm() -> None:
+    robot = calibrated_arm()
+    q = random_positions(robot, 20)
+    peers, missing = find_peers(robot)
+    assert 'pinocchio' in peers
+    assert all('not installed' in reason for reason in missing.values())
+    for peer in peers.values():
+        assert np.abs(peer.poses(q) - chain.forward(robot, q)).max() < 1e-13
+        if peer.screws:
+            assert np.abs(peer.screws(q)[1] - chain.jacobian(robot, q)).max() < 1e-13
+
+
+def test_two_screws_a_row_are_the_derivatives_by_all_dh_values() -> None:
+    robot = calibrated_arm()
+    q = random_positions(robot, 30)
+    turns = [(key, i) for i in range(robot.n) for key in ('theta', 'alpha')]
+    found = written_out(BulkKernel(robot, turns).screws(q)[1])
+    wanted = chain.identification_jacobian(robot, q)
+    names = chain.identification_channels(robot)
+    columns = [names.index((key, i)) for i in range(robot.n) for key in DH_KEYS]
+    assert np.abs(found - wanted[..., columns]).max() < 1e-13
+
+
+@pytest.mark.slow
+def test_the_command_writes_what_it_found(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert main(['benchmark', '--quick', '--out', str(tmp_path / 'speed')]) == 0
+    assert 'poses and Jacobians' in capsys.readouterr().out
+    found = json.loads((tmp_path / 'speed' / 'benchmark.json').read_text())
+    assert len(found['workloads']) == 9
+    for load in found['workloads']:
+        assert all(c['gap'] <= load['tolerance'] for c in load['contenders'].values())
+    assert (tmp_path / 'speed' / 'growth.png').stat().st_size > 10_000
+    assert (tmp_path / 'speed' / 'benchmark.md').read_text().count('\n') == 11
+    assert (tmp_path / 'speed' / 'brief.md').exists()
+
+
+@pytest.mark.parametrize(
+    ('page', 'table'), [('docs/speed.md', 'benchmark.md'), ('README.md', 'brief.md')]
+)
+def test_pages_show_the_tables_of_the_kept_run(page: str, table: str) -> None:
+    kept = (ROOT / 'docs/results/benchmark' / table).read_text()
+    assert kept in (ROOT / page).read_text()
+
+
+def test_the_kept_tables_are_those_of_the_kept_numbers() -> None:
+    folder = ROOT / 'docs/results/benchmark'
+    found = json.loads((folder / 'benchmark.json').read_text())
+    brief = (folder / 'brief.md').read_text()
+    for load in found['workloads']:
+        ratio = load['contenders'][OWN]['ratio']
+        if not load['title'].endswith(LEFT_OUT):
+            reference = ' + '.join(load['reference'])
+            assert f'| {load["title"]} | {short(np.median(ratio))} ({reference}) |' in brief

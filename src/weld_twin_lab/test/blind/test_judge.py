@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Verdicts held against truths, with the answers worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from blind_verdicts import diagnosis, found, offset, truth
+
+from weld_twin_lab.blind.judging import judge
+
+A, B, C = ('joint_offset', 'a'), ('joint_offset', 'b'), ('gear_ratio', 'a')
+BASE = ('base_pose', None)
+ONE, TWO = truth('single', [offset('a')]), truth('double', [offset('a'), offset('b')])
+NOTHING = truth('none')
+
+
+@pytest.mark.parametrize(
+    ('case', 'verdict', 'outcome', 'named', 'right'),
+    [
+        (ONE, diagnosis('identified', [A]), 'exact', True, True),
+        (ONE, diagnosis('ambiguous', [A, C]), 'exact', True, True),
+        (ONE, diagnosis('identified', [A], [C]), 'partial', True, False),
+        (ONE, diagnosis('identified', [C]), 'wrong', False, False),
+        (ONE, diagnosis('unknown', [A]), 'exact', True, False),
+        (ONE, diagnosis('none'), 'silent', False, False),
+        (ONE, None, 'silent', False, False),
+        (TWO, diagnosis('identified', [A], [B]), 'exact', True, True),
+        (TWO, diagnosis('identified', [B, C], [A, B]), 'exact', True, True),
+        (TWO, diagnosis('identified', [A]), 'partial', False, False),
+        (TWO, diagnosis('ambiguous', [A, B]), 'partial', False, False),
+        (TWO, diagnosis('identified', [A, B], [C]), 'partial', False, False),
+        (NOTHING, diagnosis('none'), 'exact', False, True),
+        (NOTHING, diagnosis('identified', [A]), 'wrong', False, False),
+        (truth('outside', [offset('a')]), diagnosis('unknown', [C]), 'wrong', False, True),
+        (truth('withheld', [offset('a')]), diagnosis('ambiguous', [C]), 'wrong', False, False),
+    ],
+)
+def test_a_verdict_is_worth_what_it_says_of_the_causes(case, verdict, outcome, named, right):
+    judged = judge(case, verdict)
+    assert (judged.set, judged.named, judged.right) == (outcome, named, right)
+
+
+def test_a_set_that_cannot_be_told_apart_counts_once_for_two_causes():
+    judged = judge(TWO, diagnosis('ambiguous', [A, B]))
+    assert judged.family is True
+    assert not judged.named
+
+
+def test_the_like_of_an_ambiguous_construction_is_as_good_as_the_truth():
+    case = truth('ambiguous', [offset('a')], alike=[[list(BASE)]])
+    assert judge(case, diagnosis('identified', [BASE])).right
+    assert not judge(case, diagnosis('identified', [C])).right
+
+
+def test_seven_equal_lags_are_as_good_as_one_late_clock():
+    lags = [{'effect': 'servo_lag', 'joint': f'j{k}', 'time_constant': 0.01} for k in range(7)]
+    case = truth('ambiguous', lags, alike=[[['time_delay', None]]], ratios=[4.0])
+    assert judge(case, diagnosis('identified', [('time_delay', None)])).right
+    all_seven = [[('servo_lag', f'j{k}')] for k in range(7)]
+    assert judge(case, diagnosis('identified', *all_seven)).right
+    assert not judge(case, diagnosis('identified', [('servo_lag', 'j0')])).right
+
+
+def test_family_and_joint_are_judged_apart():
+    judged = judge(ONE, diagnosis('identified', [B]))
+    assert (judged.family, judged.joint) == (True, False)
+    judged = judge(ONE, diagnosis('identified', [C]))
+    assert (judged.family, judged.joint) == (False, True)
+    assert judge(truth('single', [{'effect': 'drift'}]), diagnosis('none')).joint is None
+    assert judge(NOTHING, diagnosis('none')).family is None
+
+
+@pytest.mark.parametrize(
+    ('status', 'groups', 'confidence', 'wrong'),
+    [
+        ('identified', [[C]], 0.81, True), ('identified', [[C]], 0.8, False),
+        ('none', [], 0.97, True), ('unknown', [], 0.9, False), ('identified', [[A]], 0.99, False),
+    ],
+)  # fmt: skip
+def test_a_verdict_is_sure_and_wrong_only_when_it_claims_something(
+    status, groups, confidence, wrong
+):
+    verdict = diagnosis(status, *groups, confidence=confidence)
+    assert judge(ONE, verdict).confidently_wrong is wrong
+
+
+def test_parameter_errors_are_in_standard_errors():
+    effects = [found('joint_offset', 'a', {'offset': 1.3e-3}, {'offset': 1e-4})]
+    judged = judge(ONE, diagnosis('identified', [A], effects=effects))
+    np.testing.assert_allclose(judged.z, [3.0])
+
+
+def test_a_phase_has_no_error_of_a_whole_turn():
+    case = truth('single', [
+        {'effect': 'transmission_ripple', 'joint': 'a', 'amplitude': 2e-4, 'order': 3,
+         'phase': 3.1},
+    ])  # fmt: skip
+    effects = [found('transmission_ripple', 'a', {'amplitude': 1e-4, 'phase': -3.1},
+                     {'amplitude': 1e-4, 'phase': 0.1})]  # fmt: skip
+    verdict = diagnosis('identified', [('transmission_ripple', 'a')], effects=effects)
+    np.testing.assert_allclose(judge(case, verdict).z, [-1.0, 10.0 * (2.0 * np.pi - 6.2)])
+
+
+def test_a_cause_within_a_set_has_no_parameter_errors():
+    effects = [found('joint_offset', 'a', {'offset': 1.3e-3}, {'offset': 1e-4})]
+    assert judge(ONE, diagnosis('ambiguous', [A, C], effects=effects)).z == ()
+
+
+def test_the_stratum_is_that_of_the_weakest_cause():
+    case = truth('double', [offset('a'), offset('b')], ratios=[7.0, 0.4])
+    assert judge(case, diagnosis('identified', [A])).stratum == 0.4

@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is sealed stays as it was, or is found out; what is to be blind is kept blind."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import stat
+import subprocess
+import sys
+
+import pytest
+from blind_verdicts import offset, truth
+
+from weld_twin_core.errors import DataError
+from weld_twin_lab.blind import layout, seal
+
+
+@pytest.fixture
+def sealed(tmp_path):
+    """Return directories of two cases and their truths, sealed, recordings being mere bytes."""
+    cases, truths = tmp_path / 'cases', tmp_path / 'elsewhere' / 'truths'
+    entries = []
+    for name in ('case_0001', 'case_0002'):
+        (cases / name / 'train').mkdir(parents=True)
+        (cases / name / 'train' / 'train.mcap').write_bytes(b'recording of ' + name.encode())
+        layout.write(truths / name / layout.TRUTH, truth('single', [offset('a')], name=name))
+        entries.append({
+            'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name),
+        })  # fmt: skip
+    layout.write(cases / layout.CASES, {'seal': seal.seal_of(entries), 'cases': entries})
+    layout.write(truths / layout.TRUTHS, {'seed': 1})
+    return cases, truths
+
+
+def test_untouched_truths_open_in_the_order_of_the_cases(sealed):
+    assert [item['name'] for item in seal.opened(*sealed)] == ['case_0001', 'case_0002']
+
+
+def test_the_seal_is_a_plain_hash_that_anyone_can_check(sealed):
+    listed = json.loads((sealed[0] / layout.CASES).read_text())
+    text = ''.join(f'{e["name"]} {e["case"]} {e["truth"]}\n' for e in listed['cases'])
+    assert hashlib.sha256(text.encode()).hexdigest() == listed['seal']
+
+
+def change(path):
+    """Change one byte in the middle of a file."""
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def test_one_changed_byte_of_a_recording_is_found(sealed):
+    change(sealed[0] / 'case_0002' / 'train' / 'train.mcap')
+    with pytest.raises(DataError, match='case of case_0002 was changed'):
+        seal.opened(*sealed)
+
+
+def test_one_changed_byte_of_a_truth_is_found(sealed):
+    change(sealed[1] / 'case_0001' / layout.TRUTH)
+    with pytest.raises(DataError, match='truth of case_0001 was changed'):
+        seal.opened(*sealed)
+
+
+def test_a_file_added_to_a_case_is_found(sealed):
+    (sealed[0] / 'case_0001' / 'more').write_text('')
+    with pytest.raises(DataError, match='case_0001 was changed'):
+        seal.opened(*sealed)
+
+
+def test_a_truth_taken_away_is_found(sealed):
+    (sealed[1] / 'case_0002').rename(sealed[1] / 'lost')
+    with pytest.raises(DataError, match='truth of case_0002 is missing'):
+        seal.opened(*sealed)
+
+
+def test_a_truth_swapped_together_with_its_hash_is_found_by_the_seal(sealed):
+    cases, truths = sealed
+    listed = json.loads((cases / layout.CASES).read_text())
+    change(truths / 'case_0001' / layout.TRUTH)
+    listed['cases'][0]['truth'] = seal.digest(truths / 'case_0001')
+    (cases / layout.CASES).write_text(json.dumps(listed))
+    with pytest.raises(DataError, match='seal'):
+        seal.opened(cases, truths)
+
+
+def test_a_list_sealed_anew_does_not_pass_for_the_one_published(sealed):
+    cases, truths = sealed
+    published = json.loads((cases / layout.CASES).read_text())['seal']
+    change(cases / 'case_0001' / 'train' / 'train.mcap')
+    listed = json.loads((cases / layout.CASES).read_text())
+    listed['cases'][0]['case'] = seal.digest(cases / 'case_0001')
+    listed['seal'] = seal.seal_of(listed['cases'])
+    (cases / layout.CASES).write_text(json.dumps(listed))
+    assert seal.opened(cases, truths)
+    with pytest.raises(DataError, match='seal'):
+        seal.opened(cases, truths, published)
+
+
+def test_the_command_line_tells_of_a_broken_seal_in_one_line(sealed, weld_twin, tmp_path):
+    change(sealed[1] / 'case_0001' / layout.TRUTH)
+    result = weld_twin('blind', 'score', sealed[0], '--truths', sealed[1], '--results',
+                       tmp_path / 'verdicts', '--out', tmp_path / 'score')  # fmt: skip
+    assert result.code == 2
+    assert result.err.count('\n') == 1
+    assert 'truth of case_0001 was changed' in result.err
+    assert not (tmp_path / 'score').exists()
+
+
+@pytest.mark.parametrize('place', ['cases/truths', 'truths', 'cases'])
+def test_a_diagnosis_that_could_read_the_truths_is_refused(sealed, weld_twin, tmp_path, place):
+    near = tmp_path / place / layout.TRUTHS
+    near.parent.mkdir(exist_ok=True)
+    layout.write(near, {'seed': 1})
+    result = weld_twin('blind', 'diagnose', sealed[0], '--out', tmp_path / 'out')
+    assert result.code == 2
+    assert '--allow-readable' in result.err
+    assert not (tmp_path / 'out').exists()
+
+
+def test_truths_elsewhere_are_out_of_reach(sealed):
+    assert seal.truths_within_reach(sealed[0]) is None
+
+
+def test_only_the_owner_can_read_the_truths(sealed):
+    seal.make_private(sealed[1])
+    for path in (sealed[1], *sealed[1].rglob('*')):
+        assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0
+
+
+def test_the_diagnosis_loads_neither_plant_nor_truths():
+    code = (
+        'import sys, weld_twin_lab.blind.diagnosing; print([name for name in sys.modules if '
+        'name.startswith("weld_twin_lab.plant") or name == "mujoco" or '
+        'name in ("weld_twin_lab.blind.making", "weld_twin_lab.blind.judging")])'
+    )
+    out = subprocess.run(
+        [sys.executable, '-c', code], capture_output=True, text=True, check=True,
+        env={'PYTHONPATH': ':'.join(sys.path)},
+    )  # fmt: skip
+    assert out.stdout.strip() == '[]'

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What belongs to a set-up stays with it; what belongs to the arm goes along."""
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.effects.setup_motion import of_the_robot, seen_from
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.twin import Twin
+
+SECOND = 1_000_000_000
+ROBOT = catalog.load('ur10')
+EFFECTS = tuple(effect_from_mapping(e) for e in (
+    {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3},
+    {'effect': 'setup_settling', 'xyz': [1e-3, 0.0, 0.0], 'time_constant': 40.0, 'start': 0.0},
+    {'effect': 'setup_step', 'xyz': [0.0, 5e-4, 0.0], 'time': 60.5},
+))  # fmt: skip
+
+
+def stations(first, count):
+    """Return stations of one arm pose, at seconds after the epoch of the whole recording."""
+    q = np.tile([0.1, -1.2, 1.4, -0.3, 1.5, 0.2], (count, 1))
+    motion = JointMotion(np.arange(float(count)), q, static=True)
+    return Recording('part', motion, epoch_ns=(1000 + first) * SECOND)
+
+
+def positions(effects, recording):
+    return Twin(ROBOT, effects).poses(recording).position
+
+
+@pytest.mark.parametrize('first', [0, 30, 61])
+def test_a_part_of_the_recording_sees_the_set_up_as_it_stood_then(first):
+    whole = stations(0, 100)
+    part = stations(first, 100 - first)
+    carried = seen_from(EFFECTS, whole.epoch_ns, whole.span_ns, part)
+    np.testing.assert_allclose(
+        positions(carried, part), positions(EFFECTS, whole)[first:], atol=1e-15
+    )
+
+
+@pytest.mark.parametrize('first', [-500, 5000])
+def test_another_day_sees_the_arm_alone(first):
+    whole, other = stations(0, 100), stations(first, 20)
+    carried = seen_from(EFFECTS, whole.epoch_ns, whole.span_ns, other)
+    assert carried == of_the_robot(EFFECTS) == EFFECTS[:1]

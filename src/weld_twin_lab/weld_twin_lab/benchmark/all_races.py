@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The benchmark from start to end."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core import __version__
+
+from . import processes, race_table
+from .arms import calibrated_arm
+from .fits import fits
+from .growth import draw, growth
+from .kinematics import batches, single
+from .peers import PACKAGES, Peer, find_peers
+from .race import Workload, race
+from .studies import studies
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is done: sizes of the workloads and how long they are timed."""
+
+    rounds: int = 21
+    least: float = 0.05
+    counts: tuple[int, ...] = (1000, 100_000)
+    draws: int = 10_000
+    base: int = 1024
+    poses: int = 1000
+    million: int = 1_000_000
+    minutes: tuple[float, ...] = (5.0, 15.0, 30.0, 60.0)
+    quick: bool = False
+
+
+FULL = Effort()
+QUICK = Effort(3, 0.01, (1000,), 500, 16, 100, 100_000, (0.2, 0.5), True)
+
+
+def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
+    """
+    Run everything; write ``benchmark.json``, two tables of it (``benchmark.md``, ``brief.md``) and
+    ``growth.png``.
+
+    Raises
+    ------
+    DataError
+        A contender's result is not that of the others.
+
+    """
+    robot = calibrated_arm()
+    peers, missing = find_peers(robot)
+    for name, reason in missing.items():
+        say(f'{name} is left out: {reason}')
+    outcomes = []
+    for workload in _workloads(effort, peers):
+        outcomes.append(race(workload, effort.rounds, effort.least))
+        for line in race_table.lines(outcomes[-1]):
+            say(line)
+    starts, memory = processes.starts(), processes.memory(effort.million)
+    curves = growth(effort.minutes, effort.quick)
+    for line in race_table.costs(starts, memory, curves['bag']['runs'][-1]):
+        say(line)
+    draw(curves, folder / 'growth.png')
+    (folder / 'benchmark.md').write_text(race_table.page(outcomes), encoding='utf-8')
+    (folder / 'brief.md').write_text(race_table.brief(outcomes), encoding='utf-8')
+    found = {
+        'schema': 'weld_twin/benchmark/1', 'machine': _machine(), 'left_out': missing,
+        'workloads': [outcome.as_dict() for outcome in outcomes], 'starts_s': starts,
+        'memory': memory, 'growth': curves,
+    }  # fmt: skip
+    text = json.dumps(found, indent=1) + '\n'
+    (folder / 'benchmark.json').write_text(text, encoding='utf-8')
+
+
+def _workloads(effort: Effort, peers: dict[str, Peer]) -> Iterator[Workload]:
+    robot = calibrated_arm()
+    for count in effort.counts:
+        yield from batches(robot, peers, count)
+    yield single(robot, peers)
+    yield from studies(robot, effort.draws, effort.base, 'pinocchio' in peers)
+    names = set(peers) - ({'pybotics'} if effort.quick else set())
+    yield from fits(effort.poses, effort.poses, names)
+
+
+def _machine() -> dict[str, Any]:
+    versions = {'weld_twin': __version__}
+    for package in ('numpy', 'scipy', *PACKAGES.values()):
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return {
+        'processor': _processor(), 'processors': os.cpu_count(), 'load': os.getloadavg()[0],
+        'python': platform.python_version(), 'versions': versions,
+    }  # fmt: skip
+
+
+def _processor() -> str:
+    try:
+        text = Path('/proc/cpuinfo').read_text(encoding='utf-8')
+    except OSError:
+        return platform.processor()
+    names = [line.partition(':')[2] for line in text.splitlines() if line.startswith('model name')]
+    return names[0].strip() if names else platform.machine()

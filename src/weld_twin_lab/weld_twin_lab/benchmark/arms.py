@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The arm, the joint positions and the seams that the contenders work on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import transform
+from weld_twin_core.arrays import Array
+
+DH_KEYS = ('theta', 'd', 'a', 'alpha')
+SIZE = 1e-3
+
+
+def calibrated_arm() -> Robot:
+    """Return a UR5 whose DH values are all off nominal by about a millimetre or milliradian."""
+    rng = np.random.default_rng(5)
+    arm = load('ur5')
+    rows = {key: getattr(arm, key) + SIZE * rng.normal(size=arm.n) for key in DH_KEYS}
+    tool = transform(np.eye(3), np.array([0.03, -0.02, 0.25]))
+    return replace(arm, **rows, T_flange_tool=tool)
+
+
+def arm_of(joints: int) -> Robot:
+    """Return an arm of any number of revolute joints in general position."""
+    rng = np.random.default_rng(joints)
+    wide = np.full(joints, 7.0)
+    return Robot(
+        name=f'arm of {joints}', joint_names=tuple(f'joint{i}' for i in range(joints)),
+        **{key: rng.normal(size=joints) for key in DH_KEYS}, beta=np.zeros(joints),
+        prismatic=np.zeros(joints, dtype=bool), lower=-wide, upper=wide, max_velocity=wide,
+        max_acceleration=wide,
+    )  # fmt: skip
+
+
+def random_positions(arm: Robot, count: int, seed: int = 0) -> Array:
+    """Return joint positions of which no two are the same, shape (count, n) [rad]."""
+    return np.random.default_rng(seed).uniform(-np.pi, np.pi, (count, arm.n))
+
+
+def smooth_motion(arm: Robot, count: int) -> Array:
+    """Return joint positions along a smooth seam, shape (count, n) [rad]."""
+    s = np.linspace(0.0, 1.0, count)[:, None]
+    phases = np.arange(arm.n)
+    rates = 0.7 + 0.13 * ((5 * phases) % 7)
+    return np.array([0.3, -1.2, 1.5, -1.9, -1.5, 0.2, 0.5])[phases] + 0.2 * np.sin(
+        s * rates + phases
+    )
+
+
+def links(robot: Robot) -> list[Array]:
+    """
+    Return the constant transforms between the joint axes, shape (4, 4) each, n + 1 of them.
+
+    The chain is ``links[0] Rz(q0) links[1] Rz(q1) ... links[n]``, which is how peers that know no
+    DH values are told of the arm.
+    """
+    out = [np.array(robot.T_world_base)]
+    for i in range(robot.n):
+        out.append(turn_z(robot.theta[i], robot.d[i]) @ turn_x(robot.alpha[i], robot.a[i]))
+    out[-1] = out[-1] @ robot.T_flange_tool
+    return out
+
+
+def turn_z(angle: float, along: float) -> Array:
+    """Return Rz(angle) Tz(along), shape (4, 4)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, along], [0, 0, 0, 1.0]])
+
+
+def turn_x(angle: float, along: float) -> Array:
+    """Return Rx(angle) Tx(along), shape (4, 4)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0, along], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])

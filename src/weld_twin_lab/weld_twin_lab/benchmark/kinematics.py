@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Poses, Jacobians and derivatives of many joint positions, and poses one at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import cycle
+
+import numpy as np
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.kernels.bulk import BulkKernel
+from weld_twin_core.kernels.single_pose import SinglePose
+from weld_twin_core.twin.twin import Twin
+
+from .arms import random_positions
+from .peers import Peer
+from .race import Contender, Workload
+
+OWN = 'weld_twin'
+PLAIN = 'weld_twin, plain chain'
+LOOPED = 500
+"""Poses a peer that loops is timed on; its time per pose does not depend on how many."""
+BATCH = 10_000
+"""Poses a peer that takes batches is timed on for derivatives, the slowest of the workloads."""
+EXACT = 1e-12
+
+
+def batches(robot: Robot, peers: dict[str, Peer], count: int) -> Iterator[Workload]:
+    """Yield the workloads of many joint positions."""
+    yield _poses(robot, peers, count)
+    yield _jacobians(robot, peers, count)
+    yield _derivatives(robot, peers, count)
+
+
+def single(robot: Robot, peers: dict[str, Peer]) -> Workload:
+    """Return the workload of one pose at a time, as a node has it."""
+    q = random_positions(robot, 500, seed=2)
+    wanted = forward(robot, q)
+    live = Twin(robot).live()
+
+    def step(one: Array) -> Array:
+        position, rotation = live.step(0.0, one)[1]
+        return np.column_stack([rotation, position])
+
+    ways = {OWN: SinglePose(robot), 'weld_twin, LiveTwin.step': step}
+    ways |= {name: peer.single for name, peer in peers.items() if peer.single}
+    contenders = []
+    for name, way in ways.items():
+        gap = max(np.abs(way(a)[:3] - b[:3]).max() for a, b in zip(q, wanted, strict=True))
+        contenders.append(Contender(name, _one_by_one(way, q), 1, float(gap)))
+    return Workload('one pose at a time', 'pose', contenders, EXACT)
+
+
+def _one_by_one(way: Callable[[Array], Array], q: Array) -> Callable[[], object]:
+    rows = cycle(list(q))
+    return lambda: way(next(rows))
+
+
+def _poses(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
+    q = random_positions(robot, count)
+    wanted = forward(robot, q[:LOOPED])
+    kernel = BulkKernel(robot)
+    out = kernel.poses(q)
+    gap = _gap(out, wanted)
+    contenders = [Contender(OWN, lambda: kernel.poses(q, out), count, gap)]
+    few = q[: chain_limit(count)]
+    contenders.append(Contender(PLAIN, lambda: forward(robot, few), len(few)))
+    for name, peer in peers.items():
+        part = q[:LOOPED] if peer.loops else q
+        contenders.append(
+            Contender(name, _call(peer.poses, part), len(part), _gap(peer.poses(part), wanted))
+        )
+    return Workload(f'forward kinematics, N = {count:,}', 'pose', contenders, EXACT)
+
+
+def chain_limit(count: int) -> int:
+    """Return how many poses the plain chain is timed on: fewer than it hands to the kernels."""
+    return min(count, 4096)
+
+
+def _jacobians(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
+    q = random_positions(robot, count)
+    kernel = BulkKernel(robot, [('theta', i) for i in range(robot.n)])
+    poses, out = kernel.screws(q)
+    found = out.transpose(2, 0, 1)
+    ways = {name: peer for name, peer in peers.items() if peer.screws}
+    wanted = ways['pinocchio'].screws(q[:LOOPED])[1] if 'pinocchio' in ways else found
+    own = Contender(OWN, lambda: kernel.screws(q, poses, out), count, _gap(found, wanted))
+    contenders = [own]
+    for name, peer in ways.items():
+        part = q[:LOOPED]
+        gap = _gap(peer.screws(part)[1], wanted)
+        contenders.append(Contender(name, _call(peer.screws, part), len(part), gap))
+    return Workload(
+        f'poses and Jacobians, N = {count:,}', 'pose', contenders, EXACT,
+        'weld_twin leaves the Jacobians components first in memory',
+    )  # fmt: skip
+
+
+def _derivatives(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
+    q = random_positions(robot, count)
+    kernel = BulkKernel(robot, [(key, i) for i in range(robot.n) for key in ('theta', 'alpha')])
+    poses, out = kernel.screws(q)
+    found = written_out(out[..., :LOOPED])
+    ways = {name: peer for name, peer in peers.items() if peer.dh}
+    wanted = ways['pinocchio'].dh(q[:LOOPED])[1] if 'pinocchio' in ways else found
+    own = Contender(OWN, lambda: kernel.screws(q, poses, out), count, _gap(found, wanted))
+    contenders = [own]
+    for name, peer in ways.items():
+        part = q[:LOOPED] if peer.loops else q[:BATCH]
+        derivative = peer.dh(part)[1]
+        gap = _gap(derivative, wanted[:, : derivative.shape[1]])
+        contenders.append(Contender(name, _call(peer.dh, part), len(part), gap))
+    return Workload(
+        f'poses and derivatives by {4 * robot.n} DH values, N = {count:,}', 'pose', contenders,
+        EXACT, 'weld_twin gives them as two screws a row; JAX that of the tool point alone',
+    )  # fmt: skip
+
+
+def written_out(screws: Array) -> Array:
+    """Return screws (6, 2 n, N) as derivatives by theta, d, a, alpha of every row (N, 6, 4 n)."""
+    theta, alpha = screws[:, ::2], screws[:, 1::2]
+    slides = [np.concatenate([screw[3:], np.zeros_like(screw[3:])]) for screw in (theta, alpha)]
+    out: Array = np.stack([theta, *slides, alpha], axis=2).reshape(6, -1, screws.shape[-1])
+    return out.transpose(2, 0, 1)
+
+
+def _gap(found: Array, wanted: Array) -> float:
+    shared = min(len(found), len(wanted))
+    return float(np.abs(found[:shared] - wanted[:shared]).max())
+
+
+def _call(way: Callable[[Array], object], q: Array) -> Callable[[], object]:
+    return lambda: way(q)

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Peers: the same arm in other packages, each in the fastest way its Python interface offers.
+
+A module here has ``make(robot)``, which imports the package and returns a `Peer`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+
+MODULES = {
+    'pinocchio': 'pinocchio_peer', 'mujoco': 'mujoco_peer',
+    'roboticstoolbox': 'toolbox_peer', 'pybotics': 'pybotics_peer', 'kinpy': 'kinpy_peer',
+    'jax': 'jax_peer',
+}  # fmt: skip
+PACKAGES = {
+    'pinocchio': 'pin', 'mujoco': 'mujoco', 'roboticstoolbox': 'roboticstoolbox-python',
+    'pybotics': 'pybotics', 'kinpy': 'kinpy', 'jax': 'jax', 'salib': 'SALib',
+}  # fmt: skip
+"""What they are called on PyPI."""
+
+
+@dataclass(frozen=True)
+class Peer:
+    """
+    One arm in one package.
+
+    Attributes
+    ----------
+    poses : callable
+        Joint positions (N, n) to poses (N, 4, 4).
+    screws : callable or None
+        Joint positions to poses and Jacobians (N, 6, n).
+    dh : callable or None
+        Joint positions to poses and derivatives by the DH values, (N, 6 or 3, 4 n), of each row
+        by theta, d, a, alpha.
+    single : callable or None
+        One joint position (n,) to a pose (4, 4).
+    loops : bool
+        A Python loop, so that the time per pose does not depend on how many there are.
+
+    """
+
+    poses: Callable[[Array], Array]
+    screws: Callable[[Array], tuple[Array, Array]] | None = None
+    dh: Callable[[Array], tuple[Array, Array]] | None = None
+    single: Callable[[Array], Array] | None = None
+    loops: bool = True
+
+
+def find_peers(robot: Robot) -> tuple[dict[str, Peer], dict[str, str]]:
+    """Return the peers that are installed, and why the others are left out."""
+    found, missing = {}, {}
+    for name, module in MODULES.items():
+        try:
+            found[name] = import_module(f'{__name__}.{module}').make(robot)
+        except ImportError as error:
+            missing[name] = f'not installed (pip install {PACKAGES[name]}): {error}'
+    return found, missing

@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The cell a case is recorded in: robot with its torch, instruments, surroundings, motions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import matrix_from_quaternion
+from weld_twin_core.arrays import Array
+from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
+
+from ..plant import Command, PlantRecording, Tracker, run
+from .cause_sizes import Cause
+from .displacement import rigid, rms
+from .recorded_motion import Motion, motion
+
+SPANS = (20.0, 60.0)
+RICHNESS = (0.0, 1.0)
+GROSS = 6.0
+"""Standard deviations from which a measurement is an outlier."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """
+    One cell with its instruments.
+
+    Attributes
+    ----------
+    robot : Robot
+    tracker : Tracker
+    known : tuple of effects
+        At work and told to the diagnosis.
+    align : tuple of str
+        Frames that the diagnosis is to fit.
+    loaded, warming : bool
+        Whether a wrench, or a temperature, is at work and recorded.
+    richness : float
+        How far the plant's physics goes beyond the textbook.
+
+    """
+
+    robot: Robot
+    tracker: Tracker
+    known: tuple[Cause, ...] = ()
+    align: tuple[str, ...] = ()
+    loaded: bool = False
+    warming: bool = False
+    richness: float = 1.0
+
+    @property
+    def noise(self) -> float:
+        """Return the RMS length of the measurement noise [m]."""
+        return float(np.sqrt(3.0)) * self.tracker.sigma
+
+
+class Take(NamedTuple):
+    """One run of a motion: the command and the seed of everything random in it."""
+
+    command: Command
+    seed: int
+
+
+def draw_cell(
+    robot: str, kind: str, families: Sequence[str], rng: np.random.Generator
+) -> Cell:
+    """Return a cell in which causes of these families can be seen."""
+    arm = catalog.load(robot).with_frames(tool=_torch(rng))
+    known: tuple[Cause, ...] = ()
+    if 'payload' in families:
+        arm = replace(arm, payload_mass=float(rng.uniform(1.0, 4.0)))
+        known = tuple(
+            {'effect': 'joint_compliance', 'joint': joint,
+             'compliance': float(rng.uniform(1e-5, 3e-5))}
+            for joint in arm.joint_names[1:4]
+        )  # fmt: skip
+    spring = {'joint_compliance', 'loaded_play'} & set(families)
+    return Cell(
+        arm, _tracker(kind, rng), known,
+        align=('base',) if rng.random() < 0.1 and 'base_pose' not in families else (),
+        loaded='cartesian_compliance' in families or (bool(spring) and rng.random() < 0.5),
+        warming='thermal_growth' in families or rng.random() < 0.2,
+        # Springs given as known are exactly what they are said to be.
+        richness=0.0 if known else float(rng.uniform(*RICHNESS)),
+    )  # fmt: skip
+
+
+def _torch(rng: np.random.Generator) -> Array:
+    """Return a torch frame on the flange, shape (4, 4)."""
+    tool = np.eye(4)
+    tool[:3, :3] = Rotation.from_euler('y', rng.uniform(0.2, 0.8)).as_matrix()
+    tool[:3, 3] = [rng.uniform(0.0, 0.12), rng.uniform(-0.03, 0.03), rng.uniform(0.1, 0.35)]
+    return tool
+
+
+def _tracker(kind: str, rng: np.random.Generator) -> Tracker:
+    """Return instruments between a laser tracker and a camera."""
+    sigma = float(np.exp(rng.uniform(np.log(1e-5), np.log(5e-5))))
+    orientation = bool(rng.random() < 0.7)
+    still = {'rate': None, 'drop': 0.0, 'jitter': 0.0}
+    moving = {
+        'rate': 60.0, 'drop': float(rng.uniform(0.0, 0.03)),
+        'jitter': float(rng.choice([0.0, 2e-5, 5e-5])),
+        'joint_jitter': float(rng.choice([0.0, 2e-5])),
+        'velocity': bool(rng.random() < 0.8),
+    }  # fmt: skip
+    return Tracker(
+        sigma=sigma, sigma_orientation=float(rng.uniform(3e-5, 2e-4)), orientation=orientation,
+        outlier_share=float(rng.choice([0.0, 0.002, 0.01])),
+        outlier_size=float(rng.uniform(1e-3, 5e-3)), wrench_sigma=0.2, temperature_rate=1.0,
+        temperature_lag=float(rng.uniform(0.0, 5.0)), temperature_sigma=0.03,
+        **(still if kind == 'stations' else moving),
+    )  # fmt: skip
+
+
+def take(cell: Cell, kind: str, span: float, rng: np.random.Generator) -> Take:
+    """Return a motion of a kind in this cell, with what surrounds it."""
+    return Take(_command(cell, motion(kind, cell.robot, span, rng), rng), _seed(rng))
+
+
+def again(first: Take, rng: np.random.Generator) -> Take:
+    """Return the same motion to be recorded another time."""
+    return Take(first.command, _seed(rng))
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(2**31))
+
+
+def _command(cell: Cell, moved: Motion, rng: np.random.Generator) -> Command:
+    t = moved.t
+    since, span = t - t[0], t[-1] - t[0]
+    wrench = temperature = None
+    if cell.loaded:
+        wrench = np.zeros((t.size, 6))
+        for k in range(3):
+            turn = rng.uniform(0.0, 2.0 * np.pi)
+            rate = 2.0 * np.pi * rng.uniform(2.0, 8.0) / span
+            wrench[:, k] = rng.uniform(10.0, 40.0) * np.sin(rate * since + turn)
+    if cell.warming:
+        warm = 1.0 - np.exp(-since / (rng.uniform(0.2, 0.6) * span))
+        temperature = rng.uniform(19.0, 25.0) + rng.uniform(5.0, 15.0) * warm
+    return Command(t, moved.q, moved.static, wrench, temperature)
+
+
+def record(
+    cell: Cell, causes: Sequence[Cause], taken: Take, tracker: Tracker | None = None
+) -> PlantRecording:
+    """Return what the cell with these causes records; the same take gives the same again."""
+    rng = np.random.default_rng(taken.seed)
+    effects = [*cell.known, *causes]
+    return run(
+        cell.robot.to_mapping(), effects, taken.command, tracker or cell.tracker, rng,
+        cell.richness,
+    )
+
+
+def exact(tracker: Tracker) -> Tracker:
+    """Return the instruments without their errors, sampling at the same instants."""
+    return replace(
+        tracker, sigma=0.0, sigma_orientation=0.0, orientation=True, jitter=0.0,
+        outlier_share=0.0, joint_jitter=0.0, wrench_sigma=0.0, temperature_sigma=0.0,
+    )  # fmt: skip
+
+
+def as_recording(name: str, made: PlantRecording) -> Recording:
+    """Return a plant's recording as the diagnosis takes it."""
+    rotation = None if made.quaternion is None else matrix_from_quaternion(made.quaternion)
+    return Recording(
+        name, JointMotion(made.t_joint, made.q, None if made.static else made.qd, made.static),
+        Measurements(made.t_measured, made.position, rotation),
+        _signal(made.wrench_t, made.wrench), 'tool',
+        _signal(made.temperature_t, made.temperature),
+    )  # fmt: skip
+
+
+def _signal(t: Array | None, value: Array | None) -> Signal | None:
+    return None if t is None or value is None else Signal(t, value)
+
+
+def deviation(cell: Cell, causes: Sequence[Cause], taken: Take) -> Array:
+    """
+    Return how far the causes move the measured position, free of noise, shape (M, 3) [m].
+
+    Samples are compared by their stamps, as whoever measures must.
+    """
+    instrument = exact(cell.tracker)
+    moved, ideal = record(cell, causes, taken, instrument), record(cell, (), taken, instrument)
+    off = moved.position - at_stamps(ideal, moved.t_measured)
+    return off - rigid(ideal.position, off) if 'base' in cell.align else off
+
+
+def at_stamps(made: PlantRecording, t: Array) -> Array:
+    """Return the positions of a recording at other stamps, shape (M, 3) [m]."""
+    if made.static:
+        return made.position
+    return np.asarray(CubicSpline(made.t_measured, made.position)(t))
+
+
+def floor(cell: Cell, causes: Sequence[Cause], taken: Take) -> tuple[float, list[int]]:
+    """
+    Return what is left of a recording when its causes are known, and its outliers.
+
+    Returns
+    -------
+    floor : float [m]
+        RMS of measured minus true position at the stamps, outliers left out.
+    outliers : list of int
+
+    """
+    seen = record(cell, causes, taken)
+    quiet = replace(cell.tracker, sigma=0.0, sigma_orientation=0.0, outlier_share=0.0)
+    true = record(cell, causes, taken, quiet).position
+    noise = seen.position - true
+    gross = np.linalg.norm(noise, axis=1) > GROSS * cell.noise
+    left = noise if seen.static else noise - _by_jitter(cell, causes, taken, seen)
+    return rms(left[~gross]), [int(k) for k in np.nonzero(gross)[0]]
+
+
+def _by_jitter(
+    cell: Cell, causes: Sequence[Cause], taken: Take, seen: PlantRecording
+) -> Array:
+    """Return how far the tool moves between true instants and their stamps, shape (M, 3) [m]."""
+    steady = record(cell, causes, taken, exact(cell.tracker))
+    velocity = CubicSpline(steady.t_measured, steady.position)(steady.t_measured, 1)
+    return np.asarray(velocity * (seen.t_measured - steady.t_measured)[:, None])

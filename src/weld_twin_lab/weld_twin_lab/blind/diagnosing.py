@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnose cases from their recordings alone, and keep what was said."""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import weld_twin_core
+from weld_twin_core import __version__
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.robots import load_robot
+from weld_twin_nodes.offline.task_pool import Runner, Task
+from weld_twin_nodes.offline.told_twin import build_twin
+from weld_twin_nodes.report.diagnosis_files import diagnosis_text
+from weld_twin_nodes.report.provenance import hashed
+
+from . import layout, seal
+
+_KIB = 1024 if sys.platform != 'darwin' else 1
+"""What getrusage counts memory in [bytes]."""
+
+
+def diagnose_cases(
+    cases: Path, out: Path, runner: Runner, *, allow_readable: bool = False,
+    with_holdout: bool = True,
+) -> list[dict[str, Any]]:  # fmt: skip
+    """
+    Diagnose all cases, write what was said, and return it case by case.
+
+    Parameters
+    ----------
+    cases : Path
+    out : Path
+        Gets a diagnosis.json for every case, and the list of them.
+    runner : Runner
+        Its store makes the work resumable; verdicts of another engine or other cases are not
+        taken for these.
+    allow_readable : bool
+        Go on although truths lie within reach.
+    with_holdout : bool
+        Give the diagnosis the held-out recording to judge its shrink on; without, it judges on
+        stretches of the training recording.
+
+    Raises
+    ------
+    DataError
+        Truths lie within reach, or the directory holds no cases.
+
+    """
+    readable = _truths_readable(cases, allow_readable)
+    listed = layout.read(cases / layout.CASES)
+    engine = engine_digest()
+    tasks = [
+        Task(diagnose_case, (str(cases / entry['name']), entry['case'], engine, with_holdout),
+             entry['name'])
+        for entry in listed['cases']
+    ]  # fmt: skip
+    verdicts = runner.run(tasks)
+    for verdict in verdicts:
+        content = verdict.pop('diagnosis')
+        if content is not None:
+            file = out / verdict['name'] / layout.DIAGNOSIS
+            write_text(file, json.dumps(content, indent=1) + '\n', overwrite=True)
+    layout.write(out / layout.VERDICTS, {
+        'seal': listed['seal'], 'engine': engine, 'version': __version__,
+        'with_holdout': with_holdout, 'truths_readable': readable, 'verdicts': verdicts,
+    }, overwrite=True)  # fmt: skip
+    return verdicts
+
+
+def _truths_readable(cases: Path, allowed: bool) -> bool:
+    """Return whether truths lie within reach; refuse that where it is not allowed."""
+    truths = seal.truths_within_reach(cases)
+    if truths is not None and not allowed:
+        raise DataError(
+            f"the truths in '{truths}' can be read from here, so this would not be blind; move "
+            'them away, or say --allow-readable'
+        )
+    return truths is not None
+
+
+def engine_digest() -> str:
+    """Return the SHA-256 over the source of the core: another engine, another digest."""
+    place = Path(weld_twin_core.__file__).parent
+    whole = [hashed('source', file).sha256 for file in sorted(place.rglob('*.py'))]
+    return seal.text_digest('\n'.join(whole))
+
+
+def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> dict[str, Any]:
+    """
+    Return the diagnosis of one case, how long it took and the memory it needed.
+
+    A case that cannot be diagnosed says so in place of a verdict, so that one case does not stop
+    the others; the digests only tell this task from others.
+    """
+    directory = Path(place)
+    start = time.perf_counter()
+    answer, failure = None, None
+    try:
+        answer = _diagnosis(directory, with_holdout)
+    except Exception as error:
+        failure = f'{type(error).__name__}: {error}'
+    return {
+        'name': directory.name, 'diagnosis': answer, 'error': failure,
+        'seconds': time.perf_counter() - start,
+        'memory_bytes': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _KIB,
+    }  # fmt: skip
+
+
+def _diagnosis(directory: Path, with_holdout: bool) -> dict[str, Any]:
+    case = layout.read(directory / layout.CASE)
+    known = directory / layout.KNOWN if case['known'] else ''
+    twin = build_twin(load_robot(str(directory / layout.ROBOT)), known)
+    holdout = [layout.HOLDOUT] if with_holdout else []
+    train, *held = (
+        read_recording(directory / use, twin.robot) for use in (layout.TRAIN, *holdout)
+    )
+    result = diagnose(
+        [train], twin.robot, align=frozenset(case['align']), known=twin.effects,
+        exclude=case['exclude'], holdout=held,
+    )  # fmt: skip
+    return dict(json.loads(diagnosis_text(result, ())))

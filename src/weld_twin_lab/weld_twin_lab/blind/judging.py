@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One verdict against one truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from .ambiguous import Site
+from .cause_sizes import SIZES, site
+
+CONFIDENT = 0.8
+IN_LIBRARY = frozenset({'single', 'double', 'triple', 'ambiguous'})
+NOT_IN_LIBRARY = frozenset({'outside', 'withheld'})
+SEMI_REAL, AS_IT_IS = 'semi-real', 'as it is'
+NAMING = ('identified', 'ambiguous')
+_ANGLES = frozenset({'phase'})
+_ALSO = {'transmission_ripple': ('phase',), 'vibration': ('frequency', 'damping')}
+"""Parameters besides the size whose estimates are compared."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """
+    What a verdict was worth.
+
+    Attributes
+    ----------
+    kind, robot, motion : str
+        Of the case.
+    truth, said : str
+        Both in words.
+    status : str
+        Of the verdict, or 'error'.
+    confidence : float
+    stratum : float
+        Effect RMS over noise, of the weakest cause.
+    set : str
+        'exact', 'partial', 'wrong' or 'silent': the causes named, against those at work.
+    named : bool
+        Whether every cause at work is in a set of its own.
+    family, joint : bool or None
+        Whether family, and joint, of every cause at work are named; None where there is none.
+    right : bool
+        What the confidence is about: the set is exact, or nothing was to be found and nothing
+        was said, or no library knows the cause and the verdict is 'unknown'.
+    breadth : float
+        Mean number of sites in a set that cannot be told apart.
+    z : tuple of float
+        Errors of the parameters in their standard errors.
+
+    """
+
+    name: str
+    kind: str
+    robot: str
+    motion: str
+    truth: str
+    said: str
+    status: str
+    confidence: float
+    stratum: float
+    set: str
+    named: bool
+    family: bool | None
+    joint: bool | None
+    right: bool
+    breadth: float
+    z: tuple[float, ...]
+
+    @property
+    def confidently_wrong(self) -> bool:
+        """Return whether it names what is wrong, or denies what is there, and is sure of it."""
+        return self.confidence > CONFIDENT and not self.right and self.status != 'unknown'
+
+    @property
+    def in_library(self) -> bool:
+        """Return whether the library knows every cause at work."""
+        return self.kind in IN_LIBRARY
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values."""
+        return {**asdict(self), 'confidently_wrong': self.confidently_wrong}
+
+
+def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judged:
+    """Return what a diagnosis, or its failure to come about, was worth."""
+    verdict = diagnosis['verdict'] if diagnosis else {}
+    status = str(verdict.get('status', 'error'))
+    groups = [
+        {(item['effect'], item['joint']) for item in group}
+        for group in verdict.get('indistinguishable', ())
+    ]
+    answers = [_sites(answer) for answer in (truth['sites'], *truth['alike'])]
+    answer = min(answers, key=lambda at: (-_share(at, groups), abs(len(groups) - len(at))))
+    matched = _matched(answer, groups)
+    whole = matched == len(answer)
+    kind = str(truth['kind'])
+    exact = whole and len(groups) == len(answer)
+    return Judged(
+        truth['name'], kind, truth['robot'], truth['motion'], _in_words(truth['sites']),
+        _said(groups), status, float(verdict.get('confidence', 0.0)),
+        float(min(truth['ratios'], default=0.0)),
+        _set(exact, matched, groups), whole and bool(answer) and status != 'error',
+        _all(_family, answers, groups), _all(_joint, answers, groups),
+        _right(kind, status, exact, whole), _breadth(groups),
+        _errors(truth, diagnosis, groups) if exact and diagnosis else (),
+    )  # fmt: skip
+
+
+def _sites(items: Iterable[Sequence[Any]]) -> list[Site]:
+    return [(str(item[0]), item[1]) for item in items]
+
+
+def _matched(answer: Sequence[Site], groups: Sequence[set[Site]]) -> int:
+    """Return how many causes have a set of their own that holds them."""
+    if not answer or not groups:
+        return 0
+    held = np.array([[at in group for group in groups] for at in answer], dtype=float)
+    return int(held[linear_sum_assignment(-held)].sum())
+
+
+def _share(answer: Sequence[Site], groups: Sequence[set[Site]]) -> float:
+    return _matched(answer, groups) / max(len(answer), 1)
+
+
+def _set(exact: bool, matched: int, groups: Sequence[set[Site]]) -> str:
+    if exact:
+        return 'exact'
+    if not groups:
+        return 'silent'
+    return 'partial' if matched else 'wrong'
+
+
+def _right(kind: str, status: str, exact: bool, whole: bool) -> bool:
+    if kind == 'none':
+        return status == 'none'
+    if kind in NOT_IN_LIBRARY:
+        return status == 'unknown'
+    if kind == SEMI_REAL:
+        return whole
+    return exact and status in NAMING
+
+
+def _all(
+    told: Any, answers: Sequence[Sequence[Site]], groups: Sequence[set[Site]]
+) -> bool | None:
+    """Return whether all parts of one answer are told, None where there is nothing to tell."""
+    found = [
+        parts for parts in ([told(at, groups) for at in answer] for answer in answers)
+        if any(part is not None for part in parts)
+    ]
+    if not found:
+        return None
+    return any(all(part is not False for part in parts) for parts in found)
+
+
+def _family(at: Site, groups: Sequence[set[Site]]) -> bool:
+    return any(at[0] == family for group in groups for family, _ in group)
+
+
+def _joint(at: Site, groups: Sequence[set[Site]]) -> bool | None:
+    if at[1] is None:
+        return None
+    return any(at[1] == joint for group in groups for _, joint in group)
+
+
+def _breadth(groups: Sequence[set[Site]]) -> float:
+    return float(np.mean([len(group) for group in groups])) if groups else 0.0
+
+
+def _in_words(sites: Iterable[Sequence[Any]]) -> str:
+    return ' + '.join(' of '.join(filter(None, at)) for at in sites) or 'nothing'
+
+
+def _said(groups: Sequence[set[Site]]) -> str:
+    listed = (sorted(group, key=str) for group in groups)
+    return ' + '.join(' or '.join(_in_words([at]) for at in group) for group in listed)
+
+
+def _errors(
+    truth: Mapping[str, Any], diagnosis: Mapping[str, Any], groups: Sequence[set[Site]]
+) -> tuple[float, ...]:
+    """Return the errors of the estimates of causes that are beyond confusion."""
+    alone = [next(iter(group)) for group in groups if len(group) == 1]
+    found = {(item['effect'], item['joint']): item for item in diagnosis['verdict']['effects']}
+    out: list[float] = []
+    for cause in truth['causes']:
+        at = site(cause)
+        if at not in alone or at not in found:
+            continue
+        for key in (*SIZES[at[0]], *_ALSO.get(at[0], ())):
+            out += _error(cause.get(key), found[at]['parameters'], found[at]['std'], key)
+    return tuple(out)
+
+
+def _error(
+    true: Any, parameters: Mapping[str, Any], std: Mapping[str, Any], key: str
+) -> list[float]:
+    if true is None or parameters.get(key) is None or std.get(key) is None:
+        return []
+    given, found, spread = (
+        np.atleast_1d(np.asarray(value, dtype=float))
+        for value in (true, parameters[key], std[key])
+    )
+    if not given.shape == found.shape == spread.shape:
+        return []
+    off = found - given
+    if key in _ANGLES:
+        off = (off + np.pi) % (2.0 * np.pi) - np.pi
+    return [float(value) for value in (off / np.maximum(spread, 1e-300))[spread > 0.0]]

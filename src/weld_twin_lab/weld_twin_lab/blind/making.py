@@ -1,0 +1,260 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Make sealed cases: recordings for whoever diagnoses, truths apart."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import write_recording
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.yaml_file import yaml_text
+from weld_twin_msgs_py.robots import write_robot_yaml
+from weld_twin_nodes.offline.output_directory import new_directory
+from weld_twin_nodes.offline.task_pool import Runner, Task
+
+from . import layout, seal
+from .ambiguous import CONSTRUCTIONS, construct
+from .blind_cell import (
+    SPANS,
+    Cell,
+    Take,
+    again,
+    as_recording,
+    deviation,
+    draw_cell,
+    floor,
+    record,
+    take,
+)
+from .cause_sizes import FAMILIES, MOVING, Cause, site
+from .deck import STRATA, Lot, lots
+from .displacement import rms
+from .sizing import Unseen, draw_causes, sized_together
+
+TRIES = 30
+DECOY = 0.1
+"""Share of cases with their causes in the library from which another family is taken out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """
+    One case, all of it.
+
+    Attributes
+    ----------
+    lot : Lot
+    cell : Cell
+    causes : list of effects
+    alike : list of lists of (family, joint)
+        Answers as right as the truth.
+    ratios : list of float
+        Deviation of every cause over the noise, each alone.
+    excluded : tuple of str
+        Families taken out of the library.
+    train, holdout, test : Take
+    fresh : bool
+        Whether hold-out and test are other motions than the training's.
+
+    """
+
+    lot: Lot
+    cell: Cell
+    causes: list[Cause]
+    alike: list[list[tuple[str, str | None]]]
+    ratios: list[float]
+    excluded: tuple[str, ...]
+    train: Take
+    holdout: Take
+    test: Take
+    fresh: bool
+
+
+def make(
+    cases: Path, truths: Path, seed: int, count: int, runner: Runner, kinds: Sequence[str] = (),
+    spans: tuple[float, float] = SPANS,
+) -> str:  # fmt: skip
+    """
+    Make cases and truths, and return the seal; what the same request made already stays.
+
+    Parameters
+    ----------
+    cases, truths : Path
+        Directories; the truths hold the seed, which is a truth as well.
+    seed, count : int
+    runner : Runner
+    kinds : sequence of str
+        Only these kinds of cases; empty for all.
+    spans : tuple of float [s]
+        Shortest and longest recording.
+
+    Raises
+    ------
+    DataError
+        The directories hold other cases, or the numbers make no sense.
+
+    """
+    asked = {'seed': seed, 'count': count, 'kinds': list(kinds), 'seconds': list(spans)}
+    _refuse_other(cases, truths, asked)
+    if (cases / layout.CASES).exists():
+        return str(layout.read(cases / layout.CASES)['seal'])
+    drawn = lots(seed, count, kinds, tuple(CONSTRUCTIONS))
+    truths.mkdir(parents=True, exist_ok=True)
+    layout.write(truths / layout.TRUTHS, asked, overwrite=True)
+    tasks = [
+        Task(make_case, (seed, k, lot, str(cases), str(truths), spans), f'case {k + 1}')
+        for k, lot in enumerate(drawn)
+    ]
+    entries = runner.run(tasks)
+    sealed = seal.seal_of(entries)
+    layout.write(cases / layout.CASES, {'seal': sealed, 'cases': entries}, overwrite=True)
+    seal.make_private(truths)
+    return sealed
+
+
+def _refuse_other(cases: Path, truths: Path, asked: dict[str, Any]) -> None:
+    """Refuse to mix these cases with others."""
+    if cases.resolve() == truths.resolve():
+        raise DataError('cases and truths must go to different directories')
+    if (truths / layout.TRUTHS).exists():
+        found = layout.read(truths / layout.TRUTHS)
+        if any(found.get(key) != value for key, value in asked.items()):
+            raise DataError(
+                f"'{truths}' holds the truths of other cases, of seed {found['seed']}; choose "
+                'another place'
+            )
+    elif (cases / layout.CASES).exists():
+        raise DataError(f"'{cases}' holds cases already; choose another place")
+
+
+def make_case(
+    seed: int, number: int, lot: Lot, cases: str, truths: str, spans: tuple[float, float]
+) -> dict[str, str]:
+    """Write one case and its truth; return its name and the hashes of both."""
+    rng = np.random.default_rng([seed, 1000 + number])
+    name = f'case_{number + 1:04d}'
+    for _ in range(TRIES):
+        case = draw_case(lot, rng, spans)
+        with suppress(FloatingPointError):
+            return _written(case, name, Path(cases), Path(truths))
+    raise DataError(f'the simulator cannot move any {name} of {", ".join(lot.families)}')
+
+
+def _written(case: Case, name: str, cases: Path, truths: Path) -> dict[str, str]:
+    with new_directory(cases / name, mark=layout.CASE) as place:
+        write_case(place, name, case)
+    with new_directory(truths / name, mark=layout.TRUTH) as place:
+        write_truth(place, name, case)
+    return {
+        'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name)
+    }  # fmt: skip
+
+
+def draw_case(lot: Lot, rng: np.random.Generator, spans: tuple[float, float] = SPANS) -> Case:
+    """
+    Return a case that shows its causes as large as the lot wants them.
+
+    Raises
+    ------
+    DataError
+        No cell and motion drawn shows them.
+
+    """
+    reason: Exception = Unseen(lot.kind)
+    for attempt in range(TRIES):
+        try:
+            return _attempt(_eased(lot, attempt), rng, spans)
+        except (Unseen, FloatingPointError) as error:
+            reason = error
+    raise DataError(f'no case of {", ".join(lot.families)} on {lot.robot} came about: {reason}')
+
+
+def _eased(lot: Lot, attempt: int) -> Lot:
+    """Return the lot with what cannot be: at rest nothing lags; later, any stratum will do."""
+    motion = lot.motion
+    if motion == 'stations' and (MOVING & set(lot.families) or 'equal lag' in lot.families):
+        motion = 'free'
+    shift = attempt // 6
+    strata = tuple((k + shift) % len(STRATA) for k in lot.strata)
+    return replace(lot, motion=motion, strata=strata)
+
+
+def _attempt(lot: Lot, rng: np.random.Generator, spans: tuple[float, float]) -> Case:
+    cell = draw_cell(lot.robot, lot.motion, lot.families, rng)
+    span = float(rng.uniform(*spans))
+    train = take(cell, lot.motion, span, rng)
+    causes, alike, ratios = _causes(lot, cell, train, span, rng)
+    fresh = bool(rng.random() < 0.5)
+    holdout, test = (
+        take(cell, lot.motion, span, rng) if fresh else again(train, rng) for _ in range(2)
+    )
+    excluded = _excluded(lot, rng)
+    return Case(lot, cell, causes, alike, ratios, excluded, train, holdout, test, fresh)
+
+
+def _causes(
+    lot: Lot, cell: Cell, train: Take, span: float, rng: np.random.Generator
+) -> tuple[list[Cause], list[list[tuple[str, str | None]]], list[float]]:
+    if lot.kind == 'none':
+        return [], [], []
+    if lot.kind != 'ambiguous':
+        causes, ratios = draw_causes(cell, lot.families, lot.strata, train, rng)
+        return causes, [], ratios
+    built = construct(lot.families[0], cell.robot, span, rng)
+    if 'base' in cell.align and any(c['effect'] == 'base_pose' for c in built.causes):
+        raise Unseen('an aligned base hides what the base does')
+    causes, ratio = sized_together(cell, built.causes, train, lot.strata[0], rng)
+    return causes, built.alike, [ratio]
+
+
+def _excluded(lot: Lot, rng: np.random.Generator) -> tuple[str, ...]:
+    """Return the families taken out: the cause's own, or a decoy that means nothing."""
+    if lot.kind == 'withheld':
+        return lot.families
+    others = [name for name in FAMILIES if name not in lot.families]
+    if lot.kind in ('single', 'double', 'none') and rng.random() < DECOY:
+        return (str(rng.choice(others)),)
+    return ()
+
+
+def write_case(place: Path, name: str, case: Case) -> None:
+    """Write what whoever diagnoses may see."""
+    cell = case.cell
+    write_robot_yaml(place / layout.ROBOT, cell.robot)
+    if cell.known:
+        write_text(place / layout.KNOWN, yaml_text([dict(item) for item in cell.known]))
+    for use, taken in ((layout.TRAIN, case.train), (layout.HOLDOUT, case.holdout)):
+        made = as_recording(use, record(cell, case.causes, taken))
+        write_recording(place / use, made, cell.robot)
+    layout.write(place / layout.CASE, {
+        'name': name, 'align': list(cell.align), 'exclude': list(case.excluded),
+        'known': bool(cell.known),
+    })  # fmt: skip
+
+
+def write_truth(place: Path, name: str, case: Case) -> None:
+    """Write what is sealed: the causes, and the recording that no diagnosis sees."""
+    cell, lot = case.cell, case.lot
+    tested = record(cell, case.causes, case.test)
+    write_recording(place / layout.TEST, as_recording(layout.TEST, tested), cell.robot)
+    reachable, outliers = floor(cell, case.causes, case.test)
+    every = rms(deviation(cell, case.causes, case.train)) / cell.noise if case.causes else 0.0
+    layout.write(place / layout.TRUTH, {
+        'name': name, 'salt': secrets.token_hex(16), 'kind': lot.kind, 'robot': lot.robot,
+        'motion': lot.motion, 'construction': lot.families[0] if case.alike else None,
+        'causes': case.causes, 'sites': [site(cause) for cause in case.causes],
+        'alike': case.alike, 'ratios': case.ratios, 'ratio': every,
+        'excluded': list(case.excluded), 'orientation': cell.tracker.orientation,
+        'sigma_m': cell.tracker.sigma, 'richness': cell.richness, 'align': list(cell.align),
+        'test': 'new motion' if case.fresh else 'same motion',
+        'floor_m': reachable, 'outliers': outliers,
+    })  # fmt: skip

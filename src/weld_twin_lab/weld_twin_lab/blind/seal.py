@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Commitments: hashes published before any diagnosis, which hold cases and truths to what they were.
+
+A truth carries a random salt, so that its hash cannot be had by guessing; the seal is one hash
+over the hashes of all cases and truths.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core.errors import DataError
+from weld_twin_nodes.report.provenance import hashed
+
+from . import layout
+
+PRIVATE_DIRECTORY, PRIVATE_FILE = 0o700, 0o600
+
+
+def digest(path: Path) -> str:
+    """Return the SHA-256 over the names and contents of a directory."""
+    return hashed('case', path).sha256
+
+
+def seal_of(entries: Sequence[Mapping[str, Any]]) -> str:
+    """Return the one hash over names, cases and truths, in order."""
+    lines = (f'{item["name"]} {item["case"]} {item["truth"]}\n' for item in entries)
+    return text_digest(''.join(lines))
+
+
+def text_digest(text: str) -> str:
+    """Return the SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def make_private(path: Path) -> None:
+    """Let nobody but the owner read a directory and what is in it."""
+    for place, _, files in os.walk(path):
+        os.chmod(place, PRIVATE_DIRECTORY)
+        for name in files:
+            os.chmod(Path(place) / name, PRIVATE_FILE)
+
+
+def truths_within_reach(cases: Path) -> Path | None:
+    """Return a directory of truths inside or beside the cases that can be read, or None."""
+    for place in _near(cases.resolve()):
+        if (place / layout.TRUTHS).is_file() and os.access(place / layout.TRUTHS, os.R_OK):
+            return place
+    return None
+
+
+def _near(cases: Path) -> Iterator[Path]:
+    yield cases
+    for around in (cases, cases.parent):
+        try:
+            yield from (place for place in around.iterdir() if place.is_dir())
+        except PermissionError:
+            continue
+
+
+def opened(cases: Path, truths: Path, seal: str = '') -> list[dict[str, Any]]:
+    """
+    Return the truths, in the order of the cases, once every hash has been found as committed.
+
+    Parameters
+    ----------
+    cases, truths : Path
+    seal : str, optional
+        As printed when the cases were made; left out, the one stored with the cases holds.
+
+    Raises
+    ------
+    DataError
+        A case or a truth is not what it was when the seal was made.
+
+    """
+    listed = layout.read(cases / layout.CASES)
+    entries = listed['cases']
+    if seal_of(entries) != (seal or listed['seal']) or listed['seal'] != seal_of(entries):
+        raise DataError(
+            f"the seal of '{cases / layout.CASES}' is broken: its list of cases was changed, or "
+            'it is not the list whose seal was given'
+        )
+    return [_one(cases, truths, entry) for entry in entries]
+
+
+def _one(cases: Path, truths: Path, entry: Mapping[str, Any]) -> dict[str, Any]:
+    name = str(entry['name'])
+    for place, key in ((cases / name, 'case'), (truths / name, 'truth')):
+        if not place.is_dir():
+            raise DataError(f"the {key} of {name} is missing: there is no '{place}'")
+        if digest(place) != entry[key]:
+            raise DataError(
+                f"the {key} of {name} was changed after it was sealed; see '{place}'"
+            )
+    return layout.read(truths / name / layout.TRUTH)

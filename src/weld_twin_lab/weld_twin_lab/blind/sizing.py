@@ -1,0 +1,117 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Causes made as large, against the noise, as the case wants them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+
+from .blind_cell import Cell, Take, deviation
+from .cause_sizes import MOVING, Cause, draw, plausible, scaled
+from .deck import STRATA
+from .displacement import correlation, rms
+
+TRIES = 6
+ALIKE = 0.95
+"""Correlation of two deviations from which they are one to whoever measures."""
+NEAR = 1.15
+"""A size is right when it is wrong by no more than this factor."""
+
+
+class Unseen(Exception):
+    """No plausible cause of the family is as large as wanted on this motion."""
+
+
+def sized(cell: Cell, cause: Cause, taken: Take, wanted: float) -> tuple[Cause, Array]:
+    """
+    Return a cause grown until its deviation is so many times the noise, and the deviation.
+
+    Raises
+    ------
+    Unseen
+        It would have to be implausibly large or small.
+
+    """
+    factor = 1.0
+    for _ in range(4):
+        trial = scaled(cause, factor)
+        off = deviation(cell, [trial], taken)
+        ratio = rms(off) / cell.noise
+        if 1.0 / NEAR < ratio / wanted < NEAR:
+            return trial, off
+        factor *= wanted / max(ratio, 1e-9)
+        if not plausible(cause['effect'], factor):
+            raise Unseen(f'{cause["effect"]} is {ratio:.3g} times the noise, wanted {wanted:.3g}')
+    return trial, off
+
+
+def draw_causes(
+    cell: Cell, families: Sequence[str], strata: Sequence[int], taken: Take,
+    rng: np.random.Generator,
+) -> tuple[list[Cause], list[float]]:  # fmt: skip
+    """
+    Return causes of the families, and how many times the noise each is.
+
+    Raises
+    ------
+    Unseen
+        A family cannot be seen on this motion.
+
+    """
+    causes: list[Cause] = []
+    offs: list[Array] = []
+    for family, stratum in zip(families, strata, strict=True):
+        cause, off = _one(cell, family, STRATA[stratum], taken, offs, rng)
+        causes.append(cause)
+        offs.append(off)
+    return causes, [rms(off) / cell.noise for off in offs]
+
+
+def _one(
+    cell: Cell, family: str, stratum: tuple[float, float], taken: Take,
+    others: Sequence[Array], rng: np.random.Generator,
+) -> tuple[Cause, Array]:  # fmt: skip
+    if taken.command.static and family in MOVING:
+        raise Unseen(f'{family} shows in motion only')
+    span = float(taken.command.t[-1] - taken.command.t[0])
+    reason = Unseen(family)
+    for _ in range(TRIES):
+        wanted = float(np.exp(rng.uniform(*np.log(stratum))))
+        try:
+            cause, off = sized(cell, draw(family, cell.robot, span, rng), taken, wanted)
+        except Unseen as error:
+            reason = error
+            continue
+        if all(correlation(off, other) < ALIKE for other in others):
+            return cause, off
+        reason = Unseen(f'{family} moves the tool as another cause does')
+    raise reason
+
+
+def sized_together(
+    cell: Cell, causes: Sequence[Cause], taken: Take, stratum: int, rng: np.random.Generator
+) -> tuple[list[Cause], float]:
+    """
+    Return causes grown together, and how many times the noise their deviation is.
+
+    Raises
+    ------
+    Unseen
+        They would have to be implausibly large or small.
+
+    """
+    wanted = float(np.exp(rng.uniform(*np.log(STRATA[stratum]))))
+    factor = 1.0
+    for _ in range(4):
+        grown = [scaled(cause, factor) for cause in causes]
+        ratio = rms(deviation(cell, grown, taken)) / cell.noise
+        if 1.0 / NEAR < ratio / wanted < NEAR:
+            break
+        factor *= wanted / max(ratio, 1e-9)
+        if not all(plausible(cause['effect'], factor) for cause in causes):
+            raise Unseen(f'the construction is {ratio:.3g} times the noise')
+    return grown, ratio

@@ -1,0 +1,283 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The faults: what is done to the cell, and who is to tell of it."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rclpy.serialization import serialize_message
+
+from weld_twin_msgs_py.messages.topics import (
+    JOINT_STATES,
+    MEASURED_POSE,
+    TEMPERATURE,
+    TOOL_WRENCH,
+    Topic,
+)
+
+from .bench import RATE, Bench, S
+
+TAKE_JOINTS = ('forward_kinematics_twin', 'error_injector', 'live_diagnosis')
+LEASE = 25.0
+"""Seconds after which the middleware has given up a participant that shows no sign of life."""
+LONG = 2.5
+"""Seconds of a fault: at least two looks of every node at its health."""
+HOUR = 3600 * S
+
+
+@dataclass(frozen=True)
+class Fault:
+    """
+    One fault.
+
+    Attributes
+    ----------
+    name : str
+    run : callable
+        Does it, and leaves the cell in order.
+    tell : sequence of str
+        Nodes whose health must not be ok meanwhile.
+
+    """
+
+    name: str
+    run: Callable[[Bench], None]
+    tell: Sequence[str] = TAKE_JOINTS
+
+
+def _third(spoil: Callable[[Any], None]) -> Callable[[Bench], None]:
+    """Return a fault that spoils every third joint state."""
+    def run(bench: Bench) -> None:
+        def each(k: int) -> None:
+            message = bench.joint_state()
+            if k % 3 == 0:
+                spoil(message)
+            bench.send(message, sound=k % 3 != 0)
+
+        bench.run(LONG, each)
+
+    return run
+
+
+def _bytes(make: Callable[[bytes, int], bytes]) -> Callable[[Bench], None]:
+    """Return a fault that follows every third joint state with bytes that are none."""
+    def run(bench: Bench) -> None:
+        def each(k: int) -> None:
+            message = bench.joint_state()
+            bench.send(message)
+            if k % 3 == 0:
+                bench.send(make(serialize_message(message), k), sound=False)
+
+        bench.run(LONG, each)
+
+    return run
+
+
+def _set(field: str, k: int, value: float) -> Callable[[Any], None]:
+    def spoil(message: Any) -> None:
+        getattr(message, field)[k] = value
+
+    return spoil
+
+
+def _short(message: Any) -> None:
+    message.position = message.position[:4]
+
+
+def _renamed(message: Any) -> None:
+    message.name = [*message.name[:5], 'wrist_4_joint']
+
+
+def _degrees(message: Any) -> None:
+    message.position = np.degrees(message.position)
+
+
+def _shifted(ns: int) -> Callable[[Any], None]:
+    def spoil(message: Any) -> None:
+        message.header.stamp.sec += ns // S
+
+    return spoil
+
+
+def _unset(message: Any) -> None:
+    message.header.stamp.sec = message.header.stamp.nanosec = 0
+
+
+def _noise(_: bytes, k: int) -> bytes:
+    return np.random.default_rng(k).bytes(200)
+
+
+def _promise(data: bytes, _: int) -> bytes:
+    return data[:16] + b'\xff' * 8 + data[24:]
+
+
+def _foreign(bench: Bench) -> None:
+    def each(_: int) -> None:
+        message = bench.joint_state()
+        message.name = [f'other_{name}' for name in message.name]
+        bench.send(message, sound=False)
+
+    bench.run(LONG, each)
+
+
+def _future(bench: Bench) -> None:
+    """One stamp an hour ahead; those behind it are out of order until time has begun anew."""
+    def each(k: int) -> None:
+        message = bench.joint_state()
+        if k % 50 == 10:
+            _shifted(HOUR)(message)
+        bench.send(message)
+
+    bench.run(LONG, each)
+
+
+def _rate(factor: float) -> Callable[[Bench], None]:
+    return lambda bench: bench.run(LONG + 1.0, rate=RATE * factor)
+
+
+def _silence(bench: Bench) -> None:
+    bench.rest(LONG + 1.0)
+
+
+def _twice(change: float) -> Callable[[Bench], None]:
+    """Return a fault: another publisher repeats every joint state, or contradicts it between."""
+    def run(bench: Bench) -> None:
+        second = bench.publisher(JOINT_STATES)
+        bench.cell.wait(lambda: second.get_subscription_count() >= 4, 'listeners')
+
+        def each(_: int) -> None:
+            message = bench.joint_state()
+            bench.send(message)
+            if change:
+                message.header.stamp.nanosec += 1
+                message.position[2] += change
+                bench.sent[bench.stamp + 1].append(np.array(message.position))
+            second.publish(message)
+
+        bench.run(LONG, each)
+        bench.cell.node.destroy_publisher(second)
+
+    return run
+
+
+def _restart(number: int, order: Sequence[str]) -> Callable[[Bench], None]:
+    """Return a fault: nodes end by a signal and come back in the order given."""
+    def run(bench: Bench) -> None:
+        for name in order:
+            process = bench.processes[name]
+            process.signal(number)
+            process.end(60.0)
+            bench.cell.processes.remove(process)
+        bench.run(1.0)
+        for name in order:
+            bench.start(name)
+            bench.run(0.5)
+        bench.ready()
+
+    return run
+
+
+def _stopped(bench: Bench) -> None:
+    """The twin hangs until the others have given it up, and comes back."""
+    process = bench.processes['forward_kinematics_twin']
+    process.signal(signal.SIGSTOP)
+    try:
+        bench.rest(LEASE)
+    finally:
+        process.signal(signal.SIGCONT)
+    bench.ready()
+
+
+def _clock(jump: int) -> Callable[[Bench], None]:
+    def run(bench: Bench) -> None:
+        bench.tick(jump)
+        bench.rest(0.3)
+        bench.run(LONG)
+
+    return run
+
+
+def _frozen(bench: Bench) -> None:
+    bench.ticking = False
+    bench.run(LONG)
+    bench.ticking = True
+
+
+def _beside(topic: Topic, make: Callable[[Bench, int], Any]) -> Callable[[Bench], None]:
+    """Return a fault on another topic than the joint states, which go on."""
+    def run(bench: Bench) -> None:
+        publisher = bench.publisher(topic)
+        bench.cell.wait(lambda: publisher.get_subscription_count() > 0, 'listeners')
+
+        def each(k: int) -> None:
+            bench.send(bench.joint_state())
+            if k % 3 == 0:
+                publisher.publish(make(bench, k))
+
+        bench.run(LONG, each)
+        bench.cell.node.destroy_publisher(publisher)
+
+    return run
+
+
+def _nan_pose(bench: Bench, _: int) -> Any:
+    return bench.make.pose(bench.stamp + 1, np.array([0.1, np.nan, 0.0]), np.eye(3), 'world')
+
+
+def _zero_pose(bench: Bench, _: int) -> Any:
+    message = bench.make.pose(bench.stamp + 1, np.zeros(3), np.eye(3), 'world')
+    message.pose.orientation.w = 0.0
+    return message
+
+
+JOINT_FAULTS = (
+    Fault('NaN position', _third(_set('position', 2, float('nan')))),
+    Fault('infinite position', _third(_set('position', 0, float('inf')))),
+    Fault('infinite velocity', _third(_set('velocity', 1, float('-inf')))),
+    Fault('fewer positions than names', _third(_short)),
+    Fault('a renamed joint', _third(_renamed)),
+    Fault("another robot's joints", _foreign),
+    Fault('degrees', _third(_degrees)),
+    Fault('stamp zero', _third(_unset)),
+    Fault('stamps that go back', _third(_shifted(-2 * S))),
+    Fault('a stamp an hour ahead', _future),
+    Fault('random bytes', _bytes(_noise)),
+    Fault('a message cut short', _bytes(lambda data, k: data[: 4 + k % 100])),
+    Fault('no bytes', _bytes(lambda data, k: b'')),
+    Fault('a length of four thousand million', _bytes(_promise)),
+    Fault('ten times the rate', _rate(10.0)),
+    Fault('a tenth of the rate', _rate(0.1)),
+    Fault('silence and return', _silence),
+    Fault('a second publisher of the same', _twice(0.0)),
+    Fault('a second publisher that differs', _twice(0.05)),
+)
+OTHER_FAULTS = (
+    Fault('NaN in a measured pose', _beside(MEASURED_POSE, _nan_pose),
+          ('deviation_analyzer', 'deviation_markers', 'live_diagnosis')),
+    Fault('a measured pose without orientation', _beside(MEASURED_POSE, _zero_pose),
+          ('deviation_analyzer', 'deviation_markers', 'live_diagnosis')),
+    Fault('random bytes as measured pose',
+          _beside(MEASURED_POSE, lambda b, k: np.random.default_rng(k).bytes(99)),
+          ('deviation_analyzer', 'deviation_markers', 'live_diagnosis', 'recorder')),
+    Fault('the clock goes back by a minute', _clock(-60 * S)),
+    Fault('the clock goes on by an hour', _clock(HOUR), ()),
+    Fault('the clock stands still', _frozen, ()),
+    Fault('twin killed and started again',
+          _restart(signal.SIGKILL, ['forward_kinematics_twin']), ('deviation_analyzer',)),
+    Fault('injector and analyzer killed, started in the other order',
+          _restart(signal.SIGKILL, ['error_injector', 'deviation_analyzer']),
+          ('deviation_markers',)),
+    Fault('twin, analyzer, markers ended, started in turn',
+          _restart(signal.SIGTERM, ['deviation_markers', 'forward_kinematics_twin',
+                                    'deviation_analyzer']), ()),
+    Fault('discovery lost and found (twin hangs for 25 s)', _stopped, TAKE_JOINTS[1:]),
+    Fault('an infinite wrench', _beside(
+        TOOL_WRENCH, lambda b, k: b.make.wrench(b.stamp, np.full(6, np.inf)))),
+    Fault('temperature in kelvin', _beside(
+        TEMPERATURE, lambda b, k: b.make.temperature(b.stamp, 294.0))),
+)  # fmt: skip

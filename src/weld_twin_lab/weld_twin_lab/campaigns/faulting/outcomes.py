@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What each node did under a fault."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import DEVIATION, MEASURED_POSE, TWIN_POSE
+
+from .bench import NODES, Bench
+from .fault_list import Fault
+
+PUBLISHED = {
+    'forward_kinematics_twin': TWIN_POSE.name, 'error_injector': MEASURED_POSE.name,
+    'deviation_analyzer': DEVIATION.name,
+}  # fmt: skip
+EXACT = 1e-9
+"""Largest difference [m] of a published number from the right one."""
+BEFORE, AFTER = 3.5, 1.0
+"""Seconds of sound joint states before and after a fault."""
+BACK = 30.0
+"""Seconds a node has to be ok again."""
+
+
+def trial(bench: Bench, fault: Fault) -> dict[str, Any]:
+    """Return what every node did under a fault."""
+    bench.run(BEFORE)
+    _settle(bench)
+    marks = {name: len(process.log) for name, process in bench.processes.items()}
+    for tap in bench.taps.values():
+        tap.messages.clear()
+    bench.health.clear()
+    fault.run(bench)
+    bench.run(1.2)
+    told = {name: bench.health.of(name) for name in NODES}
+    bench.health.clear()
+    bench.run(AFTER)
+    _settle(bench)
+    well = _well_again(bench)
+    rows = {}
+    for name in NODES:
+        process = bench.processes[name]
+        log = process.log[marks[name]:] if len(process.log) >= marks[name] else process.log
+        row = {
+            'alive': process.code is None, 'traceback': 'Traceback' in log,
+            'outputs': _outputs(bench, name), 'wrong': _wrong(bench, name),
+            **_summary(told[name]), 'must_tell': name in fault.tell, 'ok_again': well[name],
+        }  # fmt: skip
+        row['passed'] = bool(
+            row['alive'] and not row['traceback'] and row['wrong'] == 0 and row['ok_again']
+            and (row['told'] not in ('ok', 'silent') or not row['must_tell'])
+        )
+        rows[name] = row
+    resumed = _outputs(bench, 'deviation_analyzer') > 0
+    return {
+        'fault': fault.name, 'resumed': resumed, 'nodes': rows,
+        'passed': resumed and all(row['passed'] for row in rows.values()),
+    }  # fmt: skip
+
+
+def _settle(bench: Bench) -> None:
+    """Send sound joint states until one of now has come through all nodes."""
+    last, tap = bench.stamp, bench.taps[DEVIATION.name].messages
+    end = time.monotonic() + 60.0
+    while not tap or from_messages.stamp_ns(tap[-1]) < last:
+        if time.monotonic() > end:
+            return
+        bench.run(0.2)
+
+
+def _well_again(bench: Bench) -> dict[str, bool]:
+    """Tell of each node whether its health comes back to ok while all is well."""
+    seen: dict[str, bool] = {}
+    for _ in range(int(BACK)):
+        bench.health.clear()
+        bench.run(2.0)
+        _settle(bench)
+        seen = {
+            name: bool(entries) and all(entries)
+            for name in NODES for entries in [_inputs(bench, name)]
+        }  # fmt: skip
+        if all(seen.values()):
+            break
+    return seen
+
+
+def _inputs(bench: Bench, node: str) -> list[bool]:
+    """Tell of each input that the sound cell feeds whether it was told ok."""
+    unfed = ('/tool_wrench', '/temperature', '/measured/tool_point')
+    return [
+        any(level == 'ok' for level, _ in entries)
+        for name, entries in bench.health.told.items()
+        if name.split(': ')[0] == node and not name.endswith(unfed)
+    ]
+
+
+def _outputs(bench: Bench, node: str) -> int:
+    return len(bench.taps[PUBLISHED[node]].messages) if node in PUBLISHED else 0
+
+
+def _wrong(bench: Bench, node: str) -> int:
+    """Return how many messages of a node are not what a sound joint state of the stamp gives."""
+    if node not in PUBLISHED:
+        return 0
+    messages = bench.taps[PUBLISHED[node]].messages
+    if node == 'deviation_analyzer':
+        return sum(float(np.linalg.norm(from_messages.vector3(m))) > EXACT for m in messages)
+    return sum(not _right(bench, m) for m in messages if not _foreign(m))
+
+
+def _foreign(message: Any) -> bool:
+    """Tell whether the campaign itself published a bad pose, one nanosecond beside the beat."""
+    position = message.pose.position
+    return message.header.stamp.nanosec % 10 == 1 and (
+        not np.isfinite([position.x, position.y, position.z]).all()
+        or message.pose.orientation.w == 0.0
+    )
+
+
+def _right(bench: Bench, message: Any) -> bool:
+    position, rotation = from_messages.pose(message)
+    for q in bench.sent.get(from_messages.stamp_ns(message), ()):
+        pose = forward(bench.robot, q)
+        if (
+            np.abs(pose[:3, 3] - position).max() < EXACT
+            and np.abs(pose[:3, :3] - rotation).max() < EXACT
+        ):
+            return True
+    return False
+
+
+def _summary(told: list[tuple[str, str]]) -> dict[str, Any]:
+    """Return the worst level and the commonest sentence of it."""
+    order = ('ok', 'warn', 'stale', 'error')
+    worst = max((level for level, _ in told), key=order.index, default='silent')
+    said = Counter(text for level, text in told if level == worst and level != 'ok')
+    return {'told': worst, 'said': said.most_common(1)[0][0] if said else ''}

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Faults done to a running cell, and what each node did.
+
+A node passes a fault if it lives, published nothing but what a sound joint state of the same
+stamp gives, told of the fault on /diagnostics where it is one of its inputs', and is ok again
+afterwards.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+from weld_twin_nodes.report import markdown
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('--only', default='', help='faults whose names contain this')
+
+
+def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return what each node did under each fault."""
+    import tempfile
+    from pathlib import Path
+
+    from weld_twin_nodes.harness import Cell
+
+    from .faulting.bad_parameters import abuse
+    from .faulting.bench import Bench
+    from .faulting.fault_list import JOINT_FAULTS, OTHER_FAULTS
+
+    rows: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        bag = Path(folder) / 'bag'
+        with Cell(Path(folder) / 'cell') as cell:
+            bench = Bench(cell, bag)
+            bench.ready()
+            for fault in (*JOINT_FAULTS, *OTHER_FAULTS):
+                if args.only not in fault.name:
+                    continue
+                rows.append(_tried(bench, fault))
+                tell(_line(rows[-1]))
+            parameters = abuse(bench)
+        recorded = _recorded(bag)
+    passed = all(row['passed'] for row in rows) and all(row['refused'] for row in parameters)
+    return {
+        'passed': passed and recorded['opens'], 'faults': rows, 'parameters': parameters,
+        'bag': recorded,
+    }  # fmt: skip
+
+
+def _tried(bench: Any, fault: Any) -> dict[str, Any]:
+    """Return what happened, a cell that does not come back included."""
+    from .faulting.outcomes import trial
+
+    try:
+        return trial(bench, fault)
+    except TimeoutError as error:
+        reason = str(error)[:2000]
+        return {'fault': fault.name, 'passed': False, 'nodes': {}, 'reason': reason}
+
+
+def _line(row: dict[str, Any]) -> str:
+    nodes = ' '.join(
+        f'{name}:{node["told"]}{"" if node["passed"] else "(!)"}'
+        for name, node in row['nodes'].items()
+    )
+    return f'{"ok  " if row["passed"] else "FAIL"} {row["fault"]}: {nodes}'
+
+
+def _recorded(bag: Any) -> dict[str, Any]:
+    """Tell whether the bag of the whole campaign opens and every message in it can be read."""
+    from weld_twin_core.errors import TwinError
+    from weld_twin_msgs_py.bags import BagReader
+
+    count = 0
+    try:
+        with BagReader(bag) as reader:
+            for _ in reader.messages(list(reader.topics)):
+                count += 1
+    except TwinError as error:
+        return {'opens': False, 'messages': count, 'reason': str(error)}
+    return {'opens': True, 'messages': count, 'reason': ''}
+
+
+COLUMNS = {
+    'forward_kinematics_twin': 'twin', 'error_injector': 'injector',
+    'deviation_analyzer': 'analyzer', 'deviation_markers': 'markers',
+    'live_diagnosis': 'diagnosis', 'recorder': 'recorder',
+}  # fmt: skip
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return what each node told under each fault, and what else there is to say."""
+    rows = [
+        (
+            row['fault'], *(row['nodes'].get(name, {}).get('told', '') for name in COLUMNS),
+            sum(node['wrong'] for node in row['nodes'].values()), 'yes' if row['passed'] else 'no',
+        )
+        for row in result['faults']
+    ]  # fmt: skip
+    refused = sum(row['refused'] for row in result['parameters'])
+    return markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows) + (
+        f'\nAbsurd parameter values refused in a sentence: {refused} of '
+        f'{len(result["parameters"])}. Messages in the bag of the whole campaign, all of which '
+        f'read: {result["bag"]["messages"]:,}.\n'
+    )

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Read broken files of every kind.
+
+Samples that are right are changed at random, as bytes, as text and as trees, and read. A file must
+give a result or one clear sentence: never a traceback, a hang or a gigabyte.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+from weld_twin_nodes.report import markdown
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('--cases', type=int, default=5000, metavar='N',
+                        help='broken files of each kind (default: 5000)')  # fmt: skip
+    parser.add_argument('--seed', type=int, default=1, metavar='S')
+    parser.add_argument('--only', default='', metavar='LIST', help='kinds, comma-separated')
+
+
+def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return what every kind of file came to."""
+    from dataclasses import asdict
+
+    from weld_twin_core.errors import DataError
+
+    from .fuzzing.hunt import CPU_LIMIT, MEMORY_LIMIT, Finding, hunt
+    from .fuzzing.malicious import try_all
+    from .fuzzing.targets import targets
+
+    names = list(targets())
+    chosen = [name for name in args.only.split(',') if name] or names
+    if unknown := set(chosen) - set(names):
+        listed = ', '.join(names)
+        raise DataError(f'no kind of file is called {min(unknown)!r}; there are {listed}')
+    found: dict[str, Finding] = {}
+    kinds = {}
+    for name in chosen:
+        tally = hunt(name, args.seed, args.cases, found)
+        kinds[name] = asdict(tally)
+        tell(f'{name}: {tally.right} read, {tally.refused} refused, {tally.wrong} wrong')
+    for finding in found.values():
+        tell(f'{finding.target} {finding.case}: {finding.what} ({finding.times} times)')
+    malicious = try_all()
+    for name, outcome in malicious.items():
+        tell(f'{name}: {outcome}')
+    passed = not found and all(text.startswith('refused') for text in malicious.values())
+    return {
+        'passed': passed, 'seed': args.seed, 'cases_of_each': args.cases,
+        'cpu_limit_s': CPU_LIMIT, 'memory_limit_mb': MEMORY_LIMIT / 1e6, 'kinds': kinds,
+        'findings': [asdict(finding) for finding in found.values()], 'malicious': malicious,
+    }  # fmt: skip
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return a row for each kind of file."""
+    kinds = [(name, row['right'], row['refused'], row['wrong'])
+             for name, row in result['kinds'].items()]  # fmt: skip
+    outcomes = result['malicious'].values()
+    refused = sum(text.startswith('refused') for text in outcomes)
+    kinds.append(('malicious', 0, refused, len(outcomes) - refused))
+    return markdown.table(('kind', 'read', 'refused', 'wrong'), *kinds)

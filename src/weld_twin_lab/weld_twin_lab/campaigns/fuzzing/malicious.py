@@ -1,0 +1,243 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Files made to do harm: small ones that stand for large ones, and ones that reach elsewhere."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import struct
+import tempfile
+from collections.abc import Callable
+from contextlib import closing
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from lz4.frame import compress as lz4_compress
+
+from weld_twin_core.errors import TwinError
+from weld_twin_msgs_py.bags import bag_info, read_recording, rebuild
+from weld_twin_msgs_py.bags.unpack import zstd
+from weld_twin_msgs_py.files.diagnosis_model import load_model
+from weld_twin_msgs_py.files.path_file import read_path
+from weld_twin_msgs_py.robots import load_robot
+
+from . import hunt
+from .targets import ROBOT, Target, targets
+
+GIGABYTE = 1_000_000_000
+Make = Callable[[Path], Path]
+
+
+def harms() -> dict[str, tuple[Make, Callable[[Path], Any]]]:
+    """Return what makes each file in a folder, and what reads it."""
+    return {
+        'URDF with entities that expand': (_laughs, load_robot),
+        'URDF that names a file of the machine': (_outside, load_robot),
+        'URDF nested deeply': (_nested_xml, load_robot),
+        'URDF with a chain of ten thousand links': (_long_chain, load_robot),
+        'YAML aliases that expand': (_aliases, load_robot),
+        'YAML nested deeply': (_nested_yaml, load_robot),
+        'YAML that asks for a Python object': (_object, load_robot),
+        'YAML path of a device': (_device, read_path),
+        'JSON nested deeply': (_nested_json, lambda path: load_model(ROBOT, path)),
+        'mcap chunk of zstd, a gigabyte of zeros': (_bomb('zstd'), _bag),
+        'mcap chunk of lz4, a gigabyte of zeros': (_bomb('lz4'), _bag),
+        'the same chunk with a small size declared': (_bomb('zstd', 1000), _bag),
+        'the same chunk, recovered': (_bomb('zstd'), _recovered),
+        'mcap record that claims 2^62 bytes': (_claim, _bag),
+        'the same record, recovered': (_claim, _recovered),
+        'bag file of zstd, gigabytes of zeros': (_packed_file, _bag),
+        'message of zstd, a gigabyte of zeros': (_packed_message, _bag),
+        'metadata.yaml that lists ../outside.mcap': (_listing('../outside.mcap'), _bag),
+        'metadata.yaml that lists /etc/passwd': (_listing('/etc/passwd'), _bag),
+        'metadata.yaml that lists a directory': (_listing('..'), _bag),
+        'metadata.yaml nested deeply': (_nested_listing, _bag),
+        'sqlite3 bag whose table is an endless query': (_endless, _bag),
+        'the same bag, recovered': (_endless, _recovered),
+    }  # fmt: skip
+
+
+def try_all() -> dict[str, str]:
+    """Return what became of each, each in a process of its own."""
+    return {name: try_one(name) for name in harms()}
+
+
+def try_one(name: str) -> str:
+    """Return 'refused' with the sentence, or what went wrong."""
+    with hunt.forked(_attempt, name) as here:
+        return hunt.next_outcome(here)
+
+
+def _attempt(name: str, out: Connection) -> None:
+    make, read = harms()[name]
+    with tempfile.TemporaryDirectory() as place:
+        path = make(Path(place))
+        said: list[str] = []
+
+        def tell(path: Path) -> None:
+            try:
+                read(path)
+            except TwinError as error:
+                said.append(str(error).replace(place, ''))
+                raise
+
+        hunt.guard()
+        before = hunt.peak()
+        outcome = hunt.read(Target(path.suffix, '', (), tell), path)
+        if hunt.peak() - before > hunt.MEMORY_LIMIT:
+            outcome = f'takes more than {hunt.MEMORY_LIMIT / 1e6:.0f} MB'
+        out.send(f'{outcome}: {said[0]}' if outcome == 'refused' else outcome)
+
+
+def _bag(path: Path) -> Any:
+    return bag_info(path), read_recording(path, ROBOT)
+
+
+def _recovered(path: Path) -> Any:
+    return rebuild(path, path.with_name('recovered'))
+
+
+def _file(folder: Path, name: str, content: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def _laughs(folder: Path) -> Path:
+    levels = ''.join(f'<!ENTITY a{k} "{f"&a{k - 1};" * 10}">' for k in range(1, 11))
+    text = f'<!DOCTYPE robot [<!ENTITY a0 "ha">{levels}]><robot name="&a10;"/>'
+    return _file(folder, 'robot.urdf', text)
+
+
+def _outside(folder: Path) -> Path:
+    text = '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"/>'
+    return _file(folder, 'robot.urdf', text)
+
+
+def _nested_xml(folder: Path) -> Path:
+    return _file(folder, 'robot.urdf', '<robot name="x">' + '<link name="a">' * 60_000)
+
+
+def _long_chain(folder: Path) -> Path:
+    links = ''.join(f'<link name="l{k}"/>' for k in range(10_000))
+    joints = ''.join(
+        f'<joint name="j{k}" type="fixed"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'
+        for k in range(9_999)
+    )
+    return _file(folder, 'robot.urdf', f'<robot name="x">{links}{joints}</robot>')
+
+
+def _aliases(folder: Path) -> Path:
+    lines = ['a0: &a0 [x, x, x, x, x, x, x, x, x, x]']
+    for k in range(1, 10):
+        aliases = ', '.join([f'*a{k - 1}'] * 10)
+        lines.append(f'a{k}: &a{k} [{aliases}]')
+    return _file(folder, 'robot.yaml', '\n'.join(lines))
+
+
+def _nested_yaml(folder: Path) -> Path:
+    return _file(folder, 'robot.yaml', '[' * 500_000)
+
+
+def _object(folder: Path) -> Path:
+    text = f'!!python/object/apply:os.system ["touch {folder}/done"]'
+    return _file(folder, 'robot.yaml', text)
+
+
+def _device(folder: Path) -> Path:
+    (folder / 'path.yaml').symlink_to('/dev/zero')
+    return folder / 'path.yaml'
+
+
+def _nested_json(folder: Path) -> Path:
+    return _file(folder, 'diagnosis.json', '[' * 1_000_000)
+
+
+def _zeros(pack: str) -> bytes:
+    """Return a gigabyte of zeros, packed."""
+    if pack == 'lz4':
+        return bytes(lz4_compress(bytes(GIGABYTE)))
+    packer = zstd.ZstdCompressor()
+    out = [packer.compress(bytes(10_000_000)) for _ in range(GIGABYTE // 10_000_000)]
+    return b''.join([*out, packer.flush()])
+
+
+def _bomb(pack: str, declared: int = GIGABYTE) -> Make:
+    def make(folder: Path) -> Path:
+        data = _zeros(pack)
+        name = pack.encode()
+        chunk = struct.pack('<QQQI', 1, 2, declared, 0) + struct.pack('<I', len(name)) + name
+        chunk += struct.pack('<Q', len(data)) + data
+        return _mcap(folder, b'\x06' + struct.pack('<Q', len(chunk)) + chunk)
+
+    return make
+
+
+def _claim(folder: Path) -> Path:
+    return _mcap(folder, b'\x05' + struct.pack('<Q', 1 << 62) + bytes(100))
+
+
+def _mcap(folder: Path, record: bytes) -> Path:
+    """Return an mcap without a summary that holds a record."""
+    magic = b'\x89MCAP0\r\n'
+    header = b'\x01' + struct.pack('<Q', 8 + 4) + struct.pack('<I', 4) + b'ros2'
+    header += struct.pack('<I', 0)
+    footer = b'\x02' + struct.pack('<Q', 20) + bytes(20)
+    return _file(folder, 'bag.mcap', magic + header + record + footer + magic)
+
+
+def _sample(folder: Path, storage: str = 'mcap') -> tuple[Path, str]:
+    """Return a directory with a bag in it, and its metadata."""
+    kinds = targets()
+    bag = folder / 'bag'
+    bag.mkdir()
+    _file(bag, f'bag{kinds[storage].suffix}', kinds[storage].seeds[0])
+    return bag, kinds['metadata'].seeds[0].decode()
+
+
+def _listing(path: str) -> Make:
+    def make(folder: Path) -> Path:
+        bag, text = _sample(folder)
+        shutil.copy(bag / 'bag.mcap', folder / 'outside.mcap')
+        _file(bag, 'metadata.yaml', text.replace('- bag.mcap', f"- '{path}'"))
+        return bag
+
+    return make
+
+
+def _nested_listing(folder: Path) -> Path:
+    bag, _ = _sample(folder)
+    _file(bag, 'metadata.yaml', 'rosbag2_bagfile_information: ' + '[' * 1_000_000)
+    return bag
+
+
+def _packed_file(folder: Path) -> Path:
+    bag, text = _sample(folder)
+    _file(bag, 'bag.mcap.zstd', _zeros('zstd') * 3)
+    text = text.replace('- bag.mcap', '- bag.mcap.zstd')
+    text = text.replace("compression_mode: ''", 'compression_mode: file')
+    _file(bag, 'metadata.yaml', text.replace("compression_format: ''", 'compression_format: zstd'))
+    return bag
+
+
+def _packed_message(folder: Path) -> Path:
+    bag, text = _sample(folder, 'sqlite3')
+    with closing(sqlite3.connect(bag / 'bag.db3')) as base, base:
+        base.execute('UPDATE messages SET data = ?', (_zeros('zstd'),))
+    text = text.replace('- bag.mcap', '- bag.db3').replace(': mcap', ': sqlite3')
+    text = text.replace("compression_mode: ''", 'compression_mode: message')
+    _file(bag, 'metadata.yaml', text.replace("compression_format: ''", 'compression_format: zstd'))
+    return bag
+
+
+def _endless(folder: Path) -> Path:
+    bag, _ = _sample(folder, 'sqlite3')
+    with closing(sqlite3.connect(bag / 'bag.db3')) as base, base:
+        base.execute('DROP TABLE messages')
+        base.execute(
+            'CREATE VIEW messages AS WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id + 1 '
+            'FROM n) SELECT id, 1 AS topic_id, id AS timestamp, zeroblob(100) AS data FROM n'
+        )
+    return bag / 'bag.db3'

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint state in to twin pose out, beside a bare relay that copies the message.
+
+Relay and twin take turns of a second on one machine in one run, so that the ratios hold on a busy
+machine too. Times are from the call that sends the joint state to the call that receives the
+answer. A second part lets the twin answer with and without a live diagnosis under way.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from copy import copy
+from typing import Any
+
+from weld_twin_nodes.report import markdown
+
+RATES = (125.0, 500.0, 1000.0)
+LIMIT = 1.25
+"""Largest ratio of the twin to the relay that passes."""
+COMPARED = ('p50_us', 'p99_us', 'cpu_us')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('--turns', type=int, default=20, help='turns of each, at each rate')
+    parser.add_argument('--seconds', type=float, default=1.0, help='length of a turn')
+
+
+def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return latency and CPU time of each contender at each rate, and the ratios."""
+    from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE
+
+    from .live.latency_race import Contender, Race
+
+    relay = f'{__package__}.live.relay'
+    joints, pose = JOINT_STATES.message_class(), TWIN_POSE.message_class()
+    contenders = (
+        Contender('relay', relay, joints, ()),
+        Contender('raw_relay', relay, joints, ('-p', 'raw:=true')),
+        Contender('twin', 'weld_twin_nodes.live.forward_kinematics_twin', pose, ()),
+    )
+    with Race(contenders) as race:
+        for contender in contenders:
+            race.turn(contender, 500.0, 1.0)
+        rates = [_at(race, rate, args, tell) for rate in RATES]
+        beside = _beside_diagnosis(race, contenders[2], args, tell)
+    worst = max(row['ratio'][key] for row in rates for key in COMPARED)
+    return {
+        'passed': worst <= LIMIT and all(row['twin']['lost'] == 0 for row in rates),
+        'limit': LIMIT, 'worst_ratio': worst, 'turns': args.turns, 'turn_s': args.seconds,
+        'rates': rates, 'beside_live_diagnosis': beside,
+    }  # fmt: skip
+
+
+def _at(
+    race: Any, rate: float, args: argparse.Namespace, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    for contender in race.contenders:
+        contender.clear()
+    for k in range(args.turns):
+        for i in range(len(race.contenders)):
+            race.turn(race.contenders[(i + k) % len(race.contenders)], rate, args.seconds)
+    row: dict[str, Any] = {'rate_hz': rate}
+    for contender in race.contenders:
+        row[contender.name] = contender.result()
+        tell(f'{rate:6.0f} Hz  {contender.name:10} {row[contender.name]}')
+    row['ratio'] = {
+        key: round(row['twin'][key] / row['relay'][key], 3) for key in COMPARED
+    }
+    tell(f'{rate:6.0f} Hz  twin / relay {row["ratio"]}')
+    return row
+
+
+def _beside_diagnosis(
+    race: Any, twin: Any, args: argparse.Namespace, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    """Return the twin's figures at 500 Hz with and without a diagnosis in its own process."""
+    from weld_twin_nodes.live.diagnosis_worker import Worker
+
+    job, worker = _job(), Worker()
+    samples: dict[str, dict[str, float]] = {}
+    both = {'alone': copy(twin), 'beside': copy(twin)}
+    for contender in both.values():
+        contender.clear()
+    for _ in range(args.turns):
+        for name, contender in both.items():
+            if name == 'beside':
+                worker.start(job)
+            twin.clear()
+            race.turn(twin, 500.0, args.seconds)
+            contender.add(twin)
+            worker.stop()
+    for name, contender in both.items():
+        samples[name] = contender.result()
+        tell(f'   500 Hz  twin {name:7} {samples[name]}')
+    return samples
+
+
+def _job() -> Any:
+    """Return a diagnosis of a minute of a cell, which takes longer than a turn."""
+    import numpy as np
+
+    from weld_twin_core.arm import catalog
+    from weld_twin_core.recording import JointMotion, Measurements, Recording
+    from weld_twin_core.twin.twin import Twin
+    from weld_twin_nodes.live.diagnosis_worker import Job
+
+    robot = catalog.load('ur5')
+    t = np.arange(0.0, 60.0, 0.002)
+    q = 0.5 * np.sin(np.outer(t, 0.9 + 0.3 * np.arange(6)))
+    motion = JointMotion(t, q + [0, -1.2, 1.4, -1, -1.5, 0])
+    poses = Twin(robot, ()).poses(Recording('minute', motion))
+    measured = Measurements(t, poses.position + 1e-3 * np.sin(3.0 * q[:, :3]), poses.rotation)
+    return Job(Recording('minute', motion, measured), robot)
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return a row for each rate: latency in ms, CPU time in us."""
+    def ms(row: dict[str, float]) -> str:
+        return f'{row["p50_us"] / 1e3:.2f} / {row["p99_us"] / 1e3:.2f}'
+
+    head = 'Hz', 'relay p50 / p99', 'raw relay', 'twin', 'twin / relay'
+    return markdown.table((*head, 'CPU relay / twin', 'ratio'), *(
+        (
+            f'{row["rate_hz"]:g}', ms(row['relay']), ms(row['raw_relay']), ms(row['twin']),
+            f'{row["ratio"]["p50_us"]:.2f} / {row["ratio"]["p99_us"]:.2f}',
+            f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}',
+            f'{row["ratio"]["cpu_us"]:.2f}',
+        )
+        for row in result['rates']
+    ))  # fmt: skip

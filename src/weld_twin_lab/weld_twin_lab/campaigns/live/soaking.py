@@ -1,0 +1,215 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The cell of the soak, and what is read from its processes, its health topic and its bag."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.errors import TwinError
+from weld_twin_msgs_py.bags import BagReader
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.offline.seam_motion import plan_motion
+
+from .listener import HealthListener
+from .usage import children, cpu_ns, rss_bytes
+
+MIB = 2.0**20
+ROBOT, PATH = 'ur5', 'polyline'
+COMPLETE = 300.0
+"""Seconds the recorder has to complete its bag."""
+SPLIT = 300.0
+"""Seconds a file of the bag spans."""
+EACH = ('/joint_states', '/actual/joint_states', '/measured/tool_pose', '/twin/tool_pose')
+"""Topics with one message for each joint state."""
+COUNTED = (*EACH, '/deviation')
+"""Inputs of which a node should have had as many messages as joint states were sent."""
+
+
+class Usage(NamedTuple):
+    """Time since the start [s], resident memory [bytes] and time on a CPU [ns] of a process."""
+
+    t: float
+    rss: int
+    cpu: int
+
+
+class Soak:
+    """A context manager with all nodes of a cell in processes of their own."""
+
+    def __init__(
+        self, folder: Path, bag: Path, rate: float, seconds: float, effects: str
+    ) -> None:
+        self._cell = Cell(folder)
+        self._bag, self._rate, self._effects = bag, rate, effects
+        samples = plan_motion(catalog.load(ROBOT), PATH, rate=rate).motion.t.size
+        self._rounds = max(round(seconds * rate / samples), 1)
+        self.sent = self._rounds * samples
+        self.samples: dict[str, list[Usage]] = defaultdict(list)
+        self._work: dict[int, Usage] = {}
+
+    def __enter__(self) -> Soak:
+        """Start the nodes."""
+        self._cell.__enter__()
+        try:
+            self._start()
+        except BaseException:
+            self._cell.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the nodes."""
+        self._cell.__exit__()
+
+    def finish(self) -> None:
+        """Let the recorder complete its bag, which takes it some time."""
+        recorder = self._cell.processes[0]
+        recorder.interrupt()
+        recorder.end(COMPLETE)
+
+    def _start(self) -> None:
+        cell, sure = self._cell, {'reliable_inputs': True}
+        self._listener = HealthListener(cell.node)
+        cell.start('recorder', out=str(self._bag), split_duration=SPLIT, **sure)
+        cell.start('live_diagnosis', **sure)
+        cell.start('deviation_markers', **sure)
+        cell.start('deviation_analyzer', wait_for_subscribers=1, **sure)
+        cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
+        cell.start('error_injector', effects=self._effects, seed=1, wait_for_subscribers=2, **sure)
+        cell.start(
+            'trajectory_generator', rate=self._rate, repeat=self._rounds, path=PATH, robot=ROBOT,
+            wait_for_subscribers=4, **sure,
+        )  # fmt: skip
+        node = cell.node
+        cell.wait(lambda: node.count_publishers('/diagnostics') == len(cell.processes), 'all')
+
+    def run(self, every: float, tell: Callable[[str], None]) -> None:
+        """Let the cell work to the end of the motion; look at its processes now and then."""
+        heard = self._listener.values
+        self._cell.wait(
+            lambda: int(heard.get('recorder: /deviation', {}).get('received', 0)) > 0, 'the motion'
+        )
+        begin = time.monotonic()
+        self._listener.clear()
+        due = every
+        while due <= self.sent / self._rate:
+            end = begin + due
+            self._cell.wait(lambda: time.monotonic() >= end, 'the next look', every + 60.0)  # noqa: B023
+            self._look(time.monotonic() - begin)
+            if round(due / every) % 12 == 0:
+                tell(self._line(due))
+            due += every
+        self._told = {name: list(entries) for name, entries in self._listener.told.items()}
+        end = time.monotonic() + COMPLETE
+        self._cell.wait(
+            lambda: self._least() >= self.sent or time.monotonic() > end, 'the rest',
+            2.0 * COMPLETE,
+        )  # fmt: skip
+        quiet = time.monotonic() + 3.0
+        self._cell.wait(lambda: time.monotonic() > quiet, 'the last word on health')
+
+    def _least(self) -> int:
+        """Return how many messages came through where fewest did."""
+        return min(
+            int(values['received']) for name, values in self._listener.values.items()
+            if name.partition(': ')[2] in COUNTED
+        )  # fmt: skip
+
+    def _look(self, t: float) -> None:
+        for process in self._cell.processes:
+            usage = Usage(t, rss_bytes(process.pid), cpu_ns(process.pid))
+            self.samples[process.name].append(usage)
+            for child in children(process.pid):
+                with suppress(OSError):  # it has just ended
+                    self._work[child] = Usage(t, rss_bytes(child), cpu_ns(child))
+
+    def _line(self, t: float) -> str:
+        now = ' '.join(f'{name}:{s[-1].rss / MIB:.0f}' for name, s in self.samples.items())
+        return f'{t / 60.0:5.1f} min, MiB {now}'
+
+    def usage(self, warm: float) -> dict[str, dict[str, float]]:
+        """Return CPU share, memory and its slope of each node, and of the diagnosis's workers."""
+        out = {}
+        for name, samples in self.samples.items():
+            t, rss, cpu = np.array(samples, dtype=np.float64).T
+            late = t > warm * t[-1]
+            slope = np.polyfit(t[late], rss[late], 1)[0] if late.sum() > 2 else 0.0
+            out[name] = {
+                'cpu_share': round(float((cpu[-1] - cpu[0]) / (t[-1] - t[0])) * 1e-9, 4),
+                'rss_mib': round(float(rss[-1]) / MIB, 1),
+                'rss_first_mib': round(float(rss[late][0]) / MIB, 1),
+                'rss_slope_mib_per_h': round(float(slope) * 3600.0 / MIB, 2),
+            }  # fmt: skip
+        spent = sum(usage.cpu for usage in self._work.values())
+        span = next(iter(self.samples.values()))[-1].t
+        out['live_diagnosis workers'] = {
+            'cpu_share': round(spent * 1e-9 / span, 4), 'runs': len(self._work),
+            'rss_mib': round(max((u.rss for u in self._work.values()), default=0) / MIB, 1),
+            'rss_slope_mib_per_h': 0.0,
+        }  # fmt: skip
+        return out
+
+    def health(self) -> dict[str, Any]:
+        """Return received, refused and missing of each input, and what was told but ok."""
+        out: dict[str, Any] = {}
+        for name, values in sorted(self._listener.values.items()):
+            told = [entry for entry in self._told.get(name, []) if entry[0] != 'ok']
+            row = {key: int(values[key]) for key in ('received', 'refused') if key in values}
+            if name.partition(': ')[2] in COUNTED:
+                row['missing'] = self.sent - row['received']
+            out[name] = {
+                **row, 'not_ok': len(told), 'worst': sorted({text for _, text in told})[:5],
+            }  # fmt: skip
+        return out
+
+
+def losses(bag: Path, sent: int) -> dict[str, Any]:
+    """Return how many messages of each topic the bag holds and lacks of those that were sent."""
+    try:
+        with BagReader(bag) as reader:
+            counts = {topic: count for topic, (_, count) in reader.topics.items()}
+    except TwinError as error:
+        return {'reason': str(error)}
+    return {
+        topic: {'messages': count, **({'missing': sent - count} if topic in EACH else {})}
+        for topic, count in counts.items()
+    }
+
+
+def verdict(result: dict[str, Any], flat: float) -> bool:
+    """Tell whether no node lost or refused anything and every node's memory is flat."""
+    inputs = result['health'].values()
+    return (
+        all(result['recorded'].get(topic, {}).get('missing') == 0 for topic in EACH)
+        and all(node['rss_slope_mib_per_h'] <= flat for node in result['nodes'].values())
+        and all(row.get('refused', 0) == row.get('missing', 0) == 0 for row in inputs)
+    )
+
+
+def picture(path: Path, samples: dict[str, list[Usage]]) -> None:
+    """Draw memory and CPU share of each node over the time of the run."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 6), layout='constrained')
+    FigureCanvasAgg(figure)
+    memory, share = figure.subplots(2, 1, sharex=True)
+    for name, rows in samples.items():
+        t, rss, cpu = np.array(rows, dtype=np.float64).T
+        memory.plot(t / 60.0, rss / MIB, label=name)
+        share.plot(t[1:] / 60.0, np.diff(cpu) / np.diff(t) * 1e-9 * 100.0)
+    memory.set_ylabel('resident memory [MiB]')
+    memory.set_ylim(bottom=0.0)
+    share.set_ylabel('share of one core [%]')
+    share.set_xlabel('time [min]')
+    memory.legend(ncols=2, fontsize='small')
+    figure.savefig(path, dpi=110)

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Check the diagnosis on recordings whose causes are withheld from it.
+
+Cases come from a simulator that shares no formula with the twin. Their truths are sealed before
+any diagnosis, and opened when the verdicts are in.
+"""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+from inspect import getdoc
+
+JOBS = ('make', 'diagnose', 'score', 'run', 'semi-real', 'recovery')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the jobs, each with its options."""
+    jobs = parser.add_subparsers(required=True, metavar='JOB', dest='job')
+    for name in JOBS:
+        module = import_module(f'weld_twin_lab.cli.blind_jobs.{name.replace("-", "_")}')
+        text = getdoc(module) or ''
+        job = jobs.add_parser(
+            name, help=text.partition('\n')[0], description=text,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
+        module.add_arguments(job)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the job."""
+    module = import_module(f'weld_twin_lab.cli.blind_jobs.{args.job.replace("-", "_")}')
+    return int(module.run(args))

@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The arm as a MuJoCo model: rigid links, payload, and what gives between motor and link.
+
+Each joint is one to three coaxial hinges (or slides) of the same link, in series: the motor, a
+gap if the gear has play, a spring if it gives. Gap and spring are thus read as positions of
+their own, free of the motor's tracking error. World is the robot base.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from . import exponentials, screws
+from .exponentials import Arm
+from .screws import Motion
+
+MASSLESS = 1e-6  # kg; MuJoCo wants some mass on every moving body
+GYRATION = 0.3   # radius of gyration of a link, whose inertia is not known, per length
+SMALL = 0.03     # m, the least radius of gyration
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """
+    What the flange carries besides the tool.
+
+    Attributes
+    ----------
+    mass : float [kg]
+    com : array, shape (3,) [m]
+        Centre of mass in the tool frame.
+
+    """
+
+    mass: float
+    com: np.ndarray
+
+
+def load_from(robot: Mapping, extra: list[tuple[float, np.ndarray]]) -> Load:
+    """Return the declared payload and the undeclared ones (mass, com) as one."""
+    entry = robot.get('payload') or {}
+    parts = [(float(entry.get('mass', 0.0)), np.array(entry.get('com', [0.0] * 3), dtype=float))]
+    parts += extra
+    mass = sum(part[0] for part in parts)
+    if mass < 0.0:
+        raise ValueError(f'the payload must not weigh less than nothing, got {mass} kg')
+    moment = sum(part[0] * part[1] for part in parts)
+    return Load(mass, moment / mass if mass > 0.0 else np.zeros(3))
+
+
+def add_links(spec: mujoco.MjSpec, robot: Mapping, arm: Arm, load: Load) -> list:
+    """Add the links, the tool and the payload, without joints; return the link bodies."""
+    spec.option.gravity = list(robot.get('gravity', STANDARD_GRAVITY))
+    at = exponentials.home(arm)
+    parent, before, bodies = spec.worldbody, screws.identity(), []
+    for i, pose in enumerate(at.links):
+        parent = _add_body(parent, f'link{i}', screws.compose(screws.inverse(before), pose))
+        before = pose
+        _add_mass(parent, robot, i, _reach(arm, i))
+        bodies.append(parent)
+    tool = _add_body(parent, 'tool', arm.tool)
+    # the wrench acts at a body's centre of mass, so the tool needs one, at its tip
+    _weigh(tool, MASSLESS, np.zeros(3), 1e-9)
+    if load.mass > 0.0:
+        _weigh(_add_body(tool, 'payload', screws.identity()), load.mass, load.com,
+               load.mass * SMALL ** 2)
+    return bodies
+
+
+def _reach(arm: Arm, i: int) -> float:
+    return float(np.hypot(arm.rows.a[i], arm.rows.d[i]))
+
+
+def _add_body(parent, name: str, pose: Motion):
+    x, y, z, w = Rotation.from_matrix(pose.rotation).as_quat()
+    return parent.add_body(name=name, pos=pose.position, quat=[w, x, y, z])
+
+
+def _add_mass(body, robot: Mapping, i: int, reach: float) -> None:
+    links = robot.get('links') or []
+    link = links[i] if i < len(links) else {}
+    mass = max(float(link.get('mass', 0.0)), MASSLESS)
+    inertia = mass * max(GYRATION * reach, SMALL) ** 2 + 1e-6
+    _weigh(body, mass, np.array(link.get('com', [0.0, 0.0, 0.0]), dtype=float), inertia)
+
+
+def _weigh(body, mass: float, com: np.ndarray, inertia: float) -> None:
+    body.explicitinertial = True
+    body.mass, body.ipos, body.inertia = mass, com, np.full(3, inertia)
+
+
+def add_hinge(body, arm: Arm, at: exponentials.Home, i: int, name: str, **options):
+    """Add a hinge or slide of joint i to its link."""
+    link = at.links[i]
+    axis = at.v[i] if arm.sliding[i] else at.omega[i]
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if arm.sliding[i] else mujoco.mjtJoint.mjJNT_HINGE
+    anchor = screws.compose(screws.inverse(link), Motion(np.eye(3), at.point[i])).position
+    return body.add_joint(name=name, type=kind, axis=link.rotation.T @ axis, pos=anchor,
+                          **options)
+
+
+def rigid(robot: Mapping, arm: Arm, load: Load) -> mujoco.MjModel:
+    """Return the arm with one hinge a joint and nothing that gives."""
+    spec = mujoco.MjSpec()
+    at = exponentials.home(arm)
+    for i, body in enumerate(add_links(spec, robot, arm, load)):
+        add_hinge(body, arm, at, i, f'joint{i}')
+    return spec.compile()
+
+
+class Statics:
+    """Torques of the rigid arm at rest, and its inertia."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model, self._data = model, mujoco.MjData(model)
+        self._tool = model.body('tool').id
+
+    def torque(self, q: np.ndarray, wrench: np.ndarray | None = None) -> np.ndarray:
+        """
+        Return the load torque on each joint, shape (N, n) [N m, or N for a slide].
+
+        Parameters
+        ----------
+        q : array, shape (N, n)
+        wrench : array, shape (N, 6), optional
+            Force and torque on the tool, tool frame.
+
+        """
+        data, tau = self._data, np.empty_like(q)
+        for k, row in enumerate(q):
+            data.qpos[:] = row
+            mujoco.mj_fwdPosition(self.model, data)
+            mujoco.mj_fwdVelocity(self.model, data)
+            tau[k] = -data.qfrc_bias
+            if wrench is not None and wrench[k].any():
+                turn = data.xmat[self._tool].reshape(3, 3)
+                mujoco.mj_applyFT(self.model, data, turn @ wrench[k, :3], turn @ wrench[k, 3:],
+                                  data.xpos[self._tool], self._tool, tau[k])
+        return tau
+
+    def inertia(self, q: np.ndarray) -> np.ndarray:
+        """Return the diagonal of the mass matrix, shape (N, n) [kg m^2 or kg]."""
+        out = np.empty_like(q)
+        full = np.empty((self.model.nv, self.model.nv))
+        for k, row in enumerate(q):
+            self._data.qpos[:] = row
+            mujoco.mj_fwdPosition(self.model, self._data)
+            mujoco.mj_fullM(self.model, self._data, full)
+            out[k] = np.diag(full)
+        return out
+
+    def drive_torque(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+        """Return the torque the motors owe to the links' inertia alone, shape (N, n)."""
+        out = np.empty_like(q)
+        data = self._data
+        for k in range(len(q)):
+            data.qpos[:], data.qvel[:], data.qacc[:] = q[k], qd[k], qdd[k]
+            mujoco.mj_inverse(self.model, data)
+            out[k] = data.qfrc_inverse
+            data.qvel[:] = 0.0
+            data.qacc[:] = 0.0
+            mujoco.mj_inverse(self.model, data)
+            out[k] -= data.qfrc_inverse
+        data.qvel[:] = 0.0
+        return out

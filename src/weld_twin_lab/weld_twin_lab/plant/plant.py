@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The plant: the cell as it really is, standing in for one on the shop floor.
+
+Order of things: command -> servo and flywheel (`drives`) -> gearing (`effects`) -> gap and spring
+under load (`tree`, `compliance`) -> geometry as built (`geometry`) -> tool under load ->
+instrument and clocks (`tracker`). Nothing here is shared with the twin that is to diagnose it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from . import drives, exponentials, outside_causes, rollout, screws, tree
+from . import textbook_effects as library
+from . import tracker as sensors
+from .compliance import Compliant
+from .exponentials import Arm
+from .plant_recording import Command, Course, PlantRecording
+from .screws import Motion
+from .textbook_effects import Causes
+from .tracker import Tracker
+
+KNOWN = library.LIBRARY | outside_causes.OUTSIDE
+
+
+@dataclass(frozen=True, eq=False)
+class _Cell:
+    """One robot with its flaws and one command."""
+
+    robot: Mapping
+    arm: Arm
+    causes: Causes
+    course: Course
+    richness: float
+
+    @property
+    def start(self) -> float:
+        """The recording's first stamp [s]."""
+        return float(self.course.command.t[0])
+
+
+def run(robot: Mapping, effects: Sequence[Mapping], command: Command, tracker: Tracker,
+        rng: np.random.Generator, richness: float = 1.0) -> PlantRecording:
+    """
+    Move a robot with flaws and record it.
+
+    Parameters
+    ----------
+    robot : mapping
+        A robot file (interface section 2).
+    effects : sequence of mappings
+        The flaws, as in an effects file; also those of `outside`.
+    command : Command
+    tracker : Tracker
+    rng : Generator
+        Source of everything random; the same seed gives the same recording.
+    richness : float
+        How far the physics of servo, gap, spring and flywheel goes beyond the textbook form of
+        the effect: 0 is the textbook, 1 a plausible machine.
+
+    Returns
+    -------
+    PlantRecording
+
+    """
+    if not 0.0 <= richness <= 3.0:
+        raise ValueError(f'richness must be within 0 and 3, got {richness}')
+    arm = exponentials.arm_from(robot)
+    if command.q.shape[1] != len(arm.names):
+        raise ValueError(f'the command moves {command.q.shape[1]} joints, '
+                         f'the robot has {len(arm.names)}')
+    causes = library.causes_from(effects, arm, KNOWN)
+    cell = _Cell(robot, arm, causes, Course(command), richness)
+    return _record(cell, tracker, rng)
+
+
+def _record(cell: _Cell, instrument: Tracker, rng: np.random.Generator) -> PlantRecording:
+    command, static = cell.course.command, cell.course.command.static
+    if static:
+        # a lost station is lost on both sides: one joint state, one measurement each
+        t = t_joint = command.t[sensors.kept(len(command.t), instrument.drop, rng)]
+        stamps, joint_stamps = t.copy(), t.copy()
+    else:
+        t = sensors.instants(command.t, instrument.rate, instrument.drop, rng)
+        stamps = sensors.stamped(t, instrument.jitter, rng)
+        t_joint = sensors.instants(command.t, instrument.joint_rate, instrument.joint_drop, rng)
+        joint_stamps = sensors.stamped(t_joint, instrument.joint_jitter, rng)
+    pose = true_poses(cell, t, rng)
+    floors = [float(item['sigma']) for item in cell.causes.of('measurement_noise')]
+    sigma = float(np.linalg.norm([instrument.sigma, *floors]))
+    position, quaternion = sensors.observe(instrument, pose, sigma, rng)
+    late = float(cell.causes.total('time_delay', 'delay')) + instrument.clock_offset
+    return PlantRecording(
+        joint_stamps, cell.course.q(t_joint),
+        cell.course.q(t_joint, 1) if instrument.velocity else None,
+        stamps + late, position, quaternion,
+        *sensors.wrench_stream(instrument, cell.course, rng),
+        *sensors.temperature_stream(instrument, cell.course, rng), static)
+
+
+def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
+    """Return the tool as the measuring frame has it at true times (M,) [s], free of noise."""
+    q, motor = _link_side(cell, t, rng)
+    causes, arm, since = cell.causes, cell.arm, t - cell.start
+    rows = library.rows_as_built(causes, arm, since, cell.course.temperature(t))
+    lean = outside_causes.wobble(causes, motor)
+    base, tool = library.frames(causes, arm)
+    base = screws.compose(base, outside_causes.frame_error(causes, 'column_bend', since))
+    tool = screws.compose(tool, outside_causes.frame_error(causes, 'tool_slip', since))
+    flange = exponentials.flange(arm, exponentials.home(arm, rows), q, lean)
+    pose = screws.compose(base, flange, tool)
+    pose = library.yielding(causes, pose, cell.course.wrench(t))
+    return library.measured(causes, outside_causes.on_instrument(causes, pose, since), since)
+
+
+def _link_side(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> tuple:
+    """Return the links' and the motors' positions at times t, each (M, n)."""
+    compliant = Compliant(cell.robot, cell.arm, cell.causes, cell.richness)
+    lost = drives.displacement(cell.causes, cell.course, cell.richness)
+    motor = cell.course.q(t) + (0.0 if lost is None else lost(t))
+    geared = motor + library.gearing(cell.causes, motor)
+    rounding = library.rounding(cell.causes, motor)
+    if cell.course.command.static:
+        give = _at_rest(cell, compliant, rng)[np.searchsorted(cell.course.command.t, t)]
+    else:
+        give = _in_motion(cell, compliant, lost, rng)(t)
+    return geared + rounding + give, motor
+
+
+def _at_rest(cell: _Cell, compliant: Compliant, rng: np.random.Generator) -> np.ndarray:
+    """Return what gives at every station, in the order they are visited, shape (N, n)."""
+    command = cell.course.command
+    q = command.q + library.gearing(cell.causes, command.q)
+    give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, command.wrench)
+    return give + outside_causes.on_joints(cell.causes, command.t, q,
+                                    lambda: compliant.torque(q, command.wrench), rng)
+
+
+def _in_motion(cell: _Cell, compliant: Compliant, lost: CubicSpline | None,
+               rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray | float]:
+    """Return what gives as a function of time."""
+    flawed = any(item['effect'] in outside_causes.JOINT_LEVEL for item in cell.causes.items)
+    if compliant.rigid and not flawed:
+        return lambda _: 0.0
+    times = cell.course.command.t
+    grid = rollout.grid(times[0], times[-1], tree.STEP)
+    motor = cell.course.q(grid) + (0.0 if lost is None else lost(grid))
+    geared = motor + library.gearing(cell.causes, motor)
+    wrench = cell.course.wrench(grid)
+    give = outside_causes.on_joints(cell.causes, grid, geared,
+                             lambda: compliant.torque(geared, wrench), rng)
+    if not compliant.rigid:
+        give = give + tree.moving(compliant, grid, CubicSpline(grid, geared), wrench)
+    return CubicSpline(grid, give)

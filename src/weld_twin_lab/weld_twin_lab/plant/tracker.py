@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The instruments: tracker, joint stream, wrench and temperature sensors, each with its clock."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from .plant_recording import Course
+from .screws import Motion
+
+STAMP_MARGIN = 0.45  # jittered stamps keep their order: at most this share of the spacing
+
+
+@dataclass(frozen=True)
+class Tracker:
+    """
+    What records the cell. All zero and None: exact values at the command's own stamps.
+
+    Attributes
+    ----------
+    rate : float [Hz], optional
+        Of the pose stream; None measures at the command's stamps. Ignored at rest.
+    sigma : float [m]
+        White noise of each coordinate.
+    sigma_orientation : float [rad]
+        White noise about each axis.
+    orientation : bool
+        False records positions only.
+    jitter : float [s]
+        Standard deviation of the stamps about the true instants, in motion.
+    drop : float
+        Share of samples lost.
+    outlier_share, outlier_size : float, float [m]
+        Share of positions thrown off, and how far, in a random direction.
+    clock_offset : float [s]
+        Of the tracker's clock, added to its stamps: a time_delay by another name.
+    joint_rate : float [Hz], optional
+    joint_jitter : float [s]
+    joint_drop : float
+    velocity : bool
+        Whether joint velocity is published.
+    wrench_sigma : float [N]
+        White noise of the forces; torques have a tenth of it [N m].
+    temperature_rate : float [Hz], optional
+    temperature_lag : float [s]
+        First-order lag of the sensor; it starts in equilibrium.
+    temperature_sigma : float [K]
+
+    """
+
+    rate: float | None = None
+    sigma: float = 0.0
+    sigma_orientation: float = 0.0
+    orientation: bool = True
+    jitter: float = 0.0
+    drop: float = 0.0
+    outlier_share: float = 0.0
+    outlier_size: float = 0.0
+    clock_offset: float = 0.0
+    joint_rate: float | None = None
+    joint_jitter: float = 0.0
+    joint_drop: float = 0.0
+    velocity: bool = True
+    wrench_sigma: float = 0.0
+    temperature_rate: float | None = None
+    temperature_lag: float = 0.0
+    temperature_sigma: float = 0.0
+
+
+def instants(t: np.ndarray, rate: float | None, drop: float,
+             rng: np.random.Generator) -> np.ndarray:
+    """Return true sampling instants within a command's times, some of them lost, (M,) [s]."""
+    if rate is not None:
+        # the sensor's clock does not start with the command's
+        t = np.arange(t[0] + rng.uniform(0.0, 1.0 / rate), t[-1], 1.0 / rate)
+    return t[kept(len(t), drop, rng)]
+
+
+def kept(count: int, drop: float, rng: np.random.Generator) -> np.ndarray:
+    """Return which samples arrive, shape (count,), bool."""
+    return rng.random(count) >= drop if drop > 0.0 else np.ones(count, dtype=bool)
+
+
+def stamped(t: np.ndarray, jitter: float, rng: np.random.Generator) -> np.ndarray:
+    """Return stamps that scatter about the true instants but keep their order, (M,) [s]."""
+    if jitter <= 0.0 or len(t) < 2:
+        return t.copy()
+    limit = STAMP_MARGIN * np.diff(t).min()
+    return t + np.clip(jitter * rng.standard_normal(len(t)), -limit, limit)
+
+
+def observe(tracker: Tracker, pose: Motion, sigma: float,
+            rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray | None]:
+    """
+    Return what the tracker reads of true poses.
+
+    Parameters
+    ----------
+    tracker : Tracker
+    pose : Motion, shape (M,)
+    sigma : float [m]
+        White noise of each coordinate, the tracker's and any other.
+    rng : Generator
+
+    Returns
+    -------
+    position : array, shape (M, 3) [m]
+    quaternion : array, shape (M, 4) x y z w, or None
+
+    """
+    position = pose.position + sigma * rng.standard_normal(pose.position.shape)
+    if tracker.outlier_share > 0.0:
+        off = rng.random(len(position)) < tracker.outlier_share
+        way = rng.standard_normal(position.shape)
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        position += tracker.outlier_size * off[:, None] * way
+    if not tracker.orientation:
+        return position, None
+    shake = tracker.sigma_orientation * rng.standard_normal(position.shape)
+    turned = Rotation.from_matrix(pose.rotation) * Rotation.from_rotvec(shake)
+    return position, turned.as_quat()
+
+
+def wrench_stream(tracker: Tracker, course: Course, rng: np.random.Generator) -> tuple:
+    """Return stamps and readings of the tool wrench at the command's stamps, or two Nones."""
+    command = course.command
+    if command.wrench is None:
+        return None, None
+    scale = tracker.wrench_sigma * np.repeat([1.0, 0.1], 3)
+    return command.t.copy(), command.wrench + scale * rng.standard_normal(command.wrench.shape)
+
+
+def temperature_stream(tracker: Tracker, course: Course, rng: np.random.Generator) -> tuple:
+    """Return stamps and readings of a slow, noisy temperature sensor, or two Nones."""
+    command = course.command
+    if command.temperature is None:
+        return None, None
+    t = instants(command.t, tracker.temperature_rate, 0.0, rng)
+    reading = course.temperature(t)
+    if tracker.temperature_lag > 0.0:
+        follow = 1.0 - np.exp(-np.diff(t, prepend=t[0]) / tracker.temperature_lag)
+        level = reading[0]
+        for k in range(len(t)):
+            level += follow[k] * (reading[k] - level)
+            reading[k] = level
+    return t, reading + tracker.temperature_sigma * rng.standard_normal(len(t))

@@ -1,0 +1,163 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every split diagnosed by the ordinary engine, judged on its held-out poses, and written down."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from weld_twin_core import __version__
+from weld_twin_core.arm import catalog
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import Diagnosis, diagnose
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.report import hashed
+from weld_twin_nodes.report.diagnosis_files import diagnosis_text
+from weld_twin_nodes.report.family_table import ripples
+
+from .data import Source, Split, tables, ur5_splits, ur10_splits
+from .unseen_stations import ALIGN, Errors, errors, frames_only, inside, residual
+
+RESULTS = 'results.json'
+SPLITS = {'ur5': ur5_splits, 'ur10': ur10_splits}
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """
+    A split with its diagnosis and what that predicts on the held-out poses.
+
+    Attributes
+    ----------
+    split : Split
+    diagnosis : Diagnosis
+        Of the training poses alone.
+    before, after : Errors
+        On the held-out poses: frames fitted only, and with everything found.
+    before_parts, after_parts : array, shape (3 or 6, M)
+        The residuals behind them [m, rad].
+    seconds : float
+
+    """
+
+    split: Split
+    diagnosis: Diagnosis
+    before: Errors
+    after: Errors
+    before_parts: Array
+    after_parts: Array
+    seconds: float
+
+    @property
+    def within(self) -> bool:
+        """Return whether the claimed interval contains what is got."""
+        return inside(self.diagnosis, self.before, self.after)
+
+    @property
+    def reached(self) -> bool:
+        """Return whether every goal of the split is reached."""
+        goal, got = self.split.goal, self.after
+        pairs = [
+            (goal.mean_m, got.mean_m), (goal.max_m, got.max_m),
+            (goal.orientation_rad, got.orientation_rms_rad),
+        ]  # fmt: skip
+        return all(g is None or (v is not None and v <= g) for g, v in pairs)
+
+
+def study(
+    ur5: Path, ur10: Path, out: Path, tell: Callable[[str], None] = lambda text: None
+) -> dict[str, Any]:
+    """
+    Diagnose both arms on every split and write pages and results to a directory.
+
+    Parameters
+    ----------
+    ur5, ur10 : Path
+        Directories with the published tables.
+    out : Path
+        Exists and is empty.
+    tell : callable
+        Told what is being done.
+
+    Raises
+    ------
+    DataError
+        A table is missing or cannot be read.
+
+    """
+    from .arm_page import robot_page
+
+    results: dict[str, Any] = {'version': __version__, 'robots': {}}
+    for robot, directory in (('ur5', ur5), ('ur10', ur10)):
+        sources = tables(robot, directory)
+        judged = list(_judged(robot, sources, tell))
+        for each in judged:
+            write_text(out / f'{each.split.name}.json', diagnosis_text(each.diagnosis, ()))
+        write_text(out / f'{robot}.html', robot_page(robot, sources, judged))
+        results['robots'][robot] = _entry(sources, judged)
+    write_text(out / RESULTS, json.dumps(results, indent=1, allow_nan=False) + '\n')
+    return results
+
+
+def _judged(
+    robot: str, sources: tuple[Source, ...], tell: Callable[[str], None]
+) -> Iterator[Judged]:
+    for split in SPLITS[robot](sources):
+        yield judge(split, lambda text, name=split.name: tell(f'{name}: {text}'))  # type: ignore[misc]
+
+
+def judge(split: Split, tell: Callable[[str], None] = lambda text: None) -> Judged:
+    """Return a split diagnosed on its training poses and judged on the others."""
+    nominal = catalog.load(split.robot)
+    start = perf_counter()
+    diagnosis = diagnose([split.train], nominal, align=ALIGN, progress=tell)
+    seconds = perf_counter() - start
+    before = residual(frames_only(split.train, nominal), split.train, split.test)
+    after = residual(diagnosis.model, split.train, split.test)
+    return Judged(split, diagnosis, errors(before), errors(after), before, after, seconds)
+
+
+def _entry(sources: tuple[Source, ...], judged: list[Judged]) -> dict[str, Any]:
+    return {
+        'tables': [
+            {'name': s.path.name, 'sha256': hashed('table', s.path).sha256,
+             'assumptions': list(s.assumptions)}
+            for s in sources
+        ],
+        'splits': {each.split.name: _split(each) for each in judged},
+    }  # fmt: skip
+
+
+def _split(judged: Judged) -> dict[str, Any]:
+    diagnosis, goal = judged.diagnosis, judged.split.goal
+    return {
+        'what': judged.split.title,
+        'goal': goal._asdict(),
+        'frames_only': judged.before.as_dict(),
+        'got': judged.after.as_dict(),
+        'reached': judged.reached,
+        'claimed': {
+            'ratio': diagnosis.shrink.ratio, 'ci95': list(diagnosis.shrink.ci95),
+            'rms_after_m': diagnosis.shrink.rms_after_m,
+        },
+        'achieved_ratio': judged.after.rms_m / judged.before.rms_m,
+        'inside_claim': judged.within,
+        'noise_floor_m': diagnosis.gap.noise_floor_m,
+        'status': diagnosis.status,
+        'confidence': diagnosis.confidence,
+        'waterfall': [{'added': n, 'rms_m': v} for n, v in diagnosis.shrink.steps],
+        'families': [
+            {'effect': f.effect, 'named': f.named, 'rms_m': f.rms_m} for f in diagnosis.families
+        ],
+        'ripple': [
+            {'joint': r.joint, 'rms_rad': r.rms,
+             'strongest': [{'order': n, 'amplitude_rad': a} for n, a in r.lines]}
+            for r in ripples(diagnosis)
+        ],
+        'seconds': round(judged.seconds, 1),
+    }  # fmt: skip

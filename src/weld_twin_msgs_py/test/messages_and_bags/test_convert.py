@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags.typestore import decode
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.to_messages import bag_messages, ros_messages
+
+NS = 1_700_000_000_987_654_321
+
+
+@pytest.fixture(params=['rclpy', 'rosbags'])
+def make(request):
+    if request.param == 'rclpy':
+        pytest.importorskip('rclpy')
+        return ros_messages()
+    return bag_messages()
+
+
+@pytest.fixture
+def joints(make):
+    q = np.array([3.0, 1.0, 2.0])
+    return make.joint_state(NS, ['c', 'a', 'b'], q, 0.1 * q)
+
+
+def test_joints_are_matched_by_name_in_any_order_and_extras_left_out(joints):
+    np.testing.assert_array_equal(from_messages.joint_positions(joints, ('a', 'c')), [1.0, 3.0])
+    back = from_messages.joint_velocities(joints, ('b', 'a'))
+    np.testing.assert_allclose(back, [0.2, 0.1], rtol=1e-15)
+
+
+def test_a_missing_joint_is_named_with_those_present(joints):
+    with pytest.raises(DataError, match=r"^the joint state has no joint 'd'; it has c, a, b$"):
+        from_messages.joint_positions(joints, ('a', 'd'))
+
+
+@pytest.mark.parametrize('bad', [np.nan, np.inf])
+def test_a_position_that_is_no_number_is_refused(make, bad):
+    message = make.joint_state(NS, ['a', 'b'], np.array([0.0, bad]))
+    with pytest.raises(DataError, match=rf"^joint 'b' has the position {bad}; it must be"):
+        from_messages.joint_positions(message, ('a', 'b'))
+    assert from_messages.joint_positions(message, ('a',)) == [0.0]
+
+
+def test_fewer_positions_than_names_are_refused(make):
+    message = make.joint_state(NS, ['a', 'b'], np.array([0.0]))
+    with pytest.raises(DataError, match='2 names but 1 positions'):
+        from_messages.joint_positions(message, ('a',))
+
+
+@pytest.mark.parametrize('qd', [None, np.array([0.1, np.nan])])
+def test_velocity_that_is_absent_or_nan_is_unknown(make, qd):
+    message = make.joint_state(NS, ['a', 'b'], np.zeros(2), qd)
+    assert from_messages.joint_velocities(message, ('a', 'b')) is None
+
+
+def test_infinite_velocity_is_refused(make):
+    message = make.joint_state(NS, ['a'], np.zeros(1), np.array([np.inf]))
+    with pytest.raises(DataError, match='velocity inf'):
+        from_messages.joint_velocities(message, ('a',))
+
+
+def test_stamps_are_exact_to_the_nanosecond(joints):
+    assert from_messages.stamp_ns(joints) == NS
+
+
+def test_a_stamp_left_at_zero_is_refused(make):
+    with pytest.raises(DataError, match=r'header\.stamp is 0 ns: the publisher left it unset'):
+        from_messages.stamp_ns(make.point(0, np.zeros(3)))
+
+
+def test_a_quarter_turn_about_z_takes_x_to_y(make):
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    message = make.pose(NS, np.array([1.0, 2.0, 3.0]), turn)
+    q = message.pose.orientation
+    np.testing.assert_allclose([q.x, q.y, q.z, q.w], [0, 0, np.sqrt(0.5), np.sqrt(0.5)])
+    position, rotation = from_messages.pose(message)
+    np.testing.assert_array_equal(position, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(rotation, turn, atol=1e-15)
+
+
+def test_rotations_survive_the_message(make):
+    halves = [np.diag(d) for d in ([1.0, -1, -1], [-1.0, 1, -1], [-1.0, -1, 1])]
+    for matrix in [*Rotation.random(200, random_state=3).as_matrix(), np.eye(3), *halves]:
+        _, back = from_messages.pose(make.pose(NS, np.zeros(3), matrix))
+        np.testing.assert_allclose(back, matrix, atol=1e-15)
+
+
+def test_a_quaternion_left_at_zero_is_refused(make):
+    message = make.pose(NS, np.zeros(3), np.eye(3))
+    message.pose.orientation.w = 0.0
+    with pytest.raises(DataError, match='orientation of the pose 0 has length 0'):
+        from_messages.pose(message)
+
+
+def test_vectors_come_back_as_they_went(make):
+    six = np.arange(1.0, 7.0)
+    np.testing.assert_array_equal(from_messages.point(make.point(NS, six[:3])), six[:3])
+    np.testing.assert_array_equal(from_messages.vector3(make.vector3(NS, six[:3])), six[:3])
+    message = make.wrench(NS, six)
+    assert (message.wrench.force.x, message.wrench.torque.z) == (1.0, 6.0)
+    np.testing.assert_array_equal(from_messages.wrench(message), six)
+
+
+def test_nan_in_a_point_is_refused(make):
+    with pytest.raises(DataError, match='the point is'):
+        from_messages.point(make.point(NS, np.array([0.0, np.nan, 0.0])))
+
+
+@pytest.mark.parametrize(('celsius', 'words'), [
+    (np.nan, 'no temperature'), (-300.0, 'no temperature'), (296.0, 'looks like kelvin'),
+])  # fmt: skip
+def test_impossible_temperatures_are_refused(make, celsius, words):
+    with pytest.raises(DataError, match=words):
+        from_messages.temperature(make.temperature(NS, celsius))
+
+
+def test_metrics_round_trip_exactly(make):
+    message = make.diagnostics(NS, 'deviation', {'rms_m': 0.1 + 0.2, 'samples': 12}, level=1)
+    assert from_messages.metrics(message) == {'rms_m': 0.1 + 0.2, 'samples': 12.0}
+    assert from_messages.diagnostics(message)['deviation']['samples'] == '12'
+
+
+def test_metrics_that_are_no_numbers_are_refused(make):
+    with pytest.raises(DataError, match="metrics 'deviation'"):
+        from_messages.metrics(make.diagnostics(NS, 'deviation', {'rms_m': 'many'}))
+
+
+def test_ros_messages_serialise_to_what_rosbags_reads():
+    serialization = pytest.importorskip('rclpy.serialization')
+    q, qd = np.array([0.1, 0.2]), np.array([1.0, 2.0])
+    # a frame and joint names of these lengths leave four bytes after the empty effort
+    message = ros_messages().joint_state(NS, ['a', 'b'], q, qd, 'ba')
+    data = serialization.serialize_message(message)
+    theirs = decode(data, 'sensor_msgs/msg/JointState')
+    assert from_messages.stamp_ns(theirs) == NS
+    np.testing.assert_array_equal(from_messages.joint_positions(theirs, ('b', 'a')), [0.2, 0.1])

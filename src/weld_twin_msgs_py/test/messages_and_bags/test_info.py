@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import BagWriter, bag_info, write_recording
+from weld_twin_msgs_py.messages.to_messages import bag_messages
+from weld_twin_msgs_py.messages.topics import TopicNames
+
+SECOND = 1_000_000_000
+
+
+def write_joints(path, stamps, topic='/joint_states'):
+    make = bag_messages()
+    with BagWriter(path) as bag:
+        for k, ns in enumerate(stamps):
+            bag.write(topic, make.joint_state(ns, ['a'], np.zeros(1)), SECOND + k)
+
+
+def test_rates_counts_and_uses_of_a_whole_bag(tmp_path, robot, recording):
+    write_recording(tmp_path / 'bag', recording, robot)
+    info = bag_info(tmp_path / 'bag')
+    topics = {topic.name: topic for topic in info.topics}
+    assert {name: (t.count, t.use) for name, t in topics.items()} == {
+        '/joint_states': (400, 'joints'),
+        '/measured/tool_pose': (90, 'pose'),
+        '/measured/sigma': (90, 'sigma'),
+        '/tool_wrench': (200, 'wrench'),
+        '/temperature': (4, 'temperature'),
+    }
+    assert topics['/joint_states'].rate_hz == pytest.approx(125.0)
+    assert topics['/measured/tool_pose'].rate_hz == pytest.approx(1.0 / 0.033)
+    assert info.duration_s == pytest.approx(399 * 0.008)
+    assert info.start_ns == recording.epoch_ns
+    assert info.usable
+    assert info.missing == ()
+    assert info.provenance['robot']['name'] == 'two'
+
+
+def test_a_gap_is_counted_and_measured(tmp_path):
+    stamps = [SECOND + k * 10_000_000 for k in [*range(50), *range(150, 200)]]
+    write_joints(tmp_path / 'bag', stamps)
+    (topic,) = bag_info(tmp_path / 'bag').topics
+    assert topic.gaps == 1
+    assert topic.longest_gap_s == pytest.approx(1.01)
+    assert topic.rate_hz == pytest.approx(100.0)
+
+
+def test_stamps_that_cannot_be_used_are_counted(tmp_path):
+    write_joints(tmp_path / 'bag', [0, SECOND, 3 * SECOND, 2 * SECOND, 2 * SECOND])
+    (topic,) = bag_info(tmp_path / 'bag').topics
+    assert (topic.count, topic.unstamped, topic.unordered, topic.repeated) == (5, 1, 1, 1)
+
+
+def test_a_bag_without_measurements_is_not_usable_and_says_why(tmp_path):
+    write_joints(tmp_path / 'bag', [SECOND, 2 * SECOND])
+    info = bag_info(tmp_path / 'bag')
+    assert not info.usable
+    assert info.missing == ("no measurements on '/measured/tool_pose' or '/measured/tool_point'",)
+
+
+def test_a_topic_of_the_right_type_is_suggested(tmp_path):
+    write_joints(tmp_path / 'bag', [SECOND, 2 * SECOND], '/cell/joints')
+    missing = bag_info(tmp_path / 'bag').missing
+    assert missing[0] == (
+        "no joint states on '/joint_states'; '/cell/joints' has that type, "
+        'try --joint-topic /cell/joints'
+    )
+    renamed = bag_info(tmp_path / 'bag', TopicNames(joints='/cell/joints'))
+    assert [topic.use for topic in renamed.topics] == ['joints']
+
+
+def test_clocks_without_overlap_are_told(tmp_path):
+    make = bag_messages()
+    with BagWriter(tmp_path / 'bag') as bag:
+        for k in range(5):
+            bag.write('/joint_states', make.joint_state(SECOND + k, ['a'], np.zeros(1)), k + 1)
+            bag.write('/measured/tool_point', make.point(90 * SECOND + k, np.zeros(3)), k + 1)
+    assert 'do not overlap in time' in bag_info(tmp_path / 'bag').missing[0]
+
+
+def test_an_empty_bag_is_described_not_refused(tmp_path):
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.add_topic('/joint_states', 'sensor_msgs/msg/JointState')
+    info = bag_info(tmp_path / 'bag')
+    assert info.duration_s == 0.0
+    assert not info.usable
+
+
+def test_a_damaged_bag_is_refused_in_one_sentence(tmp_path):
+    write_joints(tmp_path / 'bag', [SECOND])
+    file = tmp_path / 'bag' / 'bag.mcap'
+    file.write_bytes(file.read_bytes()[:-20])
+    with pytest.raises(DataError, match='damaged or was cut short'):
+        bag_info(tmp_path / 'bag')

@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+import re
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.dynamics import gravity_torque
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_msgs_py.files.effects_file import read_effects, write_effects
+from weld_twin_msgs_py.robots import load_robot, read_urdf, write_robot_yaml, write_urdf
+
+ROBOTS = [
+    ('ur_description/urdf/ur3_robot.urdf', None, 'tool0'),
+    ('ur_description/urdf/ur5_robot.urdf', None, 'tool0'),
+    ('ur_description/urdf/ur5_gripper.urdf', 'base_link', 'wrist_3_link'),
+    ('ur_description/urdf/ur10_robot.urdf', None, 'ee_link'),
+    ('panda_description/urdf/panda.urdf', None, 'panda_hand'),
+    ('panda_description/urdf/panda.urdf', 'panda_link1', 'panda_link8'),
+    ('kinova_description/robots/kinova.urdf', None, 'j2s6s200_end_effector'),
+    ('xarm_description/urdf/xarm7.urdf', None, 'link7'),
+    ('pr2_description/urdf/pr2.urdf', 'torso_lift_link', 'r_gripper_tool_frame'),
+    ('talos_data/robots/talos_full_v2.urdf', 'torso_2_link', 'gripper_left_base_link'),
+    ('tiago_description/robots/tiago.urdf', 'base_footprint', 'arm_tool_link'),
+    ('romeo_description/urdf/romeo.urdf', 'torso', 'l_wrist'),
+    ('icub_description/robots/icub.urdf', None, 'l_hand'),
+]
+
+
+class Reference:
+    """Pinocchio's view of the same URDF."""
+
+    def __init__(self, path, base, tip, joint_names):
+        self.pin = pytest.importorskip('pinocchio')
+        self.model = self.pin.buildModelFromUrdf(str(path))
+        self.data = self.model.createData()
+        self.base = self.model.getFrameId(base) if base else 0
+        self.tip = self.model.getFrameId(tip)
+        self.joints = [self.model.joints[self.model.getJointId(name)] for name in joint_names]
+
+    def configuration(self, q):
+        full = self.pin.neutral(self.model)
+        for joint, value in zip(self.joints, q, strict=True):
+            turns = joint.nq == 2  # a continuous joint is held as cosine and sine
+            full[joint.idx_q : joint.idx_q + joint.nq] = (
+                (np.cos(value), np.sin(value)) if turns else value
+            )
+        return full
+
+    def pose(self, q):
+        self.pin.framesForwardKinematics(self.model, self.data, self.configuration(q))
+        return (self.data.oMf[self.base].inverse() * self.data.oMf[self.tip]).homogeneous
+
+    def gravity(self, q, gravity):
+        self.model.gravity.linear = gravity
+        torque = self.pin.computeGeneralizedGravity(self.model, self.data, self.configuration(q))
+        return np.array([torque[joint.idx_v] for joint in self.joints])
+
+
+@pytest.fixture(params=ROBOTS, ids=lambda case: f'{Path(case[0]).stem}-{case[2]}')
+def case(request):
+    name, base, tip = request.param
+    try:
+        shared = files('example-robot-data') or ()
+    except PackageNotFoundError:
+        pytest.skip('example-robot-data is not installed')
+    path = next(file.locate() for file in shared if str(file).endswith(f'/robots/{name}'))
+    robot = read_urdf(path, base, tip)
+    return robot, Reference(path, base, tip, robot.joint_names)
+
+
+def random_positions(robot, count=40):
+    return np.random.default_rng(11).uniform(-3.0, 3.0, (count, robot.n))
+
+
+def test_a_urdf_gives_the_poses_pinocchio_gives(case):
+    robot, reference = case
+    q = random_positions(robot)
+    expected = np.array([reference.pose(row) for row in q])
+    np.testing.assert_allclose(forward(robot, q), expected, rtol=0.0, atol=1e-12)
+
+
+def test_a_urdf_gives_the_gravity_torques_pinocchio_gives(case):
+    robot, reference = case
+    q = random_positions(robot)
+    held = np.array([reference.gravity(row, np.array([0.0, 0.0, -9.80665])) for row in q])
+    np.testing.assert_allclose(gravity_torque(robot, q), -held, rtol=0.0, atol=1e-10)
+
+
+def test_a_urdf_written_and_read_again_has_the_same_poses(case, tmp_path):
+    robot, _ = case
+    write_urdf(tmp_path / 'again.urdf', robot)
+    again = load_robot(str(tmp_path / 'again.urdf'))
+    q = random_positions(robot)
+    np.testing.assert_allclose(forward(again, q), forward(robot, q), rtol=0.0, atol=1e-13)
+    np.testing.assert_array_equal(again.lower, robot.lower)
+    np.testing.assert_array_equal(again.max_velocity, robot.max_velocity)
+    assert again.joint_names == robot.joint_names
+
+
+@pytest.mark.parametrize('name', catalog.names())
+def test_pinocchio_reads_our_urdf_of_a_bundled_robot_with_its_gear_errors(name, tmp_path):
+    nominal = catalog.load(name)
+    rng = np.random.default_rng(3)
+    shifts = {key: getattr(nominal, key) + rng.normal(0.0, 1e-3, nominal.n)
+              for key in ('a', 'd', 'alpha', 'theta', 'beta')}  # fmt: skip
+    robot = Robot(**{**nominal.__dict__, **shifts})
+    write_urdf(tmp_path / 'r.urdf', robot)
+    reference = Reference(tmp_path / 'r.urdf', 'world', 'tool', robot.joint_names)
+    q = random_positions(robot)
+    expected = np.array([reference.pose(row) for row in q])
+    np.testing.assert_allclose(forward(robot, q), expected, rtol=0.0, atol=1e-12)
+
+
+def test_nearly_parallel_axes_keep_their_numbers_small(tmp_path):
+    robot = catalog.load('ur5')
+    tilted = Robot(**{**robot.__dict__, 'beta': np.array([0, 1e-4, -2e-4, 0, 0, 0])})
+    write_urdf(tmp_path / 'r.urdf', tilted)
+    again = load_robot(str(tmp_path / 'r.urdf'))
+    assert abs(again.d).max() < 0.2
+    q = random_positions(robot)
+    np.testing.assert_allclose(forward(again, q), forward(tilted, q), rtol=0.0, atol=1e-13)
+
+
+def test_modified_convention_is_written_exactly(tmp_path):
+    rows = [{'name': f'j{k}', 'a': 0.1 * k, 'alpha': 0.7 - k, 'd': 0.3, 'theta_offset': 0.2 * k,
+             'type': 'prismatic' if k == 1 else 'revolute'} for k in range(4)]  # fmt: skip
+    robot = Robot.from_mapping({'name': 'm', 'convention': 'modified', 'joints': rows})
+    write_urdf(tmp_path / 'm.urdf', robot)
+    q = random_positions(robot)
+    again = load_robot(str(tmp_path / 'm.urdf'))
+    np.testing.assert_allclose(forward(again, q), forward(robot, q), rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize('name', catalog.names())
+def test_yaml_round_trips_to_the_last_bit(name, tmp_path):
+    robot = load_robot(name.upper())
+    write_robot_yaml(tmp_path / 'r.yaml', robot)
+    again = load_robot(str(tmp_path / 'r.yaml'))
+    assert again.to_mapping() == robot.to_mapping()
+
+
+def test_exponents_without_a_point_are_numbers(tmp_path):
+    (tmp_path / 'r.yaml').write_text('name: r\njoints:\n- {name: j, a: 1e-3, alpha: -2E+0}\n')
+    robot = load_robot(str(tmp_path / 'r.yaml'))
+    assert (robot.a[0], robot.alpha[0]) == (0.001, -2.0)
+
+
+BOMB = 'a: &a [x, x]\nb: &b [*a, *a]\n'
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('name: r\njoints: [\n', "robot file '{}' line 3: "),
+    ('name: r\njoints:\n- {name: j, a: 1}\n- {name: j, a: 1}\n', 'uses a joint name twice'),
+    ('name: r\nname: s\n', "robot file '{}' line 2: the key 'name' is given twice"),
+    (BOMB, "robot file '{}' line 2: aliases are not accepted"),
+    ('name: !!python/object:os.system x\n', 'could not determine a constructor'),
+    ('name: r\njoints:\n- {name: j, alpha: 90}\n',
+     "robot file '{}': joint 'j': alpha is 90, which looks like degrees in a radian field"),
+    ('name: r\njoints:\n- {name: j, lower: -170, upper: 170}\n', 'lower is -170, which looks'),
+    ('name: r\njoints:\n- {name: j, a: 425}\n', 'a is 425, which looks like millimetres'),
+    ('name: r\njoints:\n- {name: j, b: 1}\n', "joint 'j' has the unknown key 'b'"),
+    ('', 'a robot file must be a mapping of keys, got NoneType'),
+    ('[' * 100_000, 'nested too deeply'),
+    ('x' * 1_100_000, 'is larger than 1 MB'),
+])  # fmt: skip
+def test_bad_robot_files_are_refused_in_one_sentence(tmp_path, text, words):
+    path = tmp_path / 'r.yaml'
+    path.write_text(text)
+    with pytest.raises(ModelError, match=re.escape(words.format(path))) as caught:
+        load_robot(str(path))
+    assert '\n' not in str(caught.value)
+
+
+LINKS = '<link name="a"/><link name="b"/><link name="c"/>'
+JOINT = '<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/>{}</joint>'
+
+
+def urdf(*joints):
+    return '<robot name="r">' + LINKS + ''.join(JOINT.format(*j) for j in joints) + '</robot>'
+
+
+def turning(kind='revolute', inside=''):
+    """A URDF whose first joint is odd and whose second is sound."""
+    return urdf(('j', kind, 'a', 'b', inside), ('k', 'revolute', 'b', 'c', ''))
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('<robot', 'is not well-formed XML'),
+    ('<!DOCTYPE r [<!ENTITY a "b">]><robot name="r"/>', 'has a document type or entities'),
+    ('<model name="r"/>', 'its outermost tag is <model>, not <robot>'),
+    ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:m/></robot>', 'is a xacro file'),
+    ('<robot name="r"/>', 'there is no link in it'),
+    (urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'fixed', 'a', 'c', '')),
+     'the chain has several ends (b, c); say which with --tip-link'),
+    (urdf(('j', 'fixed', 'a', 'b', ''), ('k', 'fixed', 'b', 'c', '')), 'no joint moves'),
+    (turning('floating'), "joint 'j' is floating"),
+    (turning(inside='<axis xyz="0 0 0"/>'), "the axis of joint 'j' has no direction"),
+    (turning(inside='<mimic joint="k"/>'), "joint 'j' mimics another"),
+    (urdf(('j', 'revolute', 'a', 'z', '')), "joint 'j' names a link 'z' that is not there"),
+    (urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'revolute', 'c', 'b', '')),
+     "link 'b' hangs on two joints"),
+    (urdf(('j', 'revolute', 'b', 'c', ''), ('k', 'revolute', 'c', 'b', '')), 'no chain of joints'),
+    (turning(inside='<origin xyz="1 2"/>'), "URDF '"),
+    (turning(inside='<origin xyz="1 2 nan"/>'),
+     "origin xyz of joint 'j' has 1 value(s) that are not finite"),
+])  # fmt: skip
+def test_bad_urdfs_are_refused_in_one_sentence(tmp_path, capfd, text, words):
+    path = tmp_path / 'r.urdf'
+    path.write_text(text)
+    with pytest.raises(ModelError, match=re.escape(words)) as caught:
+        load_robot(str(path), None, 'c' if 'no chain' in words else None)
+    assert '\n' not in str(caught.value)
+    assert capfd.readouterr().err == ''
+
+
+def test_links_that_are_not_there_are_named(tmp_path):
+    (tmp_path / 'r.urdf').write_text(turning())
+    with pytest.raises(ModelError, match="no tip link 'tool'; its links are a, b, c"):
+        load_robot(str(tmp_path / 'r.urdf'), tip_link='tool')
+
+
+@pytest.mark.parametrize(('spec', 'words'), [
+    ('ur7', "'ur7' is neither a bundled robot (ur5, "),
+    ('nowhere.yaml', "robot file 'nowhere.yaml' cannot be read: No such file"),
+    ('nowhere.urdf', "URDF 'nowhere.urdf' cannot be read: No such file"),
+    ('arm.urdf.xacro', "is a xacro file; run 'xacro arm.urdf.xacro'"),
+])  # fmt: skip
+def test_a_robot_that_is_not_there_is_named(spec, words):
+    with pytest.raises(ModelError, match=re.escape(words)):
+        load_robot(spec)
+
+
+def test_base_and_tip_links_belong_to_a_urdf():
+    with pytest.raises(ModelError, match="'ur5' is no URDF, so it has no base link"):
+        load_robot('ur5', tip_link='tool0')
+
+
+def test_files_are_not_overwritten_unless_asked(tmp_path, robot):
+    write_robot_yaml(tmp_path / 'r.yaml', robot)
+    with pytest.raises(DataError, match='exists already and is not overwritten'):
+        write_robot_yaml(tmp_path / 'r.yaml', robot)
+    write_robot_yaml(tmp_path / 'r.yaml', robot, overwrite=True)
+    assert [path.name for path in tmp_path.iterdir()] == ['r.yaml']
+
+
+# Effects files -------------------------------------------------------------------------------
+
+
+def test_effects_round_trip(tmp_path, robot):
+    entries = [
+        {'effect': 'backlash', 'joint': 'elbow', 'width': 0.0005},
+        {'effect': 'transmission_ripple', 'joint': 'elbow', 'amplitude': [1e-5, 2e-5],
+         'order': [1.0, 2.0], 'phase': [0.1, 0.2]},
+        {'effect': 'base_pose', 'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 1e-3]},
+    ]  # fmt: skip
+    write_effects(tmp_path / 'e.yaml', map(effect_from_mapping, entries))
+    back = read_effects(tmp_path / 'e.yaml', robot)
+    for effect, entry in zip(back, entries, strict=True):
+        mapping = effect.to_mapping()
+        assert {key: mapping[key] for key in entry} == entry
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('- {effect: backlash, joint: wrist, width: 1e-4}\n',
+     "effect 0: robot 'two' has no joint 'wrist'; its joints are shoulder, elbow"),
+    ('- {effect: slack}\n', "effect 0: unknown effect 'slack'"),
+    ('effect: backlash\n', 'an effects file must be a list of effects'),
+    ('- {effect: backlash\n', 'line 2: '),
+])  # fmt: skip
+def test_bad_effects_files_name_file_and_entry(tmp_path, robot, text, words):
+    path = tmp_path / 'e.yaml'
+    path.write_text(text)
+    with pytest.raises(ModelError, match=re.escape(words)) as caught:
+        read_effects(path, robot)
+    assert str(caught.value).startswith(f"effects file '{path}'")
+
+
+def test_an_empty_effects_file_means_no_effects(tmp_path, robot):
+    (tmp_path / 'e.yaml').write_text('')
+    assert read_effects(tmp_path / 'e.yaml', robot) == ()

@@ -1,0 +1,319 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+import csv
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import read_recording, write_recording
+from weld_twin_msgs_py.robots import load_robot
+from weld_twin_msgs_py.tables import TableOptions, read_table
+
+JOINTS = ['j1', 'j2', 'j3', 'j4', 'j5', 'j6']
+
+
+@pytest.fixture
+def ur5():
+    return catalog.load('ur5')
+
+
+def columns_of(path, delimiter):
+    """Read a table with the standard library alone; a decimal comma becomes a point."""
+    with open(path, newline='') as file:
+        rows = list(csv.reader(file, delimiter=delimiter))
+    cells = [[float(cell.replace(',', '.')) for cell in row] for row in rows[1:]]
+    return dict(zip(rows[0], np.array(cells).T, strict=True))
+
+
+def stacked(columns, *names):
+    return np.stack([columns[name] for name in names], axis=1)
+
+
+def poses(robot, count=12, seed=2):
+    q = np.random.default_rng(seed).uniform(-2.5, 2.5, (count, robot.n))
+    return q, forward(robot, q)
+
+
+def table(path, header, *blocks, delimiter=','):
+    rows = np.concatenate([np.reshape(b, (len(b), -1)) for b in blocks], axis=1)
+    lines = [delimiter.join(header), *(delimiter.join(repr(float(v)) for v in r) for r in rows)]
+    path.write_text('\n'.join(lines) + '\n')
+    return path
+
+
+# The two published formats -------------------------------------------------------------------
+
+
+def test_target_plus_difference_in_mm_and_degrees(data, ur5):
+    raw = columns_of(data / 'ur5_like.csv', ',')
+    recording, said = read_table(data / 'ur5_like.csv', ur5)
+    target = stacked(raw, 'x_t', 'y_t', 'z_t')
+    difference = stacked(raw, 'x_dif', 'y_dif', 'z_dif')
+    expected = (target + difference) / 1000
+    np.testing.assert_allclose(recording.measured.position, expected, atol=1e-15)
+    q = stacked(raw, *(f'joint_{k}' for k in range(1, 7)))
+    np.testing.assert_allclose(recording.joints.q, np.deg2rad(q), atol=1e-15)
+    np.testing.assert_array_equal(recording.joints.t, np.arange(24.0))
+    assert recording.joints.static
+    assert recording.measured.rotation is None
+    assert said[:4] == (
+        "columns are separated by ','",
+        'joint columns are joint_1, joint_2, joint_3, joint_4, joint_5, joint_6',
+        f'joint angles are in degrees (up to {abs(q).max():.4g})',
+        'measured = target (x_t, y_t, z_t) plus difference (x_dif, y_dif, z_dif); '
+        '--difference decides',
+    )
+    assert any(sentence.startswith('positions are in mm') for sentence in said)
+
+
+def test_the_sign_of_the_difference_is_the_users(data, ur5):
+    raw = columns_of(data / 'ur5_like.csv', ',')
+    options = TableOptions(difference='subtract')
+    recording, _ = read_table(data / 'ur5_like.csv', ur5, options)
+    expected = (raw['x_t'] - raw['x_dif']) / 1000
+    np.testing.assert_allclose(recording.measured.position[:, 0], expected, atol=1e-15)
+
+
+def test_decimal_comma_euler_angles_sigmas_and_temperature(data):
+    raw = columns_of(data / 'ur10_like.csv', ';')
+    recording, said = read_table(data / 'ur10_like.csv', catalog.load('ur10'))
+    m = recording.measured
+    position = stacked(raw, 'measurement_x', 'measurement_y', 'measurement_z') / 1000
+    np.testing.assert_allclose(m.position, position, atol=1e-15)
+    angles = stacked(raw, 'measurement_rx', 'measurement_ry', 'measurement_rz')
+    x, y, z = (Rotation.from_euler(axis, angles[:, [k]], True) for k, axis in enumerate('xyz'))
+    np.testing.assert_allclose(m.rotation, (x * y * z).as_matrix(), atol=1e-14)
+    std = stacked(raw, *(f'measurement_std_{axis}' for axis in 'xyz')) / 1000
+    np.testing.assert_allclose(m.sigma, np.sqrt((std**2).mean(axis=1)), rtol=1e-14)
+    np.testing.assert_allclose(recording.temperature.value, raw['measurement_temperature'])
+    np.testing.assert_allclose(recording.joints.q[:, 1], raw['shoulder_lift_joint'])
+    text = '\n'.join(said)
+    assert 'the decimal sign is a comma' in text
+    assert 'measured angles are Euler XYZ (intrinsic)' in text
+    assert "stamps in 'Timestamp' do not increase from row to row; rows are taken in their" in text
+
+
+def test_an_imported_table_survives_the_bag(data, tmp_path):
+    robot = catalog.load('ur10')
+    recording, _ = read_table(data / 'ur10_like.csv', robot)
+    write_recording(tmp_path / 'bag', recording, robot)
+    back = read_recording(tmp_path / 'bag', robot)
+    assert back.joints.static
+    np.testing.assert_array_equal(back.measured.position, recording.measured.position)
+    np.testing.assert_allclose(back.measured.rotation, recording.measured.rotation, atol=1e-14)
+    np.testing.assert_allclose(back.measured.sigma, recording.measured.sigma, rtol=1e-14)
+    np.testing.assert_array_equal(back.temperature.value, recording.temperature.value)
+
+
+# What is found out ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('order', ['XYZ', 'ZYX', 'XZY', 'YXZ'])
+@pytest.mark.parametrize('unit', ['rad', 'deg'])
+def test_the_order_of_the_angles_follows_from_the_arm(tmp_path, ur5, order, unit):
+    q, T = poses(ur5)
+    world = Rotation.random(random_state=4)
+    turned = world * Rotation.from_matrix(T[:, :3, :3]) * Rotation.random(random_state=5)
+    angles = turned.as_euler(order, degrees=unit == 'deg')
+    columns = angles[:, [order.index(axis) for axis in 'XYZ']]
+    path = table(
+        tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z', 'rx', 'ry', 'rz'], q,
+        world.apply(T[:, :3, 3]), columns,
+    )  # fmt: skip
+    recording, said = read_table(path, ur5)
+    np.testing.assert_allclose(recording.measured.rotation, turned.as_matrix(), atol=1e-12)
+    assert any(f'Euler {order} (intrinsic)' in sentence for sentence in said)
+
+
+def test_a_rotation_vector_is_told_from_euler_angles(tmp_path, ur5):
+    q, T = poses(ur5)
+    vector = Rotation.from_matrix(T[:, :3, :3]).as_rotvec()
+    header = [*JOINTS, 'x', 'y', 'z', 'rx', 'ry', 'rz']
+    recording, said = read_table(table(tmp_path / 't.csv', header, q, T[:, :3, 3], vector), ur5)
+    np.testing.assert_allclose(recording.measured.rotation, T[:, :3, :3], atol=1e-12)
+    assert any('a rotation vector' in sentence for sentence in said)
+
+
+def test_quaternions_are_read_by_their_names(tmp_path, ur5):
+    q, T = poses(ur5)
+    x, y, z, w = Rotation.from_matrix(T[:, :3, :3]).as_quat().T
+    header = [*JOINTS, 'x', 'y', 'z', 'qw', 'qx', 'qy', 'qz']
+    path = table(tmp_path / 't.csv', header, q, T[:, :3, 3], w, x, y, z)
+    recording, _ = read_table(path, ur5)
+    np.testing.assert_allclose(recording.measured.rotation, T[:, :3, :3], atol=1e-12)
+
+
+def test_units_in_the_header_are_believed(tmp_path, ur5):
+    q, T = poses(ur5)
+    header = [*(f'{joint} [deg]' for joint in JOINTS), 'x [mm]', 'y [mm]', 'z [mm]']
+    path = table(tmp_path / 't.csv', header, np.rad2deg(q), T[:, :3, 3] * 1000)
+    recording, said = read_table(path, ur5)
+    np.testing.assert_allclose(recording.joints.q, q, atol=1e-14)
+    np.testing.assert_allclose(recording.measured.position, T[:, :3, 3], atol=1e-14)
+    assert not any('positions are in' in sentence for sentence in said)
+
+
+def test_joints_with_their_own_names_may_stand_in_any_order(tmp_path, ur5):
+    q, T = poses(ur5)
+    header = [*reversed(ur5.joint_names), 'x', 'y', 'z']
+    recording, _ = read_table(table(tmp_path / 't.csv', header, q[:, ::-1], T[:, :3, 3]), ur5)
+    np.testing.assert_array_equal(recording.joints.q, q)
+
+
+def test_the_tool_offset_does_not_hide_that_the_table_is_right(tmp_path, ur5):
+    q, T = poses(ur5, 40)
+    tip = T[:, :3, 3] + T[:, :3, :3] @ [0.1, 0.05, 0.3]
+    _, said = read_table(table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, tip), ur5)
+    (sentence,) = (s for s in said if 'base and tool fitted' in s)
+    assert float(re.search(r'are (\S+) mm', sentence).group(1)) < 0.01
+
+
+def test_a_row_that_stands_out_is_named_and_kept(tmp_path, ur5):
+    q, T = poses(ur5, 60)
+    position = T[:, :3, 3] + np.random.default_rng(1).normal(0.0, 1e-3, (60, 3))
+    position[17] += 0.08
+    recording, said = read_table(
+        table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, position), ur5
+    )
+    assert any(s.startswith('1 rows stand out, most of all line 19') for s in said)
+    assert recording.joints.t.size == 60
+
+
+def test_stamps_that_increase_are_kept(tmp_path, ur5):
+    q, T = poses(ur5)
+    ms = 1_700_000_000_000.0 + 2500.0 * np.arange(12)
+    path = table(tmp_path / 't.csv', ['time', *JOINTS, 'x', 'y', 'z'], ms, q, T[:, :3, 3])
+    recording, said = read_table(path, ur5)
+    np.testing.assert_allclose(recording.joints.t, 2.5 * np.arange(12), atol=1e-6)
+    assert recording.epoch_ns == 1_700_000_000_000_000_000
+    assert "stamps in 'time' are in ms" in said
+
+
+def test_rows_with_a_gap_are_left_out_and_counted(tmp_path, ur5):
+    q, T = poses(ur5)
+    path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3])
+    lines = path.read_text().splitlines()
+    lines[4] = ','.join(['', *lines[4].split(',')[1:]])
+    path.write_text('\n'.join(lines))
+    recording, said = read_table(path, ur5)
+    assert recording.joints.t.size == 11
+    assert '1 rows with empty cells left out, the first in line 5' in said
+
+
+def test_rows_to_skip_are_skipped(data, ur5):
+    recording, _ = read_table(data / 'ur5_like.csv', ur5, TableOptions(skip_rows=(1, 24)))
+    assert recording.joints.t.size == 22
+
+
+# What is refused -----------------------------------------------------------------------------
+
+HEAD = 'j1,j2,j3,j4,j5,j6,x,y,z'
+ROW = '0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9'
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('', "table '{}' needs a header line and at least one row"),
+    (f'{ROW}\n{ROW}\n', "table '{}' has numbers in its first line; put a header line above"),
+    (f'{HEAD}\n{ROW},1\n{ROW}\n', "table '{}' line 2 has 10 cells, the header has 9"),
+    ('a b\n1 2\n', '--delimiter decides'),
+    (f'{HEAD}\n{ROW}\n{ROW.replace("0.3", "abc")}\n',
+     "table '{}' line 3, column 'j3': 'abc' is no number with decimal '.'"),
+    (f'{HEAD},x\n{ROW},1\n', "table '{}' has two columns called 'x'; rename one"),
+    (f'{HEAD.replace("j6", "w")}\n{ROW}\n',
+     "table '{}': the table has no columns for the 6 joints of robot 'ur5' (shoulder_pan_joint, "),
+    (f'{HEAD.replace("z", "w")}\n{ROW}\n',
+     "table '{}': the table has no columns with measured positions, nor target and difference; "
+     '--position-columns'),
+    ('j1;j2;j3;j4;j5;j6;x;y;z\n0,1;0,2;0,3;0,4;0,5;0,6;7.1;8.1;9.1\n', '--decimal decides'),
+    (HEAD.replace('x,y,z', 'measured_x,measured_y,measured_z,laser_x,laser_y,laser_z') + '\n'
+     + f'{ROW},1,2,3\n', 'several columns could serve (measured_x, measured_y, measured_z; '
+     'laser_x, laser_y, laser_z); --position-columns decides'),
+    (f'{HEAD}\n{ROW.replace("0.9", "")}\n', "table '{}' has no complete row"),
+    (f'{HEAD}\n{ROW}\n{ROW.replace("0.9", "-1e308")}\n',
+     "table '{}' line 3, column 'z': -1e+308 is far beyond any robot's"),
+])  # fmt: skip
+def test_bad_tables_are_refused_in_one_sentence(tmp_path, ur5, text, words):
+    path = tmp_path / 't.csv'
+    path.write_text(text)
+    with pytest.raises(DataError, match=re.escape(words.format(path))) as caught:
+        read_table(path, ur5)
+    assert '\n' not in str(caught.value)
+
+
+def test_blank_lines_before_the_header_do_not_matter(data, tmp_path, ur5):
+    text = (data / 'ur5_like.csv').read_text()
+    (tmp_path / 'late.csv').write_text('\n' * 40 + text)
+    late, _ = read_table(tmp_path / 'late.csv', ur5)
+    usual, _ = read_table(data / 'ur5_like.csv', ur5)
+    np.testing.assert_array_equal(late.measured.position, usual.measured.position)
+
+
+def test_a_spreadsheet_is_no_table(tmp_path, ur5):
+    (tmp_path / 't.xlsx').write_bytes(b'PK\x03\x04\0\0\0\0')
+    with pytest.raises(DataError, match='is no text; save it as CSV'):
+        read_table(tmp_path / 't.xlsx', ur5)
+
+
+def test_a_missing_table_is_named(tmp_path, ur5):
+    with pytest.raises(DataError, match=r"nowhere\.csv' cannot be read: No such file"):
+        read_table(tmp_path / 'nowhere.csv', ur5)
+
+
+def test_positions_of_another_robot_are_refused(tmp_path, ur5):
+    q, T = poses(load_robot('abb_irb1600'), 40)
+    path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3])
+    with pytest.raises(DataError, match='wrong robot, joint columns, or units'):
+        read_table(path, ur5)
+
+
+def test_a_length_that_is_neither_metres_nor_millimetres_is_refused(tmp_path, ur5):
+    q, T = poses(ur5, 40)
+    path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3] * 39.37)
+    with pytest.raises(DataError, match='--length-unit decides'):
+        read_table(path, ur5)
+
+
+def test_angles_no_convention_explains_are_refused(tmp_path, ur5):
+    q, T = poses(ur5, 40)
+    angles = np.random.default_rng(3).uniform(-3.0, 3.0, (40, 3))
+    header = [*JOINTS, 'x', 'y', 'z', 'rx', 'ry', 'rz']
+    path = table(tmp_path / 't.csv', header, q, T[:, :3, 3], angles)
+    with pytest.raises(DataError, match='no reading of the three angles agrees with the arm'):
+        read_table(path, ur5)
+    recording, _ = read_table(path, ur5, TableOptions(positions_only=True))
+    assert recording.measured.rotation is None
+
+
+def test_angles_that_fit_several_conventions_need_the_user(tmp_path, ur5):
+    q, T = poses(ur5, 1)
+    q = np.repeat(q, 9, axis=0)
+    q[:, 5] += np.linspace(0.0, 1.0, 9)
+    there = forward(ur5, q)
+    turned = Rotation.from_matrix(T[0, :3, :3]).inv() * Rotation.from_matrix(there[:, :3, :3])
+    header = [*JOINTS, 'x', 'y', 'z', 'rx', 'ry', 'rz']
+    path = table(
+        tmp_path / 't.csv', header, q, there[:, :3, 3], turned.as_rotvec()
+    )
+    with pytest.raises(DataError, match='--rotation decides'):
+        read_table(path, ur5, TableOptions(length_unit='m'))
+
+
+@pytest.mark.parametrize(('options', 'words'), [
+    ({'difference': 'times'}, "--difference must be one of add, subtract, got 'times'"),
+    ({'rotation': 'ABC'}, '--rotation must be one of XYZ, '),
+    ({'position_columns': ('x', 'y')}, '--position-columns needs 3 column names, got 2'),
+])  # fmt: skip
+def test_options_that_mean_nothing_are_refused(options, words):
+    with pytest.raises(DataError, match=re.escape(words)):
+        TableOptions(**options)
+
+
+def test_a_column_that_is_not_there_lists_those_there_are(data, ur5):
+    options = TableOptions(position_columns=('x', 'y', 'z'))
+    with pytest.raises(DataError, match="no column 'x'; its columns are step_order, x_t, y_t"):
+        read_table(data / 'ur5_like.csv', ur5, options)

@@ -1,0 +1,206 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is in a bag and what of it a diagnosis can use."""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..messages.topics import (
+    JOINT_STATES,
+    MEASURED_POINT,
+    MEASURED_SIGMA,
+    TEMPERATURE,
+    TOOL_WRENCH,
+    TopicNames,
+)
+from .from_bag import POSE_TYPES
+from .reader import BagReader
+
+GAP = 4.0
+"""A step longer than so many median steps is a gap."""
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """
+    One topic of a bag.
+
+    Attributes
+    ----------
+    start_ns, end_ns : int, optional [ns]
+        Earliest and latest stamp.
+    rate_hz : float, optional
+        From the median step; None with fewer than two messages.
+    gaps : int
+        Steps longer than `GAP` median steps.
+    longest_gap_s : float [s]
+    unordered, repeated, unstamped : int
+        Messages that go back in time, repeat the stamp before, or have none.
+    use : str
+        What a diagnosis takes it for; empty for a topic it does not know.
+
+    """
+
+    name: str
+    type: str
+    count: int
+    use: str = ''
+    start_ns: int | None = None
+    end_ns: int | None = None
+    rate_hz: float | None = None
+    gaps: int = 0
+    longest_gap_s: float = 0.0
+    unordered: int = 0
+    repeated: int = 0
+    unstamped: int = 0
+
+
+@dataclass(frozen=True)
+class BagInfo:
+    """
+    A bag at a glance.
+
+    Attributes
+    ----------
+    duration_s : float [s]
+        From the first to the last stamp of the topics in use, else of all.
+    usable : bool
+        A diagnosis can start from it.
+    missing : tuple of str
+        What keeps it from being usable, a sentence each.
+    notes : tuple of str
+        What a diagnosis will do without or work around.
+    provenance : dict
+
+    """
+
+    path: Path
+    topics: tuple[TopicInfo, ...]
+    start_ns: int
+    duration_s: float
+    missing: tuple[str, ...]
+    notes: tuple[str, ...]
+    provenance: dict[str, Any]
+
+    @property
+    def usable(self) -> bool:
+        """Return whether nothing is missing."""
+        return not self.missing
+
+
+def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
+    """
+    Look through a bag; every message is touched, none is decoded.
+
+    Raises
+    ------
+    DataError
+        No such bag, or damaged.
+
+    """
+    names = TopicNames() if topics is None else topics
+    stamps: dict[str, array[int]] = {}
+    unstamped: dict[str, int] = {}
+    with BagReader(path) as bag:
+        for topic, ns, header in bag.stamps():
+            if header and ns == 0:
+                unstamped[topic] = unstamped.get(topic, 0) + 1
+            else:
+                stamps.setdefault(topic, array('q')).append(ns)
+        found = [
+            _describe(name, kind, stamps.get(name, array('q')), unstamped.get(name, 0), names)
+            for name, (kind, _) in sorted(bag.topics.items())
+        ]
+        made = bag.provenance
+    used = [t for t in found if t.use and t.start_ns is not None]
+    timed = used or [t for t in found if t.start_ns is not None]
+    start = min((t.start_ns for t in timed if t.start_ns is not None), default=0)
+    end = max((t.end_ns for t in timed if t.end_ns is not None), default=0)
+    missing, notes = _judge(names, {t.use: t for t in used}, found)
+    return BagInfo(Path(path), tuple(found), start, (end - start) * 1e-9, missing, notes, made)
+
+
+def _uses(names: TopicNames) -> dict[str, tuple[str, tuple[str, ...]]]:
+    """Return use and acceptable types by topic name."""
+    return {
+        names.joints: ('joints', (JOINT_STATES.type,)),
+        names.pose: ('pose', POSE_TYPES),
+        names.point: ('point', (MEASURED_POINT.type,)),
+        names.sigma: ('sigma', (MEASURED_SIGMA.type,)),
+        names.wrench: ('wrench', (TOOL_WRENCH.type,)),
+        names.temperature: ('temperature', (TEMPERATURE.type,)),
+    }
+
+
+def _describe(
+    name: str, kind: str, stamps: array[int], unstamped: int, names: TopicNames
+) -> TopicInfo:
+    use, types = _uses(names).get(name, ('', ()))
+    ns = np.frombuffer(stamps, dtype=np.int64)
+    steps = np.diff(ns)
+    forward = steps[steps > 0]
+    count = ns.size + unstamped
+    use = use if kind in types else ''
+    if ns.size == 0:
+        return TopicInfo(name, kind, count, use, unstamped=unstamped)
+    median = float(np.median(forward)) if forward.size else 0.0
+    gaps = forward[forward > GAP * median]
+    return TopicInfo(
+        name, kind, count, use, int(ns.min()), int(ns.max()),
+        1e9 / median if median else None, int(gaps.size), float(gaps.max(initial=0)) * 1e-9,
+        int((steps < 0).sum()), int((steps == 0).sum()), unstamped,
+    )  # fmt: skip
+
+
+def _judge(
+    names: TopicNames, used: dict[str, TopicInfo], found: list[TopicInfo]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return what is missing for a diagnosis and what it will do without."""
+    missing, notes = [], []
+    others = {t.type: t.name for t in found if not t.use and t.count}
+    if 'joints' not in used:
+        missing.append(
+            f"no joint states on '{names.joints}'" + _hint(others, JOINT_STATES.type, 'joint')
+        )
+    measured = used.get('pose') or used.get('point')
+    if measured is None:
+        hints = _hint(others, POSE_TYPES[0], 'pose') or _hint(others, MEASURED_POINT.type, 'point')
+        missing.append(f"no measurements on '{names.pose}' or '{names.point}'" + hints)
+    joints = used.get('joints')
+    if joints and measured and not _overlap(joints, measured):
+        missing.append(
+            f"'{joints.name}' and '{measured.name}' do not overlap in time: their stamps come "
+            'from different clocks'
+        )
+    if measured is not None and measured.use == 'point':
+        notes.append('positions only: errors that turn the tool in place stay invisible')
+    for use, effects in (('wrench', 'tool loads'), ('temperature', 'thermal growth')):
+        if use not in used:
+            notes.append(f'no {use}: {effects} cannot be told from other causes')
+    for topic in used.values():
+        for number, what in (
+            (topic.unstamped, 'without a stamp'), (topic.unordered, 'out of order'),
+            (topic.repeated, 'with a repeated stamp'), (topic.gaps, 'after a gap'),
+        ):  # fmt: skip
+            if number:
+                notes.append(f"{number} messages of '{topic.name}' {what}")
+    return tuple(missing), tuple(notes)
+
+
+def _hint(others: dict[str, str], kind: str, option: str) -> str:
+    if kind not in others:
+        return ''
+    return f"; '{others[kind]}' has that type, try --{option}-topic {others[kind]}"
+
+
+def _overlap(first: TopicInfo, second: TopicInfo) -> bool:
+    if first.start_ns is None or second.start_ns is None:
+        return False
+    assert first.end_ns is not None and second.end_ns is not None
+    return first.start_ns <= second.end_ns and second.start_ns <= first.end_ns

@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The model of a diagnosis file: fitted frames, effects given, effects found."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array, readonly
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects.setup_motion import of_the_robot, seen_from
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_core.recording import Recording
+from weld_twin_core.twin.twin import Twin
+
+from .yaml_file import whole
+
+SCHEMA_PREFIX = 'weld_twin/diagnosis/'
+SIZE_LIMIT = 64_000_000
+"""Bytes; a diagnosis of thousands of stations is some hundred kilobytes."""
+
+
+def read_diagnosis(path: Path | str) -> dict[str, Any]:
+    """
+    Return the content of a diagnosis file.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, is no JSON, or is no diagnosis.
+
+    """
+    try:
+        with Path(path).open('rb') as file:
+            raw = file.read(SIZE_LIMIT + 1)
+        if len(raw) > SIZE_LIMIT:
+            raise ModelError(f"'{path}' is larger than any diagnosis")
+        data = json.loads(raw, parse_int=lambda text: whole(int(text)))
+    except OSError as error:
+        raise ModelError(f"diagnosis '{path}' cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise ModelError(f"diagnosis '{path}' is not JSON: {error}") from None
+    schema = data.get('schema') if isinstance(data, dict) else None
+    if not isinstance(data, dict) or not str(schema).startswith(SCHEMA_PREFIX):
+        raise ModelError(
+            f"'{path}' is no diagnosis: its schema is {schema!r}, expected {SCHEMA_PREFIX}1; give "
+            'the diagnosis.json that weld-twin diagnose wrote'
+        )
+    return data
+
+
+def read_model(robot: Robot, path: Path | str) -> Model:
+    """
+    Return the model of a diagnosis file, on the robot it was made for.
+
+    Raises
+    ------
+    ModelError
+        The file is no diagnosis, holds no model, or its effects do not fit the robot.
+
+    """
+    model = read_diagnosis(path).get('model')
+    if not isinstance(model, dict):
+        raise ModelError(f"diagnosis '{path}' holds no model; make it anew with diagnose")
+    try:
+        tool = _frame(model['tool'], 'model.tool')
+        bases = tuple(_frame(base, 'model.bases') for base in model['bases'])
+        known = effects_from_list(model.get('known', []), robot)
+        found = effects_from_list(model.get('found', []), robot)
+    except (KeyError, TypeError) as error:
+        raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
+    except (ModelError, DataError) as error:
+        raise ModelError(f"diagnosis '{path}': {error}") from None
+    if not bases:
+        raise ModelError(f"the model of diagnosis '{path}' has no base frame")
+    return Model(robot.with_frames(tool=tool), bases, known, found)
+
+
+def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:
+    """
+    Return the twin of a diagnosis file: fitted frames, effects given and effects found.
+
+    Parameters
+    ----------
+    robot : Robot
+        The nominal robot that was diagnosed.
+    path : Path or str
+        diagnosis.json.
+    setup : int
+        Which recording's base frame, in the order of the diagnosis; they differ where the
+        set-up moved between recordings.
+
+    Raises
+    ------
+    ModelError
+        The file holds no usable model, or has no such set-up.
+
+    """
+    model = read_model(robot, path)
+    if not 0 <= setup < len(model.bases):
+        raise ModelError(
+            f"diagnosis '{path}' has {len(model.bases)} set-up(s), there is no number {setup + 1}"
+        )
+    return model.twin(setup)
+
+
+def timed(path: Path | str, model: Model, setup: int, recording: Recording) -> Twin:
+    """
+    Return the twin of one set-up of a diagnosis file, for a recording at its time.
+
+    How the set-up itself moved is applied where the recording overlaps with the one diagnosed,
+    and left out elsewhere.
+    """
+    stored = read_diagnosis(path)['model']
+    twin = model.twin(setup)
+    try:
+        epoch, span = int(stored['epochs_ns'][setup]), stored['spans_ns'][setup]
+        effects = seen_from(twin.effects, epoch, (int(span[0]), int(span[1])), recording)
+    except (KeyError, IndexError, TypeError, ValueError):
+        effects = of_the_robot(twin.effects)
+    return Twin(twin.robot, effects)
+
+
+def one_base(model: Model) -> bool:
+    """Return whether all recordings share one base frame."""
+    return all(np.array_equal(base, model.bases[0]) for base in model.bases)
+
+
+def _frame(value: Any, name: str) -> Array:
+    frame = readonly(value, (4, 4), name)
+    turned = frame[:3, :3] @ frame[:3, :3].T
+    if abs(turned - np.eye(3)).max() > 1e-6 or abs(frame[3] - [0, 0, 0, 1]).max() > 1e-9:
+        raise DataError(f'{name} is no rigid transform')
+    return frame

@@ -1,0 +1,295 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Messages to arrays.
+
+The functions read attributes only, so messages of rclpy and of rosbags serve alike. Positions in
+m, angles in rad, quaternions x y z w, stamps int64 ns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm.rotation import matrix_from_quaternion
+from weld_twin_core.arrays import Array, readonly
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion
+
+NANOSECONDS = 1_000_000_000
+
+
+def stamp_ns(message: Any) -> int:
+    """
+    Return the header stamp [ns].
+
+    Raises
+    ------
+    DataError
+        The stamp was never set, or is not a time.
+
+    """
+    stamp = message.header.stamp
+    ns = int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+    if ns <= 0:
+        raise DataError(
+            f'header.stamp is {ns} ns: the publisher left it unset, so the sample has no place in '
+            'time; set header.stamp where the sample is taken'
+        )
+    return ns
+
+
+@lru_cache(maxsize=64)
+def _indices(present: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[int, ...]:
+    """Return where the wanted joints are; cached because every message repeats its names."""
+    missing = [name for name in wanted if name not in present]
+    if missing:
+        listed = ', '.join(present) or 'none'
+        raise DataError(f'the joint state has no joint {missing[0]!r}; it has {listed}')
+    return tuple(present.index(name) for name in wanted)
+
+
+@lru_cache(maxsize=64)
+def _present(present: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for name in wanted if name in present)
+
+
+def joints_present(message: Any, joint_names: Sequence[str]) -> tuple[str, ...]:
+    """Return which of the joints a joint state tells of, in the order they were asked for."""
+    return _present(tuple(message.name), tuple(joint_names))
+
+
+def joint_positions(message: Any, joint_names: Sequence[str]) -> Array:
+    """
+    Return joint positions, shape (n,) [rad or m], matched by name.
+
+    Order does not matter and further joints are left out.
+
+    Raises
+    ------
+    DataError
+        A joint is missing (the message names it and those present), there are fewer positions
+        than names, or a position is not finite.
+
+    """
+    index = _indices(tuple(message.name), tuple(joint_names))
+    values = message.position
+    if len(values) != len(message.name):
+        raise DataError(
+            f'the joint state has {len(message.name)} names but {len(values)} positions; '
+            'it must give one position per name'
+        )
+    chosen = [values[k] for k in index]
+    _refuse_unfinite(chosen, joint_names, 'position')
+    return np.array(chosen, dtype=np.float64)
+
+
+def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
+    """
+    Return joint velocities, shape (n,) [rad/s or m/s], or None where they are not known.
+
+    joint_state_broadcaster writes NaN for a joint without a velocity interface, so NaN means
+    unknown here; an infinite velocity is refused.
+
+    Raises
+    ------
+    DataError
+        A velocity is infinite.
+
+    """
+    values = message.velocity
+    if len(values) != len(message.name):
+        return None
+    index = _indices(tuple(message.name), tuple(joint_names))
+    chosen = [values[k] for k in index]
+    if any(value != value for value in chosen):
+        return None
+    _refuse_unfinite(chosen, joint_names, 'velocity')
+    return np.array(chosen, dtype=np.float64)
+
+
+def _refuse_unfinite(values: Sequence[float], joint_names: Sequence[str], what: str) -> None:
+    """Refuse in plain numbers: for one sample of an arm numpy costs more than the arithmetic."""
+    if not all(map(isfinite, values)):
+        k = [isfinite(value) for value in values].index(False)
+        raise DataError(
+            f'joint {joint_names[k]!r} has the {what} {values[k]}; it must be a finite number'
+        )
+
+
+def _xyz(vector: Any, name: str) -> Array:
+    out = np.array([vector.x, vector.y, vector.z], dtype=np.float64)
+    if not np.isfinite(out).all():
+        raise DataError(f'{name} is {out.tolist()}; it must be finite numbers')
+    return out
+
+
+def pose(message: Any) -> tuple[Array, Array]:
+    """
+    Return position (3,) [m] and rotation (3, 3) of a PoseStamped or PoseWithCovarianceStamped.
+
+    Raises
+    ------
+    DataError
+        A number is not finite, or the quaternion is not of length 1.
+
+    """
+    inner = message.pose
+    inner = getattr(inner, 'pose', inner)
+    q = inner.orientation
+    rotation = matrix_from_quaternion([q.x, q.y, q.z, q.w], 'orientation of the pose')
+    return _xyz(inner.position, 'position of the pose'), rotation
+
+
+def point(message: Any) -> Array:
+    """
+    Return the point of a PointStamped, shape (3,) [m].
+
+    Raises
+    ------
+    DataError
+        A coordinate is not finite.
+
+    """
+    return _xyz(message.point, 'the point')
+
+
+def vector3(message: Any) -> Array:
+    """
+    Return the vector of a Vector3Stamped, shape (3,).
+
+    Raises
+    ------
+    DataError
+        A component is not finite.
+
+    """
+    return _xyz(message.vector, 'the vector')
+
+
+def wrench(message: Any) -> Array:
+    """
+    Return force and torque of a WrenchStamped, shape (6,) [N, N m].
+
+    Raises
+    ------
+    DataError
+        A component is not finite.
+
+    """
+    inner = message.wrench
+    return np.concatenate([_xyz(inner.force, 'the force'), _xyz(inner.torque, 'the torque')])
+
+
+def temperature(message: Any) -> float:
+    """
+    Return the temperature of a Temperature message [degC].
+
+    Raises
+    ------
+    DataError
+        It is not finite, or below absolute zero, or so high that it must be in kelvin.
+
+    """
+    value = float(message.temperature)
+    if not isfinite(value) or value < -273.15:
+        raise DataError(f'the temperature is {value} degC, which is no temperature')
+    if value > 200.0:
+        raise DataError(
+            f'the temperature is {value:.6g} degC, which looks like kelvin; publish degC as '
+            'sensor_msgs/Temperature defines'
+        )
+    return value
+
+
+def position_sigma(message: Any) -> float | None:
+    """
+    Return one standard deviation of a PoseWithCovarianceStamped's position [m].
+
+    None where the covariance is left at zero. Axes are joined by their root mean square.
+
+    Raises
+    ------
+    DataError
+        A variance is negative or not finite.
+
+    """
+    diagonal = readonly(np.asarray(message.pose.covariance)[[0, 7, 14]], (3,), 'covariance')
+    if (diagonal < 0.0).any():
+        raise DataError('the covariance of the pose has a negative variance')
+    return float(np.sqrt(diagonal.mean())) if diagonal.any() else None
+
+
+def joint_trajectory(message: Any, joint_names: Sequence[str]) -> JointMotion:
+    """
+    Return the motion of a JointTrajectory, matched by name, t from its first point [s].
+
+    Velocities are kept where every point has them.
+
+    Raises
+    ------
+    DataError
+        A joint is missing, there are fewer than two points, a point has not one position per
+        name, a number is not finite, or the times do not increase.
+
+    """
+    index = list(_indices(tuple(message.joint_names), tuple(joint_names)))
+    count, points = len(message.joint_names), message.points
+    if len(points) < 2:
+        raise DataError(f'the joint trajectory has {len(points)} points; a motion needs two')
+    if any(len(p.positions) != count for p in points):
+        raise DataError(f'every point of the joint trajectory must have {count} positions')
+    q = np.array([p.positions for p in points], dtype=np.float64)[:, index]
+    known = all(len(p.velocities) == count for p in points)
+    qd = np.array([p.velocities for p in points], dtype=np.float64)[:, index] if known else None
+    since = [p.time_from_start for p in points]
+    t = np.array([s.sec + s.nanosec / NANOSECONDS for s in since])
+    if (np.diff(t) <= 0.0).any():
+        raise DataError('time_from_start must increase from point to point')
+    return JointMotion(t - t[0], q, qd)
+
+
+def path_points(message: Any) -> Array:
+    """
+    Return the positions of a Path, shape (N, 3) [m].
+
+    Raises
+    ------
+    DataError
+        There are fewer than two poses, or a coordinate is not finite.
+
+    """
+    if len(message.poses) < 2:
+        raise DataError(f'the path has {len(message.poses)} poses; a seam needs two')
+    return np.stack([_xyz(item.pose.position, 'a pose of the path') for item in message.poses])
+
+
+def diagnostics(message: Any) -> dict[str, dict[str, str]]:
+    """Return the key-value pairs of each status of a DiagnosticArray, by status name."""
+    return {
+        status.name: {pair.key: pair.value for pair in status.values}
+        for status in message.status
+    }
+
+
+def metrics(message: Any) -> Mapping[str, float]:
+    """
+    Return the numbers of the first status of a DiagnosticArray.
+
+    Raises
+    ------
+    DataError
+        The array is empty, or a value is not a number.
+
+    """
+    for status in message.status:
+        try:
+            return {pair.key: float(pair.value) for pair in status.values}
+        except ValueError as error:
+            raise DataError(f'metrics {status.name!r}: {error}') from None
+    raise DataError('the diagnostic array has no status')

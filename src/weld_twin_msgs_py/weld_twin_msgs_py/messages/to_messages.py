@@ -1,0 +1,269 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Arrays to messages.
+
+One factory serves rclpy and rosbags: both take the fields as keywords, they only differ in where
+the class comes from and in what holds a sequence of numbers.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.recording import JointMotion
+
+from .from_messages import NANOSECONDS
+
+LEVELS = (b'\x00', b'\x01', b'\x02', b'\x03')
+"""Levels of a DiagnosticStatus: ok, warn, error, stale."""
+
+
+class Messages:
+    """Makes messages of one flavour; use `ros_messages` or `bag_messages`."""
+
+    def __init__(
+        self,
+        lookup: Callable[[str], Any],
+        numbers: Callable[[Array], Any],
+        level: Callable[[int], Any],
+    ) -> None:
+        self._lookup = lookup
+        self._numbers = numbers
+        self._level = level
+
+    def _make(self, kind: str, **fields: Any) -> Any:
+        return self._lookup(kind)(**fields)
+
+    def time(self, ns: int) -> Any:
+        """Return a builtin_interfaces/Time."""
+        sec, nanosec = divmod(int(ns), NANOSECONDS)
+        return self._make('builtin_interfaces/msg/Time', sec=sec, nanosec=nanosec)
+
+    def header(self, ns: int, frame_id: str) -> Any:
+        """Return a std_msgs/Header."""
+        return self._make('std_msgs/msg/Header', stamp=self.time(ns), frame_id=frame_id)
+
+    def joint_state(
+        self, ns: int, names: Sequence[str], q: Array, qd: Array | None = None, frame_id: str = ''
+    ) -> Any:
+        """Return a JointState from positions and velocities, shape (n,) each [rad, rad/s]."""
+        empty = np.zeros(0)
+        return self._make(
+            'sensor_msgs/msg/JointState', header=self.header(ns, frame_id), name=list(names),
+            position=self._numbers(np.asarray(q, dtype=np.float64)),
+            velocity=self._numbers(empty if qd is None else np.asarray(qd, dtype=np.float64)),
+            effort=self._numbers(empty),
+        )  # fmt: skip
+
+    def _xyz(self, kind: str, value: Array) -> Any:
+        x, y, z = (float(v) for v in value)
+        return self._make(f'geometry_msgs/msg/{kind}', x=x, y=y, z=z)
+
+    def pose(self, ns: int, position: Array, rotation: Array, frame_id: str = 'base') -> Any:
+        """Return a PoseStamped from position (3,) [m] and rotation (3, 3)."""
+        x, y, z, w = quaternion(rotation)
+        turned = self._make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
+        inner = self._make(
+            'geometry_msgs/msg/Pose', position=self._xyz('Point', position), orientation=turned
+        )
+        return self._make(
+            'geometry_msgs/msg/PoseStamped', header=self.header(ns, frame_id), pose=inner
+        )
+
+    def point(self, ns: int, position: Array, frame_id: str = 'base') -> Any:
+        """Return a PointStamped, (3,) [m]."""
+        return self._make(
+            'geometry_msgs/msg/PointStamped',
+            header=self.header(ns, frame_id), point=self._xyz('Point', position),
+        )  # fmt: skip
+
+    def vector3(self, ns: int, vector: Array, frame_id: str = 'base') -> Any:
+        """Return a Vector3Stamped, (3,)."""
+        return self._make(
+            'geometry_msgs/msg/Vector3Stamped',
+            header=self.header(ns, frame_id), vector=self._xyz('Vector3', vector),
+        )  # fmt: skip
+
+    def wrench(self, ns: int, wrench: Array, frame_id: str = 'tool') -> Any:
+        """Return a WrenchStamped from force and torque, (6,) [N, N m]."""
+        inner = self._make(
+            'geometry_msgs/msg/Wrench',
+            force=self._xyz('Vector3', wrench[:3]), torque=self._xyz('Vector3', wrench[3:]),
+        )  # fmt: skip
+        return self._make(
+            'geometry_msgs/msg/WrenchStamped', header=self.header(ns, frame_id), wrench=inner
+        )
+
+    def temperature(self, ns: int, celsius: float, frame_id: str = '') -> Any:
+        """Return a Temperature [degC]; its variance is left unknown (zero)."""
+        return self._make(
+            'sensor_msgs/msg/Temperature',
+            header=self.header(ns, frame_id), temperature=float(celsius), variance=0.0,
+        )  # fmt: skip
+
+    def diagnostics(
+        self, ns: int, name: str, values: Mapping[str, Any], level: int = 0, message: str = '',
+        hardware_id: str = '',
+    ) -> Any:  # fmt: skip
+        """Return a DiagnosticArray with one status; numbers are written to round trip."""
+        status = Status(name, level, message, values, hardware_id)
+        return self.statuses(ns, [status])
+
+    def statuses(self, ns: int, statuses: Sequence[Status]) -> Any:
+        """Return a DiagnosticArray."""
+        return self._make(
+            'diagnostic_msgs/msg/DiagnosticArray', header=self.header(ns, ''),
+            status=[self._status(status) for status in statuses],
+        )  # fmt: skip
+
+    def _status(self, status: Status) -> Any:
+        pairs = [
+            self._make('diagnostic_msgs/msg/KeyValue', key=str(k), value=_text(v))
+            for k, v in status.values.items()
+        ]
+        return self._make(
+            'diagnostic_msgs/msg/DiagnosticStatus', level=self._level(status.level),
+            name=status.name, message=status.message, hardware_id=status.hardware_id,
+            values=pairs,
+        )  # fmt: skip
+
+    def joint_trajectory(self, ns: int, names: Sequence[str], motion: JointMotion) -> Any:
+        """Return a JointTrajectory of a motion; its first point is at time zero."""
+        points = []
+        for t, q, qd in zip(motion.t - motion.t[0], motion.q, motion.velocity, strict=True):
+            sec, nanosec = divmod(round(float(t) * NANOSECONDS), NANOSECONDS)
+            points.append(self._make(
+                'trajectory_msgs/msg/JointTrajectoryPoint', positions=self._numbers(q),
+                velocities=self._numbers(qd), accelerations=self._numbers(np.zeros(0)),
+                effort=self._numbers(np.zeros(0)), time_from_start=self._make(
+                    'builtin_interfaces/msg/Duration', sec=sec, nanosec=nanosec),
+            ))  # fmt: skip
+        return self._make(
+            'trajectory_msgs/msg/JointTrajectory', header=self.header(ns, ''),
+            joint_names=list(names), points=points,
+        )  # fmt: skip
+
+    def path(self, ns: int, poses: Array, frame_id: str = 'world') -> Any:
+        """Return a Path through tool poses, shape (N, 4, 4)."""
+        stamped = [self.pose(ns, T[:3, 3], T[:3, :3], frame_id) for T in poses]
+        return self._make('nav_msgs/msg/Path', header=self.header(ns, frame_id), poses=stamped)
+
+    def markers(self, ns: int, markers: Sequence[Lines], frame_id: str = 'world') -> Any:
+        """Return a MarkerArray; each marker replaces the one of its name."""
+        return self._make(
+            'visualization_msgs/msg/MarkerArray',
+            markers=[self._lines(ns, frame_id, item) for item in markers],
+        )  # fmt: skip
+
+    def _lines(self, ns: int, frame_id: str, lines: Lines) -> Any:
+        kinds = self._lookup('visualization_msgs/msg/Marker')
+        colors = [
+            self._make('std_msgs/msg/ColorRGBA', r=float(r), g=float(g), b=float(b), a=1.0)
+            for r, g, b in lines.colors
+        ]
+        return self._make(
+            'visualization_msgs/msg/Marker', header=self.header(ns, frame_id), ns=lines.name,
+            id=0, type=kinds.LINE_STRIP if lines.strip else kinds.LINE_LIST, action=kinds.ADD,
+            pose=self._make('geometry_msgs/msg/Pose'),
+            scale=self._xyz('Vector3', np.array([lines.width, 0.0, 0.0])),
+            points=[self._xyz('Point', point) for point in lines.points], colors=colors,
+        )  # fmt: skip
+
+
+class Status(NamedTuple):
+    """One status of a DiagnosticArray."""
+
+    name: str
+    level: int
+    message: str
+    values: Mapping[str, Any]
+    hardware_id: str = ''
+
+
+class Lines(NamedTuple):
+    """
+    A marker of lines.
+
+    Attributes
+    ----------
+    name : str
+    points : array, shape (N, 3) [m]
+    colors : array, shape (N, 3)
+        Red, green, blue of each point, 0 to 1.
+    width : float [m]
+    strip : bool
+        One line through all points, or one between each two.
+
+    """
+
+    name: str
+    points: Array
+    colors: Array
+    width: float
+    strip: bool
+
+
+def quaternion(rotation: Array) -> list[float]:
+    """
+    Return the quaternion x y z w, w >= 0, of one rotation (3, 3).
+
+    In plain numbers, because a live node makes one per sample and scipy takes a third of a
+    millisecond for it.
+
+    References
+    ----------
+    .. [1] S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1, 1978.
+
+    """
+    r = rotation.tolist()
+    squares = [1.0 + 2.0 * r[k][k] - r[0][0] - r[1][1] - r[2][2] for k in range(3)]
+    squares.append(1.0 + r[0][0] + r[1][1] + r[2][2])
+    largest = max(range(4), key=squares.__getitem__)  # dividing by it loses no digits
+    out = [0.0] * 4
+    out[largest] = squares[largest]
+    if largest == 3:
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            out[k] = r[j][i] - r[i][j]
+    else:
+        i, j = (largest + 1) % 3, (largest + 2) % 3
+        out[i] = r[i][largest] + r[largest][i]
+        out[j] = r[j][largest] + r[largest][j]
+        out[3] = r[j][i] - r[i][j]
+    length = sum(value * value for value in out) ** 0.5
+    sign = -1.0 if out[3] < 0.0 else 1.0
+    return [sign * value / length for value in out]
+
+
+def _text(value: Any) -> str:
+    return repr(float(value)) if isinstance(value, float | np.floating) else str(value)
+
+
+def ros_messages() -> Messages:
+    """Return the factory of rclpy messages; needs a ROS installation."""
+    cache: dict[str, Any] = {}
+
+    def lookup(kind: str) -> Any:
+        if kind not in cache:
+            package, folder, name = kind.split('/')
+            cache[kind] = getattr(import_module(f'{package}.{folder}'), name)
+        return cache[kind]
+
+    # rclpy refuses numpy arrays for sequences and wants a byte as bytes.
+    return Messages(lookup, lambda values: array('d', values), lambda level: LEVELS[level])
+
+
+def bag_messages() -> Messages:
+    """Return the factory of rosbags messages, the ones a `BagWriter` serialises."""
+    from ..bags.typestore import TYPES
+
+    return Messages(
+        lambda kind: TYPES.types[kind], lambda values: values, lambda level: level
+    )

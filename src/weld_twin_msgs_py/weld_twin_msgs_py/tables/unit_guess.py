@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Degrees or radians, millimetres or metres: from the header, else from what the arm can do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+
+METRES = {'m': 1.0, 'mm': 1e-3}
+RADIANS = {'rad': 1.0, 'deg': np.pi / 180.0}
+_DOUBT = 6.0
+"""The spread of the measurements may differ from the arm's own by this factor."""
+
+
+def angle_unit(values: Array, given: str | None, what: str) -> tuple[str, str]:
+    """Return the unit of angles and the sentence that says how it was found."""
+    if given is not None:
+        return given, ''
+    largest = float(np.nanmax(abs(values), initial=0.0))
+    if largest > 2.0 * np.pi + 1e-3:
+        return 'deg', f'{what} are in degrees (up to {largest:.4g})'
+    return 'rad', f'{what} are in radians (none beyond {largest:.3g})'
+
+
+def length_unit(position: Array, robot: Robot, q: Array, given: str | None) -> tuple[str, str]:
+    """
+    Return the unit of the measured positions and the sentence that says how it was found.
+
+    The spread of the measurements must be that of the poses the joints give, whatever frame the
+    instrument has.
+
+    Raises
+    ------
+    DataError
+        Neither metres nor millimetres fit.
+
+    """
+    if given is not None:
+        return given, ''
+    own = _spread(forward(robot, q)[:, :3, 3])
+    theirs = _spread(position)
+    for unit, factor in METRES.items():
+        if own / _DOUBT < theirs * factor < own * _DOUBT:
+            return unit, f'positions are in {unit} (they spread as far as the arm moves)'
+    raise DataError(
+        f'positions spread over {theirs:.4g}, the arm moves over {own:.4g} m: neither metres nor '
+        'millimetres fit; --length-unit decides, or the joint columns are not what they seem'
+    )
+
+
+def _spread(position: Array) -> float:
+    return float(np.sqrt(((position - position.mean(axis=0)) ** 2).sum(axis=1).mean()))

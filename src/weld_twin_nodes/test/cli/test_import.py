@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`import`: tables made here from known angles, in the units and words of others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import forward
+from weld_twin_msgs_py.bags import read_recording
+
+ROBOT = catalog.load('ur5')
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Thirty stations in degrees and millimetres, the tool 2 mm off along x of the world."""
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-1.5, 1.5, size=(30, 6))
+    position = forward(ROBOT, q)[:, :3, 3] + [2e-3, 0.0, 0.0]
+    file = tmp_path / 'table.csv'
+    header = ','.join([f'joint_{k}' for k in range(1, 7)] + ['x_measured', 'y_measured',
+                                                             'z_measured'])  # fmt: skip
+    np.savetxt(file, np.hstack([np.degrees(q), position * 1e3]), delimiter=',', header=header,
+               comments='', fmt='%.17g')  # fmt: skip
+    return file, q, position
+
+
+def test_degrees_and_millimetres_arrive_as_radians_and_metres(weld_twin, tmp_path, table):
+    file, q, position = table
+    result = weld_twin('import', file, '--robot', 'ur5', '--out', tmp_path / 'bag')
+    assert result.code == 0, result.err
+    recording = read_recording(tmp_path / 'bag', ROBOT)
+    assert recording.joints.static
+    np.testing.assert_allclose(recording.joints.q, q, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(recording.measured.position, position, rtol=0.0, atol=1e-13)
+    assert 'joint angles are in degrees' in result.out
+    assert 'base and tool frame not fitted: RMS 2.000 mm, max 2.000 mm' in result.out
+
+
+def test_deviations_come_as_table_and_picture_too(weld_twin, tmp_path, table):
+    csv, png = tmp_path / 'off.csv', tmp_path / 'off.png'
+    weld_twin('import', table[0], '--robot', 'ur5', '--out', tmp_path / 'bag', '--table', csv,
+              '--picture', png)  # fmt: skip
+    rows = np.genfromtxt(csv, delimiter=',', names=True)
+    np.testing.assert_allclose(rows['dx_m'], 2e-3, atol=1e-9)
+    np.testing.assert_allclose(rows['dz_m'], 0.0, atol=1e-9)
+    assert png.read_bytes().startswith(b'\x89PNG')
+
+
+@pytest.mark.parametrize(('words', 'sentence'), [
+    (('--joint-columns', 'a,b,c,d,e,f'), "no column 'a'"),
+    (('--angle-unit', 'rad'), 'wrong robot'),
+    (('--position-columns', 'x_measured'), 'needs 3 column names'),
+    (('--skip-rows', '99'), 'names row 99'),
+])  # fmt: skip
+def test_a_table_misread_is_refused_with_the_option_that_decides(
+    weld_twin, tmp_path, table, words, sentence
+):
+    result = weld_twin('import', table[0], '--robot', 'ur5', '--out', tmp_path / 'bag', *words)
+    assert result.code == 2
+    assert sentence in result.err
+    assert len(result.err.splitlines()) == 1
+    assert not (tmp_path / 'bag').exists()

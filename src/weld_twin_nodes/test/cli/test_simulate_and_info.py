@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`simulate`, `info` and what every subcommand does with bad input."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import forward
+from weld_twin_msgs_py.bags import BagReader, provenance, read_recording
+from weld_twin_msgs_py.messages import from_messages
+
+ROBOT = catalog.load('ur5')
+
+
+def rows(path, topic):
+    with BagReader(path) as bag:
+        return [message for _, _, _, message in bag.messages([topic])]
+
+
+@pytest.fixture
+def effects(tmp_path):
+    file = tmp_path / 'effects.yaml'
+    file.write_text('- {effect: joint_offset, joint: elbow_joint, offset: 5e-4}\n')
+    return file
+
+
+def test_without_effects_the_deviation_vanishes(weld_twin, tmp_path):
+    """The paper's baseline scenario: line, constant speed, no error."""
+    out = tmp_path / 'bag'
+    assert weld_twin(
+        'simulate', '--robot', 'ur5', '--path', 'line', '--profile', 'constant', '--out', out
+    ).code == 0  # fmt: skip
+    last = from_messages.metrics(rows(out, '/deviation/metrics')[-1])
+    assert last['D_norm'] < 1e-12
+    assert last['samples'] > 1000
+    assert last['dropped'] == last['waiting'] == 0
+
+
+@pytest.mark.parametrize('profile', ['smooth', 'aggressive'])
+def test_a_joint_offset_moves_the_tool_as_the_arm_turned_by_it(
+    weld_twin, tmp_path, effects, profile
+):
+    out = tmp_path / 'bag'
+    result = weld_twin('simulate', '--robot', 'ur5', '--effects', effects, '--rate', 40,
+                       '--path', 'weave', '--profile', profile, '--out', out)  # fmt: skip
+    assert result.code == 0, result.err
+    recording = read_recording(out, ROBOT)
+    assert ('slowed down' in result.out) == (profile == 'aggressive')
+    turned = recording.joints.q + [0, 0, 5e-4, 0, 0, 0]
+    np.testing.assert_allclose(
+        recording.measured.position, forward(ROBOT, turned)[:, :3, 3], rtol=0.0, atol=1e-12
+    )
+    vectors = np.array([from_messages.vector3(m) for m in rows(out, '/deviation')])
+    nominal = forward(ROBOT, recording.joints.q)[:, :3, 3]
+    np.testing.assert_allclose(
+        vectors, recording.measured.position - nominal, rtol=0.0, atol=1e-12
+    )
+
+
+def test_a_model_that_knows_the_effects_leaves_no_deviation(weld_twin, tmp_path, effects):
+    out = tmp_path / 'bag'
+    weld_twin('simulate', '--robot', 'ur5', '--effects', effects, '--model', effects,
+              '--profile', 'aggressive', '--out', out)  # fmt: skip
+    assert from_messages.metrics(rows(out, '/deviation/metrics')[-1])['max'] < 1e-12
+
+
+def test_the_same_command_writes_the_same_messages(weld_twin, tmp_path, effects):
+    effects.write_text('[{effect: measurement_noise, sigma: 1e-5}]')
+    words = ('simulate', '--robot', 'ur5', '--effects', effects, '--profile', 'aggressive')
+    for name, seed in (('a', 1), ('b', 1), ('c', 2)):
+        assert weld_twin(*words, '--seed', seed, '--out', tmp_path / name).code == 0
+    a, b, c = (read_recording(tmp_path / name, ROBOT).measured.position for name in 'abc')
+    np.testing.assert_array_equal(a, b)
+    assert abs(a - c).max() > 1e-6
+    assert provenance(tmp_path / 'a')['seed'] == 1
+
+
+def test_a_path_file_with_torch_angles_is_followed(weld_twin, tmp_path):
+    file, out = tmp_path / 'seam.yaml', tmp_path / 'bag'
+    file.write_text(
+        'kind: line\nstart: [0.4, -0.1, 0.1]\nend: [0.4, 0.1, 0.1]\n'
+        'torch: {travel: 0.2, work: -0.1}\n'
+    )
+    result = weld_twin('simulate', '--robot', 'ur5', '--path', file, '--speed', 0.05,
+                       '--rate', 50, '--out', out)  # fmt: skip
+    assert result.code == 0, result.err
+    position = read_recording(out, ROBOT).measured.position
+    np.testing.assert_allclose(position[0], [0.4, -0.1, 0.1], atol=1e-8)
+    np.testing.assert_allclose(position[-1], [0.4, 0.1, 0.1], atol=1e-8)
+
+
+def test_taught_points_from_a_table_are_visited(weld_twin, tmp_path):
+    file, out = tmp_path / 'points.csv', tmp_path / 'bag'
+    points = np.array([[0.4, -0.1, 0.1], [0.42, 0.0, 0.11], [0.4, 0.1, 0.1]])
+    np.savetxt(file, points, delimiter=',', header='x,y,z', comments='')
+    assert weld_twin('simulate', '--robot', 'ur5', '--path', file, '--out', out).code == 0
+    position = read_recording(out, ROBOT).measured.position
+    for point in points:
+        assert np.linalg.norm(position - point, axis=1).min() < 3e-4
+
+
+def test_info_says_what_is_there_and_what_it_is_good_for(weld_twin, tmp_path, effects):
+    out = tmp_path / 'bag'
+    weld_twin('simulate', '--robot', 'ur5', '--effects', effects, '--rate', 40, '--out', out)
+    result = weld_twin('info', out)
+    assert result.code == 0
+    joints = next(line for line in result.out.splitlines() if line.startswith('/joint_states'))
+    assert joints.split()[1:3] == ['sensor_msgs/msg/JointState', 'joints']
+    assert '40' in joints.split()
+    assert 'usable for a diagnosis' in result.out
+    assert 'robot: ur5' in result.out
+
+
+def test_info_lists_the_bundled_robots(weld_twin):
+    listed = weld_twin('info', '--robots').out
+    assert all(name in listed for name in catalog.names())
+
+
+def test_a_bag_that_was_cut_short_is_named(weld_twin, tmp_path):
+    out = tmp_path / 'bag'
+    weld_twin('simulate', '--robot', 'ur5', '--profile', 'aggressive', '--out', out)
+    file = out / 'bag.mcap'
+    file.write_bytes(file.read_bytes()[:-4000])
+    result = weld_twin('info', out)
+    assert (result.code, result.out) == (2, '')
+    assert 'cut short' in result.err
+
+
+BAD = {
+    'unknown robot': (('--robot', 'ur99'), "'ur99' is neither"),
+    'unknown effect': (('--effects', '[{effect: rust}]'), "unknown effect 'rust'"),
+    'malformed effects': (('--effects', '- {effect: '), 'line'),
+    'missing effects file': (('--effects', None), 'No such file'),
+    'unknown joint': (
+        ('--effects', '[{effect: joint_offset, joint: knee, offset: 1}]'), "no joint 'knee'"),
+    'unknown profile': (('--profile', 'hasty'), "no profile is called 'hasty'"),
+    'unreachable seam': (
+        ('--path', 'kind: line\nstart: [3, 0, 0]\nend: [3, 1, 0]'), 'reach'),
+    'too fast': (('--speed', '9', '--profile', 'constant'), 'its limit is'),
+    'unknown kind of seam': (('--path', 'kind: heart'), "'heart'"),
+    'malformed seam': (('--path', 'kind: line\nstart: [0, 0'), 'line'),
+    'no samples': (('--rate', '0'), 'rate must be positive'),
+    'negative seed': (('--seed', '-1'), '--seed'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('what', BAD)
+def test_bad_input_costs_one_line_and_leaves_nothing(weld_twin, tmp_path, what):
+    words, sentence = BAD[what]
+    if words[0] in ('--effects', '--path'):
+        file = tmp_path / 'input.yaml'
+        if words[1] is not None:
+            file.write_text(words[1])
+        words = (words[0], file)
+    before = set(tmp_path.iterdir())
+    result = weld_twin('simulate', '--robot', 'ur5', '--out', tmp_path / 'bag', *words)
+    assert result.code == 2
+    assert result.out == ''
+    assert len(result.err.splitlines()) == 1
+    assert sentence in result.err
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_an_existing_bag_is_not_overwritten(weld_twin, tmp_path):
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'precious').touch()
+    result = weld_twin('simulate', '--robot', 'ur5', '--out', tmp_path / 'bag')
+    assert result.code == 2
+    assert 'exists already' in result.err
+    assert (tmp_path / 'bag' / 'precious').exists()
+
+
+@pytest.mark.parametrize('words', [(), ('dance',), ('simulate',), ('info',)])
+def test_wrong_usage_exits_with_2(weld_twin, words):
+    result = weld_twin(*words)
+    assert result.code == 2
+    assert result.err
+
+
+def test_help_is_quick_because_it_imports_little():
+    code = (
+        'import sys\n'
+        'from weld_twin_nodes.cli import main\n'
+        'for words in (["--help"], ["simulate", "--help"], ["import", "--help"]):\n'
+        '    try: main(words)\n'
+        '    except SystemExit as stop: assert stop.code == 0\n'
+        'slow = {"numpy", "scipy", "rclpy", "matplotlib", "rosbags"} & set(sys.modules)\n'
+        'assert not slow, slow\n'
+    )
+    subprocess.run([sys.executable, '-c', code], check=True, capture_output=True)
+
+
+def test_every_subcommand_has_help(weld_twin):
+    listed = weld_twin('--help').out
+    for name in ('demo', 'simulate', 'info', 'import'):
+        assert f' {name} ' in listed
+        assert weld_twin(name, '--help').code == 0

@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot, a short seam and a cell of live nodes."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.motion.planned_motion import Plan
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.offline.seam_motion import plan_motion
+
+
+@pytest.fixture(scope='session')
+def robot() -> Robot:
+    return catalog.load('ur5')
+
+
+@pytest.fixture(scope='session')
+def plan(robot: Robot) -> Plan:
+    """Some two hundred samples with reversals in them."""
+    return plan_motion(robot, 'line', 'aggressive', 50.0)
+
+
+@pytest.fixture
+def cell(tmp_path):
+    with Cell(tmp_path / 'cell') as cell:
+        yield cell

@@ -1,0 +1,191 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The standard interfaces of a cell, over DDS."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from scipy.interpolate import CubicHermiteSpline
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.recording import JointMotion
+from weld_twin_lab.campaigns.live.listener import HealthListener
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import (
+    JOINT_STATES,
+    JOINT_TRAJECTORY,
+    MEASURED_POSE,
+    PATH,
+    ROBOT_DESCRIPTION,
+    TWIN_POSE,
+)
+from weld_twin_msgs_py.robots import write_urdf
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
+from weld_twin_nodes.live.deviation_markers import DeviationMarkers
+from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+from weld_twin_nodes.live.trajectory_generator import TrajectoryGenerator
+
+S = 1_000_000_000
+Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+
+
+@pytest.fixture(scope='module')
+def shared(tmp_path_factory):
+    with Cell(tmp_path_factory.mktemp('cell')) as cell:
+        yield cell
+
+
+@pytest.fixture
+def run(shared):
+    """Put a node into the shared cell for one test."""
+    nodes = []
+
+    def add(make, **parameters):
+        nodes.append(shared.add(make, reliable_inputs=True, **parameters))
+        return nodes[-1]
+
+    yield add
+    for node in nodes:
+        shared.remove(node)
+
+
+def until_heard(cell, publisher, message_of, tap, what):
+    """Publish again and again until something comes back: discovery takes its time."""
+    count = [0]
+
+    def told():
+        count[0] += 1
+        publisher.publish(message_of(count[0]))
+        return len(tap) > 0
+
+    cell.wait(told, what)
+
+
+def test_the_robot_description_is_the_model_of_the_twin(shared, run, robot, tmp_path):
+    write_urdf(tmp_path / 'arm.urdf', robot)
+    row = ROBOT_DESCRIPTION
+    latched = shared.node.create_publisher(row.message_class(), row.name, row.offered.to_rclpy())
+    latched.publish(row.message_class()(data=(tmp_path / 'arm.urdf').read_text()))
+    node = run(ForwardKinematicsTwin, robot='topic')
+    assert node.robot.joint_names == robot.joint_names
+    poses = shared.collect(TWIN_POSE.name)
+    until_heard(
+        shared, shared.publisher(),
+        lambda k: shared.messages.joint_state(k * S, robot.joint_names, Q), poses, 'a pose',
+    )  # fmt: skip
+    np.testing.assert_allclose(
+        from_messages.pose(poses.last)[0], forward(robot, Q)[:3, 3], rtol=0.0, atol=1e-12
+    )
+
+
+def test_joints_of_two_publishers_make_one_pose(shared, run, robot):
+    run(ForwardKinematicsTwin)
+    poses, make = shared.collect(TWIN_POSE.name), shared.messages
+    first, second = shared.publisher(), shared.publisher()
+
+    def told():
+        told.count += 1
+        for publisher, part in ((first, slice(0, 2)), (second, slice(2, 6))):
+            publisher.publish(make.joint_state(
+                told.count * S, robot.joint_names[part], Q[part], np.zeros(6)[part]))
+        return len(poses) > 0
+
+    told.count = 0
+    shared.wait(told, 'a pose')
+    np.testing.assert_allclose(
+        from_messages.pose(poses.last)[0], forward(robot, Q)[:3, 3], rtol=0.0, atol=1e-15
+    )
+
+
+def test_a_publisher_that_offers_too_little_is_told_of(shared, run):
+    node = run(ForwardKinematicsTwin)
+    health = HealthListener(shared.node)
+    hasty = shared.node.create_publisher(
+        JOINT_STATES.message_class(), JOINT_STATES.name,
+        QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT),
+    )  # fmt: skip
+
+    def said():
+        return [text for _, text in health.told[node.get_name()] if 'reliability' in text]
+
+    shared.wait(lambda: said() != [], 'the mismatch to be told')
+    assert '/joint_states: a publisher offers another reliability than is asked' in said()[0]
+    shared.node.destroy_publisher(hasty)
+
+
+def trajectory(robot):
+    t = np.array([0.0, 0.4, 1.0])
+    q = Q + np.outer([0.0, 0.1, 0.3], np.arange(1.0, 7.0)) * 0.2
+    qd = np.outer([0.0, 0.2, 0.0], np.ones(6))
+    return JointMotion(t, q, qd)
+
+
+def generator_of(run, source):
+    return run(
+        TrajectoryGenerator, source=source, rate=100.0, start_stamp_ns=S, playback=0.0,
+        wait_for_subscribers=1,
+    )  # fmt: skip
+
+
+def test_a_joint_trajectory_is_run_by_cubics_through_its_points(shared, run, robot):
+    node, motion = generator_of(run, 'joint_trajectory'), trajectory(robot)
+    states = shared.collect(JOINT_STATES.name)
+    names = robot.joint_names[::-1]
+    turned = JointMotion(motion.t, motion.q[:, ::-1], motion.qd[:, ::-1])
+    until_heard(
+        shared, shared.publisher(JOINT_TRAJECTORY),
+        lambda _: shared.messages.joint_trajectory(S, names, turned), states, 'a joint state',
+    )  # fmt: skip
+    shared.wait(lambda: len(states) >= 101, 'the whole motion')
+    t = (states.stamps[:101] - S) * 1e-9
+    np.testing.assert_allclose(t, np.arange(101) * 0.01, atol=1e-9)
+    expected = CubicHermiteSpline(motion.t, motion.q, motion.qd)(t)
+    got = [from_messages.joint_positions(m, robot.joint_names) for m in states.messages[:101]]
+    np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-9)
+    assert node.done
+
+
+def test_a_path_is_planned_and_run_and_the_plan_is_told_to_latecomers(shared, run, robot):
+    generator_of(run, 'path')
+    start = forward(robot, Q)
+    points = start[:3, 3] + np.outer(np.linspace(0.0, 1.0, 5), [0.0, 0.08, 0.0])
+    frames = np.tile(start, (5, 1, 1))
+    frames[:, :3, 3] = points
+    states = shared.collect(JOINT_STATES.name)
+    until_heard(
+        shared, shared.publisher(PATH),
+        lambda _: shared.messages.path(S, frames), states, 'a joint state',
+    )  # fmt: skip
+    planned = shared.collect('/planned/path')
+    trajectories = shared.collect('/planned/joint_trajectory')
+    shared.wait(lambda: len(planned) > 0 and len(trajectories) > 0, 'the plan')
+    way = from_messages.path_points(planned.last)
+    np.testing.assert_allclose(way[[0, -1]], points[[0, -1]], atol=1e-6)
+    np.testing.assert_allclose(way[:, [0, 2]], points[:1, [0, 2]].repeat(len(way), 0), atol=1e-6)
+    told = from_messages.joint_trajectory(trajectories.last, robot.joint_names)
+    np.testing.assert_allclose(forward(robot, told.q)[:, :3, 3], way, atol=1e-9)
+
+
+def test_markers_show_the_deviation_where_it_is(shared, run):
+    run(DeviationAnalyzer)
+    run(DeviationMarkers, every=0.05, magnification=100.0)
+    twin, measured = shared.publisher(TWIN_POSE), shared.publisher(MEASURED_POSE)
+    pictures, make = shared.collect('/deviation/markers'), shared.messages
+
+    def told():
+        told.count += 1
+        place, off = np.array([0.01 * told.count, 0.2, 0.3]), np.array([0.0, 1e-3, 0.0])
+        twin.publish(make.pose(told.count * S, place, np.eye(3)))
+        measured.publish(make.pose(told.count * S, place + off, np.eye(3)))
+        return len(pictures) > 0
+
+    told.count = 0
+    shared.wait(told, 'a picture')
+    seam, strokes = pictures.last.markers
+    assert (seam.ns, strokes.ns) == ('seam', 'deviation')
+    begin, end = strokes.points[0], strokes.points[1]
+    np.testing.assert_allclose([begin.y, end.y], [0.2, 0.3], atol=1e-9)
+

@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Four nodes in four processes over DDS, recorded, against the same run computed in bulk."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_msgs_py.bags import BagReader, provenance
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.offline.seam_motion import plan_motion, stamps
+from weld_twin_nodes.offline.simulated_bag import write_simulation
+from weld_twin_nodes.offline.simulation import Simulation
+from weld_twin_nodes.offline.told_twin import build_twin
+
+EFFECTS = """
+- {effect: backlash, joint: elbow_joint, width: 5e-4}
+- {effect: servo_lag, joint: shoulder_pan_joint, time_constant: 0.02}
+- {effect: joint_compliance, joint: shoulder_lift_joint, compliance: 2e-6}
+- {effect: link_length, joint: elbow_joint, da: 3e-4}
+- {effect: drift, xyz_rate: [1e-5, 0, -2e-5]}
+- {effect: time_delay, delay: 0.013}
+- {effect: measurement_noise, sigma: 2e-5}
+"""
+START = 1_700_000_000_000_000_000
+RATE = 50.0
+
+
+def run_cell(folder, plan, robot, effects, seed=7):
+    """Run generator, injector, twin and analyzer live, with the recorder; return the bag."""
+    with Cell(folder) as cell:
+        sure = {'reliable_inputs': True}
+        recorder = cell.start('recorder', out=str(folder / 'live'), **sure)
+        cell.start('deviation_analyzer', wait_for_subscribers=2, path_length=plan.length,
+                   metrics_idle=0.3, **sure)  # fmt: skip
+        cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
+        cell.start('error_injector', effects=effects, seed=seed, wait_for_subscribers=2, **sure)
+        metrics = cell.collect('/deviation/metrics')
+        cell.start(
+            'trajectory_generator', path='line', profile='aggressive', rate=RATE, playback=0.0,
+            follow='/deviation', start_stamp_ns=START, wait_for_subscribers=3, **sure,
+        )  # fmt: skip
+        delayed = 1 if 'time_delay' in effects else 0
+        cell.wait(
+            lambda: bool(metrics.messages)
+            and from_messages.metrics(metrics.last)['samples'] >= plan.motion.t.size - delayed,
+            'the last metrics',
+        )
+        n = plan.motion.t.size
+        cell.wait_recorded({
+            '/joint_states': n, '/actual/joint_states': n, '/measured/tool_pose': n,
+            '/twin/tool_pose': n, '/deviation': n - delayed,
+            '/deviation/metrics': len(metrics),
+        })  # fmt: skip
+        recorder.interrupt()
+        assert recorder.end() == 0
+    return folder / 'live'
+
+
+def content(path):
+    """Return stamps and numbers of every topic of a bag."""
+    read = {
+        'sensor_msgs/msg/JointState': lambda m: [*m.position, *m.velocity],
+        'geometry_msgs/msg/PoseStamped': lambda m: [*from_messages.pose(m)[0], *from_messages.pose(m)[1].flat],
+        'geometry_msgs/msg/Vector3Stamped': from_messages.vector3,
+        'diagnostic_msgs/msg/DiagnosticArray': lambda m: [
+            v for k, v in from_messages.metrics(m).items() if k != 'waiting'],
+    }  # fmt: skip
+    rows = defaultdict(list)
+    with BagReader(path) as bag:
+        for topic, kind, _, message in bag.messages([t for t, (_, n) in bag.topics.items() if n]):
+            rows[topic].append((from_messages.stamp_ns(message), read[kind](message)))
+    return {
+        topic: (np.array([s for s, _ in found]), np.array([v for _, v in found]))
+        for topic, found in rows.items()
+    }
+
+
+@pytest.fixture(scope='module')
+def live_and_offline(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('four')
+    robot = catalog.load('ur5')
+    plan = plan_motion(robot, 'line', 'aggressive', RATE)
+    live = run_cell(folder, plan, robot, EFFECTS)
+    simulation = Simulation(
+        build_twin(robot, effects=EFFECTS), build_twin(robot), plan.motion,
+        stamps(plan.motion.t, START), 7, plan.length,
+    )  # fmt: skip
+    write_simulation(folder / 'offline', simulation)
+    return live, folder / 'offline', robot
+
+
+def test_the_recorded_bag_holds_what_the_offline_twin_computes(live_and_offline):
+    live, offline = (content(path) for path in live_and_offline[:2])
+    assert live.keys() == offline.keys()
+    assert len(live) == 6
+    # A pause of the machine may add a metrics message in between; those due are all there.
+    stamp, values = live['/deviation/metrics']
+    due = np.isin(stamp, offline['/deviation/metrics'][0])
+    live['/deviation/metrics'] = stamp[due], values[due]
+    for topic, (stamp, values) in offline.items():
+        np.testing.assert_array_equal(live[topic][0], stamp, err_msg=topic)
+        np.testing.assert_allclose(
+            live[topic][1], values, rtol=1e-10, atol=1e-12, err_msg=topic
+        )
+
+
+def test_the_recorded_bag_says_how_it_came_about(live_and_offline):
+    live, offline, robot = live_and_offline
+    made = provenance(live)
+    assert made['robot'] == robot.to_mapping()
+    assert made['seed'] == 7
+    assert made['version']
+    assert made['effects'] == provenance(offline)['effects']
+    assert made['effects'][0]['effect'] == 'backlash'
+
+
+def test_another_tool_opens_the_recorded_bag(live_and_offline):
+    make_reader = pytest.importorskip('mcap.reader').make_reader
+    decoder = pytest.importorskip('mcap_ros2.decoder').DecoderFactory()
+    live = live_and_offline[0]
+    stamp, values = content(live)['/twin/tool_pose']
+    with next(live.glob('*.mcap')).open('rb') as file:
+        reader = make_reader(file, decoder_factories=[decoder])
+        found = [
+            (m.header.stamp.sec * 10**9 + m.header.stamp.nanosec, m.pose.position)
+            for _, _, _, m in reader.iter_decoded_messages(topics=['/twin/tool_pose'])
+        ]
+    np.testing.assert_array_equal([s for s, _ in found], stamp)
+    np.testing.assert_array_equal([(p.x, p.y, p.z) for _, p in found], values[:, :3])
+
+
+def test_without_errors_the_deviation_over_ros_is_zero_to_float_precision(tmp_path):
+    robot = catalog.load('ur5')
+    plan = plan_motion(robot, 'line', 'aggressive', RATE)
+    values = content(run_cell(tmp_path, plan, robot, ''))['/deviation'][1]
+    assert len(values) == plan.motion.t.size
+    assert np.abs(values).max() <= np.finfo(float).eps

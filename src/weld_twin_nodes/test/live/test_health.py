@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a node tells of its inputs, look by look."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.messages.to_messages import bag_messages
+from weld_twin_msgs_py.messages.topics import BY_NAME
+from weld_twin_nodes.live.deviation_lines import DeviationLines, colors
+from weld_twin_nodes.live.health import ERROR, OK, STALE, WARN, Health
+from weld_twin_nodes.streams.joint_assembly import JointStates
+
+CONFIG = Path(__file__).parents[4] / 'src/weld_twin_nodes/config'
+ROBOT = load('ur5')
+NAMES = ROBOT.joint_names
+Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+NS = 5_000_000_000
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Time in the hand of the test [s]."""
+    now = [100.0]
+    monkeypatch.setattr('weld_twin_nodes.live.health.time.monotonic', lambda: now[0])
+    return now
+
+
+class Watched:
+    """One input, a second at a time."""
+
+    def __init__(self, clock, **options):
+        self.clock = clock
+        self.health = Health('twin', 1.0)
+        self.input = self.health.watch('/joint_states', **{'required': True, **options})
+
+    def second(self, received=0, refused=0, others=0, reason=''):
+        self.clock[0] += 1.0
+        if received:
+            self.input.last = self.clock[0] - 0.01
+        self.input.received += received
+        self.input.refused += refused
+        self.input.others += others
+        self.input.last_reason = reason or self.input.last_reason
+        status = self.health.statuses()[1]
+        assert status.name == 'twin: /joint_states'
+        return status.level, status.message
+
+
+def test_an_input_goes_from_nothing_over_good_and_bad_to_silence_and_back(clock):
+    watched = Watched(clock)
+    assert watched.second() == (STALE, 'nothing received yet')
+    for _ in range(4):
+        assert watched.second(500) == (OK, '500/s')
+    assert watched.second(500, refused=100, reason='NaN') == (WARN, '100 of 500 refused: NaN')
+    assert watched.second(500, refused=500) == (ERROR, '500 of 500 refused: NaN')
+    assert watched.second(500, others=500)[0] == WARN
+    assert watched.second(50) == (WARN, '50/s where 500/s is usual')
+    assert watched.second(5000) == (WARN, '5000/s where 500/s is usual')
+    assert watched.second()[0] == STALE
+    assert watched.second() == (STALE, 'silent for 2.0 s')
+    assert watched.second(500) == (OK, '500/s')
+
+
+def test_a_second_publisher_of_the_same_is_told_and_one_of_other_joints_is_not(clock):
+    watched = Watched(clock)
+    watched.input.publishers = 2
+    assert watched.second(200) == (WARN, '2 publishers send the same')
+    assert watched.second(200, others=100) == (OK, '200/s')
+
+
+def test_an_input_nobody_needs_may_be_missing_and_slow_ones_are_waited_for(clock):
+    assert Watched(clock, required=False).second() == (OK, 'not in use')
+    rare = Watched(clock, required=False, steady=False)
+    assert rare.second(1)[0] == OK
+    for _ in range(60):
+        assert rare.second()[0] == OK
+
+
+def test_the_node_itself_tells_what_lasts_each_time_and_what_happened_once():
+    health = Health('twin', 1.0)
+    health.lasting['/x'] = 'nobody hears'
+    health.say('time went back')
+    assert health.statuses()[0][:3] == ('twin', WARN, 'nobody hears; time went back')
+    assert health.statuses()[0][:3] == ('twin', WARN, 'nobody hears')
+    health.lasting.clear()
+    assert health.statuses()[0][:3] == ('twin', OK, 'running')
+
+
+def state(names, q, ns=NS, qd=None):
+    return bag_messages().joint_state(ns, list(names), np.asarray(q), qd)
+
+
+def test_joints_spread_over_publishers_are_put_together_by_equal_stamps():
+    joints = JointStates(ROBOT)
+    with pytest.raises(DataError, match="no joint 'wrist_1_joint'"):
+        joints.take(state(NAMES[:3], Q[:3]))
+    out = [joints.take(state(NAMES[3:][::-1], Q[3:][::-1], qd=np.ones(3)))]
+    out += [joints.take(state(NAMES[k:k + 3], Q[k:k + 3], NS + 1)) for k in (0, 3)]
+    assert [sample and sample.stamp for sample in out] == [NS, None, NS + 1]
+    for sample in (out[0], out[2]):
+        assert sample.qd is None
+        np.testing.assert_array_equal(sample.q, Q)
+    assert joints.others == 1
+
+
+def test_joints_whose_other_half_never_comes_are_refused_and_not_held_over():
+    joints = JointStates(ROBOT)
+    with pytest.raises(DataError):
+        joints.take(state(NAMES[:3], Q[:3]))
+    with pytest.raises(DataError, match="'wrist_1_joint' never came with the stamp"):
+        joints.take(state(NAMES[3:], Q[3:], NS + 1))
+    with pytest.raises(DataError, match="'shoulder_pan_joint' never came with the stamp"):
+        joints.take(state(NAMES[:3], Q[:3], NS + 2))
+    sample = joints.take(state(NAMES[3:], Q[3:], NS + 2))
+    assert sample.stamp == NS + 2
+
+
+def test_messages_about_other_joints_are_passed_over():
+    joints = JointStates(ROBOT)
+    assert joints.take(state(['gripper', 'track'], [0.1, 2.0])) is None
+    assert joints.others == 1
+    sample = joints.take(state(['gripper', *NAMES[::-1]], [0.1, *Q[::-1]]))
+    np.testing.assert_array_equal(sample.q, Q)
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf, -90.0])
+def test_the_quick_way_refuses_what_the_thorough_way_refuses(value):
+    joints = JointStates(ROBOT)
+    usual = state(NAMES, Q, qd=np.zeros(6))
+    usual.name = names = tuple(NAMES)
+    joints.take(usual)
+    bad = state(NAMES, [*Q[:2], value, *Q[3:]], NS + 1, np.zeros(6))
+    bad.name = names
+    with pytest.raises(DataError, match='elbow_joint'):
+        joints.take(bad)
+
+
+def test_deviations_are_drawn_at_their_place_magnified_and_by_colour():
+    lines = DeviationLines(magnification=100.0, tolerance=1e-3, spacing=0.01, points=3)
+    for k in range(6):
+        lines.measured(k, np.array([0.005 * k, 0.0, 1e-3]))
+        lines.deviation(k, np.array([0.0, 0.0, 1e-3]))
+    lines.deviation(99, np.ones(3))
+    seam, strokes = lines.drawn()
+    np.testing.assert_allclose(seam.points[:, 0], [0.0, 0.01, 0.02])
+    np.testing.assert_allclose(seam.points[:, 2], 0.0, atol=1e-15)
+    np.testing.assert_allclose(strokes.points[1::2] - strokes.points[::2], [[0, 0, 0.1]] * 3)
+    np.testing.assert_allclose(seam.colors, [[1.0, 0.0, 0.0]] * 3)
+    np.testing.assert_allclose(colors(np.array([0.0, 0.5])), [[0, 1, 0], [1, 1, 0]])
+
+
+def test_the_views_show_topics_that_exist():
+    rviz = yaml.safe_load((CONFIG / 'cell.rviz').read_text())
+    shown = {
+        item[key]['Value']
+        for item in rviz['Visualization Manager']['Displays']
+        for key in ('Topic', 'Description Topic') if key in item
+    }  # fmt: skip
+    layout = json.loads((CONFIG / 'cell.foxglove.json').read_text())
+    panels = layout['configById']
+    shown |= set(panels['3D!cell']['topics']) | {panels['RawMessages!verdict']['topicPath']}
+    shown |= {'/' + p['value'].split('.')[0][1:] for p in panels['Plot!deviation']['paths']}
+    assert len(shown) == 7
+    assert shown <= set(BY_NAME)

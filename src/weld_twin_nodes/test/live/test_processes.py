@@ -1,0 +1,180 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes as programs: how they start, stop, die, and what the recorder keeps then."""
+
+from __future__ import annotations
+
+import signal
+import sqlite3
+from contextlib import closing, suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.exceptions import EndOfFile
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+from rosgraph_msgs.msg import Clock
+
+from weld_twin_core.recording import JointMotion
+from weld_twin_msgs_py.bags import BagReader
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_nodes.harness import Cell, CellTimeout
+from weld_twin_nodes.harness.process import MODULES
+
+S = 1_000_000_000
+
+
+def wait_for_nodes(cell, names):
+    cell.wait(lambda: set(names) <= set(cell.node.get_node_names()), f'{names} to be up')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_every_node_ends_quietly_when_told_to(cell, tmp_path, number):
+    processes = [
+        cell.start(name, **({'out': str(tmp_path / 'bag')} if name == 'recorder' else {}))
+        for name in MODULES
+    ]
+    wait_for_nodes(cell, MODULES)
+    cell.trigger('/recorder/counts')
+    for process in processes:
+        process.signal(number)
+    assert [process.end() for process in processes] == [0] * len(processes)
+    for process in processes:
+        assert 'Traceback' not in process.log, process.log
+    assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
+
+
+BAD_STARTS = {
+    'unknown robot': ('error_injector', {'robot': 'ur99'}, "'ur99' is neither"),
+    'unknown seam': ('trajectory_generator', {'path': 'nowhere.yaml'}, "'nowhere.yaml'"),
+    'out of range': ('trajectory_generator', {'rate': -5.0}, 'rate'),
+    'wrong type': ('error_injector', {'seed': 1.5}, 'seed'),
+    'no bag': ('recorder', {}, "needs the parameter 'out'"),
+    'unknown topic': ('recorder', {'out': 'x', 'topics': ['/chatter']}, "'/chatter'"),
+}
+
+
+def test_a_node_that_cannot_start_says_why_in_a_line_and_exits_with_2(cell, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    started = {
+        what: (cell.start(node, **parameters), sentence)
+        for what, (node, parameters, sentence) in BAD_STARTS.items()
+    }
+    for what, (process, sentence) in started.items():
+        assert process.end(15.0) == 2, what
+        said = [line for line in process.log.splitlines() if line.startswith('weld_twin: ')]
+        assert len(said) == 1, process.log
+        assert sentence in said[0], what
+        assert 'Traceback' not in process.log, what
+    assert list(tmp_path.glob('*x*')) == []
+
+
+def motion(robot, samples):
+    t = np.arange(samples) * 0.01
+    return JointMotion(t, np.zeros((samples, robot.n)) + 0.01 * t[:, None])
+
+
+def sqlite_messages(folder):
+    for file in folder.rglob('*.db3'):
+        with closing(sqlite3.connect(f'file:{file}?mode=ro', uri=True)) as base:
+            return base.execute('SELECT count(*) FROM messages').fetchone()[0]
+    return 0
+
+
+def mcap_messages(folder):
+    """Read as far as the file goes, as `mcap recover` does."""
+    count = 0
+    for file in folder.rglob('*.mcap'):
+        with file.open('rb') as stream, suppress(EndOfFile):
+            for record in StreamReader(stream).records:
+                count += isinstance(record, Message)
+    return count
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_a_killed_recorder_leaves_what_it_had_flushed(tmp_path, robot, storage):
+    with Cell(tmp_path / 'cell') as cell:
+        recorder = cell.start(
+            'recorder', out=str(tmp_path / 'bag'), storage=storage, flush_every=0.1,
+            reliable_inputs=True,
+        )  # fmt: skip
+        cell.feed(motion(robot, 60), robot.joint_names)
+        cell.wait_recorded({'/joint_states': 60})
+        held = {'mcap': mcap_messages, 'sqlite3': sqlite_messages}[storage]
+        cell.wait(lambda: held(tmp_path) == 60, 'the recorder to flush')
+        recorder.signal(signal.SIGKILL)
+        assert recorder.end() == -signal.SIGKILL
+        assert held(tmp_path) == 60
+        assert not (tmp_path / 'bag').exists()
+        cell.processes.remove(recorder)
+
+
+def test_simulated_time_drives_the_generator(cell):
+    cell.start(
+        'trajectory_generator', use_sim_time=True, profile='aggressive', rate=100.0,
+        wait_for_subscribers=1,
+    )  # fmt: skip
+    states = cell.collect('/joint_states')
+    clock = cell.node.create_publisher(Clock, '/clock', 10)
+    cell.wait(lambda: clock.get_subscription_count() > 0, 'a subscriber of /clock')
+    told = [5 * S]
+
+    def tick(step):
+        def condition_of(wanted):
+            def condition():
+                clock.publish(Clock(clock=cell.messages.time(told[0])))
+                return len(states) >= wanted
+
+            return condition
+
+        told[0] += step
+        return condition_of
+
+    cell.wait(tick(0)(1), 'the first joint state')
+    first = states.stamps[0]
+    assert first >= 5 * S
+    cell.wait(tick(S // 5)(15), 'joint states of a fifth of a second')
+    assert states.stamps[-1] <= told[0]
+    spacing = np.diff(states.stamps)
+    np.testing.assert_array_equal(spacing, 10_000_000)
+
+
+def test_the_harness_says_which_node_died_and_why(cell):
+    cell.start('error_injector', robot='ur99')
+    with pytest.raises(CellTimeout, match=r"(?s)error_injector, ended with 2.*'ur99'"):
+        cell.wait(lambda: False, 'what cannot happen')
+    cell.processes.clear()
+
+
+def test_topics_can_be_remapped(cell, robot):
+    from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+
+    cell.add(
+        ForwardKinematicsTwin,
+        cli_args=['--ros-args', '-r', '/twin/tool_pose:=/cell7/predicted'],
+    )
+    poses = cell.collect('/cell7/predicted', type(cell.messages.pose(S, np.zeros(3), np.eye(3))))
+    publisher = cell.publisher()
+
+    def told():
+        publisher.publish(cell.messages.joint_state(
+            cell.node.get_clock().now().nanoseconds, robot.joint_names, np.zeros(6)))
+        return len(poses) > 0
+
+    cell.wait(told, 'a pose on the new topic')
+    assert from_messages.stamp_ns(poses.last) > 0
+
+
+def test_a_bag_is_played_into_the_cell(cell, robot):
+    bag = Path(__file__).parents[4] / 'bags/elbow_play'
+    cell.start('deviation_analyzer', reliable_inputs=True)
+    deviations = cell.collect('/deviation')
+    with BagReader(bag) as reader:
+        recorded = [m for _, _, _, m in reader.messages(['/deviation'])]
+    cell.play(bag, ['/measured/tool_pose', '/twin/tool_pose'], speed=8.0)
+    cell.wait(lambda: len(deviations) == len(recorded), 'every deviation')
+    np.testing.assert_allclose(
+        [from_messages.vector3(m) for m in deviations.messages],
+        [from_messages.vector3(m) for m in recorded], rtol=0.0, atol=1e-15,
+    )  # fmt: skip

@@ -1,0 +1,277 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a recording that was cut short gives back."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import resource
+import signal
+import sqlite3
+import time
+from contextlib import closing
+
+import pytest
+from mcap.reader import make_reader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import BagReader, GrowingBag, bag_info, provenance, rebuild
+from weld_twin_nodes.cli import main
+
+FLUSHED, WRITTEN = 700, 950
+
+
+@pytest.fixture
+def cut_short(tmp_path, storage, numbered):
+    """Return the name of a recording of which some messages were flushed and others not."""
+    path = tmp_path / 'bag'
+    bag = GrowingBag(path, storage=storage, split_bytes=30_000, provenance={'seed': 7}).open()
+    for number in range(FLUSHED):
+        bag.write_cdr(*numbered(number))
+    bag.flush()
+    for number in range(FLUSHED, WRITTEN):
+        bag.write_cdr(*numbered(number))
+    bag.release()
+    return path
+
+
+def last_file(folder):
+    """Return the file that was growing."""
+    return next(
+        file for item in folder.iterdir() if item.is_dir()
+        for file in item.iterdir() if file.suffix in ('.mcap', '.db3')
+    )  # fmt: skip
+
+
+def record_until_killed(path, storage, messages, told):
+    bag = GrowingBag(path, storage=storage).open()
+    for message in messages[:FLUSHED]:
+        bag.write_cdr(*message)
+    bag.flush()
+    for message in messages[FLUSHED:]:
+        bag.write_cdr(*message)
+    told.send('written')
+    time.sleep(60.0)
+
+
+def test_a_killed_process_has_kept_what_it_had_flushed(tmp_path, storage, numbered, numbers):
+    context = multiprocessing.get_context('fork')
+    here, there = context.Pipe()
+    messages = [numbered(number) for number in range(WRITTEN)]
+    process = context.Process(
+        target=record_until_killed, args=(tmp_path / 'bag', storage, messages, there)
+    )
+    process.start()
+    assert here.recv() == 'written'
+    os.kill(process.pid, signal.SIGKILL)
+    process.join()
+    rebuild(tmp_path / 'bag')
+    found = numbers(tmp_path / 'bag')
+    assert len(found) >= FLUSHED
+    assert found == list(range(len(found)))
+
+
+def test_what_was_flushed_is_recovered_and_the_original_stays(cut_short, numbers):
+    growing = cut_short.with_name('bag.unfinished')
+    before = {file: file.read_bytes() for file in growing.rglob('*') if file.is_file()}
+    done = rebuild(cut_short)
+    found = numbers(cut_short)
+    assert FLUSHED <= len(found) <= WRITTEN
+    assert found == list(range(len(found)))
+    assert done.messages == {'/joint_states': len(found)}
+    assert provenance(cut_short)['seed'] == 7
+    assert any('recovered' in key for key in provenance(cut_short))
+    assert {file: file.read_bytes() for file in growing.rglob('*') if file.is_file()} == before
+    assert {item.name for item in cut_short.parent.iterdir()} == {'bag', 'bag.unfinished'}
+
+
+@pytest.mark.parametrize('tail', [b'', b'\0' * 5000, os.urandom(5000), b'\x06\xff' * 500])
+def test_a_tail_the_disk_never_got_costs_only_itself(
+    tmp_path, storage, numbered, numbers, tail
+):
+    """After a power cut a file may have grown by blocks whose content was never written."""
+    bag = GrowingBag(tmp_path / 'bag', storage=storage).open()
+    for number in range(FLUSHED):
+        bag.write_cdr(*numbered(number))
+    bag.flush()
+    bag.release()
+    file = last_file(bag.folder)
+    with file.open('ab') as stream:
+        stream.write(tail)
+    rebuild(tmp_path / 'bag')
+    assert numbers(tmp_path / 'bag') == list(range(FLUSHED))
+
+
+def test_a_chunk_with_a_flipped_bit_is_left_out_and_told(tmp_path, numbered, numbers):
+    bag = GrowingBag(tmp_path / 'bag').open()
+    for number in range(300):
+        bag.write_cdr(*numbered(number))
+        if number % 100 == 99:
+            bag.flush()
+    bag.release()
+    file = last_file(bag.folder)
+    whole = bytearray(file.read_bytes())
+    whole[len(whole) // 2] ^= 0x10
+    file.write_bytes(whole)
+    done = rebuild(tmp_path / 'bag')
+    assert numbers(tmp_path / 'bag') == [*range(100), *range(200, 300)]
+    assert any('damaged chunk' in sentence for sentence in done.damage)
+
+
+@pytest.mark.parametrize('share', [0.6, 0.9])
+def test_a_bag_cut_anywhere_gives_what_lies_before_the_cut(
+    tmp_path, storage, numbered, numbers, share
+):
+    bag = GrowingBag(tmp_path / 'bag', storage=storage).open()
+    for number in range(FLUSHED):
+        bag.write_cdr(*numbered(number))
+        if number % 50 == 49:
+            bag.flush()
+    bag.close()
+    file = next(item for item in (tmp_path / 'bag').iterdir() if item.suffix != '.yaml')
+    file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
+    done = rebuild(tmp_path / 'bag')
+    assert done.path == tmp_path / 'bag_recovered'
+    found = numbers(done.path)
+    assert 0.3 * FLUSHED < len(found) < FLUSHED
+    assert done.damage
+    # Pages of a database are not in the order of its rows, so a cut may fall between some.
+    prefix = list(range(len(found)))
+    assert found == (prefix if storage == 'mcap' else sorted(set(found) & set(range(FLUSHED))))
+
+
+def test_a_step_a_database_was_in_is_undone(tmp_path, numbered, numbers):
+    bag = GrowingBag(tmp_path / 'bag', storage='sqlite3').open()
+    for number in range(FLUSHED):
+        bag.write_cdr(*numbered(number))
+    bag.flush()
+    file = last_file(bag.folder)
+    committed = file.read_bytes()
+    bag.release()
+    with closing(sqlite3.connect(file, isolation_level=None)) as base:
+        base.execute('PRAGMA journal_mode = DELETE')
+        base.execute('PRAGMA cache_size = 1')
+        base.execute('BEGIN')
+        base.execute('UPDATE messages SET data = zeroblob(500)')
+        # What a kill leaves here: pages of the update in the file, what they were in a journal.
+        journal = file.with_name(file.name + '-journal').read_bytes()
+        half_done = file.read_bytes()
+    assert half_done != committed
+    file.write_bytes(half_done)
+    file.with_name(file.name + '-journal').write_bytes(journal)
+    rebuild(tmp_path / 'bag')
+    assert numbers(tmp_path / 'bag') == list(range(FLUSHED))
+
+
+def test_every_reader_leads_to_the_command(cut_short, capsys):
+    command = f"'weld-twin recover {cut_short}'"
+    for path in (cut_short, cut_short.with_name('bag.unfinished')):
+        with pytest.raises(DataError, match='cut short') as caught:
+            bag_info(path)
+        assert command in str(caught.value)
+    assert main(['info', str(cut_short)]) == 2
+    assert command in capsys.readouterr().err
+    with pytest.raises(DataError, match='is not overwritten') as caught:
+        GrowingBag(cut_short).open()
+    assert command in str(caught.value)
+
+
+def test_the_command_says_what_it_found_and_writes_where_it_is_told(cut_short, capsys, numbers):
+    assert main(['recover', str(cut_short), '--out', str(cut_short.parent / 'there')]) == 0
+    said = capsys.readouterr().out
+    count = len(numbers(cut_short.parent / 'there'))
+    assert f'{count}  /joint_states' in said
+    assert 'the original stays' in said
+    assert not cut_short.exists()
+    assert main(['recover', str(cut_short), '--out', str(cut_short.parent / 'there')]) == 2
+    assert 'is not overwritten' in capsys.readouterr().err
+
+
+def test_a_recording_that_still_runs_is_left_alone(tmp_path, numbered):
+    bag = GrowingBag(tmp_path / 'bag').open()
+    bag.write_cdr(*numbered(0))
+    bag.flush()
+    with pytest.raises(DataError, match='is still being recorded'):
+        rebuild(tmp_path / 'bag')
+    bag.close()
+
+
+def test_nothing_stays_of_a_recovery_that_finds_nothing(tmp_path):
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'bag_0.mcap').write_bytes(b'\x89MCAP0\r\n')
+    with pytest.raises(DataError, match='holds no whole message'):
+        rebuild(tmp_path / 'bag')
+    assert [item.name for item in tmp_path.iterdir()] == ['bag']
+    with pytest.raises(DataError, match='there is no bag at'):
+        rebuild(tmp_path / 'nowhere')
+
+
+def test_types_nobody_here_knows_are_recovered_too(tmp_path, storage):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(get_types_from_msg('float64 current\n', 'their_msgs/msg/Arc'))
+    plugin = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}[storage]
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=plugin) as bag:
+        arc = bag.add_connection('/arc', 'their_msgs/msg/Arc', typestore=store)
+        bag.write(arc, 5, b'\0\1\0\0' + b'\0' * 8)
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    assert rebuild(tmp_path / 'bag').messages == {'/arc': 1}
+    with BagReader(tmp_path / 'bag_recovered') as reader:
+        assert list(reader.raw(['/arc'])) == [
+            ('/arc', 'their_msgs/msg/Arc', 5, b'\0\1\0\0' + b'\0' * 8)
+        ]
+
+
+def record_until_full(path, storage, messages, limit, told):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    bag = GrowingBag(path, storage=storage).open()
+    try:
+        for k, message in enumerate(messages):
+            bag.write_cdr(*message)
+            if k % 50 == 49:
+                bag.flush()
+                told.send(k + 1)
+        told.send('all')
+    except DataError as error:
+        bag.release()
+        told.send(str(error))
+
+
+def test_a_full_disk_is_told_in_a_sentence_and_keeps_what_was_on_it(
+    tmp_path, storage, numbered, numbers
+):
+    context = multiprocessing.get_context('fork')
+    here, there = context.Pipe()
+    messages = [numbered(number) for number in range(4000)]
+    process = context.Process(
+        target=record_until_full,
+        args=(tmp_path / 'bag', storage, messages, 200_000, there),
+    )
+    process.start()
+    flushed, said = 0, here.recv()
+    while isinstance(said, int):
+        flushed, said = said, here.recv()
+    process.join()
+    assert process.exitcode == 0
+    assert f"bag '{tmp_path}/bag' cannot be written: " in said
+    assert f"'weld-twin recover {tmp_path}/bag'" in said
+    rebuild(tmp_path / 'bag')
+    found = numbers(tmp_path / 'bag')
+    assert len(found) >= flushed > 0
+    assert found == list(range(len(found)))
+
+
+def test_another_tool_reads_the_recovered_bag(cut_short, storage):
+    if storage != 'mcap':
+        pytest.skip('the other tool reads mcap')
+    rebuild(cut_short)
+    count = 0
+    for file in sorted(cut_short.glob('*.mcap')):
+        with file.open('rb') as stream:
+            count += sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages())
+    assert count >= FLUSHED
+    assert json.loads((cut_short.with_name('bag.unfinished') / 'provenance.json').read_text())

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Compensated commands, and constant errors written into the robot, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import rotation_matrix
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.motion.paths import default_seam
+from weld_twin_core.motion.planned_motion import plan
+from weld_twin_core.recording import JointMotion, Recording, Signal
+from weld_twin_core.twin.compensation import compensate
+from weld_twin_core.twin.corrected import corrected, joint_offsets
+from weld_twin_core.twin.twin import Twin
+
+
+@pytest.fixture(scope='module', params=['ur5', 'franka_panda'])
+def robot(request):
+    return load(request.param)
+
+
+def seam(robot, profile='smooth'):
+    return Recording('seam', plan(robot, default_seam(robot), profile, fit=True).motion)
+
+
+def effects(robot, *entries):
+    return tuple(effect_from_mapping(entry) for entry in entries)
+
+
+def geometric(robot):
+    j = robot.joint_names
+    return effects(
+        robot,
+        {'effect': 'joint_offset', 'joint': j[1], 'offset': 2e-3},
+        {'effect': 'link_length', 'joint': j[2], 'da': 1e-3},
+        {'effect': 'link_offset', 'joint': j[3], 'dd': -1e-3},
+        {'effect': 'link_twist', 'joint': j[0], 'dalpha': 2e-3},
+        {'effect': 'axis_parallelism', 'joint': j[1], 'dbeta': -1e-3},
+        {'effect': 'base_pose', 'xyz': [1e-3, -2e-3, 3e-3], 'rotvec': [1e-3, 2e-3, -1e-3]},
+        {'effect': 'tool_pose', 'xyz': [1e-3, 0, 2e-3], 'rotvec': [0, 3e-3, 1e-3]},
+    )
+
+
+def in_numbers(robot):
+    """Return the robot with `geometric` written into its file by hand."""
+    data = robot.to_mapping()
+    rows = data['joints']
+    rows[1]['theta_offset'] += 2e-3
+    rows[2]['a'] += 1e-3
+    rows[3]['d'] -= 1e-3
+    rows[0]['alpha'] += 2e-3
+    rows[1]['beta'] = rows[1].get('beta', 0.0) - 1e-3
+    out = Robot.from_mapping(data)
+    base, tool = np.array(robot.T_world_base), np.array(robot.T_flange_tool)
+    base[:3, :3] = rotation_matrix([1e-3, 2e-3, -1e-3]) @ base[:3, :3]
+    base[:3, 3] += [1e-3, -2e-3, 3e-3]
+    tool[:3, 3] += [1e-3, 0, 2e-3]
+    tool[:3, :3] = tool[:3, :3] @ rotation_matrix([0, 3e-3, 1e-3])
+    return out.with_frames(base=base, tool=tool)
+
+
+def test_geometric_errors_are_closed(robot):
+    recording = seam(robot)
+    result = compensate(robot, geometric(robot), recording)
+    got = Twin(in_numbers(robot)).poses(Recording('real', result.motion))
+    wanted = Twin(robot).poses(recording)
+    assert np.abs(got.position - wanted.position).max() < 1e-9
+    assert np.abs(got.rotation - wanted.rotation).max() < 1e-9
+    assert result.rms[0] > 1e-3
+
+
+def test_an_offset_is_compensated_by_its_opposite():
+    robot = load('ur5')
+    error = effects(robot, {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3})
+    recording = seam(robot)
+    result = compensate(robot, error, recording)
+    wanted = recording.joints.q - 2e-3 * np.eye(6)[2]
+    assert np.abs(result.motion.q - wanted).max() < 1e-9
+    assert np.abs(result.motion.qd - recording.joints.qd).max() < 1e-6
+
+
+def test_a_gear_error_is_compensated_in_position_and_speed():
+    robot = load('ur5')
+    gear = {'effect': 'gear_ratio', 'joint': 'shoulder_pan_joint', 'scale': 1e-3}
+    recording = seam(robot)
+    result = compensate(robot, effects(robot, gear), recording)
+    assert np.abs(result.motion.q[:, 0] - recording.joints.q[:, 0] / 1.001).max() < 1e-9
+    speed = recording.joints.qd[:, 0] / 1.001
+    assert np.abs(result.motion.qd[5:-5, 0] - speed[5:-5]).max() < 1e-5
+
+
+def test_springs_under_gravity_and_process_force_are_closed():
+    robot = load('ur5')
+    soft = [{'effect': 'joint_compliance', 'joint': j, 'compliance': 3e-5}
+            for j in robot.joint_names[:3]]  # fmt: skip
+    motion = seam(robot).joints
+    force = Signal(motion.t[[0, -1]], np.array([[0, 0, 80.0, 0, 0, 0], [40.0, 0, 0, 0, 0, 0]]))
+    result = compensate(robot, effects(robot, *soft), Recording('seam', motion, wrench=force))
+    assert result.rms[0] > 1e-4 and np.abs(result.after).max() < 1e-9
+
+
+@pytest.mark.parametrize(('entry', 'gain'), [
+    ({'effect': 'servo_lag', 'time_constant': 0.02}, 200.0),
+    ({'effect': 'backlash', 'width': 1e-3}, 20.0),
+])  # fmt: skip
+def test_effects_with_memory_shrink_by_iteration(entry, gain):
+    robot = load('ur5')
+    acting = effects(robot, {**entry, 'joint': 'shoulder_pan_joint'})
+    before, after = compensate(robot, acting, seam(robot, 'aggressive')).rms
+    assert before > 1e-4 and after < before / gain
+
+
+def test_a_resonance_never_makes_it_worse():
+    robot = load('ur5')
+    shaky = effects(robot, {'effect': 'vibration', 'joint': 'shoulder_pan_joint',
+                            'frequency': 8.0, 'damping': 0.05, 'gain': 0.3})  # fmt: skip
+    before, after = compensate(robot, shaky, seam(robot, 'aggressive')).rms
+    assert after <= before
+
+
+def test_errors_of_the_instrument_are_left_alone():
+    robot = load('ur5')
+    own = effects(robot, {'effect': 'time_delay', 'delay': 0.02},
+                  {'effect': 'measurement_scale', 'scale': 1e-3},
+                  {'effect': 'drift', 'xyz_rate': [1e-5, 0, 0]})  # fmt: skip
+    recording = seam(robot)
+    result = compensate(robot, own, recording)
+    assert np.array_equal(result.motion.q, recording.joints.q)
+    assert result.left_out == own
+
+
+def test_stations_are_compensated_one_by_one():
+    robot = load('ur5')
+    q = np.random.default_rng(0).uniform(-0.4, 0.4, (20, 6)) + [0, -1.2, 1.4, -1.0, -1.5, 0]
+    q[7, 4] = 1e-4  # the wrist is stretched here: no small step closes it
+    stations = Recording('stations', JointMotion(np.arange(20.0), q, static=True))
+    result = compensate(robot, geometric(robot), stations)
+    rest = np.arange(20) != 7
+    assert result.motion.static and np.abs(result.after[rest]).max() < 1e-9
+    assert np.linalg.norm(result.after[7]) <= np.linalg.norm(result.before[7])
+
+
+def test_constant_errors_go_into_the_numbers_of_the_robot(robot):
+    ripple = effects(robot, {'effect': 'transmission_ripple', 'joint': robot.joint_names[0],
+                             'amplitude': 1e-4, 'order': 2.0})  # fmt: skip
+    got, left = corrected(robot, geometric(robot) + ripple)
+    wanted = in_numbers(robot)
+    for key in ('a', 'alpha', 'd', 'theta', 'beta', 'T_world_base', 'T_flange_tool'):
+        assert np.allclose(getattr(got, key), getattr(wanted, key), atol=1e-12), key
+    assert left == ripple
+    assert joint_offsets(robot, geometric(robot))[1] == 2e-3
+
+
+def test_the_offset_of_a_slide_goes_into_its_travel():
+    data = load('ur5').to_mapping()
+    data['joints'][0] |= {'type': 'prismatic'}
+    robot = Robot.from_mapping(data)
+    error = effects(robot, {'effect': 'joint_offset', 'joint': robot.joint_names[0],
+                            'offset': 1e-3})  # fmt: skip
+    got, _ = corrected(robot, error)
+    assert got.d[0] == pytest.approx(robot.d[0] + 1e-3) and np.array_equal(got.theta, robot.theta)
+
+
+def test_a_payload_is_joined_with_the_one_declared():
+    data = load('ur5').to_mapping() | {'payload': {'mass': 2.0, 'com': [0.0, 0.0, 0.1]}}
+    robot = Robot.from_mapping(data)
+    more = effects(robot, {'effect': 'payload', 'mass': 1.0, 'com': [0.3, 0.0, 0.1]})
+    got, left = corrected(robot, more)
+    assert got.payload_mass == 3.0 and left == ()
+    assert got.payload_com == pytest.approx([0.1, 0.0, 0.1])

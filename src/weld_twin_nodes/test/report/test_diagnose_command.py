@@ -1,0 +1,264 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""diagnose, predict, export and compensate on a small simulated cell, from files to files."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.recording import Recording
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.bags import BagReader, provenance, read_recording
+from weld_twin_msgs_py.files.diagnosis_model import load_model
+from weld_twin_msgs_py.robots import read_robot_yaml, read_urdf
+from weld_twin_nodes.cli import main
+
+WIDTH, OFFSET, DELAY = 1.0e-3, 1.5e-3, 0.012
+FILES = {
+    'diagnosis.json', 'report.html', 'effects.yaml', 'robot.yaml', 'robot.urdf',
+    'joint_offsets.csv', 'robot_effects.yaml',
+}  # fmt: skip
+
+
+def run(*words):
+    return main([str(word) for word in words])
+
+
+@pytest.fixture(scope='module')
+def cell(tmp_path_factory):
+    """Two runs along a seam of an arm with play in its elbow."""
+    folder = tmp_path_factory.mktemp('cell')
+    (folder / 'true.yaml').write_text(
+        f'- {{effect: backlash, joint: elbow_joint, width: {WIDTH}}}\n'
+        '- {effect: measurement_noise, sigma: 2.0e-5}\n'
+    )
+    for name, path, seed in (('first', 'line', 1), ('second', 'arc', 2)):
+        code = run('simulate', '--robot', 'ur5', '--effects', folder / 'true.yaml', '--path', path,
+                   '--profile', 'aggressive', '--rate', 60, '--seed', seed,
+                   '--out', folder / name)  # fmt: skip
+        assert code == 0
+    return folder
+
+
+@pytest.fixture(scope='module')
+def found(cell):
+    """What diagnose leaves behind, judged on the other run."""
+    out = cell / 'found'
+    assert run('diagnose', cell / 'first', '--robot', 'ur5', '--holdout', cell / 'second',
+               '--out', out) == 0  # fmt: skip
+    return out
+
+
+def test_play_is_found_with_its_width(found):
+    data = json.loads((found / 'diagnosis.json').read_text())
+    assert data['schema'] == 'weld_twin/diagnosis/1'
+    verdict = data['verdict']
+    assert verdict['status'] == 'identified'
+    assert [(e['effect'], e['joint']) for e in verdict['effects']] == [('backlash', 'elbow_joint')]
+    assert verdict['effects'][0]['parameters']['width'] == pytest.approx(WIDTH, rel=0.05)
+    assert data['shrink']['held_out'] == 'second'
+    assert data['shrink']['ratio'] < 0.3
+
+
+def test_all_files_are_there_and_nothing_else(found):
+    assert {path.name for path in found.iterdir()} == FILES
+    assert not [path for path in found.parent.iterdir() if path.name.startswith('.')]
+
+
+def test_inputs_are_told_with_their_hashes(cell, found):
+    inputs = json.loads((found / 'diagnosis.json').read_text())['inputs']
+    digest = hashlib.sha256()
+    for file in sorted((cell / 'first').iterdir()):
+        digest.update(file.name.encode() + b'\0' + file.read_bytes())
+    assert [item['use'] for item in inputs] == ['recording', 'held out']
+    assert inputs[0]['sha256'] == digest.hexdigest()
+    assert digest.hexdigest() in (found / 'report.html').read_text()
+
+
+def test_the_verdict_is_printed(cell, tmp_path, capsys):
+    code = run('diagnose', cell / 'first', '--robot', 'ur5', '--out', tmp_path / 'd')
+    out, err = capsys.readouterr()
+    assert code == 0 and err == ''
+    assert 'comes from backlash of elbow_joint' in ' '.join(out.split())
+    assert str(tmp_path / 'd' / 'report.html') in out.replace('\n', '')
+
+
+def test_what_is_known_is_in_the_twin_from_the_start(cell, tmp_path):
+    run('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known', cell / 'true.yaml',
+        '--out', tmp_path / 'rest')  # fmt: skip
+    data = json.loads((tmp_path / 'rest' / 'diagnosis.json').read_text())
+    assert data['gap']['rms_m'] < 1.1 * np.sqrt(3) * 2e-5
+    assert data['model']['known'][0] == {
+        'effect': 'backlash', 'joint': 'elbow_joint', 'width': WIDTH,
+    }  # fmt: skip
+
+
+def test_an_excluded_family_is_never_named(cell, tmp_path):
+    run('diagnose', cell / 'first', '--robot', 'ur5', '--exclude-effect', 'backlash',
+        '--out', tmp_path / 'd')  # fmt: skip
+    data = json.loads((tmp_path / 'd' / 'diagnosis.json').read_text())
+    named = {e['effect'] for e in data['verdict']['effects'] + data['candidates']}
+    assert 'backlash' not in named
+
+
+@pytest.mark.parametrize(('words', 'reason'), [
+    (['--align', 'bas'], '--align takes base, tool or base,tool'),
+    (['--exclude-effect', 'rust'], "no effect 'rust'"),
+    (['--holdout', 'nowhere'], "no bag at 'nowhere'"),
+    (['--effects-known', 'nowhere.json'], 'cannot be read'),
+    (['--pose-topic', '/camera'], "no message on '/camera'"),
+])  # fmt: skip
+def test_wrong_use_is_one_line_and_leaves_nothing(cell, tmp_path, capsys, words, reason):
+    out = tmp_path / 'd'
+    assert run('diagnose', cell / 'first', '--robot', 'ur5', '--out', out, *words) == 2
+    err = capsys.readouterr().err
+    assert reason in err and err.count('\n') == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_directory_of_something_else_is_not_replaced(cell, tmp_path, capsys):
+    (tmp_path / 'thesis.tex').write_text('years of work')
+    assert run('diagnose', cell / 'first', '--robot', 'ur5', '--out', tmp_path) == 2
+    assert 'holds something else' in capsys.readouterr().err
+    assert (tmp_path / 'thesis.tex').read_text() == 'years of work'
+
+
+def twin_poses(bag):
+    with BagReader(bag) as reader:
+        rows = [(m.message.header.stamp.sec * 10**9 + m.message.header.stamp.nanosec,
+                 m.message.pose.position) for m in reader.messages(['/twin/tool_pose'])]
+    return np.array([ns for ns, _ in rows]), np.array([[p.x, p.y, p.z] for _, p in rows])
+
+
+def test_predict_adds_what_was_found_at_every_joint_state(cell, found, tmp_path):
+    model = found / 'diagnosis.json'
+    out = tmp_path / 'predicted'
+    assert run('predict', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    ns, position = twin_poses(out)
+    recording = read_recording(cell / 'second', load('ur5'))
+    assert np.array_equal(ns - recording.epoch_ns, np.round(recording.joints.t * 1e9))
+    twin = load_model(load('ur5'), model)
+    wanted = twin.poses(recording, recording.joints.t).position
+    assert np.abs(position - wanted).max() < 1e-12
+    left = read_recording(out, load('ur5')).measured.position - wanted
+    assert np.sqrt((left**2).sum(axis=1).mean()) < 5e-5
+
+
+def write_model(path, robot, effects, bases, tool=None, inputs=()):
+    path.write_text(json.dumps({
+        'schema': 'weld_twin/diagnosis/1', 'inputs': list(inputs),
+        'model': {
+            'tool': (robot.T_flange_tool if tool is None else tool).tolist(),
+            'bases': [base.tolist() for base in bases], 'known': [], 'found': effects,
+        },
+    }))  # fmt: skip
+    return path
+
+
+def test_predicted_poses_are_those_of_the_instrument_at_the_same_stamp(cell, tmp_path):
+    """A clock that is late by d shows at t where the arm was at t - d, in the fitted frames."""
+    robot = load('ur5')
+    base, tool = np.eye(4), np.eye(4)
+    base[:3, 3], tool[:3, 3] = [0.5, -0.2, 1.0], [0.0, 0.01, 0.15]
+    model = write_model(tmp_path / 'm.json', robot,
+                        [{'effect': 'time_delay', 'delay': DELAY}], [base], tool)  # fmt: skip
+    out = tmp_path / 'p'
+    assert run('predict', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    _, position = twin_poses(out)
+    motion = read_recording(cell / 'first', robot).joints
+    nominal = Twin(robot.with_frames(tool=tool))
+    late = nominal.poses(Recording('r', motion), motion.t - DELAY).position + base[:3, 3]
+    assert np.abs(position - late).max() < 1e-12
+    assert np.abs(position - nominal.poses(Recording('r', motion)).position
+                  - base[:3, 3]).max() > 1e-4  # fmt: skip
+
+
+def test_with_several_set_ups_the_bag_tells_which_is_meant(cell, tmp_path, capsys):
+    bases = [np.eye(4), np.eye(4)]
+    bases[1][0, 3] = 1.0
+    hashes = []
+    for name in ('first', 'second'):
+        digest = hashlib.sha256()
+        for file in sorted((cell / name).iterdir()):
+            digest.update(file.name.encode() + b'\0' + file.read_bytes())
+        hashes.append({'use': 'recording', 'path': name, 'sha256': digest.hexdigest()})
+    own = write_model(tmp_path / 'own.json', load('ur5'), [], bases, inputs=hashes)
+    other = write_model(tmp_path / 'other.json', load('ur5'), [], bases, inputs=hashes[:1])
+    predict = ('predict', cell / 'second', '--robot', 'ur5')
+    assert run(*predict, '--model', own, '--out', tmp_path / 'a') == 0
+    assert run(*predict, '--model', other, '--out', tmp_path / 'b') == 2
+    assert '--setup 1 to 2' in capsys.readouterr().err
+    assert run(*predict, '--model', other, '--setup', 1, '--out', tmp_path / 'c') == 0
+    apart = twin_poses(tmp_path / 'a')[1] - twin_poses(tmp_path / 'c')[1]
+    assert apart == pytest.approx(np.tile([1.0, 0.0, 0.0], (len(apart), 1)))
+
+
+@pytest.fixture
+def offset_model(tmp_path):
+    effects = [
+        {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': OFFSET},
+        {'effect': 'backlash', 'joint': 'wrist_1_joint', 'width': WIDTH},
+    ]
+    return write_model(tmp_path / 'm.json', load('ur5'), effects, [np.eye(4)])
+
+
+def test_exports_carry_the_correction_and_leave_the_rest_as_effects(offset_model, tmp_path):
+    for form, name in (('yaml', 'r.yaml'), ('urdf', 'r.urdf'), ('offsets', 'o.csv'),
+                       ('left-over', 'l.yaml'), ('effects', 'e.yaml')):  # fmt: skip
+        assert run('export', offset_model, '--robot', 'ur5', '--format', form,
+                   '--out', tmp_path / name) == 0  # fmt: skip
+    q = np.array([[0.1, -1.0, 1.2, 0.3, -0.5, 0.2]])
+    shifted = q + OFFSET * np.eye(6)[2]
+    wanted = Twin(load('ur5')).poses(Recording('r', _at(shifted))).position
+    for robot in (read_robot_yaml(tmp_path / 'r.yaml'), read_urdf(tmp_path / 'r.urdf')):
+        assert np.allclose(Twin(robot).poses(Recording('r', _at(q))).position, wanted, atol=1e-9)
+    rows = {row['joint']: row for row in csv.DictReader((tmp_path / 'o.csv').open())}
+    assert float(rows['elbow_joint']['offset']) == OFFSET and rows['elbow_joint']['unit'] == 'rad'
+    assert [e['effect'] for e in yaml.safe_load((tmp_path / 'l.yaml').read_text())] == ['backlash']
+    assert len(yaml.safe_load((tmp_path / 'e.yaml').read_text())) == 2
+
+
+def _at(q):
+    from weld_twin_core.recording import JointMotion
+
+    return JointMotion(np.zeros(1), q)
+
+
+def test_an_export_is_printed_where_no_file_is_named(offset_model, capsys):
+    assert run('export', offset_model, '--robot', 'ur5', '--format', 'offsets') == 0
+    assert f'elbow_joint,{OFFSET},rad' in capsys.readouterr().out
+
+
+def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path, capsys):
+    model = write_model(
+        tmp_path / 'm.json', load('ur5'),
+        [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': OFFSET}], [np.eye(4)],
+    )  # fmt: skip
+    out = tmp_path / 'commands'
+    assert run('compensate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    nominal = read_recording(cell / 'first', load('ur5')).joints
+    commands = read_recording(out, load('ur5')).joints
+    assert np.abs(commands.q - (nominal.q - OFFSET * np.eye(6)[2])).max() < 1e-9
+    assert provenance(out)['compensated_with'][0]['effect'] == 'joint_offset'
+    assert 'and 0.0000 mm with these' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(('content', 'reason'), [
+    ('[]', 'is no diagnosis'), ('{"schema": "other/1"}', 'is no diagnosis'),
+    ('{', 'is not JSON'), ('{"schema": "weld_twin/diagnosis/1"}', 'holds no model'),
+    ('{"schema": "weld_twin/diagnosis/1", "model": {"tool": [[1]], "bases": []}}', 'model.tool'),
+    ('{"schema": "weld_twin/diagnosis/1", "model": {"bases": []}}', "lacks 'tool'"),
+])  # fmt: skip
+def test_a_file_that_is_no_diagnosis_is_told_in_one_line(tmp_path, capsys, content, reason):
+    path = tmp_path / 'm.json'
+    path.write_text(content)
+    assert run('export', path, '--robot', 'ur5') == 2
+    err = capsys.readouterr().err
+    assert reason in err and err.count('\n') == 1

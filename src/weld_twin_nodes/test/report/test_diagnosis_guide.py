@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The guide's commands and code run as they stand, and its tables are complete."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from weld_twin_nodes.cli import main
+from weld_twin_nodes.offline.exports import FORMATS
+from weld_twin_nodes.report.diagnosis_files import PAGE, RESULT
+
+ROOT = Path(__file__).parents[4]
+GUIDE = (ROOT / 'docs' / 'diagnosis.md').read_text(encoding='utf-8')
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    (tmp_path / 'bags').symlink_to(ROOT / 'bags')
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_commands_run_one_after_the_other(here):
+    commands = re.findall(r'^    weld-twin (.*)$', GUIDE, re.MULTILINE)
+    assert len(commands) == 4
+    for command in commands:
+        assert main(shlex.split(command)) == 0, command
+
+
+def test_the_code_runs(here, capsys):
+    exec(re.search(r'```python\n(.*?)```', GUIDE, re.DOTALL)[1], {})
+    assert "'status'" in capsys.readouterr().out
+
+
+def test_every_file_is_told():
+    for name in [PAGE, RESULT, *(name for name, _ in FORMATS.values())]:
+        assert f'`{name}`' in GUIDE, name
+
+
+def test_every_option_is_told(capsys):
+    with pytest.raises(SystemExit):
+        main(['diagnose', '--help'])
+    told = capsys.readouterr().out
+    for option in set(re.findall(r'--[a-z-]+', told)) - {
+        '--help', '--base-link', '--tip-link', '--out', '--robot', '--robots',
+    }:  # fmt: skip
+        assert option in GUIDE, option

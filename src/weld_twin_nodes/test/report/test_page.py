@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The page as a browser has it: no script errors, nothing fetched, readable at any width."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from html import escape
+from html.parser import HTMLParser
+
+import diagnoses
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from weld_twin_core.diagnosis.result import Check, Traces
+from weld_twin_nodes.report import InputFile, report_page
+from weld_twin_nodes.report.seam_view import seam_data
+
+FRAME = '<iframe width="{width}" height="3000" srcdoc="{page}"></iframe>'
+MEASURE = """
+<title>?</title>
+<script>
+addEventListener('load', () => {
+  const frames = [...document.querySelectorAll('iframe')];
+  const wide = frames.map((frame) => frame.contentDocument.documentElement.scrollWidth);
+  document.title = 'wide ' + Math.max(...wide);
+});
+</script>
+"""
+
+
+@pytest.fixture(scope='module', params=list(diagnoses.ALL))
+def case(request):
+    return diagnoses.ALL[request.param]()
+
+
+def embedded(page):
+    return json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL)[1])
+
+
+def test_the_page_runs_without_a_console_message(case, browser):
+    seen = browser.look(report_page(case))
+    assert seen.console == []
+    assert re.search(r'id="times">\d+ .<', seen.dom), 'the script did not run to its end'
+
+
+def test_a_script_error_would_be_noticed(browser):
+    seen = browser.look('<script>nothing_of_that_name()</script>')
+    assert any('nothing_of_that_name' in line for line in seen.console)
+
+
+def test_both_seams_are_drawn_and_the_one_before_is_redder(browser):
+    image = imread(browser.picture(report_page(diagnoses.backlash()), height=1200))
+    seam = image[650:1150]
+    red = (seam[..., 0] > 0.6) & (seam[..., 1] < 0.35) & (seam[..., 2] < 0.35)
+    blue = (seam[..., 2] > 0.55) & (seam[..., 0] < 0.3) & (seam[..., 1] < 0.65)
+    half = seam.shape[1] // 2
+    assert red[:, :half].sum() > 200 > 20 > red[:, half:].sum()
+    assert blue[:, half:].sum() > 200
+
+
+@pytest.mark.parametrize('width', [360, 768])
+def test_nothing_sticks_out_at_the_width_of_a_phone(browser, width):
+    pages = [report_page(diagnoses.ALL[name]()) for name in ('backlash', 'calibration')]
+    frames = [FRAME.format(width=width, page=escape(page, quote=True)) for page in pages]
+    seen = browser.look(MEASURE + ''.join(frames), width=900)
+    assert int(re.search(r'<title>wide (\d+)', seen.dom)[1]) == width
+
+
+def test_it_prints_on_a_few_pages(browser):
+    content = browser.printed(report_page(diagnoses.backlash())).read_bytes()
+    assert content.startswith(b'%PDF') and 2 <= len(re.findall(rb'/Type /Page\b', content)) <= 5
+
+
+def test_the_page_needs_no_other_file(case):
+    page = report_page(case)
+    assert not re.search(r'(src|href)\s*=|@import|url\(|https?://', page)
+    assert "default-src 'none'" in page.replace('&#x27;', "'")
+    assert len(page) < 500_000
+
+
+class Nesting(HTMLParser):
+    VOID = ('meta', 'input', 'br')
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_every_element_is_closed_in_order(case):
+    parser = Nesting()
+    parser.feed(report_page(case))
+    assert parser.open == []
+
+
+def test_names_from_a_bag_cannot_become_markup():
+    evil = '</script><script>alert(1)</script>'
+    case = diagnoses.nothing()
+    recording = replace(case.recordings[0], name=evil)
+    checks = (Check(evil, 'warning', evil),)
+    page = report_page(
+        replace(case, recordings=(recording,), checks=checks), [InputFile(evil, evil, evil)]
+    )
+    assert evil not in page and page.count('<script') == 2
+
+
+def test_a_diagnosis_without_pictures_still_has_a_page(browser):
+    case = replace(diagnoses.nothing(), traces=Traces((), (), (), ()), recordings=(), checks=())
+    assert browser.look(report_page(case)).console == []
+
+
+def test_the_picture_keeps_the_largest_deviations_of_a_long_recording():
+    count = 200_000
+    t = np.arange(count) * 0.01
+    measured = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+    before = np.zeros((count, 3))
+    before[123_457] = [0, 3e-3, 4e-3]
+    traces = Traces((t,), (measured,), (before,), (np.zeros((count, 3)),))
+    run = seam_data(replace(diagnoses.nothing(), traces=traces))['runs'][0]
+    shown = np.reshape(run['before'], (-1, 3))
+    assert len(shown) <= 3000
+    assert np.linalg.norm(shown, axis=1).max() == pytest.approx(5000.0)
+
+
+def test_the_picture_is_drawn_from_the_deviations_of_the_diagnosis():
+    case = diagnoses.backlash()
+    run = embedded(report_page(case))['runs'][0]
+    path, before = (np.reshape(run[key], (-1, 3)) for key in ('path', 'before'))
+    assert np.allclose(path + before, 1e6 * case.traces.measured[0], atol=0.11)
+
+
+def test_outliers_are_counted_and_not_drawn():
+    case = diagnoses.backlash()
+    traces = case.traces
+    wild = [np.array(part) for part in traces.before]
+    wild[0][7] = [0.05, 0.0, 0.0]
+    good = [np.ones(len(part), bool) for part in wild]
+    good[0][7] = False
+    spoilt = replace(traces, before=tuple(wild), trusted=tuple(good))
+    assert seam_data(replace(case, traces=spoilt))['top'] < 2.0 * seam_data(case)['top']
+    assert '(1 outlier not drawn)' in report_page(replace(case, traces=spoilt))
+    assert 'not drawn' not in report_page(case)
+
+
+def test_a_measurement_to_make_is_told_in_sentences_without_its_stations():
+    wanted = {
+        'kind': 'bidirectional', 'sentence': 'Measure base_pose anew.', 'reason': 'It shows.',
+        'expected_separation_sigma': 12.3, 'cost': 20.0,
+        'motion': {'static': True, 't': [0.125], 'q': [[0.625]]},
+    }  # fmt: skip
+    page = report_page(replace(diagnoses.ambiguous(), next_experiment=wanted))
+    part = page[page.index('id="next"'):page.index('id="checks"')]
+    assert 'Measure base pose error anew.' in part
+    assert 'about 20 min' in part
+    assert '12 standard deviations' in part
+    assert '0.625' not in part

@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Plays a bag into the running nodes, for machines without `ros2 bag`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import BagReader
+from weld_twin_msgs_py.messages.to_messages import ros_messages
+from weld_twin_msgs_py.messages.topics import BY_NAME, RELIABLE, Qos, Topic
+
+CLOCK = '/clock'
+SETTLE = 0.2
+"""Seconds for the other side to see us, and for a clock that was set back to be noticed."""
+LOOK = 0.02
+ACKNOWLEDGED = 5.0
+
+
+class Playing(NamedTuple):
+    """
+    How to play.
+
+    Attributes
+    ----------
+    rate : float
+        Speed against the recording.
+    clock : float [1/s]
+        How often to tell the recording's time on /clock; 0 never.
+    topics : collection of str
+        What to play; empty for all.
+    loop : int
+        How often; 0 until stopped.
+    subscribers : int
+        How many each topic is to have before the start.
+    wait : float [s]
+        Longest time to wait for them.
+
+    """
+
+    rate: float = 1.0
+    clock: float = 0.0
+    topics: Collection[str] = ()
+    loop: int = 1
+    subscribers: int = 1
+    wait: float = 5.0
+
+
+def play(bag: Path | str, how: Playing, tell: Callable[[str], None]) -> int:
+    """
+    Play a bag; return how many messages were published.
+
+    Raises
+    ------
+    DataError
+        The bag cannot be read or has no such topic, or the rate makes no sense.
+
+    """
+    if not 0.0 < how.rate < float('inf'):
+        raise DataError(f'the rate must be positive, got {how.rate:g}')
+    with BagReader(bag) as reader, _node() as node:
+        publishers = _publishers(node, reader, how, tell)
+        ticker = _Ticker(node, how) if how.clock else None
+        _await(publishers, how)
+        count = rounds = 0
+        while how.loop == 0 or rounds < how.loop:
+            count += _once(reader, publishers, how.rate, ticker)
+            rounds += 1
+            for publisher in publishers.values():
+                publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED))
+            time.sleep(SETTLE)
+        return count
+
+
+@contextmanager
+def _node() -> Iterator[Node]:
+    context = rclpy.Context()
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    node = Node('player', context=context)
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
+
+
+class _Ticker:
+    """Tells the time of the recording on /clock."""
+
+    def __init__(self, node: Node, how: Playing) -> None:
+        self._publisher = node.create_publisher(Clock, CLOCK, 10)
+        self._messages = ros_messages()
+        self._period = 1.0 / how.clock
+        self.next = 0.0
+
+    def tick(self, ns: int) -> None:
+        """Tell a time [ns]."""
+        self._publisher.publish(Clock(clock=self._messages.time(ns)))
+        self.next = time.monotonic() + self._period
+
+
+def _publishers(
+    node: Node, reader: BagReader, how: Playing, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    wanted = [name if name.startswith('/') else f'/{name}' for name in how.topics]
+    missing = [name for name in wanted if name not in reader.topics]
+    if missing:
+        raise DataError(f'the bag has no topic {missing[0]!r}; it has {", ".join(reader.topics)}')
+    out = {}
+    for name, (kind, count) in reader.topics.items():
+        if count == 0 or (wanted and name not in wanted) or (how.clock and name == CLOCK):
+            continue
+        qos = BY_NAME[name].offered if name in BY_NAME else Qos(RELIABLE, 1000)
+        try:
+            message = Topic(name, kind, qos, qos, '').message_class()
+        except (ImportError, AttributeError):
+            tell(f'{name}: the type {kind} is not installed here; it is left out')
+            continue
+        out[name] = node.create_publisher(message, name, qos.to_rclpy())
+    return out
+
+
+def _await(publishers: dict[str, Any], how: Playing) -> None:
+    end = time.monotonic() + how.wait
+    while time.monotonic() < end and any(
+        publisher.get_subscription_count() < how.subscribers for publisher in publishers.values()
+    ):
+        time.sleep(LOOK)
+    time.sleep(SETTLE)
+
+
+def _once(
+    reader: BagReader, publishers: dict[str, Any], rate: float, ticker: _Ticker | None
+) -> int:
+    begin, first, count = 0.0, None, 0
+    for topic, _, log_ns, data in reader.raw(list(publishers)):
+        if first is None:
+            first = log_ns
+            if ticker is not None:
+                ticker.tick(first)
+                time.sleep(SETTLE)
+            begin = time.monotonic()
+        due = begin + (log_ns - first) * 1e-9 / rate
+        while (now := time.monotonic()) < due:
+            if ticker is not None and now >= ticker.next:
+                ticker.tick(first + round((now - begin) * rate * 1e9))
+            time.sleep(min(due - now, LOOK if ticker is None else max(ticker.next - now, 0.0)))
+        publishers[topic].publish(bytes(data))
+        count += 1
+    return count

@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What every node of the cell shares: settings, guarded inputs, health, and its listeners."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any, ClassVar
+
+from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+from weld_twin_core.errors import TwinError
+from weld_twin_msgs_py.messages.cdr_read import checked, decoder
+from weld_twin_msgs_py.messages.to_messages import ros_messages
+from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, Topic
+
+from . import qos_events
+from .health import Health, Input
+from .settings import Setting
+
+WARN_EVERY = 5.0
+"""Seconds between two warnings about the same topic."""
+READY_EVERY = 0.02
+"""Seconds between two looks at whether the listeners are there."""
+HEALTH_EVERY = 1.0
+"""Seconds between two health messages."""
+
+SHARED = (
+    Setting('wait_for_subscribers', 0,
+            'take no input before the main outputs have this many subscribers [1]', 0, 100),
+    Setting('reliable_inputs', False,
+            'request reliable delivery; only for inputs whose publishers offer it'),
+    Setting('stale_after', 1.0, 'silence after which an input counts as stale [s]', 0.05, 3600.0),
+)  # fmt: skip
+
+
+class CellNode(Node):
+    """A node whose bad input costs a sentence and a sample, never a crash or a wrong output."""
+
+    settings: ClassVar[tuple[Setting, ...]] = ()
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        super().__init__(name, **kwargs)
+        self.messages = ros_messages()
+        self.refused = 0
+        self.finished = False
+        self.failure: TwinError | None = None
+        self._warned: dict[str, float] = {}
+        self._outputs: list[Any] = []
+        self._waiting: list[Callable[[], None]] = []
+        for item in (*SHARED, *self.settings):
+            self.declare_parameter(item.name, item.default, item.descriptor())
+        self.health = Health(name, self.setting('stale_after'))
+        self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
+        self.every(HEALTH_EVERY, self._tell_health)
+        self._jumps = self.get_clock().create_jump_callback(
+            JumpThreshold(
+                min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
+            ),
+            post_callback=self._jumped,
+        )
+
+    def setting(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        return self.get_parameter(name).value
+
+    def every(self, period: float, action: Callable[[], None]) -> Any:
+        """Return a timer [s] that runs on whether or not simulated time stands still."""
+        def guarded() -> None:
+            try:
+                action()
+            except Exception:
+                self._raise_unless_over()
+
+        return self.create_timer(period, guarded, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _raise_unless_over(self) -> None:
+        """Pass an exception on, except what a shutdown in the middle of a callback causes."""
+        if self.context.ok():
+            raise
+
+    def offer(self, topic: Topic, *, awaited: bool = True) -> Any:
+        """Return a publisher of a topic of the table; ``wait_for_subscribers`` is for awaited."""
+        publisher = self.create_publisher(
+            topic.message_class(), topic.name, topic.offered.to_rclpy(),
+            event_callbacks=qos_events.of_publisher(
+                topic.name, topic.offered, partial(self._mismatch, topic.name)
+            ),
+        )  # fmt: skip
+        if awaited:
+            self._outputs.append(publisher)
+        return publisher
+
+    def listen(
+        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False,
+        required: bool = False,
+    ) -> Input:  # fmt: skip
+        """
+        Subscribe to a topic of the table once the outputs have their subscribers.
+
+        Parameters
+        ----------
+        topic : Topic
+        callback : callable
+            Takes an object that `weld_twin_msgs_py.messages.from_messages` reads.
+        raw : bool
+            Give it the serialised bytes instead, once they proved to be such a message.
+        required : bool
+            The node can do nothing without this input; health calls its absence stale.
+
+        """
+        state = self.health.watch(topic.name, required=required, steady=topic.steady)
+        decode = checked(topic.type) if raw else decoder(topic.type)
+
+        def guarded(data: bytes) -> None:
+            state.received += 1
+            state.last = time.monotonic()
+            try:
+                callback(decode(data))
+            except TwinError as error:
+                self.refuse(topic.name, str(error))
+            except Exception:
+                self._raise_unless_over()
+
+        def subscribe() -> None:
+            wanted = topic.requested
+            if self.setting('reliable_inputs'):
+                wanted = replace(wanted, reliability=topic.offered.reliability)
+            self.create_subscription(
+                topic.message_class(), topic.name, guarded, wanted.to_rclpy(), raw=True,
+                event_callbacks=qos_events.of_subscription(
+                    topic.name, wanted, partial(self._mismatch, topic.name)
+                ),
+            )  # fmt: skip
+
+        self.when_ready(subscribe)
+        return state
+
+    def refuse(self, source: str, reason: str) -> None:
+        """Count a sample that cannot be used, and say why, now and then."""
+        self.refused += 1
+        state = self.health.inputs.get(source)
+        if state is None:
+            self.health.say(f'{source}: {reason}')
+        else:
+            state.refused += 1
+            state.last_reason = reason
+        self.warn(source, f'{source}: {reason} ({self.refused} refused so far)')
+
+    def warn(self, source: str, sentence: str) -> None:
+        """Write a sentence into the log, unless one from the same source was written just now."""
+        now = time.monotonic()
+        if now - self._warned.get(source, -WARN_EVERY) >= WARN_EVERY:
+            self._warned[source] = now
+            self.get_logger().warning(sentence)
+
+    def time_went_back(self) -> None:
+        """Forget what was heard: the clock begins anew, as when a bag is played in a loop."""
+
+    def when_ready(self, action: Callable[[], None]) -> None:
+        """Run an action once every output has as many subscribers as it waits for."""
+        if self.setting('wait_for_subscribers') == 0:
+            action()
+            return
+        if not self._waiting:
+            self._ready_timer = self.every(READY_EVERY, self._look)
+        self._waiting.append(action)
+
+    def _look(self) -> None:
+        wanted = self.setting('wait_for_subscribers')
+        if any(output.get_subscription_count() < wanted for output in self._outputs):
+            return
+        self._ready_timer.cancel()
+        waiting, self._waiting = self._waiting, []
+        for action in waiting:
+            action()
+
+    def _mismatch(self, topic: str, sentence: str) -> None:
+        """Tell of a partner that gets or gives nothing, as long as there are partners."""
+        self.get_logger().warning(sentence)
+        self.health.lasting[topic] = sentence
+
+    def _jumped(self, jump: TimeJump) -> None:
+        sentence = f'time went back by {-jump.delta.nanoseconds * 1e-9:.3f} s; beginning anew'
+        self.get_logger().info(sentence)
+        self.health.say(sentence)
+        self.time_went_back()
+
+    def _tell_health(self) -> None:
+        for name, state in self.health.inputs.items():
+            state.publishers = self.count_publishers(name)
+        for name in [name for name in self.health.lasting if name.startswith('/')]:
+            if not self.count_publishers(name) * self.count_subscribers(name):
+                del self.health.lasting[name]
+        self._diagnostics.publish(self.messages.statuses(
+            self.get_clock().now().nanoseconds, self.health.statuses()
+        ))  # fmt: skip

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Deviation analyzer: measured minus twin, paired by header stamp, and its metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.cdr_write import Vector3Encoder
+from weld_twin_msgs_py.messages.topics import (
+    DEVIATION,
+    DEVIATION_METRICS,
+    MEASURED_POINT,
+    MEASURED_POSE,
+    TWIN_POSE,
+)
+
+from ..streams.deviation_stream import METRICS, Deviation, Deviations
+from ..streams.frame_names import BASE
+from .cell_node import CellNode
+from .robot_settings import ROBOT_SETTINGS, robot_of
+from .run_node import run
+from .settings import Setting
+
+
+class DeviationAnalyzer(CellNode):
+    """Publishes the deviation of every measurement it can pair, and counts the others."""
+
+    settings = (
+        *ROBOT_SETTINGS,
+        Setting('path_length', 0.0, 'length of the seam [m]; 0: the way the twin has gone',
+                0.0, 1e4),
+        Setting('buffer', 2000, 'samples of each stream kept for pairing [1]', 10, 1_000_000),
+        Setting('max_gap', 0.5, 'longest step of the twin that is interpolated, if its usual step '
+                'allows [s]', 0.0, 60.0),
+        Setting('metrics_every', 50, 'deviations between two metrics messages [1]', 1, 100_000),
+        Setting('metrics_idle', 1.0, 'wait for more before the last metrics [s]', 0.05, 60.0),
+    )  # fmt: skip
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('deviation_analyzer', **kwargs)
+        self._deviations = Deviations(
+            robot_of(self), self.setting('path_length'),
+            self.setting('buffer'), self.setting('max_gap'),
+        )  # fmt: skip
+        self._vector = self.offer(DEVIATION)
+        self._encode = Vector3Encoder(BASE)
+        self._metrics = self.offer(DEVIATION_METRICS, awaited=False)
+        self._stamp = 0
+        self._seen = self._told = 0
+        self._every = self.setting('metrics_every')
+        self.every(self.setting('metrics_idle'), self._on_idle)
+        self.listen(MEASURED_POSE, self._on_pose)
+        self.listen(MEASURED_POINT, self._on_point)
+        self.listen(TWIN_POSE, self._on_twin, required=True)
+
+    def time_went_back(self) -> None:
+        """Forget what was not paired, and begin the metrics anew."""
+        self._deviations.reset()
+        self._seen = self._told = 0
+
+    def _on_pose(self, message: Any) -> None:
+        position, _ = from_messages.pose(message)
+        self._publish(self._deviations.add_measured(from_messages.stamp_ns(message), position))
+
+    def _on_point(self, message: Any) -> None:
+        position = from_messages.point(message)
+        self._publish(self._deviations.add_measured(from_messages.stamp_ns(message), position))
+
+    def _on_twin(self, message: Any) -> None:
+        position, _ = from_messages.pose(message)
+        self._publish(self._deviations.add_twin(from_messages.stamp_ns(message), position))
+
+    def _publish(self, deviations: Iterable[Deviation]) -> None:
+        for stamp, vector in deviations:
+            self._vector.publish(self._encode(stamp, vector))
+            self._stamp = stamp
+            if self._deviations.samples % self._every == 0:
+                self._publish_metrics()
+
+    def _on_idle(self) -> None:
+        """Tell the last metrics of a run once nothing more comes."""
+        samples = self._deviations.samples
+        if samples == self._seen != self._told:
+            self._publish_metrics()
+        self._seen = samples
+
+    def _publish_metrics(self) -> None:
+        self._told = self._deviations.samples
+        self._metrics.publish(
+            self.messages.diagnostics(self._stamp, METRICS, self._deviations.metrics())
+        )
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run(DeviationAnalyzer, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

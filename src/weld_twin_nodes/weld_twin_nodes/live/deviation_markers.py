@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The marker node: the seam coloured by deviation, and the deviations magnified."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import DEVIATION, MARKERS, MEASURED_POINT, MEASURED_POSE
+
+from ..streams.frame_names import WORLD
+from .cell_node import CellNode
+from .deviation_lines import DeviationLines
+from .robot_settings import ROBOT_SETTINGS, robot_of
+from .run_node import run
+from .settings import Setting
+
+
+class DeviationMarkers(CellNode):
+    """Publishes pictures of the deviation for RViz and Foxglove, a few times a second."""
+
+    settings = (
+        *ROBOT_SETTINGS,
+        Setting('magnification', 200.0, 'length of a deviation in the picture [1]', 1.0, 1e6),
+        Setting('tolerance', 0.001, 'deviation that is drawn red [m]', 1e-9, 1.0),
+        Setting('spacing', 0.001, 'shortest way between two points drawn [m]', 0.0, 1.0),
+        Setting('points', 1000, 'points kept of the seam [1]', 2, 100_000),
+        Setting('every', 0.5, 'time between two pictures [s]', 0.05, 60.0),
+    )  # fmt: skip
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('deviation_markers', **kwargs)
+        self._rotation = robot_of(self).T_world_base[:3, :3]
+        self._markers = self.offer(MARKERS)
+        self.time_went_back()
+        self.listen(MEASURED_POSE, self._on_pose)
+        self.listen(MEASURED_POINT, self._on_point)
+        self.listen(DEVIATION, self._on_deviation, required=True)
+        self.every(self.setting('every'), self._draw)
+
+    def time_went_back(self) -> None:
+        """Begin the picture anew."""
+        self._lines = DeviationLines(
+            self.setting('magnification'), self.setting('tolerance'), self.setting('spacing'),
+            self.setting('points'),
+        )  # fmt: skip
+        self._drawn = 0
+
+    def _on_pose(self, message: Any) -> None:
+        self._lines.measured(from_messages.stamp_ns(message), from_messages.pose(message)[0])
+
+    def _on_point(self, message: Any) -> None:
+        self._lines.measured(from_messages.stamp_ns(message), from_messages.point(message))
+
+    def _on_deviation(self, message: Any) -> None:
+        vector = self._rotation @ from_messages.vector3(message)
+        self._lines.deviation(from_messages.stamp_ns(message), vector)
+
+    def _draw(self) -> None:
+        if self._lines.count == self._drawn:
+            return
+        self._drawn = self._lines.count
+        self._markers.publish(
+            self.messages.markers(self._lines.stamp, self._lines.drawn(), WORLD)
+        )
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run(DeviationMarkers, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

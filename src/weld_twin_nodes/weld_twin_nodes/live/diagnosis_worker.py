@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A diagnosis in a process of its own, so that a node goes on listening meanwhile.
+
+Run as a module it is that process: a `Job` comes in, pickled, and a `Finding` or the sentence of
+an error goes out.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.effects import Effect
+    from weld_twin_core.recording import Recording
+
+_MODULE = 'weld_twin_nodes.live.diagnosis_worker'
+_NICENESS = 10
+
+
+class Job(NamedTuple):
+    """What to diagnose."""
+
+    recording: Recording
+    robot: Robot
+    known: tuple[Effect, ...] = ()
+    align: frozenset[str] = frozenset()
+    exclude: tuple[str, ...] = ()
+
+
+class Finding(NamedTuple):
+    """
+    What a diagnosis says, as plain values.
+
+    Attributes
+    ----------
+    stamp : int [ns]
+        Of the last measurement looked at.
+    status : str
+    sentence : str
+        The verdict in words.
+    values : dict
+        Keys and values of the diagnostic message.
+
+    """
+
+    stamp: int
+    status: str
+    sentence: str
+    values: dict[str, Any]
+
+
+class Worker:
+    """Runs one job at a time in another process; nothing here waits for it."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._thread: threading.Thread | None = None
+        self._result: Finding | str | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Return whether a job is under way."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def start(self, job: Job) -> None:
+        """Begin a job; the one before must be finished."""
+        self._result = None
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', _MODULE], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        # Handing over the data waits for the other interpreter to be up: not in the caller's time.
+        self._thread = threading.Thread(target=self._exchange, args=(self._process, job))
+        self._thread.start()
+
+    def take(self) -> Finding | str | None:
+        """Return the finding or the error of a finished job, once; else None."""
+        if self.busy:
+            return None
+        result, self._result = self._result, None
+        return result
+
+    def stop(self) -> None:
+        """End the job under way."""
+        if self._process is not None:
+            self._process.kill()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _exchange(self, process: subprocess.Popen[bytes], job: Job) -> None:
+        answer, _ = process.communicate(pickle.dumps(job))
+        if process.returncode == 0:
+            self._result = pickle.loads(answer)
+        else:
+            self._result = f'the diagnosis ended with code {process.returncode}'
+
+
+def find(job: Job) -> Finding:
+    """Return the finding of a job."""
+    from weld_twin_core.diagnosis import diagnose
+
+    from ..report.words import found_name, verdict
+
+    diagnosis = diagnose(
+        [job.recording], job.robot, align=job.align, known=job.known, exclude=job.exclude
+    )
+    gap, shrink = diagnosis.gap, diagnosis.shrink
+    values: dict[str, Any] = {
+        'status': diagnosis.status, 'confidence': diagnosis.confidence,
+        'gap_rms_m': gap.rms_m, 'noise_floor_m': gap.noise_floor_m,
+        'rms_after_m': shrink.rms_after_m, 'shrink_ratio': shrink.ratio,
+    }  # fmt: skip
+    for found in diagnosis.effects:
+        entry = found.effect.to_mapping()
+        values[found_name(found)] = {
+            key: value for key, value in entry.items() if key not in ('effect', 'joint')
+        }
+    measured = job.recording.measured
+    last = float(measured.t[-1]) if measured is not None else 0.0
+    stamp = job.recording.epoch_ns + round(last * 1e9)
+    return Finding(stamp, diagnosis.status, ' '.join(verdict(diagnosis)), values)
+
+
+def main() -> int:
+    """Do one job from standard input."""
+    from weld_twin_core.errors import TwinError
+
+    # A node may run in real time; what it can wait for must not.
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    os.nice(_NICENESS)
+    answer_to = sys.stdout.buffer
+    sys.stdout = sys.stderr
+    job = pickle.load(sys.stdin.buffer)
+    try:
+        result: Finding | str = find(job)
+    except TwinError as error:
+        result = str(error)
+    pickle.dump(result, answer_to)
+    answer_to.flush()
+    return 0
+
+
+if __name__ == '__main__':
+    # Pickle must find the classes under their real name, not under __main__.
+    from .diagnosis_worker import main as _main
+
+    raise SystemExit(_main())

@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How a node is doing: what each input brought since the last look, as diagnostic statuses."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from math import inf, isfinite
+
+from weld_twin_msgs_py.messages.to_messages import Status
+
+OK, WARN, ERROR, STALE = range(4)
+"""Levels of diagnostic_msgs/DiagnosticStatus."""
+RATE_CHANGE = 3.0
+"""Ratio to the usual rate from which on a rate is told as changed."""
+USUAL = 15
+"""Looks over which the usual rate is taken."""
+
+
+class Input:
+    """
+    One input of a node.
+
+    Parameters
+    ----------
+    topic : str
+    required : bool
+        Whether the node can do nothing without it.
+    patience : float [s]
+        Silence after which it is stale; five of its periods where that is longer. Infinite for
+        an input that comes when there is something to tell.
+
+    """
+
+    def __init__(self, topic: str, required: bool, patience: float) -> None:
+        self.topic = topic
+        self.received = self.refused = self.others = 0
+        self.publishers = 0
+        self.last_reason = ''
+        self.last = 0.0
+        self._required = required
+        self._patience = patience
+        self._rates: deque[float] = deque(maxlen=USUAL)
+        self._before = (time.monotonic(), 0, 0, 0)
+
+    def status(self, node: str, now: float) -> Status:
+        """Return what happened since the last look."""
+        then, received, refused, others = self._before
+        span = max(now - then, 1e-9)
+        n, bad = self.received - received, self.refused - refused
+        rate = n / span
+        level, message = self._judge(now, n, bad, rate, self.others - others)
+        if n > bad:
+            self._rates.append(rate)
+        self._before = (now, self.received, self.refused, self.others)
+        values = {
+            'received': self.received, 'refused': self.refused,
+            'rate_hz': round(rate, 1), 'publishers': self.publishers,
+            'age_s': round(now - self.last, 3) if self.received else 'never',
+            'last_reason': self.last_reason,
+        }  # fmt: skip
+        return Status(f'{node}: {self.topic}', level, message, values)
+
+    def _judge(self, now: float, n: int, bad: int, rate: float, others: int) -> tuple[int, str]:
+        usual = sorted(self._rates)[len(self._rates) // 2] if self._rates else 0.0
+        silent = now - self.last
+        if not self.received:
+            return (STALE, 'nothing received yet') if self._required else (OK, 'not in use')
+        if silent > max(self._patience, 5.0 / usual if usual else 0.0):
+            return STALE, f'silent for {silent:.1f} s'
+        if bad:
+            level = ERROR if bad == n else WARN
+            return level, f'{bad} of {n} refused: {self.last_reason}'
+        if n > 1 and others == n:
+            return WARN, f'none of {n} is about the joints of this robot'
+        if self.publishers > 1 and not others:
+            return WARN, f'{self.publishers} publishers send the same'
+        beats = isfinite(self._patience) and len(self._rates) >= 3 and n
+        if beats and not usual / RATE_CHANGE <= rate <= usual * RATE_CHANGE:
+            return WARN, f'{rate:.0f}/s where {usual:.0f}/s is usual'
+        return OK, f'{rate:.0f}/s'
+
+
+class Health:
+    """The inputs of a node and what else is to be told of it."""
+
+    def __init__(self, node: str, patience: float) -> None:
+        self._node = node
+        self._patience = patience
+        self.inputs: dict[str, Input] = {}
+        self.lasting: dict[str, str] = {}
+        self._said: list[str] = []
+        self._said_in_all = 0
+
+    def watch(self, topic: str, *, required: bool, steady: bool = True) -> Input:
+        """Return a new input; silence of one that is not steady means nothing."""
+        self.inputs[topic] = Input(topic, required, self._patience if steady else inf)
+        return self.inputs[topic]
+
+    def say(self, sentence: str) -> None:
+        """Tell something once."""
+        self._said.append(sentence)
+        self._said_in_all += 1
+
+    def statuses(self) -> list[Status]:
+        """Return the node itself and each of its inputs, since the last call."""
+        now = time.monotonic()
+        told = [*self.lasting.values(), *self._said[-3:]]
+        own = Status(
+            self._node, WARN if told else OK, '; '.join(told) or 'running',
+            {'inputs': len(self.inputs), 'told': self._said_in_all},
+        )  # fmt: skip
+        self._said.clear()
+        return [own, *(item.status(self._node, now) for item in self.inputs.values())]

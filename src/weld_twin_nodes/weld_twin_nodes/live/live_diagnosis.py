@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Live diagnosis: the verdict over the last minute of the cell, once there is evidence for one."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from weld_twin_core.diagnosis.algebra.problem import FRAMES
+from weld_twin_core.errors import ModelError
+from weld_twin_msgs_py.messages.topics import (
+    DIAGNOSIS,
+    JOINT_STATES,
+    MEASURED_POINT,
+    MEASURED_POSE,
+    TEMPERATURE,
+    TOOL_WRENCH,
+)
+
+from ..offline.told_twin import build_twin
+from .cell_node import CellNode
+from .diagnosis_window import Window
+from .diagnosis_worker import Finding, Job, Worker
+from .robot_settings import ROBOT_SETTINGS, robot_of
+from .run_node import run
+from .settings import Setting
+
+LOOK_EVERY = 0.2
+LEVELS = {'none': 0, 'identified': 1, 'ambiguous': 1, 'unknown': 1}
+"""Of the diagnostic message: ok, or a warning."""
+
+
+class LiveDiagnosis(CellNode):
+    """
+    Diagnoses a sliding window again and again, in another process.
+
+    Nothing is published before a gap was found; from then on every verdict is, so that its end
+    is told too.
+    """
+
+    settings = (
+        *ROBOT_SETTINGS,
+        Setting('model', '', 'what the twin knows: an effects file or diagnosis.json'),
+        Setting('align', '', 'frames fitted along: base, tool, or base,tool'),
+        Setting('window', 60.0, 'length of the window [s]', 1.0, 600.0),
+        Setting('least', 5.0, 'shortest stretch that is diagnosed [s]', 0.5, 600.0),
+        Setting('every', 15.0, 'shortest time from one diagnosis to the next [s]', 0.0, 3600.0),
+    )  # fmt: skip
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('live_diagnosis', **kwargs)
+        self._twin = build_twin(robot_of(self), self.setting('model'))
+        self._align = _frames(self.setting('align'))
+        self._window = Window(self._twin.robot, self.setting('window'))
+        self._worker = Worker()
+        self._begun = -float('inf')
+        self._seen: int | None = None
+        self._speaking = False
+        self._verdict = self.offer(DIAGNOSIS)
+        self.listen(TOOL_WRENCH, self._window.take_wrench)
+        self.listen(TEMPERATURE, self._window.take_temperature)
+        self.listen(MEASURED_POSE, self._window.take_pose)
+        self.listen(MEASURED_POINT, self._window.take_point)
+        self.listen(JOINT_STATES, self._window.take_joints, required=True)
+        self.every(LOOK_EVERY, self._look)
+
+    def destroy_node(self) -> None:
+        """End the diagnosis under way."""
+        self._worker.stop()
+        super().destroy_node()
+
+    def time_went_back(self) -> None:
+        """Forget the window."""
+        self._window.reset()
+        self._seen = None
+
+    def _look(self) -> None:
+        """Publish what has been found, and begin anew where there is something new."""
+        if self._worker.busy:
+            return
+        self._tell(self._worker.take())
+        now = time.monotonic()
+        if now - self._begun < self.setting('every') or self._window.last == self._seen:
+            return
+        recording = self._window.recording(self.setting('least'))
+        if recording is not None:
+            self._begun, self._seen = now, self._window.last
+            twin = self._twin
+            self._worker.start(Job(recording, twin.robot, twin.effects, self._align))
+
+    def _tell(self, result: Finding | str | None) -> None:
+        if isinstance(result, str):
+            self.refuse('window', result)
+        elif result is not None and (self._speaking or result.status != 'none'):
+            self._speaking = True
+            self._verdict.publish(self.messages.diagnostics(
+                result.stamp, 'weld_twin: diagnosis', result.values, LEVELS[result.status],
+                result.sentence, self._twin.robot.name,
+            ))  # fmt: skip
+
+
+def _frames(text: str) -> frozenset[str]:
+    frames = frozenset(part.strip() for part in text.split(',') if part.strip())
+    if not frames <= set(FRAMES):
+        raise ModelError(f'align takes base, tool or base,tool, got {text!r}')
+    return frames
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run(LiveDiagnosis, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the injector and the twin share: a robot, effects that can be changed, a joint stream."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+from weld_twin_core.errors import TwinError
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.messages.topics import JOINT_STATES, TEMPERATURE, TOOL_WRENCH
+
+from ..offline.told_twin import build_twin
+from ..streams.twin_stream import JointStream, Sample
+from .cell_node import CellNode
+from .robot_settings import ROBOT_SETTINGS, robot_of
+from .settings import Setting
+
+MODEL_SETTINGS = (
+    *ROBOT_SETTINGS,
+    Setting('model', '', 'effects file, or diagnosis.json with the effects found; ~/reload '
+            'reads it again'),
+    Setting('effects', '', 'more effects, as the YAML list of an effects file', live=True),
+)  # fmt: skip
+
+
+class ModelNode(CellNode):
+    """Steps a twin with every joint state; its effects may change between two messages."""
+
+    settings = MODEL_SETTINGS
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        super().__init__(name, **kwargs)
+        self.robot = robot_of(self)
+        self.stream = JointStream(self._twin(self.setting('effects')))
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._changed)
+        self.create_service(Trigger, '~/reload', self._reload)
+
+    def start(self) -> None:
+        """Take input; to be called when the outputs are there."""
+        self.listen(TOOL_WRENCH, self.stream.take_wrench)
+        self.listen(TEMPERATURE, self.stream.take_temperature)
+        self._input = self.listen(JOINT_STATES, self._on_joints, required=True)
+
+    def time_went_back(self) -> None:
+        """Forget the motion so far."""
+        self.stream.reset()
+
+    def _on_joints(self, message: Any) -> None:
+        sample = self.stream.step(message)
+        self._input.others = self.stream.joints.others
+        if sample is not None:
+            self.publish(sample)
+
+    @abstractmethod
+    def publish(self, sample: Sample) -> None:
+        """Publish what follows from one joint state."""
+
+    def on_twin(self, twin: Twin) -> None:
+        """Go on with changed effects."""
+        self.stream.change(twin)
+
+    def _twin(self, effects: str) -> Twin:
+        return build_twin(self.robot, self.setting('model'), effects)
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == 'effects':
+                try:
+                    self._twin(parameter.value)
+                except TwinError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _changed(self, parameters: list[Parameter]) -> None:
+        if any(parameter.name == 'effects' for parameter in parameters):
+            self.on_twin(self._twin(self.setting('effects')))
+
+    def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            twin = self._twin(self.setting('effects'))
+        except TwinError as error:
+            response.message = str(error)
+            return response
+        self.on_twin(twin)
+        response.success = True
+        response.message = f'{len(twin.effects)} effects'
+        return response

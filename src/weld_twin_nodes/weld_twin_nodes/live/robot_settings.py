@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters by which a node is told its robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rclpy.executors import SingleThreadedExecutor
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.errors import ModelError
+from weld_twin_msgs_py.messages.cdr_read import decoder
+from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
+from weld_twin_msgs_py.robots import load_robot, parse_urdf
+
+from .cell_node import CellNode
+from .settings import Setting
+
+ROBOT_SETTINGS = (
+    Setting('robot', 'ur5', "bundled robot, path of a robot file or URDF, or 'topic' "
+            '(or /robot_description) to wait for the URDF that robot_state_publisher tells'),
+    Setting('base_link', '', 'first link of the chain in a URDF; empty: its root'),
+    Setting('tip_link', '', 'last link of the chain in a URDF; empty: its only leaf'),
+)  # fmt: skip
+LOOK = 0.1
+"""Seconds of one turn of the loop that waits for a description."""
+
+
+def robot_of(node: CellNode) -> Robot:
+    """
+    Return the robot a node's parameters name.
+
+    Raises
+    ------
+    ModelError
+        There is no such robot, or its file or description cannot be used.
+
+    """
+    name = node.setting('robot')
+    base, tip = node.setting('base_link') or None, node.setting('tip_link') or None
+    topic = ROBOT_DESCRIPTION.name if name == 'topic' else name
+    if topic.startswith('/') and not Path(topic).suffix and not Path(topic).is_file():
+        return parse_urdf(_described(node, topic), topic, base, tip)
+    return load_robot(name, base, tip)
+
+
+def _described(node: CellNode, topic: str) -> str:
+    """Return the next text on a topic; the node's health is told meanwhile."""
+    texts: list[str] = []
+    decode = decoder(ROBOT_DESCRIPTION.type)
+    subscription = node.create_subscription(
+        ROBOT_DESCRIPTION.message_class(), topic, lambda data: texts.append(decode(data).data),
+        ROBOT_DESCRIPTION.requested.to_rclpy(), raw=True,
+    )  # fmt: skip
+    node.get_logger().info(f'waiting for the robot on {topic}')
+    node.health.lasting['robot'] = f'waiting for the robot on {topic}'
+    runner = SingleThreadedExecutor(context=node.context)
+    runner.add_node(node)
+    try:
+        while not texts:
+            if not node.context.ok():
+                raise ModelError(f'stopped before a robot was told on {topic}')
+            runner.spin_once(timeout_sec=LOOK)
+    finally:
+        runner.remove_node(node)
+        runner.shutdown()
+    node.destroy_subscription(subscription)
+    del node.health.lasting['robot']
+    return texts[-1]

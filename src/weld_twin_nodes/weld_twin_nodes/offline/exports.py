@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The model of a diagnosis in forms that robots, planners and people load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.effects import Effect
+from weld_twin_core.twin.corrected import corrected, joint_offsets
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.yaml_file import yaml_text
+from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
+
+_EVERYTHING = '# Every effect of the twin; goes with the nominal robot.\n'
+_LEFT_OVER = '# What the corrected robot.yaml cannot hold; goes with that, not with the nominal.\n'
+
+
+def write_yaml(path: Path, model: Model) -> None:
+    """Write the corrected robot as a robot file."""
+    write_robot_yaml(path, _corrected(model)[0], overwrite=True)
+
+
+def write_model_urdf(path: Path, model: Model) -> None:
+    """Write the corrected robot as a URDF."""
+    write_urdf(path, _corrected(model)[0], overwrite=True)
+
+
+def write_offsets(path: Path, model: Model) -> None:
+    """Write how much further each joint really stands than its reading [rad, or m]."""
+    robot = model.robot
+    offsets = joint_offsets(robot, _causes(model))
+    rows = ['joint,offset,unit']
+    for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
+        rows.append(f'{name},{float(offset)!r},{"m" if slides else "rad"}')
+    write_text(path, '\n'.join(rows) + '\n', overwrite=True)
+
+
+def write_effects(path: Path, model: Model) -> None:
+    """Write every effect, known and found, for use with the nominal robot."""
+    _write_effects(path, _EVERYTHING, _causes(model))
+
+
+def write_left_over(path: Path, model: Model) -> None:
+    """Write the effects that the corrected robot cannot hold."""
+    _write_effects(path, _LEFT_OVER, _corrected(model)[1])
+
+
+FORMATS: dict[str, tuple[str, Callable[[Path, Model], None]]] = {
+    'yaml': ('robot.yaml', write_yaml),
+    'urdf': ('robot.urdf', write_model_urdf),
+    'offsets': ('joint_offsets.csv', write_offsets),
+    'effects': ('effects.yaml', write_effects),
+    'left-over': ('robot_effects.yaml', write_left_over),
+}
+"""What the command line calls a form, its usual file name, and how it is written."""
+
+
+def write_all(directory: Path, model: Model) -> None:
+    """Write the model in every form."""
+    for name, write in FORMATS.values():
+        write(directory / name, model)
+
+
+def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
+    based = model.robot.with_frames(base=model.bases[0])
+    robot, left = corrected(based, _causes(model))
+    source = f'{robot.source}; corrected by a diagnosis' if robot.source else 'diagnosis'
+    return replace(robot, source=source), left
+
+
+def _causes(model: Model) -> tuple[Effect, ...]:
+    """Return the effects of robot and cell; how a set-up moved is of no use elsewhere."""
+    return tuple(effect for effect in model.known + model.found if effect.cause)
+
+
+def _write_effects(path: Path, comment: str, effects: Sequence[Effect]) -> None:
+    entries = [effect.to_mapping() for effect in effects]
+    write_text(path, comment + yaml_text(entries), overwrite=True)

@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole cell offline: what the live nodes publish for a motion, computed in bulk."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.poses import Poses
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
+from weld_twin_msgs_py.messages.to_messages import Messages
+from weld_twin_msgs_py.messages.topics import (
+    ACTUAL_JOINT_STATES,
+    DEVIATION,
+    DEVIATION_METRICS,
+    JOINT_STATES,
+    MEASURED_POSE,
+    TWIN_POSE,
+)
+
+from ..streams.deviation_stream import METRICS, Deviation, Deviations
+from ..streams.frame_names import BASE, WORLD
+from ..streams.injected_noise import Noise
+
+METRICS_EVERY = 50
+
+
+class Entry(NamedTuple):
+    """One message of a run with its stamp [ns] and topic."""
+
+    stamp: int
+    topic: str
+    message: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """
+    A run of the cell.
+
+    Attributes
+    ----------
+    real : Twin
+        The robot as it is, with the injected effects.
+    twin : Twin
+        The robot as it is believed to be.
+    motion : JointMotion
+    stamps : array of int64, shape (N,) [ns]
+        Of the joint states.
+    seed : int
+        Of the measurement noise.
+    path_length : float [m]
+        For D_norm; 0 takes the way of the twin.
+
+    """
+
+    real: Twin
+    twin: Twin
+    motion: JointMotion
+    stamps: np.ndarray
+    seed: int = 0
+    path_length: float = 0.0
+
+    @cached_property
+    def recording(self) -> Recording:
+        """Return the joint stream as the live nodes see it, on whole nanoseconds."""
+        t = (self.stamps - self.stamps[0]) * 1e-9
+        motion = JointMotion(t, self.motion.q, self.motion.velocity)
+        return Recording('simulation', motion, epoch_ns=int(self.stamps[0]))
+
+    @cached_property
+    def actual_joints(self) -> Array:
+        """Return the joint positions with the joint-space effects, shape (N, n)."""
+        return self.real.joints(self.recording)
+
+    @cached_property
+    def measured(self) -> Poses:
+        """Return the measured tool poses, one for each joint state."""
+        position, rotation = self.real.poses(self.recording)
+        noise = Noise(self.real.effects, self.seed).draw(len(position))
+        return Poses(position + noise, rotation)
+
+    @cached_property
+    def expected(self) -> Poses:
+        """Return the twin's tool poses, one for each joint state."""
+        return self.twin.poses(self.recording)
+
+    def deviations(self) -> Iterator[tuple[Deviation, dict[str, float | int]]]:
+        """Yield each deviation with the metrics up to it."""
+        analyzer = Deviations(self.twin.robot, self.path_length)
+        measured = zip(_late(self.stamps, self.real), self.measured.position, strict=True)
+        expected = zip(_late(self.stamps, self.twin), self.expected.position, strict=True)
+        takers = (analyzer.add_measured, analyzer.add_twin)
+        tagged = [[(s, take, p) for s, p in rows] for take, rows in
+                  zip(takers, (measured, expected), strict=True)]  # fmt: skip
+        for stamp, take, position in heapq.merge(*tagged, key=lambda row: row[0]):
+            for deviation in take(stamp, position):
+                yield deviation, analyzer.metrics()
+
+    def entries(self, make: Messages) -> Iterator[Entry]:
+        """Yield every message of the run in the order of stamps."""
+        names, motion = self.twin.robot.joint_names, self.motion
+        stamps = self.stamps.tolist()
+        planned = (
+            Entry(s, JOINT_STATES.name, make.joint_state(s, names, q, qd))
+            for s, q, qd in zip(stamps, motion.q, motion.velocity, strict=True)
+        )
+        actual = (
+            Entry(s, ACTUAL_JOINT_STATES.name, make.joint_state(s, names, q))
+            for s, q in zip(stamps, self.actual_joints, strict=True)
+        )
+        measured = _poses(make, MEASURED_POSE.name, _late(self.stamps, self.real), self.measured)
+        expected = _poses(make, TWIN_POSE.name, _late(self.stamps, self.twin), self.expected)
+        yield from heapq.merge(
+            planned, actual, measured, expected, self._analysis(make), key=lambda e: e.stamp
+        )
+
+    def _analysis(self, make: Messages) -> Iterator[Entry]:
+        """Yield deviations, and metrics now and then and after the last one."""
+        count, told, stamp, metrics = 0, 0, 0, {}
+        for count, ((stamp, vector), metrics) in enumerate(self.deviations(), start=1):
+            yield Entry(stamp, DEVIATION.name, make.vector3(stamp, vector, BASE))
+            if count % METRICS_EVERY == 0:
+                told = count
+                yield _metrics(make, stamp, metrics)
+        if count != told:
+            yield _metrics(make, stamp, metrics)
+
+
+def _late(stamps: np.ndarray, twin: Twin) -> list[int]:
+    """Return the stamps of measurements, late by the delay of the measurement clock."""
+    return (stamps + round(twin.delay * NANOSECONDS)).tolist()
+
+
+def _poses(make: Messages, topic: str, stamps: list[int], poses: Poses) -> Iterator[Entry]:
+    for stamp, position, rotation in zip(stamps, *poses, strict=True):
+        yield Entry(stamp, topic, make.pose(stamp, position, rotation, WORLD))
+
+
+def _metrics(make: Messages, stamp: int, values: dict[str, float | int]) -> Entry:
+    return Entry(stamp, DEVIATION_METRICS.name, make.diagnostics(stamp, METRICS, values))

@@ -1,0 +1,259 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Many independent tasks, on the cores of this machine or on a Dask cluster, and resumable.
+
+A task is a function of a module and its arguments, and returns plain data (what JSON can hold,
+arrays become lists). Wherever a task runs, its result passes through JSON, so that a study on one
+core, on many, on a cluster and one that was resumed give identical numbers.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from weld_twin_core import __version__
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.whole_files import write_text
+
+from .content_hash import digest
+
+Plain = Any
+"""What JSON can hold."""
+Tell = Callable[[int, int, str], None]
+"""Told how many tasks are done, how many there are, and what the last was."""
+_THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A function of a module, its arguments, and what progress calls it."""
+
+    function: Callable[..., Plain]
+    arguments: tuple[Any, ...]
+    label: str = ''
+
+    @property
+    def key(self) -> str:
+        """Return the name of its result."""
+        return digest(__version__, self.function, *self.arguments)
+
+
+class Pool(Protocol):
+    """Where tasks run."""
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[int, str]]:
+        """Yield the number of each task and its result as JSON text, in order of completion."""
+
+    def close(self) -> None:
+        """Let go of the workers."""
+
+
+class Runner:
+    """
+    Runs tasks on a pool and keeps their results; closes the pool when its block ends.
+
+    Parameters
+    ----------
+    pool : Pool
+    store : Path, optional
+        Directory of results; a task whose result is there already is not run again.
+    tell : callable, optional
+        Told about progress.
+
+    """
+
+    def __init__(self, pool: Pool, store: Path | None = None, tell: Tell | None = None) -> None:
+        self._pool, self._store, self._tell = pool, store, tell
+
+    def __enter__(self) -> Runner:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.close()
+
+    def run(self, tasks: Sequence[Task]) -> list[Plain]:
+        """Return the results in the order of the tasks."""
+        results: list[Plain] = [None] * len(tasks)
+        waiting = []
+        for k, task in enumerate(tasks):
+            text = self._kept(task)
+            if text is None:
+                waiting.append(k)
+            else:
+                results[k] = json.loads(text)
+        done = len(tasks) - len(waiting)
+        if done:
+            self._told(done, len(tasks), f'{done} results were there already')
+        for place, text in self._pool.run([tasks[k] for k in waiting]):
+            k = waiting[place]
+            results[k] = json.loads(text)
+            self._keep(tasks[k], text)
+            done += 1
+            self._told(done, len(tasks), tasks[k].label)
+        return results
+
+    def _told(self, done: int, total: int, label: str) -> None:
+        if self._tell is not None:
+            self._tell(done, total, label)
+
+    def _file(self, task: Task) -> Path | None:
+        return None if self._store is None else self._store / f'{task.key}.json'
+
+    def _kept(self, task: Task) -> str | None:
+        file = self._file(task)
+        if file is None or not file.is_file():
+            return None
+        text = file.read_text(encoding='utf-8')
+        try:
+            json.loads(text)
+        except ValueError:
+            raise DataError(f"'{file}' is damaged; delete it to have it made again") from None
+        return text
+
+    def _keep(self, task: Task, text: str) -> None:
+        file = self._file(task)
+        if file is not None:
+            write_text(file, text, overwrite=True)
+
+
+@dataclass(frozen=True)
+class Here:
+    """The process that asks; for tests and for tasks too small to send anywhere."""
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[int, str]]:
+        """Run one after the other."""
+        for k, task in enumerate(tasks):
+            yield k, call(task.function, task.arguments)
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+class Cores:
+    """
+    Processes on this machine, each with one thread.
+
+    The processes start anew, so that no library has chosen its threads before, and stay until
+    the pool is closed.
+
+    Parameters
+    ----------
+    workers : int
+        0 means one for every core.
+
+    """
+
+    def __init__(self, workers: int = 0) -> None:
+        self._workers = workers or available_cores()
+        self._pool: ProcessPoolExecutor | None = None
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[int, str]]:
+        """Run as many at once as there are workers."""
+        if self._pool is None:
+            context = multiprocessing.get_context('spawn')
+            self._pool = ProcessPoolExecutor(self._workers, mp_context=context)
+        with _one_thread():
+            futures: dict[Future[str], int] = {
+                self._pool.submit(call, task.function, task.arguments): k
+                for k, task in enumerate(tasks)
+            }
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+
+    def close(self) -> None:
+        """Stop the processes; what has not begun is not run."""
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+            self._pool = None
+
+
+class Cluster:
+    """A Dask cluster, at the address of its scheduler, whose workers have this package."""
+
+    def __init__(self, address: str) -> None:
+        self._client, self._completed = _connected(address)
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[int, str]]:
+        """Run on the cluster's workers."""
+        futures = {
+            self._client.submit(call, task.function, task.arguments, pure=False): k
+            for k, task in enumerate(tasks)
+        }
+        for future in self._completed(list(futures)):
+            yield futures[future], future.result()
+
+    def close(self) -> None:
+        """Leave the cluster; what has not begun is not run."""
+        self._client.close()
+
+
+def pool_of(scheduler: str = '', workers: int = 0) -> Pool:
+    """
+    Return the cluster at an address, or the cores of this machine.
+
+    Raises
+    ------
+    DataError
+        A negative number of workers.
+
+    """
+    if workers < 0:
+        raise DataError(f'the number of workers must not be negative, got {workers}')
+    return Cluster(scheduler) if scheduler else Cores(workers)
+
+
+def available_cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, 'sched_getaffinity'):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def call(function: Callable[..., Plain], arguments: tuple[Any, ...]) -> str:
+    """Return the result of a task as JSON text; every float reads back exactly."""
+    return json.dumps(function(*arguments), default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f'a task returned a {type(value).__name__}, which JSON cannot hold')
+
+
+def _connected(address: str) -> tuple[Any, Callable[..., Any]]:
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise DataError(
+            "--scheduler needs Dask; install it with: pip install 'weld-twin[cluster]'"
+        ) from None
+    try:
+        return Client(address, timeout='10s'), as_completed
+    except (OSError, ValueError) as error:
+        raise DataError(f"no Dask scheduler answers at '{address}': {error}") from None
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Have processes that start within use one thread each."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, '1'))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A twin as parameters and the command line describe it: effects file, diagnosis, text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects.setup_motion import of_the_robot
+from weld_twin_core.errors import ModelError
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
+from weld_twin_msgs_py.files.effects_file import read_effects
+from weld_twin_msgs_py.files.yaml_file import parse_yaml
+
+
+def build_twin(robot: Robot, model: Path | str = '', effects: str = '') -> Twin:
+    """
+    Return a robot with the effects of a file and those of a text.
+
+    Parameters
+    ----------
+    robot : Robot
+    model : Path or str
+        An effects file, or a diagnosis (``.json``) with what it found of the robot, how one
+        set-up moved left out; empty for none.
+    effects : str
+        More effects, in the form of an effects file.
+
+    Raises
+    ------
+    ModelError
+        A file or the text cannot be read, or names an effect the robot cannot have.
+
+    """
+    more = effects_from_list(parse_yaml(effects, 'effects'), robot)
+    if not str(model):
+        return Twin(robot, more)
+    if Path(model).suffix.lower() != '.json':
+        return Twin(robot, read_effects(model, robot) + more)
+    known = _diagnosed(robot, model)
+    return Twin(known.robot, of_the_robot(known.effects) + more)
+
+
+def _diagnosed(robot: Robot, path: Path | str) -> Twin:
+    """Return the model of a diagnosis, or the effects of its verdict where it holds no model."""
+    data = read_diagnosis(path)
+    if 'model' in data:
+        return load_model(robot, path)
+    try:
+        found = [_flat(entry) for entry in data['verdict']['effects']]
+        return Twin(robot, effects_from_list(found, robot))
+    except (KeyError, TypeError, AttributeError):
+        raise ModelError(f"diagnosis '{path}' has no list 'verdict.effects'") from None
+    except ModelError as error:
+        raise ModelError(f"diagnosis '{path}': {error}") from None
+
+
+def _flat(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entry of an effects file for one of a diagnosis."""
+    known = {key: value for key, value in entry.items() if key not in ('parameters', 'std')}
+    if known.get('joint') is None:
+        known.pop('joint', None)
+    return {**known, **entry['parameters']}

@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which effect: what was found, what else was considered, what cannot be told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Found, Site
+
+from .family_table import families_table
+from .html import Child, Html, bars, joined, section, table, tag
+from .quantities import MISSING, change, millimetres, odds, parameter_rows
+from .words import found_name, in_words, listed, site_name
+
+_CANDIDATES = 6
+"""Hypotheses shown for a cause."""
+_SLOTS = 6
+_STAND_IN = (
+    'No effect is named. These imitate the unknown cause together; figures and pictures that say '
+    'after are with them.'
+)
+_ABOVE = 1.5
+"""Ratio to the noise floor above which what remains is not at its level."""
+
+
+def causes_section(diagnosis: Diagnosis) -> Html:
+    """Return parameters, candidates and equivalence sets."""
+    return section(
+        'Which effect', _found(diagnosis), _candidates(diagnosis), _sets(diagnosis),
+        _absent(diagnosis), id_='causes',
+    )  # fmt: skip
+
+
+def _found(diagnosis: Diagnosis) -> Html | None:
+    if not diagnosis.effects:
+        return None if diagnosis.model.found else tag('p', 'No effect was put into the twin.')
+    if diagnosis.families:
+        return families_table(diagnosis)
+    heads = ['Effect', 'Parameter', 'Value ± standard error']
+    alone = [_alone(diagnosis, found) for found in diagnosis.effects]
+    # With a single effect it is what the whole verdict leaves.
+    told = len(alone) > 1 and any(left is not None for left in alone)
+    rows: list[list[Child]] = []
+    for found, left in zip(diagnosis.effects, alone, strict=True):
+        for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
+            row: list[Child] = [found_name(found) if k == 0 else '', name, value]
+            rows.append(row + [millimetres(left) if k == 0 else ''] * told)
+    heads += ['Left if only this is mended'] * told
+    return joined([tag('h3', 'Effects found'), table(heads, rows, 'effects')])
+
+
+def _alone(diagnosis: Diagnosis, found: Found) -> float | None:
+    """Return the gap [m] left if only one effect were mended, where it is known by itself."""
+    site = Site(found.effect.name, found.effect.site)
+    return dict(diagnosis.shrink.alone).get(str(site))
+
+
+def _candidates(diagnosis: Diagnosis) -> Html | None:
+    """Return the hypotheses for every cause, the most probable first."""
+    if not diagnosis.candidates:
+        return None
+    slots = _slots(diagnosis.candidates)
+    parts: list[Html] = []
+    for slot in slots[:_SLOTS]:
+        parts.append(bars([_candidate(diagnosis, c) for c in slot[:_CANDIDATES]], 'wide'))
+    more = len(diagnosis.candidates) - sum(len(s[:_CANDIDATES]) for s in slots[:_SLOTS])
+    note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
+    if not diagnosis.effects:
+        title, lead = 'What fits best, though no cause is named', _STAND_IN
+    else:
+        title = 'Candidates and their probabilities'
+        lead = 'A group for every cause: what was found, and what else it could be.'
+    told = tag('p', lead, class_='note') if len(slots) > 1 or not diagnosis.effects else None
+    return joined([tag('h3', title), told, *parts, note])
+
+
+def _candidate(diagnosis: Diagnosis, c: Candidate) -> tuple[str, float, str]:
+    """Return label, length and text of a bar; what only stands in has no probability."""
+    left = f'leaves {millimetres(c.rms_after_m)} ({change(c.shrink)})'
+    if not diagnosis.effects:
+        return site_name(c.site), c.shrink, left
+    return site_name(c.site), c.probability, f'{odds(c.probability)} · {left}'
+
+
+def _slots(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+    """Return the hypotheses cause by cause: within one, probabilities do not rise."""
+    out: list[list[Candidate]] = []
+    for c in candidates:
+        if out and c.probability <= out[-1][-1].probability:
+            out[-1].append(c)
+        else:
+            out.append([c])
+    return out
+
+
+def _sets(diagnosis: Diagnosis) -> Html | None:
+    if not diagnosis.effects:
+        return None
+    sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
+    title = tag('h3', 'What these data cannot tell apart')
+    if not sets and diagnosis.families:
+        shared = [tag('li', in_words(reason, ())) for reason in diagnosis.reasons]
+        return joined([title, tag('ul', *shared, class_='sentences')])
+    if not sets:
+        return joined([title, tag('p', 'Nothing: every effect named stands alone.')])
+    items = [
+        tag('li', f'{listed([site_name(site) for site in group], "or")}: '
+            'naming one of them would be a guess.')
+        for group in sets
+    ]  # fmt: skip
+    every = {site for group in sets for site in group}
+    reasons = [tag('li', in_words(reason, every)) for reason in diagnosis.reasons]
+    return joined([
+        title, tag('ul', *items, class_='sentences'),
+        tag('p', 'Why:') if reasons else None, tag('ul', *reasons, class_='sentences'),
+    ])  # fmt: skip
+
+
+def _absent(diagnosis: Diagnosis) -> Html | None:
+    if not diagnosis.absent:
+        return None
+    rows = sorted(diagnosis.absent.items())
+    return tag(
+        'details', tag('summary', f'Not considered, and why ({len(rows)})'),
+        table(('Effect', 'Why'), rows),
+    )  # fmt: skip
+
+
+def leftover(diagnosis: Diagnosis) -> Html:
+    """Return what remains after the verdict."""
+    rest = diagnosis.unexplained
+    floor = diagnosis.gap.noise_floor_m
+    if not rest.above_noise and rest.rms_m > _ABOVE * floor:
+        return tag('p', f'What remains, {millimetres(rest.rms_m)}, depends on nothing that was '
+                   f'looked at, but the instrument is better than that: {millimetres(floor)}.')
+    if not rest.above_noise:
+        text = f'What remains, {millimetres(rest.rms_m)}, is at the level of the noise.'
+        return tag('p', text)
+    items = [tag('li', line) for line in rest.structure] or [tag('li', MISSING)]
+    return joined([
+        tag('p', f'{millimetres(rest.rms_m)} above the noise remain unexplained. It depends on:'),
+        tag('ul', *items, class_='sentences'),
+    ])  # fmt: skip

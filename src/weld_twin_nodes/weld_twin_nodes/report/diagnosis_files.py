@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The files a diagnosis leaves behind."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core import __version__
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_msgs_py.files.joint_file import write_joint_motion
+from weld_twin_msgs_py.files.whole_files import write_text
+
+from ..offline.exports import write_all
+from .diagnosis_page import report_page
+from .provenance import InputFile
+
+RESULT = 'diagnosis.json'
+PAGE = 'report.html'
+NEXT = 'next_experiment.yaml'
+"""The motion to measure next, where one decides; the trajectory generator runs it."""
+
+
+def write_results(directory: Path, diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> None:
+    """Write diagnosis.json, the page, the model in every form, and what to measure next."""
+    wanted = diagnosis.next_experiment
+    if wanted is not None and wanted.get('motion') is not None:
+        write_joint_motion(directory / NEXT, wanted['motion'], wanted['sentence'])
+        diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': NEXT})
+    write_text(directory / PAGE, report_page(diagnosis, inputs))
+    write_all(directory, diagnosis.model)
+    write_text(directory / RESULT, diagnosis_text(diagnosis, inputs))
+
+
+def diagnosis_text(diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> str:
+    """Return the text of diagnosis.json; what is not a finite number is null."""
+    content = diagnosis.as_dict()
+    content['inputs'] = [item.as_dict() for item in inputs]
+    content['version'] = __version__
+    return json.dumps(_plain(content), indent=1, allow_nan=False) + '\n'
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value

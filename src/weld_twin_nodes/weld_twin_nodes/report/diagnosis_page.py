@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The report as one HTML file that needs nothing else: no network, no other file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .cause_list import causes_section
+from .footing import checks_section, inputs_section, next_section
+from .gap_location import where_section
+from .headline import header, opening
+from .html import Html, joined, tag
+from .provenance import InputFile
+from .seam_view import seam_data, seam_section
+from .shrinking import shrink_section
+from .words import STATUS
+
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+
+
+def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
+    """
+    Return the page.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    inputs : sequence of InputFile
+        What it was made from, as the page lists it.
+
+    """
+    body = tag(
+        'main', header(diagnosis), opening(diagnosis), seam_section(diagnosis),
+        where_section(diagnosis), causes_section(diagnosis), shrink_section(diagnosis),
+        next_section(diagnosis), checks_section(diagnosis), inputs_section(inputs),
+    )  # fmt: skip
+    title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
+    head = joined([
+        tag('meta', charset='utf-8'),
+        tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
+        tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
+        tag('meta', name_='color-scheme', content='light dark'),
+        tag('title', title), tag('style', _file('page.css')),
+    ])  # fmt: skip
+    data = tag('script', _embedded(seam_data(diagnosis)), type='application/json', id_='data')
+    whole = tag(
+        'html', tag('head', head), tag('body', body, data, tag('script', _file('page.js'))),
+        lang='en',
+    )
+    return f'<!doctype html>\n{whole}\n'
+
+
+def _file(name: str) -> Html:
+    return Html((files(__package__) / name).read_text(encoding='utf-8'))
+
+
+def _embedded(data: dict[str, Any]) -> Html:
+    """Return JSON that no name in it can end the script element with."""
+    return Html(json.dumps(data, separators=(',', ':')).replace('<', '\\u003c'))

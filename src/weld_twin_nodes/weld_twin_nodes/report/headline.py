@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The top of the page: the verdict in two sentences, the figures behind it, what to do."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .family_table import worth_doing
+from .html import Html, tag
+from .quantities import interval, millimetres, milliradians, odds, percent, turns_only
+from .words import STATUS, found_name, listed, verdict
+
+_SURE_OF = {
+    'identified': 'that the causes named are right',
+    'ambiguous': 'that one of those named is right',
+    'unknown': 'that the cause is none of those known',
+}
+_FEW = 3
+_FIRST_REAL_STAMP = 10**18
+"""Stamps [ns] before 2001 count from something else than the epoch."""
+
+
+def header(diagnosis: Diagnosis) -> Html:
+    """Return what was diagnosed."""
+    robot = diagnosis.model.robot
+    names = ', '.join(recording.name for recording in diagnosis.recordings)
+    parts = [robot.name, names, _date(diagnosis)]
+    return tag(
+        'header', tag('p', 'Positional accuracy ', tag('b', 'diagnosis'), class_='kind'),
+        tag('p', ' · '.join(part for part in parts if part), class_='subject'),
+    )  # fmt: skip
+
+
+def _date(diagnosis: Diagnosis) -> str:
+    stamps = [r.epoch_ns for r in diagnosis.recordings if r.epoch_ns > _FIRST_REAL_STAMP]
+    if not stamps:
+        return ''
+    when = datetime.fromtimestamp(min(stamps) * 1e-9, tz=timezone.utc)
+    return f'recorded {when:%Y-%m-%d %H:%M} UTC'
+
+
+def opening(diagnosis: Diagnosis) -> Html:
+    """Return status, verdict, figures and actions."""
+    first, second = verdict(diagnosis)
+    return tag(
+        'section',
+        tag('p', STATUS[diagnosis.status], class_=f'status {diagnosis.status}'),
+        tag('h1', first), tag('p', second, class_='second'),
+        _figures(diagnosis), _actions(diagnosis),
+        id_='verdict',
+    )  # fmt: skip
+
+
+def _figures(diagnosis: Diagnosis) -> Html:
+    gap, shrink = diagnosis.gap, diagnosis.shrink
+    rows = [
+        ('Gap', millimetres(gap.rms_m), f'RMS of {gap.samples} samples; '
+         f'{millimetres(gap.max_m)} at most'),
+        ('Left over', millimetres(shrink.rms_after_m), _left(diagnosis)),
+        ('Noise floor', millimetres(gap.noise_floor_m), 'what the data cannot resolve'),
+    ]  # fmt: skip
+    if diagnosis.status in _SURE_OF:
+        rows.append(('Confidence', odds(diagnosis.confidence), _SURE_OF[diagnosis.status]))
+    if gap.orientation_rms_rad is not None:
+        rows.append(('Orientation', milliradians(gap.orientation_rms_rad), _turned(diagnosis)))
+    cells = [
+        tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
+        for name, value, note in rows
+    ]
+    return tag('dl', *cells, class_='figures')
+
+
+def _left(diagnosis: Diagnosis) -> str:
+    shrink = diagnosis.shrink
+    if not diagnosis.model.found:
+        return 'on unseen data; no effect is in the twin'
+    if turns_only(diagnosis):
+        return 'on unseen data; what was found turns the tool'
+    with_what = '' if diagnosis.effects else ', with what fits best'
+    return f'{percent(shrink.ratio)} of it on unseen data{with_what} ({interval(shrink)})'
+
+
+def _turned(diagnosis: Diagnosis) -> str:
+    turned = diagnosis.shrink.orientation_rad
+    if turned is None or not diagnosis.effects:
+        return 'RMS gap'
+    return f'RMS gap; {milliradians(turned[1])} left over'
+
+
+def _actions(diagnosis: Diagnosis) -> Html | None:
+    if not diagnosis.actions:
+        return None
+    items = [tag('li', action) for action in worth_doing(diagnosis)]
+    title = 'What to do'
+    if diagnosis.status == 'ambiguous':
+        named = listed([found_name(found) for found in diagnosis.effects[:_FEW]])
+        title = f'What to do, should it be {named}'
+    return tag('div', tag('h3', title), tag('ul', *items), class_='actions')

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From a setting to a directory of results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_msgs_py.files.whole_files import write_text
+
+from ..offline.task_pool import Pool, Runner, Tell
+from .claims_table import SEAMS, run_claims
+from .figures import Drawing, draw, drawable
+from .setting import Setting
+from .study_files import PAGE, TASKS, study_directory, write_claims, write_drawing, write_study
+from .study_page import study_page
+from .whole import run_study
+
+
+def make_study(
+    out: Path | str, pool: Pool, setting: Setting | None, *, claims_on: Sequence[Robot] = (),
+    seams: Sequence[str] = SEAMS, tell: Tell | None = None, seed: int = 0,
+) -> Path:  # fmt: skip
+    """
+    Run a study, the claims, or both, write the results and return the page.
+
+    Parameters
+    ----------
+    out : Path or str
+        Directory of the results; one that was begun is continued.
+    pool : Pool
+        Where tasks run.
+    setting : Setting, optional
+        Left out, only the claims are studied.
+    claims_on : sequence of Robot
+        Robots the claims are measured on; none for no claims.
+    seams : sequence of str
+        Bundled seams the claims are measured on.
+    tell : callable, optional
+        Told about progress.
+    seed : int
+        Of the claims.
+
+    """
+    place = study_directory(out)
+    study = claims = None
+    drawings: list[Drawing] = []
+    with Runner(pool, place / TASKS, tell) as runner:
+        if setting is not None:
+            study = run_study(setting, runner)
+        if claims_on:
+            claims = run_claims(runner, claims_on, seams, seed)
+    if setting is not None and study is not None:
+        drawings = make_figures(place / 'figures', setting, drawable(setting))
+        write_study(place, study, setting.tolerances)
+    if claims is not None:
+        write_claims(place, claims)
+    write_text(place / PAGE, study_page(study, claims, drawings), overwrite=True)
+    return place / PAGE
+
+
+def make_figures(place: Path, setting: Setting, keys: Sequence[str]) -> list[Drawing]:
+    """Draw figures and write them with their data."""
+    found = [draw(setting, key) for key in keys]
+    drawings = [drawing for drawing in found if drawing is not None]
+    for drawing in drawings:
+        write_drawing(place, drawing)
+    return drawings

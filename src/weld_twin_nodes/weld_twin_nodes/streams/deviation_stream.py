@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Measured minus twin: what the analyzer computes, live or over a finished run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.metrics.running import RunningMetrics
+
+from .pairing import Pair, Pairing
+
+METRICS = 'deviation'
+"""Name of the status that carries the metrics."""
+
+
+class Deviation(NamedTuple):
+    """Measured minus twin in the base frame, shape (3,) [m], at a measurement's stamp [ns]."""
+
+    stamp: int
+    vector: Array
+
+
+class Deviations:
+    """
+    Pairs measurements with twin poses and keeps the metrics of the pairs.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its base frame is the one deviations are given in.
+    path_length : float [m]
+        Length of the seam; 0 takes the way the twin has gone.
+    depth, max_gap
+        See `Pairing`.
+
+    """
+
+    def __init__(
+        self, robot: Robot, path_length: float = 0.0, depth: int = 2000, max_gap: float = 0.5
+    ) -> None:
+        self._rotation_base_world = robot.T_world_base[:3, :3].T
+        self._pairing = Pairing(depth, max_gap)
+        self._path_length = path_length
+        self._metrics = RunningMetrics(path_length)
+
+    def reset(self) -> None:
+        """Begin anew, as after a jump of the clock."""
+        self._pairing.reset()
+        self._metrics = RunningMetrics(self._path_length)
+
+    @property
+    def samples(self) -> int:
+        """Return how many measurements were paired so far."""
+        return self._metrics.samples
+
+    def add_measured(self, stamp: int, position: Array) -> Iterator[Deviation]:
+        """Take a measured position (3,) [m]; yield the deviations that are known now."""
+        return self._each(self._pairing.add_measured(stamp, position))
+
+    def add_twin(self, stamp: int, position: Array) -> Iterator[Deviation]:
+        """Take a twin position (3,) [m]; yield the deviations that are known now."""
+        restarts = self._pairing.restarts
+        pairs = self._pairing.add_twin(stamp, position)
+        if self._pairing.restarts > restarts:
+            self._metrics = RunningMetrics(self._path_length)
+        return self._each(pairs)
+
+    def metrics(self) -> dict[str, float | int]:
+        """Return the metrics so far by their names on `/deviation/metrics`."""
+        return {
+            **self._metrics.as_dict(),
+            'dropped': self._pairing.dropped,
+            'waiting': self._pairing.waiting,
+        }
+
+    def _each(self, pairs: list[Pair]) -> Iterator[Deviation]:
+        """Work one pair at a time, so that the metrics are those up to the deviation yielded."""
+        for stamp, measured, twin in pairs:
+            vector = self._rotation_base_world @ (measured - twin)
+            self._metrics.add(vector, twin)
+            yield Deviation(stamp, vector)

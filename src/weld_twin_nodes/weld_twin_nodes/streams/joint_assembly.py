@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states of whatever controller: any order, further joints, spread over publishers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.messages import from_messages
+
+_SLACK = 1e-6
+"""What `Robot.check_positions` allows beyond a limit [rad or m]."""
+
+
+class JointSample(NamedTuple):
+    """Stamp [ns], positions (n,) and velocities (n,), None where the controller tells none."""
+
+    stamp: int
+    q: Array
+    qd: Array | None
+
+
+class JointStates:
+    """
+    Takes joint states; gives samples of one robot.
+
+    Messages about other joints are passed over. Joints spread over several publishers are put
+    together where their stamps are equal, as those of one controller manager are; to hold one
+    joint at its last position while another moves on would be a pose the arm never had.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._names = robot.joint_names
+        self._ranges = [
+            (low - _SLACK, high + _SLACK)
+            for low, high in zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)
+        ]
+        self._usual: Any = None
+        self._index: list[int] = []
+        self._spread: set[str] = set()
+        self._stamp = 0
+        self._parts: dict[str, tuple[float, float]] = {}
+        self.others = 0
+
+    def take(self, message: Any) -> JointSample | None:
+        """
+        Return the sample that a message completes, None if it completes none.
+
+        Raises
+        ------
+        DataError
+            The message cannot be used.
+
+        """
+        stamp = from_messages.stamp_ns(message)
+        if message.name is self._usual:  # the decoder repeats the very object
+            quick = self._quick(stamp, message)
+            if quick is not None:
+                return quick
+        present = from_messages.joints_present(message, self._names)
+        if not present and message.name:
+            self.others += 1
+            return None
+        if 0 < len(present) < len(self._names):
+            return self._part(stamp, message, present)
+        q = from_messages.joint_positions(message, self._names)
+        self._check(q)
+        self._usual = message.name
+        self._index = [list(message.name).index(name) for name in self._names]
+        return JointSample(stamp, q, from_messages.joint_velocities(message, self._names))
+
+    def _quick(self, stamp: int, message: Any) -> JointSample | None:
+        """Return the sample of a message with the names of the last one, None if in doubt."""
+        position, velocity, count = message.position, message.velocity, len(message.name)
+        if len(position) != count or len(velocity) != count:
+            return None
+        q = [position[k] for k in self._index]
+        qd = [velocity[k] for k in self._index]
+        for value, (low, high) in zip(q, self._ranges, strict=True):
+            if not low <= value <= high:
+                return None
+        if not (isfinite(sum(q)) and isfinite(sum(qd))):
+            return None
+        return JointSample(stamp, np.array(q), np.array(qd))
+
+    def _check(self, q: Array) -> None:
+        """Refuse what lies beyond the limits; the robot has the sentence."""
+        for value, (low, high) in zip(q.tolist(), self._ranges, strict=True):
+            if not low <= value <= high:
+                self._robot.check_positions(q)
+
+    def _part(self, stamp: int, message: Any, present: tuple[str, ...]) -> JointSample | None:
+        q = from_messages.joint_positions(message, present)
+        qd = from_messages.joint_velocities(message, present)
+        left, before = self._missing(self._parts), self._stamp
+        if stamp != before:
+            self._parts, self._stamp = {}, stamp
+        unknown = np.full(len(present), np.nan)
+        self._parts |= {
+            name: (float(a), float(b))
+            for name, a, b in zip(present, q, unknown if qd is None else qd, strict=True)
+        }
+        self._spread.update(present)
+        if len(self._spread) < len(self._names):
+            from_messages.joint_positions(message, self._names)  # has the sentence
+        if stamp != before and 0 < len(left) < len(self._names):
+            raise DataError(
+                f'joint {left[0]!r} never came with the stamp {before * 1e-9:.6f} s; publish all '
+                'joints in one message, or with equal stamps'
+            )
+        if self._missing(self._parts):
+            self.others += 1
+            return None
+        return self._whole()
+
+    def _missing(self, parts: Mapping[str, Any]) -> list[str]:
+        return [name for name in self._names if name not in parts]
+
+    def _whole(self) -> JointSample:
+        values = np.array([self._parts[name] for name in self._names])
+        self._check(values[:, 0])
+        qd = None if np.isnan(values[:, 1]).any() else values[:, 1]
+        return JointSample(self._stamp, values[:, 0], qd)

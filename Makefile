@@ -12,7 +12,8 @@ test: lint
 	@$(RUN) python -m pytest
 
 lint: setup-test
-	@$(RUN) ruff check src test
+	@$(RUN) ruff check .
+	@$(RUN) ruff format --check .
 	@$(RUN) mypy
 
 setup: .venv/ready

@@ -15,7 +15,14 @@ setup(
     ],
     # rosbags, mcap and lz4 have no ROS package; on ROS machines pip adds them beside the rest
     install_requires=[
-        'setuptools', 'numpy', 'PyYAML', 'defusedxml', 'urdf_parser_py', 'rosbags', 'mcap', 'lz4',
+        'setuptools',
+        'numpy',
+        'PyYAML',
+        'defusedxml',
+        'urdf_parser_py',
+        'rosbags',
+        'mcap',
+        'lz4',
     ],
     extras_require={'test': ['pytest']},
     zip_safe=False,

@@ -43,35 +43,51 @@ def stations(n, count, rng):
     return 2.0 * np.arange(count), rng.uniform(-2.0, 2.0, (count, n))
 
 
-def recorded(robot, effects, seed=1, *, seconds=15.0, static=0, orientation=True, warm=False,
-             richness=1.0, name='run'):  # fmt: skip
+def recorded(
+    robot,
+    effects,
+    seed=1,
+    *,
+    seconds=15.0,
+    static=0,
+    orientation=True,
+    warm=False,
+    richness=1.0,
+    name='run',
+):
     """Return what the plant records of a robot with effects (mappings of an effects file)."""
     rng = np.random.default_rng(seed)
     t, q = stations(robot.n, static, rng) if static else swing(robot.n, seconds, rng)
     temperature = 20.0 + 8.0 * (1.0 - np.exp(-t / (0.5 * t[-1]))) if warm else None
     command = Command(t, q, static=bool(static), temperature=temperature)
     tracker = Tracker(
-        rate=None if static else 50.0, sigma=SIGMA, sigma_orientation=SIGMA_TURN,
-        orientation=orientation, drop=0.0 if static else 0.02,
-        outlier_share=0.005, outlier_size=2e-3,
-    )  # fmt: skip
+        rate=None if static else 50.0,
+        sigma=SIGMA,
+        sigma_orientation=SIGMA_TURN,
+        orientation=orientation,
+        drop=0.0 if static else 0.02,
+        outlier_share=0.005,
+        outlier_size=2e-3,
+    )
     seen = run(robot.to_mapping(), effects, command, tracker, rng, richness)
     turned = None if seen.quaternion is None else matrix_from_quaternion(seen.quaternion)
     return Recording(
         name,
         JointMotion(seen.t_joint, seen.q, seen.qd, seen.static),
         Measurements(seen.t_measured, seen.position, turned),
-        temperature=None if seen.temperature is None else Signal(seen.temperature_t,
-                                                                 seen.temperature),
-    )  # fmt: skip
+        temperature=None
+        if seen.temperature is None
+        else Signal(seen.temperature_t, seen.temperature),
+    )
 
 
 @cache
 def solved(*effects, robot='ur5', seed=1, exclude=(), align=(), **options):
     """Return the diagnosis of a recording with effects, each a tuple (name, key, value, ...)."""
     arm = load(robot)
-    true = [{'effect': e[0], **dict(zip(e[1::2], map(_plain, e[2::2]), strict=True))}
-            for e in effects]  # fmt: skip
+    true = [
+        {'effect': e[0], **dict(zip(e[1::2], map(_plain, e[2::2]), strict=True))} for e in effects
+    ]
     recording = recorded(arm, true, seed, **options)
     return diagnose([recording], arm, exclude=exclude, align=frozenset(align))
 

@@ -15,12 +15,19 @@ NUMBER, TEXT, FLAG = Real, str, bool
 JOINT = (str, type(None))
 SCHEMA = {
     'schema': TEXT,
-    'gap': {'rms_m': NUMBER, 'mean_m': NUMBER, 'max_m': NUMBER,
-            'orientation_rms_rad': (Real, type(None)), 'samples': int, 'noise_floor_m': NUMBER},
+    'gap': {
+        'rms_m': NUMBER,
+        'mean_m': NUMBER,
+        'max_m': NUMBER,
+        'orientation_rms_rad': (Real, type(None)),
+        'samples': int,
+        'noise_floor_m': NUMBER,
+    },
     'where': {
         'joints': [{'name': TEXT, 'share': NUMBER}],
-        'regimes': dict.fromkeys(('static', 'reversal', 'speed', 'acceleration', 'load',
-                                  'temperature', 'time'), NUMBER),
+        'regimes': dict.fromkeys(
+            ('static', 'reversal', 'speed', 'acceleration', 'load', 'temperature', 'time'), NUMBER
+        ),
         'path': [{'t_start': NUMBER, 't_end': NUMBER, 'share': NUMBER, 'rms_m': NUMBER}],
         'direction': {'along_m': NUMBER, 'across_m': NUMBER, 'normal_m': NUMBER},
     },
@@ -30,24 +37,40 @@ SCHEMA = {
         'confidence': NUMBER,
         'indistinguishable': [[{'effect': TEXT, 'joint': JOINT}]],
     },
-    'candidates': [{'effect': TEXT, 'joint': JOINT, 'probability': NUMBER,
-                    'rms_after_m': NUMBER, 'shrink': NUMBER}],
-    'shrink': {'rms_before_m': NUMBER, 'rms_after_m': NUMBER, 'ratio': NUMBER, 'ci95': [NUMBER],
-               'held_out': TEXT},
+    'candidates': [
+        {
+            'effect': TEXT,
+            'joint': JOINT,
+            'probability': NUMBER,
+            'rms_after_m': NUMBER,
+            'shrink': NUMBER,
+        }
+    ],
+    'shrink': {
+        'rms_before_m': NUMBER,
+        'rms_after_m': NUMBER,
+        'ratio': NUMBER,
+        'ci95': [NUMBER],
+        'held_out': TEXT,
+    },
     'unexplained': {'rms_m': NUMBER, 'above_noise': FLAG, 'structure': [TEXT]},
     'next_experiment': (dict, type(None)),
-}  # fmt: skip
+}
 ANSWERS = {
     'play': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {}),
     'tool': ((('tool_pose', 'xyz', (4e-4, -3e-4, 2e-4), 'rotvec', (6e-4, 0.0, -8e-4)),), {}),
     'parallel': ((('link_offset', 'joint', 'elbow_joint', 'dd', 4e-4),), {}),
-    'unknown': ((('backlash', 'joint', 'elbow_joint', 'width', 1.5e-3),),
-                {'exclude': ('backlash',)}),
+    'unknown': (
+        (('backlash', 'joint', 'elbow_joint', 'width', 1.5e-3),),
+        {'exclude': ('backlash',)},
+    ),
     'points': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {'orientation': False}),
-    'stations': ((('joint_compliance', 'joint', 'shoulder_lift_joint', 'compliance', 1.2e-5),),
-                 {'static': 120}),
+    'stations': (
+        (('joint_compliance', 'joint', 'shoulder_lift_joint', 'compliance', 1.2e-5),),
+        {'static': 120},
+    ),
     'nothing': ((), {}),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(params=ANSWERS)
@@ -60,8 +83,12 @@ def faults(value, schema, path='diagnosis'):
     """Return where a value departs from a schema; a list's only entry describes all of its own."""
     if isinstance(schema, dict):
         missing = [f'{path}.{key} is missing' for key in schema if key not in value]
-        return missing + [f for key, inner in schema.items() if key in value
-                          for f in faults(value[key], inner, f'{path}.{key}')]  # fmt: skip
+        return missing + [
+            f
+            for key, inner in schema.items()
+            if key in value
+            for f in faults(value[key], inner, f'{path}.{key}')
+        ]
     if isinstance(schema, list):
         if type(value) is not list:
             return [f'{path} is no list']
@@ -140,9 +167,13 @@ def test_the_waterfall_ends_where_the_shrink_ends(answer):
         assert len(answer.shrink.alone) == len(answer.shrink.steps)
 
 
-@pytest.mark.parametrize(('name', 'joint', 'regime'), [
-    ('play', 'elbow_joint', 'reversal'), ('stations', 'shoulder_lift_joint', 'load'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('name', 'joint', 'regime'),
+    [
+        ('play', 'elbow_joint', 'reversal'),
+        ('stations', 'shoulder_lift_joint', 'load'),
+    ],
+)
 def test_most_of_the_gap_lies_on_the_joint_and_in_the_regime_of_its_cause(name, joint, regime):
     effects, options = ANSWERS[name]
     answer = solved(*effects, **options)

@@ -15,22 +15,36 @@ from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.unseen.unseen_stretches import TRUSTED
 
 CASES = {
-    'geometry': ((
-        effect('joint_offset', joint='elbow_joint', offset=8e-4),
-        effect('link_twist', joint='shoulder_pan_joint', dalpha=-5e-4),
-    ), ('base', 'tool'), True),
-    'play and lag': ((
-        effect('backlash', joint='elbow_joint', width=1.2e-3),
-        effect('servo_lag', joint='shoulder_lift_joint', time_constant=0.01),
-    ), ('base',), False),
-    'vibration': ((
-        effect('vibration', joint='shoulder_pan_joint', frequency=6.0, damping=0.05, gain=0.8),
-    ), (), False),
-    'delay and warmth of a ripple': ((
-        effect('time_delay', delay=4e-3),
-        effect('transmission_ripple', joint='elbow_joint', amplitude=4e-4, order=6, phase=0.4),
-    ), ('tool',), False),
-}  # fmt: skip
+    'geometry': (
+        (
+            effect('joint_offset', joint='elbow_joint', offset=8e-4),
+            effect('link_twist', joint='shoulder_pan_joint', dalpha=-5e-4),
+        ),
+        ('base', 'tool'),
+        True,
+    ),
+    'play and lag': (
+        (
+            effect('backlash', joint='elbow_joint', width=1.2e-3),
+            effect('servo_lag', joint='shoulder_lift_joint', time_constant=0.01),
+        ),
+        ('base',),
+        False,
+    ),
+    'vibration': (
+        (effect('vibration', joint='shoulder_pan_joint', frequency=6.0, damping=0.05, gain=0.8),),
+        (),
+        False,
+    ),
+    'delay and warmth of a ripple': (
+        (
+            effect('time_delay', delay=4e-3),
+            effect('transmission_ripple', joint='elbow_joint', amplitude=4e-4, order=6, phase=0.4),
+        ),
+        ('tool',),
+        False,
+    ),
+}
 
 
 def case(name):
@@ -50,8 +64,15 @@ def test_the_fit_is_the_minimum_that_another_optimiser_finds(name):
     def residual(z):
         return problem.whitened(problem.residuals(stepped(problem, start, z * unit)), scale)
 
-    other = least_squares(residual, np.zeros(unit.size), method='trf', x_scale=1.0,
-                          xtol=1e-12, ftol=1e-12, gtol=1e-10)  # fmt: skip
+    other = least_squares(
+        residual,
+        np.zeros(unit.size),
+        method='trf',
+        x_scale=1.0,
+        xtol=1e-12,
+        ftol=1e-12,
+        gtol=1e-10,
+    )
     found = fit(problem, start, scale)
     assert found.rss == pytest.approx(2.0 * other.cost, rel=1e-4)
     expected = stepped(problem, start, other.x * unit)

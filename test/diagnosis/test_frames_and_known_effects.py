@@ -74,8 +74,10 @@ def test_an_effect_known_beforehand_is_not_diagnosed_again():
 
 def test_held_out_recordings_judge_the_shrink():
     robot = load('ur5')
-    seen, unseen = (recorded(robot, [SPRING], seed, static=n, name=name)
-                    for seed, n, name in ((1, 120, 'seen'), (2, 60, 'unseen')))  # fmt: skip
+    seen, unseen = (
+        recorded(robot, [SPRING], seed, static=n, name=name)
+        for seed, n, name in ((1, 120, 'seen'), (2, 60, 'unseen'))
+    )
     answer = diagnose([seen], robot, holdout=[unseen])
     shrink = answer.shrink
     assert shrink.held_out == 'unseen'

@@ -31,9 +31,7 @@ def learned(columns, y, labels, scales):
 
 def most_likely(columns, y, labels, scales):
     """Return the prior precision that maximises p(y), the members integrated out."""
-    parts = [
-        (columns[labels == g] * scales[labels == g, None]) for g in range(labels.max() + 1)
-    ]
+    parts = [(columns[labels == g] * scales[labels == g, None]) for g in range(labels.max() + 1)]
     kernels = [part.T @ part for part in parts]
 
     def loss(logs):
@@ -84,10 +82,17 @@ def test_members_marked_free_have_no_prior():
 
 
 def test_ripple_is_grouped_by_joint_and_band_and_small_groups_are_free():
-    ripple = effect('transmission_ripple', joint='elbow_joint', amplitude=[0.0] * 5,
-                    order=[5, 6, 7, 30, 8], phase=[0.0] * 5)  # fmt: skip
-    offsets = [effect('joint_offset', joint=j, offset=0.0)
-               for j in ('elbow_joint', 'wrist_1_joint', 'wrist_2_joint')]  # fmt: skip
+    ripple = effect(
+        'transmission_ripple',
+        joint='elbow_joint',
+        amplitude=[0.0] * 5,
+        order=[5, 6, 7, 30, 8],
+        phase=[0.0] * 5,
+    )
+    offsets = [
+        effect('joint_offset', joint=j, offset=0.0)
+        for j in ('elbow_joint', 'wrist_1_joint', 'wrist_2_joint')
+    ]
     numbers, scales = groups((ripple, *offsets))
     assert scales.shape == (13,)
     low, high, rest = numbers[[0, 1, 2, 3, 4, 5, 8, 9]], numbers[[6, 7]], numbers[10:]
@@ -96,16 +101,23 @@ def test_ripple_is_grouped_by_joint_and_band_and_small_groups_are_free():
     assert np.unique(rest).size == 1 and rest[0] not in (-1, low[0])
 
 
-FAMILIES = (('joint_offset', 'offset', 2e-4), ('link_length', 'da', 1e-4),
-            ('link_offset', 'dd', 1e-4), ('link_twist', 'dalpha', 2e-4))  # fmt: skip
+FAMILIES = (
+    ('joint_offset', 'offset', 2e-4),
+    ('link_length', 'da', 1e-4),
+    ('link_offset', 'dd', 1e-4),
+    ('link_twist', 'dalpha', 2e-4),
+)
 
 
 def small_errors(seed):
     """Return errors of every joint and family, and the precision of a prior of their sizes."""
     rng = np.random.default_rng(seed)
     joints = tiny()[1].robot.joint_names
-    true = tuple(effect(name, joint=j, **{key: float(rng.normal(scale=size))})
-                 for name, key, size in FAMILIES for j in joints)  # fmt: skip
+    true = tuple(
+        effect(name, joint=j, **{key: float(rng.normal(scale=size))})
+        for name, key, size in FAMILIES
+        for j in joints
+    )
     return true, np.repeat([size**-2 for _, _, size in FAMILIES], len(joints))
 
 
@@ -117,8 +129,12 @@ def test_sizes_learned_predict_nearly_as_well_as_sizes_known_and_better_than_non
         fresh, _ = tiny(true, seed + 50, count=200, noise=0.0, turned=False)
         scale = known_scale(problem, position=1e-4)
         start = model.with_found(tuple(e.with_coordinates(np.zeros(1)) for e in true))
-        fits = (shrunk_fit(problem, start, scale)[0], fit(problem, start, scale, precision),
-                fit(problem, start, scale), fit(problem, model, scale))  # fmt: skip
+        fits = (
+            shrunk_fit(problem, start, scale)[0],
+            fit(problem, start, scale, precision),
+            fit(problem, start, scale),
+            fit(problem, model, scale),
+        )
         errors.append([(fresh.residuals(f.model)[0] ** 2).mean() for f in fits])
     shrunk, known, free, none = np.sqrt(np.mean(errors, axis=0))
     assert shrunk < 1.15 * known
@@ -128,8 +144,10 @@ def test_sizes_learned_predict_nearly_as_well_as_sizes_known_and_better_than_non
 
 @pytest.mark.parametrize('align', [(), ('base',)])
 def test_with_priors_the_slope_of_the_fit_balances_their_pull(align):
-    offsets = tuple(effect('joint_offset', joint=j, offset=2e-4)
-                    for j in ('shoulder_lift_joint', 'elbow_joint', 'wrist_1_joint'))  # fmt: skip
+    offsets = tuple(
+        effect('joint_offset', joint=j, offset=2e-4)
+        for j in ('shoulder_lift_joint', 'elbow_joint', 'wrist_1_joint')
+    )
     problem, model = tiny(offsets, align=align)
     scale = known_scale(problem)
     precision = np.array([1e8, 1e9, 1e7])
@@ -140,8 +158,7 @@ def test_with_priors_the_slope_of_the_fit_balances_their_pull(align):
         for sign in (1.0, -1.0):
             x = found.coordinates + sign * step * np.eye(3)[k]
             moved = tuple(e.with_coordinates(x[j : j + 1]) for j, e in enumerate(offsets))
-            residual = problem.whitened(
-                problem.residuals(found.model.with_found(moved)), scale)
+            residual = problem.whitened(problem.residuals(found.model.with_found(moved)), scale)
             costs.append(residual @ residual)
         slope = (costs[0] - costs[1]) / (2.0 * step)
         assert slope == pytest.approx(-2.0 * precision[k] * found.coordinates[k], rel=2e-3)

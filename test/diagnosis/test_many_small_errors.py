@@ -95,9 +95,14 @@ def test_a_family_of_three_shares_a_size_and_a_pair_is_free():
     found = (
         *(effect('link_length', joint=name, da=1e-4) for name in names),
         *(effect('joint_offset', joint=name, offset=1e-4) for name in names[:2]),
-        effect('transmission_ripple', joint='elbow_joint', amplitude=[1e-4] * 4,
-               order=[1.0, 2.0, 20.0, 300.0], phase=[0.0] * 4),
-    )  # fmt: skip
+        effect(
+            'transmission_ripple',
+            joint='elbow_joint',
+            amplitude=[1e-4] * 4,
+            order=[1.0, 2.0, 20.0, 300.0],
+            phase=[0.0] * 4,
+        ),
+    )
     labels, scales = groups(found)
     assert labels.shape == scales.shape == (3 + 2 + 8,)
     assert len(set(labels[:3])) == 1
@@ -131,16 +136,20 @@ def test_the_family_at_work_is_named_and_accounts_for_what_it_moves(families):
     told = {f.effect: f for f in weighed(SimpleNamespace(final=result), unseen)}
     recording = problem.recordings[0]
     t = recording.measured.t
-    moved = (Twin(model.robot, true).poses(recording, t).position
-             - Twin(model.robot).poses(recording, t).position)  # fmt: skip
+    moved = (
+        Twin(model.robot, true).poses(recording, t).position
+        - Twin(model.robot).poses(recording, t).position
+    )
     assert told['link_length'].named
     assert told['link_length'].rms_m == pytest.approx(
         np.sqrt((moved**2).sum(axis=1).mean()), rel=0.05
     )
     assert 'link_twist' not in told or not told['link_twist'].named
     assert [site.joint for site, _ in told['link_length'].members] == [
-        'shoulder_lift_joint', 'wrist_1_joint', 'elbow_joint',
-    ]  # fmt: skip
+        'shoulder_lift_joint',
+        'wrist_1_joint',
+        'elbow_joint',
+    ]
 
 
 @pytest.mark.parametrize(('gain', 'status'), [(0.0, 'identified'), (0.9, 'unknown')])

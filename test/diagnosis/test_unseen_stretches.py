@@ -38,8 +38,12 @@ def refitted(unseen, kept, extra=None, ridge=0.0):
     """Return the residual on every stretch of least squares on the others, by orthogonal means."""
     gone = [k for k in range(len(unseen.parts)) if k not in kept]
     target = unseen.targets[0] + unseen.targets[[1 + k for k in gone]].sum(axis=0)
-    index = np.concatenate([np.arange(unseen.frames), *(
-        np.arange(unseen.parts[k].start, unseen.parts[k].stop) for k in kept)]).astype(int)
+    index = np.concatenate(
+        [
+            np.arange(unseen.frames),
+            *(np.arange(unseen.parts[k].start, unseen.parts[k].stop) for k in kept),
+        ]
+    ).astype(int)
     columns, root = unseen.columns[index], np.sqrt(unseen.precision[index])
     wanted = -np.divide(unseen.pull[index], root, out=np.zeros(index.size), where=root > 0.0)
     if extra is not None:
@@ -75,8 +79,18 @@ def test_further_columns_are_fitted_together_with_those_of_the_model(kept):
 
 def test_a_model_without_frames_and_effects_predicts_its_target():
     unseen = made_up(20, 5)
-    bare = Unseen(None, None, unseen.labels, unseen.columns[:0], (), unseen.targets[:1],
-                  np.zeros(0), np.zeros(0), np.zeros((5, 0, 0)), np.zeros((5, 0, 1)))  # fmt: skip
+    bare = Unseen(
+        None,
+        None,
+        unseen.labels,
+        unseen.columns[:0],
+        (),
+        unseen.targets[:1],
+        np.zeros(0),
+        np.zeros(0),
+        np.zeros((5, 0, 0)),
+        np.zeros((5, 0, 1)),
+    )
     np.testing.assert_array_equal(bare.predict([]), unseen.targets[0])
     extra = np.random.default_rng(3).normal(size=(2, unseen.labels.size))
     expected = refitted(bare, [], extra, 1.0)

@@ -102,14 +102,17 @@ def test_less_than_a_period_of_ripple_is_believed_less_and_beside_another_effect
 @pytest.mark.parametrize(('order', 'told'), [(1.0, ('elbow_joint',)), (40.0, ())])
 def test_periods_seen_are_counted_over_all_recordings(order, told):
     problem, model = tiny(static=False)
-    ripple = effect('transmission_ripple', joint='elbow_joint', amplitude=1e-4, order=order,
-                    phase=0.0)  # fmt: skip
+    ripple = effect(
+        'transmission_ripple', joint='elbow_joint', amplitude=1e-4, order=order, phase=0.0
+    )
     assert glimpsed(problem, model.with_found((ripple,))) == told
 
 
 def test_belief_falls_as_what_remains_stands_above_the_floor():
-    beliefs = [decide(evidence((slot((PLAY, 1.0)),), after=a)).confidence
-               for a in (3.5e-5, 3.8e-5, 4.4e-5, 5e-5)]  # fmt: skip
+    beliefs = [
+        decide(evidence((slot((PLAY, 1.0)),), after=a)).confidence
+        for a in (3.5e-5, 3.8e-5, 4.4e-5, 5e-5)
+    ]
     assert beliefs == sorted(beliefs, reverse=True)
     assert beliefs[0] > 0.9
     assert beliefs[-1] < 0.5
@@ -133,8 +136,13 @@ def test_an_effect_smaller_than_what_remains_is_not_named():
 def test_every_order_of_a_ripple_counts_as_a_cause_of_its_own():
     site = Site('transmission_ripple', 'elbow_joint')
     for count, status in ((1, 'identified'), (4, 'unknown')):
-        ripple = effect('transmission_ripple', joint='elbow_joint', amplitude=[1e-4] * count,
-                        order=list(range(1, count + 1)), phase=[0.0] * count)  # fmt: skip
+        ripple = effect(
+            'transmission_ripple',
+            joint='elbow_joint',
+            amplitude=[1e-4] * count,
+            order=list(range(1, count + 1)),
+            phase=[0.0] * count,
+        )
         assert decide(evidence((slot((site, 1.0), found=(ripple,)),))).status == status
 
 
@@ -193,9 +201,14 @@ def test_what_the_data_cannot_show_is_absent_with_its_reason():
     assert found.absent['cartesian_compliance'] == 'no tool wrench was recorded'
 
 
-@pytest.mark.parametrize(('align', 'gone'), [
-    (('base',), {'base_pose'}), (('tool',), {'tool_pose'}), ((), set()),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('align', 'gone'),
+    [
+        (('base',), {'base_pose'}),
+        (('tool',), {'tool_pose'}),
+        ((), set()),
+    ],
+)
 def test_frames_fitted_as_nuisance_are_no_cause(align, gone):
     found = library(*tiny(align=align))
     names = {unit.family for unit in found.units}
@@ -211,11 +224,12 @@ def test_the_columns_of_a_unit_are_the_change_of_pose_its_effect_makes():
         ('link_twist', 'elbow_joint', 'dalpha', 1e-6),
         ('gear_ratio', 'wrist_1_joint', 'scale', 1e-6),
         ('joint_compliance', 'shoulder_lift_joint', 'compliance', 1e-9),
-    ):  # fmt: skip
+    ):
         unit = found.unit(family, joint)
         moved = model.with_found((effect(family, joint=joint, **{key: step}),))
         change = problem.whitened(problem.residuals(model), scale) - problem.whitened(
-            problem.residuals(moved), scale)
+            problem.residuals(moved), scale
+        )
         column = found.columns[unit.columns[0][0]]
         assert np.linalg.norm(column * step - change) < 1e-3 * np.linalg.norm(change)
 

@@ -30,12 +30,15 @@ def near(found, truth):
     """Return whether every parameter is within four standard errors and 2 % of the truth."""
     entry = found.as_dict()
     return {
-        key: bool(np.all(
-            np.abs(np.asarray(entry['parameters'][key]) - value)
-            <= 4.0 * np.asarray(entry['std'].get(key, 0.0)) + 0.02 * np.max(np.abs(value))
-        ))
-        for key, value in truth.items() if key != 'joint'
-    }  # fmt: skip
+        key: bool(
+            np.all(
+                np.abs(np.asarray(entry['parameters'][key]) - value)
+                <= 4.0 * np.asarray(entry['std'].get(key, 0.0)) + 0.02 * np.max(np.abs(value))
+            )
+        )
+        for key, value in truth.items()
+        if key != 'joint'
+    }
 
 
 @pytest.mark.parametrize('name', SINGLE)
@@ -100,10 +103,14 @@ def test_offsets_of_parallel_links_are_named_together():
     assert all(near(found, {'dd': 4e-4}).values())
 
 
-@pytest.mark.parametrize('truth', [
-    flaw('joint_offset', joint='shoulder_pan_joint', offset=5e-4),
-    flaw('base_pose', xyz=(0.0, 0.0, 0.0), rotvec=(0.0, 0.0, 5e-4)),
-], ids=['offset', 'turn'])  # fmt: skip
+@pytest.mark.parametrize(
+    'truth',
+    [
+        flaw('joint_offset', joint='shoulder_pan_joint', offset=5e-4),
+        flaw('base_pose', xyz=(0.0, 0.0, 0.0), rotvec=(0.0, 0.0, 5e-4)),
+    ],
+    ids=['offset', 'turn'],
+)
 def test_an_offset_of_the_first_joint_and_a_turn_of_the_base_are_named_together(truth):
     answer = solved(truth)
     assert answer.status == 'ambiguous'

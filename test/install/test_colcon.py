@@ -30,11 +30,27 @@ def workspace(tmp_path_factory) -> Path:
     """Build the three packages away from the tree; return the folder with ``install``."""
     folder = tmp_path_factory.mktemp('ws')
     subprocess.run(
-        [sys.executable, '-m', 'colcon', '--log-base', 'log', 'build',
-         '--base-paths', str(ROOT / 'src'), '--build-base', 'build', '--install-base', 'install'],
-        cwd=folder, check=True, capture_output=True, text=True, env=os.environ | {
-            'PYTHONPATH': '', 'PATH': f'{Path(sys.executable).parent}:{os.environ["PATH"]}'},
-    )  # fmt: skip
+        [
+            sys.executable,
+            '-m',
+            'colcon',
+            '--log-base',
+            'log',
+            'build',
+            '--base-paths',
+            str(ROOT / 'src'),
+            '--build-base',
+            'build',
+            '--install-base',
+            'install',
+        ],
+        cwd=folder,
+        check=True,
+        capture_output=True,
+        text=True,
+        env=os.environ
+        | {'PYTHONPATH': '', 'PATH': f'{Path(sys.executable).parent}:{os.environ["PATH"]}'},
+    )
     return folder
 
 
@@ -52,8 +68,11 @@ def sourced(workspace) -> dict[str, str]:
 def test_colcon_finds_exactly_the_three_packages():
     found = subprocess.run(
         [sys.executable, '-m', 'colcon', 'list', '--names-only'],
-        cwd=ROOT, check=True, capture_output=True, text=True,
-    ).stdout.split()  # fmt: skip
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.split()
     assert sorted(found) == PACKAGES
 
 
@@ -74,8 +93,12 @@ def test_each_node_runs_as_installed_with_the_parameter_file(workspace, sourced,
         own = {k: v for k, v in os.environ.items() if k.startswith('ROS_')}
         started = {}
         for name in NODES:
-            command = [str(installed / 'lib/weld_twin_nodes' / name), '--ros-args',
-                       '--params-file', str(config)]  # fmt: skip
+            command = [
+                str(installed / 'lib/weld_twin_nodes' / name),
+                '--ros-args',
+                '--params-file',
+                str(config),
+            ]
             if name == 'recorder':
                 command += ['-p', f'out:={tmp_path / "bag"}']
             assigned = [f'{k}={v}' for k, v in {**sourced, **own}.items()]

@@ -23,22 +23,34 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes']
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
 MODULES = {
-    'PyYAML': 'yaml', 'urdf-parser-py': 'urdf_parser_py', 'pin': 'pinocchio', 'SALib': 'SALib',
+    'PyYAML': 'yaml',
+    'urdf-parser-py': 'urdf_parser_py',
+    'pin': 'pinocchio',
+    'SALib': 'SALib',
     'roboticstoolbox-python': 'roboticstoolbox',
-}  # fmt: skip
+}
 """Modules of the distributions that are called otherwise."""
 ROS = {
-    'ament_index_python', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros',
-    'rcl_interfaces', 'rclpy', 'rosgraph_msgs', 'sensor_msgs', 'std_srvs',
-}  # fmt: skip
+    'ament_index_python',
+    'diagnostic_msgs',
+    'geometry_msgs',
+    'launch',
+    'launch_ros',
+    'rcl_interfaces',
+    'rclpy',
+    'rosgraph_msgs',
+    'sensor_msgs',
+    'std_srvs',
+}
 
 
 def setup_keywords(package):
     tree = ast.parse((ROOT / 'src' / package / 'setup.py').read_text())
     call = next(
-        node for node in ast.walk(tree)
+        node
+        for node in ast.walk(tree)
         if isinstance(node, ast.Call) and getattr(node.func, 'id', '') == 'setup'
-    )  # fmt: skip
+    )
     return {item.arg: item.value for item in call.keywords}
 
 
@@ -79,10 +91,13 @@ def test_everything_imported_is_declared(package):
     assert used - known - (set() if package == 'weld_twin_core' else ROS) == set()
 
 
-@pytest.mark.parametrize(('package', 'forbidden'), [
-    ('weld_twin_core', {'weld_twin_msgs_py', 'weld_twin_nodes', 'rclpy', 'rosbags', 'yaml'}),
-    ('weld_twin_msgs_py', {'weld_twin_nodes'}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('package', 'forbidden'),
+    [
+        ('weld_twin_core', {'weld_twin_msgs_py', 'weld_twin_nodes', 'rclpy', 'rosbags', 'yaml'}),
+        ('weld_twin_msgs_py', {'weld_twin_nodes'}),
+    ],
+)
 def test_imports_point_one_way(package, forbidden):
     assert set(imported(package)) & forbidden == set()
 

@@ -20,8 +20,11 @@ from launch_ros.actions import Node
 
 PACKAGE = 'weld_twin_nodes'
 NODES = (
-    'deviation_analyzer', 'forward_kinematics_twin', 'error_injector', 'trajectory_generator',
-)  # fmt: skip
+    'deviation_analyzer',
+    'forward_kinematics_twin',
+    'error_injector',
+    'trajectory_generator',
+)
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -30,22 +33,28 @@ def generate_launch_description() -> LaunchDescription:
     parameters = [LaunchConfiguration('config')]
     bag = LaunchConfiguration('bag')
     recorder = Node(
-        package=PACKAGE, executable='recorder', output='screen',
+        package=PACKAGE,
+        executable='recorder',
+        output='screen',
         parameters=[*parameters, {'out': bag}],
         condition=IfCondition(PythonExpression(["'", bag, "' != ''"])),
-    )  # fmt: skip
-    return LaunchDescription([
-        DeclareLaunchArgument('config', default_value=config, description='parameter file'),
-        DeclareLaunchArgument('bag', default_value='', description='bag to record, if any'),
-        DeclareLaunchArgument(
-            'discovery', default_value='LOCALHOST', description='LOCALHOST, SUBNET or OFF',
-        ),
-        SetEnvironmentVariable(
-            'ROS_AUTOMATIC_DISCOVERY_RANGE', LaunchConfiguration('discovery')
-        ),
-        recorder,
-        *(
-            Node(package=PACKAGE, executable=name, output='screen', parameters=parameters)
-            for name in NODES
-        ),
-    ])
+    )
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument('config', default_value=config, description='parameter file'),
+            DeclareLaunchArgument('bag', default_value='', description='bag to record, if any'),
+            DeclareLaunchArgument(
+                'discovery',
+                default_value='LOCALHOST',
+                description='LOCALHOST, SUBNET or OFF',
+            ),
+            SetEnvironmentVariable(
+                'ROS_AUTOMATIC_DISCOVERY_RANGE', LaunchConfiguration('discovery')
+            ),
+            recorder,
+            *(
+                Node(package=PACKAGE, executable=name, output='screen', parameters=parameters)
+                for name in NODES
+            ),
+        ]
+    )

@@ -16,30 +16,51 @@ def said(robot, **entry):
 @pytest.mark.parametrize(
     ('entry', 'parts'),
     [
-        ({'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 4.2e-4},
-         ['Re-master elbow_joint by -0.420 mrad (-0.0241 deg)']),
-        ({'effect': 'link_length', 'joint': 'shoulder_lift_joint', 'da': 6e-4},
-         ['a = -424.400 mm', 'in place of -425.000 mm', '+0.600 mm']),
+        (
+            {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 4.2e-4},
+            ['Re-master elbow_joint by -0.420 mrad (-0.0241 deg)'],
+        ),
+        (
+            {'effect': 'link_length', 'joint': 'shoulder_lift_joint', 'da': 6e-4},
+            ['a = -424.400 mm', 'in place of -425.000 mm', '+0.600 mm'],
+        ),
         ({'effect': 'link_twist', 'joint': 'elbow_joint', 'dalpha': -1e-3}, ['-0.0573 deg']),
-        ({'effect': 'tool_pose', 'xyz': [1e-3, 0.0, -2e-3], 'rotvec': [0.0, 0.01, 0.0]},
-         ['(+1.000, +0.000, -2.000) mm', '(+0.0000, +0.5730, +0.0000) deg']),
+        (
+            {'effect': 'tool_pose', 'xyz': [1e-3, 0.0, -2e-3], 'rotvec': [0.0, 0.01, 0.0]},
+            ['(+1.000, +0.000, -2.000) mm', '(+0.0000, +0.5730, +0.0000) deg'],
+        ),
         ({'effect': 'payload', 'mass': 2.1}, ['Enter a payload of 2.10 kg in place of 0.00 kg']),
-        ({'effect': 'backlash', 'joint': 'shoulder_lift_joint', 'width': 5e-4},
-         ['Service the gear of shoulder_lift_joint', '0.500 mrad']),
-        ({'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4, 'form': 'coast'},
-         ['elbow_joint always from one side', 'coasts across 0.500 mrad', 'ahead']),
+        (
+            {'effect': 'backlash', 'joint': 'shoulder_lift_joint', 'width': 5e-4},
+            ['Service the gear of shoulder_lift_joint', '0.500 mrad'],
+        ),
+        (
+            {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4, 'form': 'coast'},
+            ['elbow_joint always from one side', 'coasts across 0.500 mrad', 'ahead'],
+        ),
         ({'effect': 'time_delay', 'delay': 0.0123}, ['Fix the clock', '12.3 ms late']),
         ({'effect': 'time_delay', 'delay': -0.0123}, ['12.3 ms early']),
-        ({'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 2e-5},
-         ['+2.00 mrad per 100 N m', '5e+04 N m/rad']),
+        (
+            {'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 2e-5},
+            ['+2.00 mrad per 100 N m', '5e+04 N m/rad'],
+        ),
         ({'effect': 'drift', 'xyz_rate': [1e-6, 0.0, 0.0]}, ['(+3.60, 0, 0) mm per hour']),
-        ({'effect': 'thermal_growth', 'coefficient': 1.2e-5, 'links': ['elbow_joint']},
-         ['+12.0 um per m and K for elbow_joint']),
-        ({'effect': 'transmission_ripple', 'joint': 'elbow_joint', 'amplitude': [1e-4, 5e-4],
-          'order': [4.0, 9.0], 'phase': [0.0, 1.0]},
-         ['0.50 mrad at 9 per turn, 0.10 mrad at 4 per turn']),
+        (
+            {'effect': 'thermal_growth', 'coefficient': 1.2e-5, 'links': ['elbow_joint']},
+            ['+12.0 um per m and K for elbow_joint'],
+        ),
+        (
+            {
+                'effect': 'transmission_ripple',
+                'joint': 'elbow_joint',
+                'amplitude': [1e-4, 5e-4],
+                'order': [4.0, 9.0],
+                'phase': [0.0, 1.0],
+            },
+            ['0.50 mrad at 9 per turn, 0.10 mrad at 4 per turn'],
+        ),
     ],
-)  # fmt: skip
+)
 def test_the_number_and_the_unit_are_those_to_enter(ur5, entry, parts):
     sentence = said(ur5, **entry)
     assert all(part in sentence for part in parts), sentence

@@ -44,12 +44,18 @@ BASE = {'effect': 'base_pose', 'rotvec': [0.0, 0.0, 1e-3]}
     ('one', 'other', 'words'),
     [
         (FIRST, BASE, 'where the base stands'),
-        ({'effect': 'joint_offset', 'joint': 'wrist_3_joint', 'offset': 1e-3},
-         {'effect': 'tool_pose', 'rotvec': [0.0, 0.0, 1e-3]}, 'measure the tool by itself'),
-        ({'effect': 'link_offset', 'joint': 'shoulder_lift_joint', 'dd': 1e-3},
-         {'effect': 'link_offset', 'joint': 'elbow_joint', 'dd': 1e-3}, 'mends both'),
+        (
+            {'effect': 'joint_offset', 'joint': 'wrist_3_joint', 'offset': 1e-3},
+            {'effect': 'tool_pose', 'rotvec': [0.0, 0.0, 1e-3]},
+            'measure the tool by itself',
+        ),
+        (
+            {'effect': 'link_offset', 'joint': 'shoulder_lift_joint', 'dd': 1e-3},
+            {'effect': 'link_offset', 'joint': 'elbow_joint', 'dd': 1e-3},
+            'mends both',
+        ),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize('kind', [stations, moving])
 def test_what_no_motion_tells_apart_is_said_with_what_would(ur5, kind, one, other, words):
     found = proposed(ur5, *at_hand(ur5, kind, align=()), one, other)
@@ -62,8 +68,9 @@ def test_spring_against_offset_asks_for_a_measurement_that_tells_them_apart(ur5)
     problem, model = at_hand(ur5, size=0.05)
     found = proposed(ur5, problem, model, SPRING, OFFSET)
     assert found['expected_separation_sigma'] > 3.0
-    after, before = (left_by_the_wrong_one(ur5, p, m) for p, m in
-                     (with_motion(ur5, found), (problem, model)))  # fmt: skip
+    after, before = (
+        left_by_the_wrong_one(ur5, p, m) for p, m in (with_motion(ur5, found), (problem, model))
+    )
     assert after > 3.0 > before
 
 
@@ -82,10 +89,11 @@ def left_by_the_wrong_one(robot, problem, model):
     rng = np.random.default_rng(5)
     truth = effects_from_list([SPRING], robot)
     made = tuple(
-        recorded(model.robot, r.joints, rng, truth) if r.joints.static else
-        replace(r, measured=recorded(model.robot, r.joints, rng, truth).measured)
+        recorded(model.robot, r.joints, rng, truth)
+        if r.joints.static
+        else replace(r, measured=recorded(model.robot, r.joints, rng, truth).measured)
         for r in problem.recordings
-    )  # fmt: skip
+    )
     real = Problem(made, problem.align)
     scale = known_scale(real)
     costs = [
@@ -127,9 +135,12 @@ def test_what_needs_temperature_and_wrench_is_foreseen_with_those_recorded(ur5, 
     }
     problem = replace(problem, recordings=(replace(problem.recordings[0], **sides),))
     found = proposed(
-        ur5, problem, model, {'effect': 'thermal_growth', 'coefficient': 1e-5},
+        ur5,
+        problem,
+        model,
+        {'effect': 'thermal_growth', 'coefficient': 1e-5},
         {'effect': 'cartesian_compliance', 'compliance': [1e-6, 1e-6, 1e-6]},
-    )  # fmt: skip
+    )
     assert found['motion'] is not None and 'skipped' not in found
 
 

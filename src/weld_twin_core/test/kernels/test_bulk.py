@@ -55,8 +55,10 @@ def test_far_out_sine_and_cosine_err_by_the_last_digit_of_the_angle(
 def test_the_polynomials_are_as_good_as_claimed_in_longer_arithmetic() -> None:
     pi = np.longdouble('3.14159265358979323846264338327950288')
     r = np.linspace(-0.5, 0.5, 401).astype(np.longdouble)
-    sine, cosine = (np.polynomial.polynomial.polyval(r * r, np.array(c, dtype=np.longdouble))
-                    for c in (SINE, COSINE))  # fmt: skip
+    sine, cosine = (
+        np.polynomial.polynomial.polyval(r * r, np.array(c, dtype=np.longdouble))
+        for c in (SINE, COSINE)
+    )
     assert np.abs(r * sine - np.sin(pi * r)).max() < 2e-16
     assert np.abs(cosine - np.cos(pi * r)).max() < 2e-16
 

@@ -20,8 +20,9 @@ START = np.array([0.3, -0.9, 0.7, 0.5, 0.8, -0.7])
 def motion(count, size=0.3):
     """Return joint positions along a smooth motion, shape (count, 6)."""
     s = np.linspace(0.0, 1.0, count)[:, None]
-    return START + size * (np.sin(s * [1.1, 0.7, 1.3, 2.0, 1.7, 0.9] + np.arange(6.0)) - np.sin(
-        np.arange(6.0)))  # fmt: skip
+    return START + size * (
+        np.sin(s * [1.1, 0.7, 1.3, 2.0, 1.7, 0.9] + np.arange(6.0)) - np.sin(np.arange(6.0))
+    )
 
 
 @pytest.mark.parametrize('name', NAMES)

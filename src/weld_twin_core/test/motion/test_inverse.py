@@ -33,8 +33,10 @@ def gaps(robot, q, pose):
 def with_errors(robot, seed=0):
     """Return the arm with errors on every DH value, as after a calibration."""
     rng = np.random.default_rng(seed)
-    wrong = {key: getattr(robot, key) + rng.normal(scale=1e-3, size=robot.n)
-             for key in ('a', 'd', 'alpha', 'theta', 'beta')}  # fmt: skip
+    wrong = {
+        key: getattr(robot, key) + rng.normal(scale=1e-3, size=robot.n)
+        for key in ('a', 'd', 'alpha', 'theta', 'beta')
+    }
     return replace(robot, **wrong)
 
 

@@ -51,8 +51,9 @@ def test_an_arc_passes_its_three_points_and_has_the_hand_length():
     assert arc.length == pytest.approx(0.05 * np.pi)
     np.testing.assert_allclose(
         arc.sample(arc.length * np.array([0.0, 0.5, 1.0])).position,
-        [[0.1, 0, 0], [half, half, 0], [0, 0.1, 0]], atol=1e-12,
-    )  # fmt: skip
+        [[0.1, 0, 0], [half, half, 0], [0, 0.1, 0]],
+        atol=1e-12,
+    )
 
 
 def test_an_arc_through_the_far_side_takes_the_long_way():
@@ -127,12 +128,15 @@ def test_an_upright_torch_points_its_wire_at_the_work_and_x_along_the_travel():
 
 
 @pytest.mark.parametrize('heading', ['fixed', 'seam'])
-@pytest.mark.parametrize('angles, wire', [
-    ({'travel': 0.2}, [np.sin(0.2), 0, -np.cos(0.2)]),
-    ({'travel': -0.2}, [-np.sin(0.2), 0, -np.cos(0.2)]),
-    ({'work': 0.3}, [0, np.sin(0.3), -np.cos(0.3)]),
-    ({'rotation': 0.4}, [0, 0, -1]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    'angles, wire',
+    [
+        ({'travel': 0.2}, [np.sin(0.2), 0, -np.cos(0.2)]),
+        ({'travel': -0.2}, [-np.sin(0.2), 0, -np.cos(0.2)]),
+        ({'work': 0.3}, [0, np.sin(0.3), -np.cos(0.3)]),
+        ({'rotation': 0.4}, [0, 0, -1]),
+    ],
+)
 def test_torch_angles_lean_the_wire_as_documented(angles, wire, heading):
     frames = Line([0, 0, 0], [0.1, 0, 0]).sample(np.array([0.05]))
     pose = Torch(**angles, heading=heading).poses(frames)[0]
@@ -158,16 +162,29 @@ def test_a_leaning_torch_keeps_its_angles_all_the_way_round():
     np.testing.assert_allclose(out, np.cos(0.2) * np.cos(0.3), atol=1e-12)
 
 
-@pytest.mark.parametrize('data, cls', [
-    ({'kind': 'line', 'start': [0, 0, 0], 'end': [1, 0, 0], 'normal': [0, 1, 0]}, Line),
-    ({'kind': 'arc', 'start': [0, 0, 0], 'middle': [1, 1, 0], 'end': [2, 0, 0]}, Arc),
-    ({'kind': 'circle', 'centre': [0, 0, 0], 'radius': 0.1, 'turns': 0.5}, Circle),
-    ({'kind': 'polyline', 'points': [[0, 0, 0], [1, 0, 0], [1, 1, 0]], 'blend': 0.1}, Polyline),
-    ({'kind': 'spline', 'points': [[0, 0, 0], [1, 0, 0], [1, 1, 0]]}, Spline),
-    ({'kind': 'points', 'points': [[0, 0, 0], [1, 0, 0], [1, 1, 0]]}, Spline),
-    ({'kind': 'line', 'start': [0, 0, 0], 'end': [1, 0, 0],
-      'weave': {'amplitude': 0.01, 'wavelength': 0.02, 'form': 'zigzag'}}, Weave),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    'data, cls',
+    [
+        ({'kind': 'line', 'start': [0, 0, 0], 'end': [1, 0, 0], 'normal': [0, 1, 0]}, Line),
+        ({'kind': 'arc', 'start': [0, 0, 0], 'middle': [1, 1, 0], 'end': [2, 0, 0]}, Arc),
+        ({'kind': 'circle', 'centre': [0, 0, 0], 'radius': 0.1, 'turns': 0.5}, Circle),
+        (
+            {'kind': 'polyline', 'points': [[0, 0, 0], [1, 0, 0], [1, 1, 0]], 'blend': 0.1},
+            Polyline,
+        ),
+        ({'kind': 'spline', 'points': [[0, 0, 0], [1, 0, 0], [1, 1, 0]]}, Spline),
+        ({'kind': 'points', 'points': [[0, 0, 0], [1, 0, 0], [1, 1, 0]]}, Spline),
+        (
+            {
+                'kind': 'line',
+                'start': [0, 0, 0],
+                'end': [1, 0, 0],
+                'weave': {'amplitude': 0.01, 'wavelength': 0.02, 'form': 'zigzag'},
+            },
+            Weave,
+        ),
+    ],
+)
 def test_every_kind_is_built_from_its_mapping(data, cls):
     assert type(from_mapping(data)) is cls
 
@@ -175,27 +192,47 @@ def test_every_kind_is_built_from_its_mapping(data, cls):
 LINE = {'kind': 'line', 'start': [0, 0, 0], 'end': [1, 0, 0]}
 
 
-@pytest.mark.parametrize('data, sentence', [
-    ({'kind': 'lime'}, "'kind' must be one of line, arc, .*, got 'lime'"),
-    ({'kind': 'line', 'start': [0, 0, 0]}, "kind 'line' needs the key 'end'"),
-    (LINE | {'stop': 1}, "kind 'line' has the unknown key 'stop'; known keys are start"),
-    (LINE | {'end': [0, 0]}, r"kind 'line': line end must have shape \(3\), got \(2,\)"),
-    (LINE | {'end': [0, 0, 0]}, 'the line has no length'),
-    (LINE | {'normal': [0, 0, 0]}, 'line normal must not be the zero vector'),
-    (LINE | {'weave': {'amplitude': 0.1}}, "'weave' needs the key 'wavelength'"),
-    (LINE | {'weave': 3}, "'weave' must be a mapping of keys, got int"),
-    (LINE | {'weave': {'amplitude': 0.1, 'wavelength': 0.0}}, 'weave wavelength must be a pos'),
-    (LINE | {'weave': {'amplitude': 1, 'wavelength': 1, 'form': 'u'}}, 'weave form must be one'),
-    ({'kind': 'arc', 'start': [0, 0, 0], 'middle': [1, 0, 0], 'end': [2, 0, 0]}, 'lie on a line'),
-    ({'kind': 'circle', 'centre': [0, 0, 0], 'radius': 'a'}, "radius must be a positive number"),
-    ({'kind': 'polyline', 'points': [[0, 0, 0]]}, 'needs at least 2 points, got 1'),
-    ({'kind': 'polyline', 'points': [[0, 0, 0], [0, 0, 0]]}, 'points 0 and 1 are the same'),
-    ({'kind': 'polyline', 'points': [[0, 0, 0], [1, 0, 0], [0, 0, 0]]}, 'back at point 1'),
-    ({'kind': 'polyline', 'points': [[0, 0, 0], [1, 0, 0], [1, 1, 0]], 'blend': 2.0},
-     'a blend radius of 2 m does not fit between polyline points 0 and 1, 1 m apart'),
-    ({'kind': 'spline', 'points': [[0, 0, 0], [0, 0, float('nan')]]}, 'value.s. that are not fin'),
-    (3, 'a path must be a mapping of keys, got int'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    'data, sentence',
+    [
+        ({'kind': 'lime'}, "'kind' must be one of line, arc, .*, got 'lime'"),
+        ({'kind': 'line', 'start': [0, 0, 0]}, "kind 'line' needs the key 'end'"),
+        (LINE | {'stop': 1}, "kind 'line' has the unknown key 'stop'; known keys are start"),
+        (LINE | {'end': [0, 0]}, r"kind 'line': line end must have shape \(3\), got \(2,\)"),
+        (LINE | {'end': [0, 0, 0]}, 'the line has no length'),
+        (LINE | {'normal': [0, 0, 0]}, 'line normal must not be the zero vector'),
+        (LINE | {'weave': {'amplitude': 0.1}}, "'weave' needs the key 'wavelength'"),
+        (LINE | {'weave': 3}, "'weave' must be a mapping of keys, got int"),
+        (
+            LINE | {'weave': {'amplitude': 0.1, 'wavelength': 0.0}},
+            'weave wavelength must be a pos',
+        ),
+        (
+            LINE | {'weave': {'amplitude': 1, 'wavelength': 1, 'form': 'u'}},
+            'weave form must be one',
+        ),
+        (
+            {'kind': 'arc', 'start': [0, 0, 0], 'middle': [1, 0, 0], 'end': [2, 0, 0]},
+            'lie on a line',
+        ),
+        (
+            {'kind': 'circle', 'centre': [0, 0, 0], 'radius': 'a'},
+            'radius must be a positive number',
+        ),
+        ({'kind': 'polyline', 'points': [[0, 0, 0]]}, 'needs at least 2 points, got 1'),
+        ({'kind': 'polyline', 'points': [[0, 0, 0], [0, 0, 0]]}, 'points 0 and 1 are the same'),
+        ({'kind': 'polyline', 'points': [[0, 0, 0], [1, 0, 0], [0, 0, 0]]}, 'back at point 1'),
+        (
+            {'kind': 'polyline', 'points': [[0, 0, 0], [1, 0, 0], [1, 1, 0]], 'blend': 2.0},
+            'a blend radius of 2 m does not fit between polyline points 0 and 1, 1 m apart',
+        ),
+        (
+            {'kind': 'spline', 'points': [[0, 0, 0], [0, 0, float('nan')]]},
+            'value.s. that are not fin',
+        ),
+        (3, 'a path must be a mapping of keys, got int'),
+    ],
+)
 def test_a_wrong_description_is_refused_in_one_sentence(data, sentence):
     with pytest.raises(PathError, match=sentence) as refused:
         from_mapping(data)
@@ -207,12 +244,15 @@ def test_a_normal_along_the_seam_is_refused():
         Line([0, 0, 0], [0, 0, 1]).sample(np.array([0.5]))
 
 
-@pytest.mark.parametrize('data, sentence', [
-    ({'wrk': 1.0}, "torch has the unknown key 'wrk'; known keys are work"),
-    ({'work': 'a'}, "torch work must be an angle in radians, got 'a'"),
-    ({'travel': 15.0}, 'torch travel must be an angle in radians, got 15.0'),
-    ({'heading': 'x'}, "torch heading must be one of fixed, seam, got 'x'"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    'data, sentence',
+    [
+        ({'wrk': 1.0}, "torch has the unknown key 'wrk'; known keys are work"),
+        ({'work': 'a'}, "torch work must be an angle in radians, got 'a'"),
+        ({'travel': 15.0}, 'torch travel must be an angle in radians, got 15.0'),
+        ({'heading': 'x'}, "torch heading must be one of fixed, seam, got 'x'"),
+    ],
+)
 def test_a_wrong_torch_is_refused(data, sentence):
     with pytest.raises(PathError, match=sentence):
         Torch.from_mapping(data)

@@ -103,12 +103,18 @@ def test_constant_speed_is_constant():
     np.testing.assert_allclose(Constant(0.05).sample(0.1, 0.01).sd, 0.05)
 
 
-@pytest.mark.parametrize('make, sentence', [
-    (lambda: Smooth(-1.0), 'smooth profile: speed must be a positive number, got -1.0'),
-    (lambda: SCurve(jerk=float('inf')), 'scurve profile: jerk must be a positive number, got inf'),
-    (lambda: Aggressive(back=1.5), 'aggressive profile: back must be at most 1, got 1.5'),
-    (lambda: named('quick'), "no profile is called 'quick'; there are constant, trapezoid"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    'make, sentence',
+    [
+        (lambda: Smooth(-1.0), 'smooth profile: speed must be a positive number, got -1.0'),
+        (
+            lambda: SCurve(jerk=float('inf')),
+            'scurve profile: jerk must be a positive number, got inf',
+        ),
+        (lambda: Aggressive(back=1.5), 'aggressive profile: back must be at most 1, got 1.5'),
+        (lambda: named('quick'), "no profile is called 'quick'; there are constant, trapezoid"),
+    ],
+)
 def test_a_wrong_profile_is_refused(make, sentence):
     with pytest.raises(PathError, match=sentence):
         make()

@@ -45,7 +45,7 @@ def test_a_joint_offset_deviates_by_the_chord_of_its_arc(study):
     found = sweep(study, offset, default_values(offset))
     lever = np.hypot(*study.nominal.position[:, :2].T).max()
     np.testing.assert_allclose(found.max_m, 2.0 * lever * np.sin(0.5 * found.values), rtol=1e-9)
-    assert found.departure[-1] == pytest.approx(-found.values[-1] ** 2 / 24.0, rel=0.01)
+    assert found.departure[-1] == pytest.approx(-(found.values[-1] ** 2) / 24.0, rel=0.01)
 
 
 def test_linearity_of_one_joint_ends_where_the_chord_is_a_hundredth_short(study):
@@ -125,9 +125,12 @@ def test_verdicts_follow_the_measurements(case):
     assert found['smooth_below_aggressive'].verdict.startswith('holds when')
     turned = judgement({CaseName('a', 'b'): {**case, 'distal_ratio': 1.5}})
     assert {c.key: c.verdict for c in turned}['distal'] == 'holds'
-    split = judgement({
-        CaseName('a', 'b'): case, CaseName('c', 'd'): {**case, 'distal_ratio': 1.5},
-    })  # fmt: skip
+    split = judgement(
+        {
+            CaseName('a', 'b'): case,
+            CaseName('c', 'd'): {**case, 'distal_ratio': 1.5},
+        }
+    )
     distal = {c.key: c for c in split}['distal']
     assert (distal.verdict, distal.held, distal.cases) == ('does not hold', 1, 2)
     assert f'{case["distal_ratio"]:.2f} to 1.50' in distal.reason

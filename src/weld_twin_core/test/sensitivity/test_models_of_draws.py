@@ -40,12 +40,15 @@ def study(ur5):
     return planned_study(ur5, default_seam(ur5, 'arc'), 'aggressive', points=80)
 
 
-@pytest.mark.parametrize(('kind', 'numbers', 'frozen'), [
-    ('normal', (1.0, 2.0), stats.norm(1.0, 2.0)),
-    ('uniform', (-1.0, 3.0), stats.uniform(-1.0, 4.0)),
-    ('triangular', (0.0, 1.0, 4.0), stats.triang(0.25, 0.0, 4.0)),
-    ('lognormal', (2.0, 0.5), stats.lognorm(0.5, scale=2.0)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('kind', 'numbers', 'frozen'),
+    [
+        ('normal', (1.0, 2.0), stats.norm(1.0, 2.0)),
+        ('uniform', (-1.0, 3.0), stats.uniform(-1.0, 4.0)),
+        ('triangular', (0.0, 1.0, 4.0), stats.triang(0.25, 0.0, 4.0)),
+        ('lognormal', (2.0, 0.5), stats.lognorm(0.5, scale=2.0)),
+    ],
+)
 def test_distributions_are_those_of_scipy(kind, numbers, frozen):
     law = Distribution(kind, numbers)
     unit = np.linspace(0.01, 0.99, 50)
@@ -63,15 +66,18 @@ def test_a_distribution_is_cut_off_at_the_bounds_of_its_parameter():
         Distribution('uniform', (-2.0, -1.0), lower=0.0)
 
 
-@pytest.mark.parametrize(('entry', 'message'), [
-    ({'effect': 'nothing'}, 'unknown effect'),
-    ({'effect': 'backlash', 'std': -1.0}, 'does not scatter'),
-    ({'effect': 'backlash', 'parameter': 'gap'}, 'no such parameter'),
-    ({'effect': 'backlash', 'joint': 'seventh'}, "no joint 'seventh'"),
-    ({'effect': 'backlash', 'distribution': 'cauchy'}, 'must be one of'),
-    ({'effect': 'backlash', 'distribution': 'uniform', 'low': 0.0}, 'needs the key'),
-    ({'effect': 'base_pose', 'joint': 'elbow_joint'}, 'takes no joint'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('entry', 'message'),
+    [
+        ({'effect': 'nothing'}, 'unknown effect'),
+        ({'effect': 'backlash', 'std': -1.0}, 'does not scatter'),
+        ({'effect': 'backlash', 'parameter': 'gap'}, 'no such parameter'),
+        ({'effect': 'backlash', 'joint': 'seventh'}, "no joint 'seventh'"),
+        ({'effect': 'backlash', 'distribution': 'cauchy'}, 'must be one of'),
+        ({'effect': 'backlash', 'distribution': 'uniform', 'low': 0.0}, 'needs the key'),
+        ({'effect': 'base_pose', 'joint': 'elbow_joint'}, 'takes no joint'),
+    ],
+)
 def test_a_wrong_tolerance_is_refused_with_its_number(ur5, entry, message):
     with pytest.raises(ModelError, match=f'tolerance 1: .*{message}'):
         tolerances_from_list([{'effect': 'joint_offset'}, entry], ur5)
@@ -84,19 +90,25 @@ def test_tolerances_read_back_from_their_entries(ur5):
 
 
 def test_a_later_entry_replaces_an_earlier_one(ur5):
-    found = tolerances_from_list([
-        {'effect': 'joint_offset', 'std': 1e-3},
-        {'effect': 'joint_offset', 'joint': 'elbow_joint', 'std': 2e-3},
-    ], ur5)  # fmt: skip
+    found = tolerances_from_list(
+        [
+            {'effect': 'joint_offset', 'std': 1e-3},
+            {'effect': 'joint_offset', 'joint': 'elbow_joint', 'std': 2e-3},
+        ],
+        ur5,
+    )
     assert len(found) == 6
     assert {t.joint: t.distribution.numbers[1] for t in found}['elbow_joint'] == 2e-3
 
 
-@pytest.mark.parametrize('families', [
-    ('joint_offset', 'link_length', 'link_twist', 'base_pose'),
-    ('joint_offset', 'backlash', 'tool_pose'),
-    ('servo_lag', 'backlash', 'gear_ratio'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    'families',
+    [
+        ('joint_offset', 'link_length', 'link_twist', 'base_pose'),
+        ('joint_offset', 'backlash', 'tool_pose'),
+        ('servo_lag', 'backlash', 'gear_ratio'),
+    ],
+)
 def test_fast_model_agrees_with_the_exact_twin_run_by_run(study, families):
     tolerances = default_tolerances(study.robot, families)
     draws = draws_at(tolerances, np.random.default_rng(3).random((50, len(tolerances))))

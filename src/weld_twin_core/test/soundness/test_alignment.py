@@ -32,9 +32,7 @@ def test_frames_are_found_from_anywhere(name, align, points):
     if 'base' in align:
         np.testing.assert_allclose(found.bases[0], real.T_world_base, atol=1e-6)
     if not points:
-        np.testing.assert_allclose(
-            found.robot.T_flange_tool, real.T_flange_tool, atol=1e-6
-        )
+        np.testing.assert_allclose(found.robot.T_flange_tool, real.T_flange_tool, atol=1e-6)
 
 
 def test_every_recording_has_its_own_base_and_all_have_one_tool(ur5, rng):

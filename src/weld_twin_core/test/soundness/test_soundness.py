@@ -97,9 +97,10 @@ def test_another_zero_position_is_named(ur5, placed):
 
 
 def test_the_robot_that_fits_better_is_named(placed):
-    assert 'the robot is a ur5, not a abb_irb120' in sentence(
-        catalog.load('abb_irb120'), MIX_UP, placed
-    ).lower()
+    assert (
+        'the robot is a ur5, not a abb_irb120'
+        in sentence(catalog.load('abb_irb120'), MIX_UP, placed).lower()
+    )
 
 
 def test_a_left_handed_frame_is_named(ur5, placed):
@@ -128,10 +129,12 @@ def test_a_gap_that_nothing_explains_says_so(ur5, placed, rng):
     ('change', 'words'),
     [
         (lambda turn: np.swapaxes(turn, -1, -2), 'inverted'),
-        (lambda turn: matrix_from_quaternion(np.roll(quaternion_from_matrix(turn), 1, axis=-1)),
-         'w first and read x first'),
+        (
+            lambda turn: matrix_from_quaternion(np.roll(quaternion_from_matrix(turn), 1, axis=-1)),
+            'w first and read x first',
+        ),
     ],
-)  # fmt: skip
+)
 def test_orientations_in_another_convention_are_named(ur5, placed, change, words):
     bad = remeasured(placed, rotation=change(placed.measured.rotation))
     assert words in sentence(ur5, 'orientation', bad)
@@ -184,9 +187,7 @@ def test_a_frozen_instrument_is_named(ur5, run):
 
 
 def test_smooth_joint_positions_are_noted_as_commanded_and_encoder_counts_are_not(ur5, run):
-    assert 'as smooth as a command' in sentence(
-        ur5, 'source of the joints', run, level='note'
-    )
+    assert 'as smooth as a command' in sentence(ur5, 'source of the joints', run, level='note')
     counts = rejointed(run, np.round(run.joints.q / 1e-5) * 1e-5)
     assert not [c for c in findings(ur5, counts) if c.name == 'source of the joints']
 
@@ -310,8 +311,11 @@ def on_all_joints(robot, entries):
     whole = ('time_delay', 'drift', 'base_pose', 'tool_pose')
     out = []
     for entry in entries:
-        sites = [{}] if entry['effect'] in whole else [
-            {'joint': name} for name in robot.joint_names[1:3]]  # fmt: skip
+        sites = (
+            [{}]
+            if entry['effect'] in whole
+            else [{'joint': name} for name in robot.joint_names[1:3]]
+        )
         out += [{**entry, **site} for site in sites]
     return effects_from_list(out, robot)
 

@@ -12,9 +12,13 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.recording import JointMotion, Recording, Signal
 
 UR5_ROWS = [
-    (0.0, np.pi / 2, 0.089159), (-0.425, 0.0, 0.0), (-0.39225, 0.0, 0.0),
-    (0.0, np.pi / 2, 0.10915), (0.0, -np.pi / 2, 0.09465), (0.0, 0.0, 0.0823),
-]  # fmt: skip
+    (0.0, np.pi / 2, 0.089159),
+    (-0.425, 0.0, 0.0),
+    (-0.39225, 0.0, 0.0),
+    (0.0, np.pi / 2, 0.10915),
+    (0.0, -np.pi / 2, 0.09465),
+    (0.0, 0.0, 0.0823),
+]
 
 
 def random_robot(seed, n=6, convention='standard', slides=(), frames=True):
@@ -27,17 +31,24 @@ def random_robot(seed, n=6, convention='standard', slides=(), frames=True):
 
     joints = [
         {
-            'name': f'j{i}', 'a': rng.normal(scale=0.3), 'alpha': rng.uniform(-2, 2),
-            'd': rng.normal(scale=0.3), 'theta_offset': rng.uniform(-2, 2),
-            'beta': rng.uniform(-0.5, 0.5), 'type': 'prismatic' if i in slides else 'revolute',
+            'name': f'j{i}',
+            'a': rng.normal(scale=0.3),
+            'alpha': rng.uniform(-2, 2),
+            'd': rng.normal(scale=0.3),
+            'theta_offset': rng.uniform(-2, 2),
+            'beta': rng.uniform(-0.5, 0.5),
+            'type': 'prismatic' if i in slides else 'revolute',
         }
         for i in range(n)
-    ]  # fmt: skip
+    ]
     links = [{'mass': rng.uniform(1, 5), 'com': rng.normal(scale=0.1, size=3)} for _ in range(n)]
     data = {
-        'name': f'random{seed}', 'convention': convention, 'joints': joints, 'links': links,
+        'name': f'random{seed}',
+        'convention': convention,
+        'joints': joints,
+        'links': links,
         'payload': {'mass': 2.0, 'com': [0.02, -0.03, 0.1]},
-    }  # fmt: skip
+    }
     if frames:
         data |= {'base': frame(), 'tool': frame()}
     return Robot.from_mapping(data)
@@ -47,17 +58,23 @@ def ur5():
     """Return a UR5 with link masses."""
     masses = [3.7, 8.393, 2.33, 1.219, 1.219, 0.1879]
     coms = [
-        (0, -0.02561, 0.00193), (0.2125, 0, 0.11336), (0.15, 0, 0.0265), (0, -0.0018, 0.01634),
-        (0, 0.0018, 0.01634), (0, 0, -0.001159),
-    ]  # fmt: skip
-    return Robot.from_mapping({
-        'name': 'ur5',
-        'joints': [
-            {'name': f'j{i}', 'a': a, 'alpha': alpha, 'd': d}
-            for i, (a, alpha, d) in enumerate(UR5_ROWS)
-        ],
-        'links': [{'mass': m, 'com': c} for m, c in zip(masses, coms, strict=True)],
-    })  # fmt: skip
+        (0, -0.02561, 0.00193),
+        (0.2125, 0, 0.11336),
+        (0.15, 0, 0.0265),
+        (0, -0.0018, 0.01634),
+        (0, 0.0018, 0.01634),
+        (0, 0, -0.001159),
+    ]
+    return Robot.from_mapping(
+        {
+            'name': 'ur5',
+            'joints': [
+                {'name': f'j{i}', 'a': a, 'alpha': alpha, 'd': d}
+                for i, (a, alpha, d) in enumerate(UR5_ROWS)
+            ],
+            'links': [{'mass': m, 'com': c} for m, c in zip(masses, coms, strict=True)],
+        }
+    )
 
 
 ROBOTS = {
@@ -148,8 +165,9 @@ def load_torque(robot, q, wrench=None, frame='tool', **extra):
     here = textbook_pose(robot, q)
     turn = here[:3, :3] if frame == 'tool' else robot.T_world_base[:3, :3]
     for i, dq in enumerate(np.eye(robot.n) * step):
-        out[i] = -(potential_energy(robot, q + dq, **extra)
-                   - potential_energy(robot, q - dq, **extra)) / (2 * step)  # fmt: skip
+        out[i] = -(
+            potential_energy(robot, q + dq, **extra) - potential_energy(robot, q - dq, **extra)
+        ) / (2 * step)
         if wrench is not None:
             after, before = textbook_pose(robot, q + dq), textbook_pose(robot, q - dq)
             velocity = (after[:3, 3] - before[:3, 3]) / (2 * step)
@@ -196,10 +214,13 @@ def make_recording():
         at, rate = cubic_motion(robot.n, seed)
         ends = np.array([0.0, 20.0])
         return Recording(
-            'test', JointMotion(t, at(t - 3.0), rate(t - 3.0), static=static),
-            wrench=Signal(ends, wrench_at(ends - 3.0)), wrench_frame=wrench_frame,
-            temperature=Signal(ends, 20.0 + 2.0 * ends), **more,
-        )  # fmt: skip
+            'test',
+            JointMotion(t, at(t - 3.0), rate(t - 3.0), static=static),
+            wrench=Signal(ends, wrench_at(ends - 3.0)),
+            wrench_frame=wrench_frame,
+            temperature=Signal(ends, 20.0 + 2.0 * ends),
+            **more,
+        )
 
     return make
 

@@ -81,9 +81,7 @@ def test_a_turn_of_the_base_turns_every_result_and_nothing_else(robot):
     turn[:3, :3] = Rotation.from_rotvec([0.3, -0.4, 1.0]).as_matrix()
     turn[:3, 3] = 0.5, -1.0, 2.0
     moved = robot.with_frames(base=turn @ robot.T_world_base)
-    np.testing.assert_allclose(
-        chain.forward(moved, q), turn @ chain.forward(robot, q), atol=1e-13
-    )
+    np.testing.assert_allclose(chain.forward(moved, q), turn @ chain.forward(robot, q), atol=1e-13)
     jacobian = chain.jacobian(robot, q)
     expected = np.concatenate([turn[:3, :3] @ jacobian[:, :3], turn[:3, :3] @ jacobian[:, 3:]], 1)
     np.testing.assert_allclose(chain.jacobian(moved, q), expected, atol=1e-13)
@@ -99,8 +97,10 @@ def test_leading_axes_are_samples_and_draws(robot, lead):
         np.testing.assert_allclose(found[index], chain.forward(robot, q[index]), atol=1e-14)
 
 
-@pytest.mark.parametrize('channel', [('q', 1), ('d', 0), ('alpha', 2), ('base', 0), ('base', 5),
-                                     ('tool', 1), ('tool', 3)])  # fmt: skip
+@pytest.mark.parametrize(
+    'channel',
+    [('q', 1), ('d', 0), ('alpha', 2), ('base', 0), ('base', 5), ('tool', 1), ('tool', 3)],
+)
 def test_draws_of_one_channel_are_a_loop_over_draws(robot, channel):
     q = positions(robot)
     values = np.array([-0.2, 0.0, 0.3])

@@ -33,9 +33,11 @@ def pinocchio_model(pin, robot):
         if robot.convention == 'standard':
             place = after
             fixed = (
-                fixed * slide('x', robot.a[i]) * turn('x', robot.alpha[i])
+                fixed
+                * slide('x', robot.a[i])
+                * turn('x', robot.alpha[i])
                 * turn('y', robot.beta[i])
-            )  # fmt: skip
+            )
         else:
             place = after * before
         joint = pin.JointModelPZ() if robot.prismatic[i] else pin.JointModelRZ()
@@ -105,10 +107,11 @@ def test_displaced_frames_give_the_torque_of_the_displaced_robot(robot, textbook
     found = dynamics.gravity_torque(robot, q, shift)
     beta = robot.beta + 0.1 * np.eye(robot.n)[1]
     moved = dataclasses.replace(
-        robot, beta=beta,
+        robot,
+        beta=beta,
         T_world_base=textbook.frame(robot.T_world_base, base[:3], base[3:], 'left'),
         T_flange_tool=textbook.frame(robot.T_flange_tool, tool[:3], tool[3:], 'right'),
-    )  # fmt: skip
+    )
     assert found.shape == (3, 4, robot.n)
     for k, row in enumerate(q):
         expected = textbook.load_torque(moved, row)

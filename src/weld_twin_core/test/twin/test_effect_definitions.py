@@ -143,7 +143,8 @@ DEFINITIONS = {
     'axis_parallelism': ({'joint': 'j2', 'dbeta': 3e-3}, row('beta')),
     'base_pose': ({'xyz': SMALL, 'rotvec': TURN}, base_pose),
     'setup_settling': (
-        {'xyz': SMALL, 'rotvec': TURN, 'time_constant': 2.0, 'start': 1.0}, setup_settling,
+        {'xyz': SMALL, 'rotvec': TURN, 'time_constant': 2.0, 'start': 1.0},
+        setup_settling,
     ),
     'setup_step': ({'xyz': SMALL, 'rotvec': TURN, 'time': 2.0}, setup_step),
     'tool_pose': ({'xyz': SMALL, 'rotvec': TURN}, tool_pose),
@@ -161,7 +162,7 @@ DEFINITIONS = {
     'drift': ({'xyz_rate': SMALL}, drift),
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
     'measurement_noise': ({'sigma': 1e-3}, nothing),
-}  # fmt: skip
+}
 IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay'}
 
 
@@ -190,9 +191,14 @@ def test_effect_does_what_its_definition_says(
     found = Twin(robot, with_helpers(name, [effect(name, **values)])).poses(recording, at)
     for k, t in enumerate(at):
         cell = Cell(
-            robot, textbook, t, t - recording.joints.t[0], 20.0 + 2.0 * t,
-            recording.wrench.at(np.array(t)), motion_at(robot, t).copy(),
-        )  # fmt: skip
+            robot,
+            textbook,
+            t,
+            t - recording.joints.t[0],
+            20.0 + 2.0 * t,
+            recording.wrench.at(np.array(t)),
+            motion_at(robot, t).copy(),
+        )
         definition(cell)
         expected = cell.pose()
         np.testing.assert_allclose(found.position[k], expected[:3, 3], atol=1e-9)
@@ -295,8 +301,11 @@ def test_vibration_solves_its_differential_equation(arm, make_recording):
             state[1] -= gain * (rate[k] - rate[k - 1])
         run = solve_ivp(
             lambda _, x: [x[1], -2 * damping * omega * x[1] - omega**2 * x[0]],
-            (t[k], t[k + 1]), state, rtol=1e-10, atol=1e-13,
-        )  # fmt: skip
+            (t[k], t[k + 1]),
+            state,
+            rtol=1e-10,
+            atol=1e-13,
+        )
         state = run.y[:, -1]
         expected.append(q[k + 1] + state[0])
     mode = effect('vibration', joint='j3', frequency=3.0, damping=damping, gain=gain)

@@ -38,8 +38,9 @@ def test_orientation_accuracy_and_repeatability_about_one_axis():
     goal = Rotation.from_rotvec([0.3, -0.8, 0.2])
     angles = np.array([1e-3, 2e-3, 6e-3])
     turned = Rotation.from_rotvec(angles[:, None] * [0, 0, 1]) * goal
-    found = iso9283.pose_performance(np.zeros((3, 3)), np.zeros(3), turned.as_matrix(),
-                                     goal.as_matrix())  # fmt: skip
+    found = iso9283.pose_performance(
+        np.zeros((3, 3)), np.zeros(3), turned.as_matrix(), goal.as_matrix()
+    )
     np.testing.assert_allclose(found.ap_rad, [0, 0, 3e-3], atol=1e-12)
     np.testing.assert_allclose(found.rp_rad, [0, 0, 3 * statistics.stdev(angles)], atol=1e-12)
 
@@ -82,21 +83,36 @@ def test_variation_over_approaches_shows_lost_motion():
     assert iso9283.multidirectional_variation(approaches) == pytest.approx(5e-4)
 
 
-@pytest.mark.parametrize(('call', 'sentence'), [
-    (lambda: iso9283.pose_performance([[0, 0, 0]], [0, 0, 0]),
-     'repeatability needs at least two cycles, got 1; repeat the pose or path'),
-    (lambda: iso9283.path_performance([straight(0.0)], [[0, 0, 0]], [[1, 0, 0]]),
-     'repeatability needs at least two cycles, got 1; repeat the pose or path'),
-    (lambda: iso9283.path_performance([straight(0.0)] * 2, [[2.0, 0, 0]], [[1, 0, 0]]),
-     'cycle 0 does not pass command point 0; leave out the ends of the command path that not '
-     'every cycle covers'),
-    (lambda: iso9283.drift([CROSS], [0, 0, 0]),
-     'drift compares groups of cycles over time, got 1 group'),
-    (lambda: iso9283.multidirectional_variation([CROSS]),
-     'variation of pose accuracy compares directions of approach, got 1 direction'),
-    (lambda: iso9283.multidirectional_variation([CROSS, CROSS[:1]]),
-     'repeatability needs at least two cycles, got 1; repeat the pose or path'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('call', 'sentence'),
+    [
+        (
+            lambda: iso9283.pose_performance([[0, 0, 0]], [0, 0, 0]),
+            'repeatability needs at least two cycles, got 1; repeat the pose or path',
+        ),
+        (
+            lambda: iso9283.path_performance([straight(0.0)], [[0, 0, 0]], [[1, 0, 0]]),
+            'repeatability needs at least two cycles, got 1; repeat the pose or path',
+        ),
+        (
+            lambda: iso9283.path_performance([straight(0.0)] * 2, [[2.0, 0, 0]], [[1, 0, 0]]),
+            'cycle 0 does not pass command point 0; leave out the ends of the command path that not '
+            'every cycle covers',
+        ),
+        (
+            lambda: iso9283.drift([CROSS], [0, 0, 0]),
+            'drift compares groups of cycles over time, got 1 group',
+        ),
+        (
+            lambda: iso9283.multidirectional_variation([CROSS]),
+            'variation of pose accuracy compares directions of approach, got 1 direction',
+        ),
+        (
+            lambda: iso9283.multidirectional_variation([CROSS, CROSS[:1]]),
+            'repeatability needs at least two cycles, got 1; repeat the pose or path',
+        ),
+    ],
+)
 def test_data_that_do_not_allow_a_criterion_are_refused(call, sentence):
     with pytest.raises(DataError) as error:
         call()

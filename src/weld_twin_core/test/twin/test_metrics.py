@@ -79,8 +79,9 @@ def test_seam_components_keep_the_length_of_the_deviation():
     rng = np.random.default_rng(2)
     off, tangent, normal = rng.normal(size=(3, 50, 3))
     axes = seam_frame.seam_axes(tangent, normal)
-    np.testing.assert_allclose(axes @ np.swapaxes(axes, 1, 2), np.tile(np.eye(3), (50, 1, 1)),
-                               atol=1e-12)  # fmt: skip
+    np.testing.assert_allclose(
+        axes @ np.swapaxes(axes, 1, 2), np.tile(np.eye(3), (50, 1, 1)), atol=1e-12
+    )
     np.testing.assert_allclose(np.linalg.det(axes), 1.0)
     found = deviation.deviation_metrics(off, np.zeros((50, 3)), tangent=tangent, normal=normal)
     total = found.along_rms_m**2 + found.across_rms_m**2 + found.normal_rms_m**2
@@ -112,22 +113,39 @@ def test_the_dictionary_is_plain_and_frozen_results_stay():
         found.max_m = 0.0
 
 
-@pytest.mark.parametrize(('call', 'sentence'), [
-    (lambda: deviation.deviation_metrics(np.zeros((0, 3)), np.zeros((0, 3))),
-     'there are no samples to measure a deviation on'),
-    (lambda: deviation.deviation_metrics(NOMINAL[:2], NOMINAL),
-     'actual positions must have shape (3, 3), got (2, 3)'),
-    (lambda: deviation.deviation_metrics(NOMINAL, NOMINAL, tangent=[1, 0, 0]),
-     'seam components need both the tangent and the normal of the seam'),
-    (lambda: deviation.deviation_metrics(NOMINAL, NOMINAL, t=[0.0, 1.0]),
-     '3 deviations need as many stamps, got 2'),
-    (lambda: seam_frame.path_tangents(np.zeros((3, 3))),
-     'the path does not move, so it has no direction; give the seam tangent'),
-    (lambda: seam_frame.seam_axes([1, 0, 0], [2, 0, 0]),
-     'the seam normal lies along the seam; give one that points away from it'),
-    (lambda: seam_frame.seam_axes([0, 0, 0], [2, 0, 0]),
-     'the seam tangent is zero; give a direction'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('call', 'sentence'),
+    [
+        (
+            lambda: deviation.deviation_metrics(np.zeros((0, 3)), np.zeros((0, 3))),
+            'there are no samples to measure a deviation on',
+        ),
+        (
+            lambda: deviation.deviation_metrics(NOMINAL[:2], NOMINAL),
+            'actual positions must have shape (3, 3), got (2, 3)',
+        ),
+        (
+            lambda: deviation.deviation_metrics(NOMINAL, NOMINAL, tangent=[1, 0, 0]),
+            'seam components need both the tangent and the normal of the seam',
+        ),
+        (
+            lambda: deviation.deviation_metrics(NOMINAL, NOMINAL, t=[0.0, 1.0]),
+            '3 deviations need as many stamps, got 2',
+        ),
+        (
+            lambda: seam_frame.path_tangents(np.zeros((3, 3))),
+            'the path does not move, so it has no direction; give the seam tangent',
+        ),
+        (
+            lambda: seam_frame.seam_axes([1, 0, 0], [2, 0, 0]),
+            'the seam normal lies along the seam; give one that points away from it',
+        ),
+        (
+            lambda: seam_frame.seam_axes([0, 0, 0], [2, 0, 0]),
+            'the seam tangent is zero; give a direction',
+        ),
+    ],
+)
 def test_data_that_do_not_allow_a_metric_are_refused(call, sentence):
     with pytest.raises(DataError) as error:
         call()

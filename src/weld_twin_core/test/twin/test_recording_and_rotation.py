@@ -69,8 +69,9 @@ def test_taken_measurements_keep_all_they_have():
 def test_rotation_matrix_is_the_matrix_exponential(vector, size):
     v = vector * size
     np.testing.assert_allclose(rotation.rotation_matrix(v), expm(rotation.skew(v)), atol=1e-14)
-    np.testing.assert_allclose(rotation.rotation_vector(rotation.rotation_matrix(v)), v,
-                               atol=1e-12)  # fmt: skip
+    np.testing.assert_allclose(
+        rotation.rotation_vector(rotation.rotation_matrix(v)), v, atol=1e-12
+    )
 
 
 @settings(max_examples=60, deadline=None)

@@ -38,8 +38,9 @@ def test_thinned_joints_still_follow_the_motion():
     at = np.linspace(1.0, 39.0, 777)
     q, qd = thin.joints.at(at)
     np.testing.assert_allclose(q, np.stack([np.sin(2 * at), np.cos(3 * at)], 1), atol=2e-6)
-    np.testing.assert_allclose(qd, np.stack([2 * np.cos(2 * at), -3 * np.sin(3 * at)], 1),
-                               atol=1e-3)  # fmt: skip
+    np.testing.assert_allclose(
+        qd, np.stack([2 * np.cos(2 * at), -3 * np.sin(3 * at)], 1), atol=1e-3
+    )
     assert 'motion above 16 Hz is not seen' in thin.notes[-1]
 
 

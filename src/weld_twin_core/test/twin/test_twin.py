@@ -59,9 +59,12 @@ def test_live_steps_give_the_poses_of_the_batch(robot, make_recording):
     batch, joints, live = twin.poses(recording), twin.joints(recording), twin.live()
     for k, t in enumerate(recording.joints.t):
         found, pose = live.step(
-            t, recording.joints.q[k], recording.joints.qd[k], recording.wrench.at(t),
+            t,
+            recording.joints.q[k],
+            recording.joints.qd[k],
+            recording.wrench.at(t),
             float(recording.temperature.at(t)),
-        )  # fmt: skip
+        )
         np.testing.assert_allclose(found, joints[k], atol=1e-12)
         np.testing.assert_allclose(pose.position, batch.position[k], atol=1e-12)
         np.testing.assert_allclose(pose.rotation, batch.rotation[k], atol=1e-12)
@@ -107,7 +110,9 @@ def test_play_scan_is_the_loop(q, width, start):
     for value in q:
         w = min(value + width / 2, max(value - width / 2, w))
         expected.append(w)
-    np.testing.assert_allclose(associative_scan.play(np.array(q), width, np.array(start)), expected)
+    np.testing.assert_allclose(
+        associative_scan.play(np.array(q), width, np.array(start)), expected
+    )
 
 
 @settings(max_examples=50, deadline=None)
@@ -278,7 +283,7 @@ def test_an_effect_of_the_users_own_works_like_a_bundled_one(
     np.testing.assert_allclose(
         poses.position[:, 2], nominal[:, 2] - 1e-2 * nominal[:, 2] ** 2, atol=1e-15
     )
-    np.testing.assert_allclose(found[:, 2, 0], -nominal[:, 2] ** 2, atol=1e-9)
+    np.testing.assert_allclose(found[:, 2, 0], -(nominal[:, 2] ** 2), atol=1e-9)
     assert mine.to_mapping() == {'effect': 'sagging_test', 'depth': 1e-2}
 
 
@@ -286,7 +291,7 @@ def test_registering_what_breaks_the_contract_is_refused(registered):
     registered(Sagging)
     with pytest.raises(ModelError, match=r"^an effect named 'backlash' is registered already$"):
         registered(type('Other', (Sagging,), {'name': 'backlash'}))
-    with pytest.raises(ModelError, match="acts in stage PLAY, which runs in order of time"):
+    with pytest.raises(ModelError, match='acts in stage PLAY, which runs in order of time'):
         registered(type('Sagging', (Sagging,), {'name': 'x', 'stage': Stage.PLAY}))
     with pytest.raises(ModelError, match=r"^effect 'x' is a spring in a joint; name its"):
         registered(type('Sagging', (Sagging,), {'name': 'x', 'stage': Stage.ELASTIC}))

@@ -22,7 +22,10 @@ ENTRIES = {
     'setup_step': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
     'gear_ratio': {'joint': 'j1', 'scale': 1e-3},
     'transmission_ripple': {
-        'joint': 'j1', 'amplitude': [1e-4, 2e-4], 'order': [3, 50], 'phase': [0.3, 0.2],
+        'joint': 'j1',
+        'amplitude': [1e-4, 2e-4],
+        'order': [3, 50],
+        'phase': [0.3, 0.2],
     },
     'joint_coupling': {'joint': 'j3', 'source': 'j4', 'ratio': 1e-3},
     'backlash': {'joint': 'j2', 'width': 1e-3},
@@ -35,13 +38,22 @@ ENTRIES = {
     'drift': {'xyz_rate': [1e-6, 2e-6, 3e-6]},
     'vibration': {'joint': 'j2', 'frequency': 4.0, 'damping': 0.05, 'gain': 0.3},
     'measurement_scale': {'scale': 1e-4},
-}  # fmt: skip
+}
 WITHOUT = {'quantization', 'measurement_noise'}
 # No product of two of these displacements exists, so the sum of their derivatives is exact.
 SEPARATE = [
-    'joint_offset', 'link_length', 'link_twist', 'base_pose', 'tool_pose', 'gear_ratio',
-    'transmission_ripple', 'backlash', 'servo_lag', 'vibration', 'thermal_growth',
-]  # fmt: skip
+    'joint_offset',
+    'link_length',
+    'link_twist',
+    'base_pose',
+    'tool_pose',
+    'gear_ratio',
+    'transmission_ripple',
+    'backlash',
+    'servo_lag',
+    'vibration',
+    'thermal_growth',
+]
 
 
 def effect(name, **more):
@@ -85,9 +97,12 @@ def check(robot, effects, recording, at, relative, absolute=0.0):
             found[:, :3, k], position, rtol=0, atol=relative * scale + room + 1e-9, err_msg=name
         )
         np.testing.assert_allclose(
-            found[:, 3:, k], spin, rtol=0, atol=relative * max(1.0, scale) + room + 1e-6,
+            found[:, 3:, k],
+            spin,
+            rtol=0,
+            atol=relative * max(1.0, scale) + room + 1e-6,
             err_msg=name,
-        )  # fmt: skip
+        )
 
 
 def test_every_differentiable_effect_is_tested_here():
@@ -124,9 +139,7 @@ def test_all_effects_together_are_off_by_products_of_small_displacements_only(
     robot, make_recording, stamps
 ):
     recording = make_recording(robot)
-    check(
-        robot, [effect(name) for name in ENTRIES], recording, stamps(recording), 5e-3, 2e-7
-    )
+    check(robot, [effect(name) for name in ENTRIES], recording, stamps(recording), 5e-3, 2e-7)
 
 
 def test_while_a_wide_gap_is_crossed_the_derivative_stays_with_the_side_left(arm):
@@ -158,9 +171,10 @@ def test_a_numerical_derivative_stands_in_for_a_missing_closed_form(name, arm, m
         for channel in ours or ():
             scale = np.abs(ours[channel]).max()
             np.testing.assert_allclose(
-                theirs[channel], np.broadcast_to(ours[channel], theirs[channel].shape),
+                theirs[channel],
+                np.broadcast_to(ours[channel], theirs[channel].shape),
                 atol=1e-5 * scale + 1e-8,
-            )  # fmt: skip
+            )
 
 
 def test_the_instants_of_the_joint_stamps_do_not_move_with_the_measurement_clock(

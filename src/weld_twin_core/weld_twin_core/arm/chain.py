@@ -128,9 +128,14 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     flange_point = samples_first(p)
     position = flange_point + (flange @ tool_point[..., None])[..., 0]
     return Frames(
-        flange @ tool_rotation, position, tuple(rows), flange, flange_point, base_rotation,
+        flange @ tool_rotation,
+        position,
+        tuple(rows),
+        flange,
+        flange_point,
+        base_rotation,
         base_point,
-    )  # fmt: skip
+    )
 
 
 def _standard_row(
@@ -172,9 +177,7 @@ def displaced_robot(robot: Robot, shift: Mapping[Channel, float]) -> Robot:
             rows[name][i] += value
     arrays = {key: np.asarray(value) for key, value in shift.items()}
     base, tool = base_frame(robot, arrays), tool_frame(robot, arrays)
-    return replace(
-        robot, **rows, T_world_base=transform(*base), T_flange_tool=transform(*tool)
-    )
+    return replace(robot, **rows, T_world_base=transform(*base), T_flange_tool=transform(*tool))
 
 
 def forward(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
@@ -185,6 +188,7 @@ def forward(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
     """
     if q.size >= MANY * robot.n and robot.n <= MOST_JOINTS and not shift:
         from ..kernels.bulk import kernel_of
+
         return kernel_of(robot).poses(q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 4, 4)
     chain = frames(robot, q, shift)
     return transform(chain.rotation, chain.position)

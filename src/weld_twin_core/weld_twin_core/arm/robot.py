@@ -18,12 +18,29 @@ from .rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 CONVENTIONS = ('standard', 'modified')
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 _TOP_KEYS = {
-    'name', 'convention', 'gravity', 'base', 'tool', 'joints', 'links', 'payload', 'source',
-}  # fmt: skip
+    'name',
+    'convention',
+    'gravity',
+    'base',
+    'tool',
+    'joints',
+    'links',
+    'payload',
+    'source',
+}
 _JOINT_KEYS = {
-    'name', 'type', 'a', 'alpha', 'd', 'theta_offset', 'beta', 'lower', 'upper', 'max_velocity',
+    'name',
+    'type',
+    'a',
+    'alpha',
+    'd',
+    'theta_offset',
+    'beta',
+    'lower',
+    'upper',
+    'max_velocity',
     'max_acceleration',
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +106,11 @@ class Robot:
             )
         shapes: dict[str, tuple[int | None, ...]] = {
             **dict.fromkeys(('a', 'alpha', 'd', 'theta', 'beta'), (n,)),
-            'payload_com': (3,), 'gravity': (3,), 'T_world_base': (4, 4), 'T_flange_tool': (4, 4),
-        }  # fmt: skip
+            'payload_com': (3,),
+            'gravity': (3,),
+            'T_world_base': (4, 4),
+            'T_flange_tool': (4, 4),
+        }
         if self.mass is not None:
             shapes |= {'mass': (n,), 'com': (n, 3)}
         for key, shape in shapes.items():
@@ -213,10 +233,14 @@ class Robot:
         return cls(
             name=name,
             joint_names=tuple(str(row['name']) for row in rows),
-            a=column('a'), alpha=column('alpha'), d=column('d'),
-            theta=column('theta_offset'), beta=column('beta'),
+            a=column('a'),
+            alpha=column('alpha'),
+            d=column('d'),
+            theta=column('theta_offset'),
+            beta=column('beta'),
             prismatic=np.array([row.get('type', 'revolute') == 'prismatic' for row in rows]),
-            lower=column('lower', -np.inf), upper=column('upper', np.inf),
+            lower=column('lower', -np.inf),
+            upper=column('upper', np.inf),
             max_velocity=column('max_velocity', np.inf),
             max_acceleration=column('max_acceleration', np.inf),
             convention=str(data.get('convention', 'standard')),
@@ -228,7 +252,7 @@ class Robot:
             payload_com=payload.get('com', np.zeros(3)),
             gravity=data.get('gravity', STANDARD_GRAVITY),
             source=str(data.get('source', '')),
-        )  # fmt: skip
+        )
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the mapping that `from_mapping` reads: plain numbers, lists and strings."""
@@ -247,10 +271,13 @@ class Robot:
                     row[key] = value
             joints.append(row)
         out: dict[str, Any] = {
-            'name': self.name, 'convention': self.convention, 'gravity': self.gravity.tolist(),
-            'base': _pose_mapping(self.T_world_base), 'tool': _pose_mapping(self.T_flange_tool),
+            'name': self.name,
+            'convention': self.convention,
+            'gravity': self.gravity.tolist(),
+            'base': _pose_mapping(self.T_world_base),
+            'tool': _pose_mapping(self.T_flange_tool),
             'joints': joints,
-        }  # fmt: skip
+        }
         if self.mass is not None and self.com is not None:
             out['links'] = [
                 {'mass': float(m), 'com': c.tolist()}

@@ -21,15 +21,12 @@ from .hypotheses.search import Search, search
 from .many.family_verdict import family_verdict
 from .result import (
     Candidate,
-    Check,
     Diagnosis,
     Found,
     Gap,
-    Shrink,
     Site,
     Traces,
     Unexplained,
-    Where,
 )
 from .soundness import check
 from .unseen.held_out_shrink import held_out_shrink
@@ -87,35 +84,48 @@ def diagnose(
     found = search(problem, start, exclude, progress)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     kept = list(range(len(found.final.model.found)))
-    sigma, independent = noise_floor(
-        found.problem, found.problem.residuals(found.final.model)
-    )
+    sigma, independent = noise_floor(found.problem, found.problem.residuals(found.final.model))
     floor = sigma * float(np.sqrt(3.0))
     loose = structure(unseen, found.final.model, kept)
     progress('looked for what is left')
     shrink = held_out_shrink(found, unseen, holdout)
     slots = found.slots
     evidence = Evidence(
-        slots, loose, shrink.rms_before_m, shrink.rms_after_m, floor,
-        unseen.rms(unseen.predict(kept)), independent, _parts(unseen),
+        slots,
+        loose,
+        shrink.rms_before_m,
+        shrink.rms_after_m,
+        floor,
+        unseen.rms(unseen.predict(kept)),
+        independent,
+        _parts(unseen),
         glimpsed(found.problem, found.final.model),
-    )  # fmt: skip
+    )
     verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
     baseline = Unseen.of(found.problem, found.scale, found.baseline, np.zeros(0))
     where = locate(found.problem, baseline, found.baseline.model, unseen, found.final.model)
     progress('located')
     effects = _effects(found, unseen, verdict)
     return Diagnosis(
-        gap=_gap(found, floor), where=where, status=verdict.status, effects=effects,
-        confidence=verdict.confidence, indistinguishable=verdict.sets, reasons=verdict.reasons,
+        gap=_gap(found, floor),
+        where=where,
+        status=verdict.status,
+        effects=effects,
+        confidence=verdict.confidence,
+        indistinguishable=verdict.sets,
+        reasons=verdict.reasons,
         candidates=_candidates(found, slots, evidence),
         shrink=shrink,
         unexplained=_unexplained(evidence),
         next_experiment=_next(found, slots, verdict),
-        actions=actions([f.effect for f in effects], robot), checks=checks,
-        model=found.final.model, traces=_traces(found), absent=found.library.absent,
-        recordings=found.problem.recordings, families=verdict.families,
-    )  # fmt: skip
+        actions=actions([f.effect for f in effects], robot),
+        checks=checks,
+        model=found.final.model,
+        traces=_traces(found),
+        absent=found.library.absent,
+        recordings=found.problem.recordings,
+        families=verdict.families,
+    )
 
 
 def _gap(found: Search, floor: float) -> Gap:
@@ -129,9 +139,13 @@ def _gap(found: Search, floor: float) -> Gap:
     if turns:
         turn = float(np.sqrt(np.mean(np.concatenate([(t**2).sum(axis=0) for t in turns]))))
     return Gap(
-        float(np.sqrt((distance**2).mean())), float(distance.mean()), float(distance.max()),
-        turn, int(distance.size), floor,
-    )  # fmt: skip
+        float(np.sqrt((distance**2).mean())),
+        float(distance.mean()),
+        float(distance.max()),
+        turn,
+        int(distance.size),
+        floor,
+    )
 
 
 def _effects(found: Search, unseen: Unseen, verdict: Verdict) -> tuple[Found, ...]:
@@ -145,9 +159,10 @@ def _effects(found: Search, unseen: Unseen, verdict: Verdict) -> tuple[Found, ..
     )
     named = {site for group in verdict.sets for site in group}
     out = [
-        (worth[k], Found(effect, errors[k])) for k, effect in enumerate(model.found)
+        (worth[k], Found(effect, errors[k]))
+        for k, effect in enumerate(model.found)
         if Site(effect.name, effect.site) in named
-    ]  # fmt: skip
+    ]
     return tuple(item for _, item in sorted(out, key=lambda pair: -pair[0]))
 
 
@@ -211,8 +226,7 @@ def _traces(found: Search) -> Traces:
     return Traces(
         tuple(r.measured.t for r in recordings if r.measured is not None),
         tuple(r.measured.position for r in recordings if r.measured is not None),
-        tuple(p[:3].T for p in before), tuple(p[:3].T for p in after),
+        tuple(p[:3].T for p in before),
+        tuple(p[:3].T for p in after),
         tuple(w >= TRUSTED for w in found.scale.weights),
-    )  # fmt: skip
-
-
+    )

@@ -110,9 +110,11 @@ class Family:
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.families``."""
         return {
-            'effect': self.effect, 'named': self.named, 'rms_m': self.rms_m,
+            'effect': self.effect,
+            'named': self.named,
+            'rms_m': self.rms_m,
             'members': [{'joint': site.joint, 'rms_m': size} for site, size in self.members],
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -208,23 +210,32 @@ class Diagnosis:
                 'actions': list(self.actions),
             },
             'candidates': [
-                {'effect': c.site.effect, 'joint': c.site.joint, 'probability': c.probability,
-                 'rms_after_m': c.rms_after_m, 'shrink': c.shrink}
+                {
+                    'effect': c.site.effect,
+                    'joint': c.site.joint,
+                    'probability': c.probability,
+                    'rms_after_m': c.rms_after_m,
+                    'shrink': c.shrink,
+                }
                 for c in self.candidates
             ],
             'shrink': {
-                'rms_before_m': self.shrink.rms_before_m, 'rms_after_m': self.shrink.rms_after_m,
-                'ratio': self.shrink.ratio, 'ci95': list(self.shrink.ci95),
+                'rms_before_m': self.shrink.rms_before_m,
+                'rms_after_m': self.shrink.rms_after_m,
+                'ratio': self.shrink.ratio,
+                'ci95': list(self.shrink.ci95),
                 'held_out': self.shrink.held_out,
                 'steps': [{'added': n, 'rms_m': v} for n, v in self.shrink.steps],
                 'alone': [{'mended': n, 'rms_m': v} for n, v in self.shrink.alone],
-                'orientation_rms_rad': self.shrink.orientation_rad and {
+                'orientation_rms_rad': self.shrink.orientation_rad
+                and {
                     'before': self.shrink.orientation_rad[0],
                     'after': self.shrink.orientation_rad[1],
                 },
             },
             'unexplained': {
-                'rms_m': self.unexplained.rms_m, 'above_noise': self.unexplained.above_noise,
+                'rms_m': self.unexplained.rms_m,
+                'above_noise': self.unexplained.above_noise,
                 'structure': list(self.unexplained.structure),
             },
             'next_experiment': self.next_experiment,
@@ -238,7 +249,7 @@ class Diagnosis:
                 'known': [effect.to_mapping() for effect in self.model.known],
                 'found': [effect.to_mapping() for effect in self.model.found],
             },
-        }  # fmt: skip
+        }
 
     def _where(self) -> dict[str, Any]:
         where = self.where

@@ -66,7 +66,9 @@ class Backlash(MemoryEffect):
         if self.form == 'reversal':
             flips, state = _reversals(q, state)
             return {('q', i): -self.number('width') * flips}, state
-        output = associative_scan.play(q, self.number('width'), q[..., 0] if state is None else state)
+        output = associative_scan.play(
+            q, self.number('width'), q[..., 0] if state is None else state
+        )
         return {('q', i): self._side * (output - q)}, output[..., -1]
 
     @property
@@ -107,9 +109,7 @@ class Backlash(MemoryEffect):
         return np.where(resting, side, 0.0), associative_scan.last_true(resting)
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield play of a small, a usual and a large width: how it engages depends on width."""
         for width in (5e-5, 5e-4, 2e-3):
             yield cls(str(joint), width)

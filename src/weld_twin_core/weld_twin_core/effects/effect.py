@@ -68,8 +68,9 @@ class Effect(Parametric, ABC):
                 continue
             ends = np.stack([vector, vector])
             step = RELATIVE_STEP * parameter.typical
-            ends[:, k] = np.clip([vector[k] - step, vector[k] + step],
-                                 parameter.lower, parameter.upper)  # fmt: skip
+            ends[:, k] = np.clip(
+                [vector[k] - step, vector[k] + step], parameter.lower, parameter.upper
+            )
             low, high = (self.with_vector(end).displace(view) for end in ends)
             width = ends[1, k] - ends[0, k]
             out.append({key: (high[key] - low[key]) / width for key in high})
@@ -80,9 +81,7 @@ class Effect(Parametric, ABC):
         return {}
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """
         Yield the instances a search starts from; each spans one linear subspace.
 

@@ -50,9 +50,7 @@ class JointCoupling(Effect):
         return [{('q', view.robot.index(self.joint)): view.joint(view.robot.index(self.source))}]
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield one instance per neighbour along the chain, where gears share a housing."""
         i = view.robot.index(str(joint))
         for k in (i - 1, i + 1):

@@ -42,8 +42,6 @@ class MeasurementNoise(Effect):
         return rng.normal(scale=float(self.sigma), size=(samples, 3))
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield nothing: noise is no cause."""
         return ()

@@ -124,10 +124,13 @@ class Parametric:
 
     def coordinates(self) -> Array:
         """Return the fit coordinates, shape (K,)."""
-        return np.array([
-            value for (p, _), value in zip(self.components(), self.vector(), strict=True)
-            if p.differentiable
-        ])  # fmt: skip
+        return np.array(
+            [
+                value
+                for (p, _), value in zip(self.components(), self.vector(), strict=True)
+                if p.differentiable
+            ]
+        )
 
     def with_coordinates(self: P, values: Array) -> P:
         """Return the same at other fit coordinates, kept inside the physical bounds."""

@@ -52,9 +52,7 @@ class Quantization(Effect):
         return [None]
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """
         Yield the steps whose staircase the residual follows best.
 

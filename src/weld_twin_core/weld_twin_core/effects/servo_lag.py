@@ -66,7 +66,9 @@ class ServoLag(MemoryEffect):
         before = np.concatenate([np.zeros_like(x[..., :1]), x[..., :-1]], axis=-1)
         d_decay = decay * dt / tau**2
         d_weight = np.where(dt > 0.0, weight / tau - decay / tau, 0.0)
-        slope = associative_scan.linear(decay, d_decay * before - d_weight * change, np.zeros(x.shape[:-1]))
+        slope = associative_scan.linear(
+            decay, d_decay * before - d_weight * change, np.zeros(x.shape[:-1])
+        )
         return [{('q', i): slope}]
 
     def push(self, view: View, tangent: Array) -> Array:
@@ -80,9 +82,7 @@ class ServoLag(MemoryEffect):
         return tangent + x
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> list[ServoLag]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> list[ServoLag]:
         """Return a fast and a slow lag; between them the response is nearly proportional."""
         return [] if view.static else [cls(str(joint), tau) for tau in (2e-3, 3e-2)]
 

@@ -61,9 +61,7 @@ class SetupSettling(Effect):
         return [{('base', k): self._left(view)} for k in range(6)]
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield time constants from a twentieth to half of the recording."""
         span = float(view.elapsed[-1])
         if span > 0.0:

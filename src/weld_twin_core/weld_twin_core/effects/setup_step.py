@@ -58,9 +58,7 @@ class SetupStep(Effect):
         return [{('base', k): before} for k in range(6)]
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield steps at evenly spread samples, none at the very ends."""
         index = np.linspace(0, view.t.size - 1, TIMES + 2).round().astype(int)[1:-1]
         for k in np.unique(index):

@@ -86,9 +86,7 @@ class TransmissionRipple(Effect):
         return {('q', view.robot.index(self.joint)): total}
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield one instance per integer order that the joint's range of motion can tell."""
         for order in range(1, MAX_ORDER + 1):
             yield cls(str(joint), 0.0, float(order), 0.0)

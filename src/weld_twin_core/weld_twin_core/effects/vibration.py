@@ -46,8 +46,9 @@ class Vibration(MemoryEffect):
     regime = 'acceleration'
     parameters = (
         Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False, idealised=0.015),
-        Parameter('damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False,
-                  idealised=0.03),
+        Parameter(
+            'damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False, idealised=0.03
+        ),
         Parameter('gain', '-', typical=0.3, idealised=0.04),
     )
     needs = frozenset({'velocity', 'time'})
@@ -104,7 +105,12 @@ class Vibration(MemoryEffect):
             (w * (-1.0 - 1j * zeta / root), -zeta / root**2),
         ):
             drive = decay * kick / damped * d_log_damped + dt * d_pole * z
-            out.append({('q', i): gain * associative_scan.linear(decay, drive, np.zeros(z.shape[:-1])).imag})
+            out.append(
+                {
+                    ('q', i): gain
+                    * associative_scan.linear(decay, drive, np.zeros(z.shape[:-1])).imag
+                }
+            )
         return [*out, {('q', i): z.imag}]
 
     def push(self, view: View, tangent: Array) -> Array:
@@ -119,9 +125,7 @@ class Vibration(MemoryEffect):
         return pushed
 
     @classmethod
-    def seeds(
-        cls, view: View, joint: str | None, pull: Array | None = None
-    ) -> Iterable[Effect]:
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them."""
         if view.static or view.t.size < 3:
             return
@@ -143,14 +147,18 @@ class Vibration(MemoryEffect):
         On evenly spaced stamps, on which the recursion is a plain filter.
         """
         from scipy.signal import lfilter  # half a second that only a diagnosis has to wait for
+
         if zoom or view.static or view.t.size < 3:
             return None
         step = float(np.median(np.diff(view.t)))
         t = np.arange(view.t[0], view.t[-1] + step, step)
         q = np.interp(t, view.t, view.joint(view.robot.index(self.joint)))
         kick = np.concatenate([np.zeros(2), np.diff(q, n=2)]) / step
-        modes = [Vibration(self.joint, float(f), z, 1.0)
-                 for f in FREQUENCIES[FREQUENCIES * step < HIGHEST] for z in DAMPINGS]  # fmt: skip
+        modes = [
+            Vibration(self.joint, float(f), z, 1.0)
+            for f in FREQUENCIES[FREQUENCIES * step < HIGHEST]
+            for z in DAMPINGS
+        ]
         out = np.empty((len(modes), view.t.size))
         for k, mode in enumerate(modes):
             pole, damped = mode._mode()

@@ -72,10 +72,12 @@ class BulkKernel:
             k: _trimmed(_on_features(self.sizes[0], near_screws[:, t]))
             for t, k in enumerate(inner)
         }
-        self._far = np.concatenate([
-            _on_features(self.sizes[1], far.velocities(outer)),
-            _on_features(self.sizes[1], _columns(far.poses())),
-        ])  # fmt: skip
+        self._far = np.concatenate(
+            [
+                _on_features(self.sizes[1], far.velocities(outer)),
+                _on_features(self.sizes[1], _columns(far.poses())),
+            ]
+        )
         self._memory: dict[int, _Memory] = {}
 
     def poses(self, q: Array, out: Array | None = None) -> Array:

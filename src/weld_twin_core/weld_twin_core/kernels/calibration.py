@@ -69,9 +69,12 @@ def minimal_channels(robot: Robot) -> tuple[Channel, ...]:
 
 
 def calibrate(
-    robot: Robot, q: Array, poses: Array, channels: Sequence[Channel] | None = None,
+    robot: Robot,
+    q: Array,
+    poses: Array,
+    channels: Sequence[Channel] | None = None,
     length: float = 1.0,
-) -> Calibration:  # fmt: skip
+) -> Calibration:
     """
     Return the robot whose poses fit the measured ones best.
 

@@ -79,9 +79,12 @@ class HalfAngle:
     """
 
     def __init__(
-        self, *shape: int, powers: Array | None = None, own: Array | None = None,
+        self,
+        *shape: int,
+        powers: Array | None = None,
+        own: Array | None = None,
         by_tangent: bool = BY_TANGENT,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.shape = shape
         size = int(np.prod(shape))
         self._powers = aligned(DEGREE + 1, size) if powers is None else powers

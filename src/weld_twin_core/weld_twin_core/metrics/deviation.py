@@ -139,12 +139,19 @@ def deviation_metrics(
     if isinstance(actual, Poses) and isinstance(nominal, Poses):
         turn = orientation_error(actual.rotation, nominal.rotation)
     return DeviationMetrics(
-        len(size), root_mean_square(size), float(size.mean()), float(np.percentile(size, 95.0)),
-        float(size.max()), float(size.max()) / length if length > 0.0 else None,
-        float(size.sum()), None if t is None else _over_time(size, t), length,
+        len(size),
+        root_mean_square(size),
+        float(size.mean()),
+        float(np.percentile(size, 95.0)),
+        float(size.max()),
+        float(size.max()) / length if length > 0.0 else None,
+        float(size.sum()),
+        None if t is None else _over_time(size, t),
+        length,
         None if turn is None else root_mean_square(turn),
-        None if turn is None else float(turn.max()), *_on_seam(off, tangent, normal),
-    )  # fmt: skip
+        None if turn is None else float(turn.max()),
+        *_on_seam(off, tangent, normal),
+    )
 
 
 def _over_time(size: Array, t: ArrayLike) -> float:

@@ -149,9 +149,13 @@ def pose_performance(
         errors = angle_between(turned, np.asarray(command_rotation, dtype=np.float64))
         turn, spread = _three(errors.mean(axis=0)), _three(3.0 * errors.std(axis=0, ddof=1))
     return PosePerformance(
-        len(points), float(np.linalg.norm(off)), float(_repeatability(points)), _three(off), turn,
+        len(points),
+        float(np.linalg.norm(off)),
+        float(_repeatability(points)),
+        _three(off),
+        turn,
         spread,
-    )  # fmt: skip
+    )
 
 
 def path_performance(
@@ -178,10 +182,12 @@ def path_performance(
     if len(attained) < 2:
         raise DataError(_too_few(len(attained)))
     goal = readonly(command, (None, 3), 'command path')
-    crossed = np.stack([
-        normal_plane_crossings(path, goal, tangent, f'cycle {k}')
-        for k, path in enumerate(attained)
-    ])
+    crossed = np.stack(
+        [
+            normal_plane_crossings(path, goal, tangent, f'cycle {k}')
+            for k, path in enumerate(attained)
+        ]
+    )
     off = np.linalg.norm(crossed.mean(axis=0) - goal, axis=-1)
     spread = _repeatability(crossed)
     worst, loosest = int(off.argmax()), int(spread.argmax())
@@ -243,9 +249,11 @@ def drift(groups: Sequence[ArrayLike], command: ArrayLike) -> DriftPerformance:
     found = [pose_performance(group, command) for group in groups]
     accuracy, spread = (np.array([getattr(f, key) for f in found]) for key in ('ap_m', 'rp_m'))
     return DriftPerformance(
-        float(abs(accuracy - accuracy[0]).max()), float(abs(spread - spread[0]).max()),
-        tuple(accuracy.tolist()), tuple(spread.tolist()),
-    )  # fmt: skip
+        float(abs(accuracy - accuracy[0]).max()),
+        float(abs(spread - spread[0]).max()),
+        tuple(accuracy.tolist()),
+        tuple(spread.tolist()),
+    )
 
 
 def multidirectional_variation(approaches: Sequence[ArrayLike]) -> float:

@@ -136,10 +136,16 @@ def plan(
         raise PathError(_too_fast(robot, motion, timing, velocity, acceleration))
     solution = line.solution
     report = PlanReport(
-        float(timing.t[-1]), slowed, velocity, acceleration, residual,
-        float(solution.condition.max()), float(solution.manipulability.min()),
-        float(solution.limit_margin.min()), solution.method,
-    )  # fmt: skip
+        float(timing.t[-1]),
+        slowed,
+        velocity,
+        acceleration,
+        residual,
+        float(solution.condition.max()),
+        float(solution.manipulability.min()),
+        float(solution.limit_margin.min()),
+        solution.method,
+    )
     seam = path.sample(timing.s)
     return Plan(motion, line.poses(timing.s), seam, timing.s, path.length, report)
 

@@ -183,9 +183,12 @@ class Aggressive(Profile):
 
 
 PROFILES: dict[str, type[Profile]] = {
-    'constant': Constant, 'trapezoid': Trapezoid, 's-curve': SCurve, 'smooth': Smooth,
+    'constant': Constant,
+    'trapezoid': Trapezoid,
+    's-curve': SCurve,
+    'smooth': Smooth,
     'aggressive': Aggressive,
-}  # fmt: skip
+}
 
 
 def named(name: str) -> Profile:
@@ -211,8 +214,10 @@ def _trapezoid(
     ramp, sign = peak / acceleration, float(np.sign(distance))
     cruise = abs(distance) / peak - ramp
     return [
-        (ramp, sign * acceleration, 0.0), (cruise, 0.0, 0.0), (ramp, -sign * acceleration, 0.0)
-    ]  # fmt: skip
+        (ramp, sign * acceleration, 0.0),
+        (cruise, 0.0, 0.0),
+        (ramp, -sign * acceleration, 0.0),
+    ]
 
 
 def _chained(pieces: list[tuple[float, float, float]], speed: float = 0.0) -> PPoly:

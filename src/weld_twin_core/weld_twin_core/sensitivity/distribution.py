@@ -73,9 +73,7 @@ class Distribution:
         return last if self.kind == 'normal' else last - first
 
     def _text(self) -> str:
-        return ', '.join(
-            f'{k} {v:g}' for k, v in zip(KINDS[self.kind], self.numbers, strict=True)
-        )
+        return ', '.join(f'{k} {v:g}' for k, v in zip(KINDS[self.kind], self.numbers, strict=True))
 
     def _below(self, value: float) -> float:
         """Return the probability below a value."""
@@ -109,9 +107,10 @@ class Distribution:
                 return np.asarray(v[0] * np.exp(v[1] * ndtri(p)))
         rise, fall = (v[1] - v[0]) * (v[2] - v[0]), (v[2] - v[1]) * (v[2] - v[0])
         return np.where(
-            p * (v[2] - v[0]) < v[1] - v[0], v[0] + np.sqrt(p * rise),
+            p * (v[2] - v[0]) < v[1] - v[0],
+            v[0] + np.sqrt(p * rise),
             v[2] - np.sqrt((1.0 - p) * fall),
-        )  # fmt: skip
+        )
 
     @property
     def mean(self) -> float:
@@ -155,7 +154,6 @@ class Distribution:
         except (TypeError, ValueError):
             raise ModelError(f'the numbers of a {kind} distribution must be numbers') from None
         return cls(kind, numbers, lower, upper)
-
 
 
 def _below_triangle(value: float, low: float, mode: float, high: float) -> float:

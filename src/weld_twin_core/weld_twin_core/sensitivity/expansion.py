@@ -150,13 +150,21 @@ def expand(study: Study, tolerances: Sequence[Tolerance]) -> Expansion:
     strength, left = np.linalg.eigh(flat @ flat.T)
     left = left[:, strength > _RANK**2 * strength[-1]]
     shapes = (left.T @ flat).reshape(-1, 3, study.samples).swapaxes(0, 1)
-    chain = jacobian(study.robot, study.recording.joints.q if study.at is None else
-                     study.recording.joints.at(study.at)[0])  # fmt: skip
+    chain = jacobian(
+        study.robot,
+        study.recording.joints.q if study.at is None else study.recording.joints.at(study.at)[0],
+    )
     moved = [study.on_seam(chain[:, :3, part.joint]).T for part in memory]
     return Expansion(
-        study, tolerances, scale, products, left,
-        np.ascontiguousarray(shapes), memory, np.array(moved),
-    )  # fmt: skip
+        study,
+        tolerances,
+        scale,
+        products,
+        left,
+        np.ascontiguousarray(shapes),
+        memory,
+        np.array(moved),
+    )
 
 
 class _Runs(NamedTuple):

@@ -102,8 +102,9 @@ class LocalSensitivity:
     @property
     def contribution(self) -> Array:
         """Return the rms deviation that the scatter of each parameter makes, shape (P,) [m]."""
-        size = np.array([np.hypot(t.distribution.mean, t.distribution.std)
-                         for t in self.tolerances])  # fmt: skip
+        size = np.array(
+            [np.hypot(t.distribution.mean, t.distribution.std) for t in self.tolerances]
+        )
         return np.asarray(self.rms * size)
 
     def groups(self, by: str = 'effect') -> dict[str, float]:
@@ -121,22 +122,25 @@ class LocalSensitivity:
         return {
             'compared': 'slope of D at no error (right-hand); dD/dp at one tolerance',
             'parameters': rows,
-            'by_effect_m': self.groups('effect'), 'by_joint_m': self.groups('site'),
-        }  # fmt: skip
+            'by_effect_m': self.groups('effect'),
+            'by_joint_m': self.groups('site'),
+        }
 
     def _row(self, k: int) -> Mapping[str, Any]:
         tolerance = self.tolerances[k]
         return {
-            'name': tolerance.name, 'unit': tolerance.unit,
+            'name': tolerance.name,
+            'unit': tolerance.unit,
             'S_analytic_peak_m': float(self.peak[k]),
             'S_difference_peak_m': float(self.forward[k].max()),
-            'S_rms_m': float(self.rms[k]), 'S_norm': float(self.normalized[k]),
+            'S_rms_m': float(self.rms[k]),
+            'S_norm': float(self.normalized[k]),
             'disagreement': float(self.disagreement[k]),
             'disagreement_at_tolerance': float(self.offset_disagreement[k]),
             'S_turn_peak_rad': float(self.turns[k].max()),
             'tolerance': tolerance.distribution.to_mapping(),
             'contribution_m': float(self.contribution[k]),
-        }  # fmt: skip
+        }
 
 
 def _relative(difference: Array, scale: Array) -> Array:
@@ -165,9 +169,15 @@ def local_sensitivity(study: Study, tolerances: Sequence[Tolerance]) -> LocalSen
     forward = np.linalg.norm(exact_deviations(study, tolerances, np.diag(step)), axis=-1)
     analytic, difference = _at_tolerance(study, tolerances, size)
     return LocalSensitivity(
-        tolerances, arc_weights(study.s), study.length, vectors, turns, forward / step[:, None],
-        analytic, difference,
-    )  # fmt: skip
+        tolerances,
+        arc_weights(study.s),
+        study.length,
+        vectors,
+        turns,
+        forward / step[:, None],
+        analytic,
+        difference,
+    )
 
 
 def _linearised(

@@ -96,9 +96,7 @@ def remembered(
     return tuple(out)
 
 
-def displacement(
-    study: Study, joint: int, tolerances: Sequence[Tolerance], draws: Array
-) -> Array:
+def displacement(study: Study, joint: int, tolerances: Sequence[Tolerance], draws: Array) -> Array:
     """Return displacements of a joint, shape (D, N), beyond those of the known effects."""
     name = study.robot.joint_names[joint]
     known = tuple(e for e in study.known if e.stage in MEMORY and e.site == name)

@@ -58,15 +58,19 @@ class Screening:
         """Return plain numbers and lists."""
         rows = [
             {
-                'name': name, 'mu_star': float(self.mu_star[k]),
-                'mu_star_half': float(self.mu_star_half[k]), 'sigma': float(self.sigma[k]),
+                'name': name,
+                'mu_star': float(self.mu_star[k]),
+                'mu_star_half': float(self.mu_star_half[k]),
+                'sigma': float(self.sigma[k]),
             }
             for k, name in enumerate(self.names)
-        ]  # fmt: skip
+        ]
         return {
-            'trajectories': self.trajectories, 'runs': self.runs, 'seed': self.seed,
+            'trajectories': self.trajectories,
+            'runs': self.runs,
+            'seed': self.seed,
             'indices': rows,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -102,9 +106,11 @@ class MorrisDesign:
     def samples(self) -> Array:
         """Return probabilities of every input, shape (trajectories (P + 1), P)."""
         values: Array = salib('sample.morris').sample(
-            self._problem(), self.trajectories, num_levels=LEVELS,
+            self._problem(),
+            self.trajectories,
+            num_levels=LEVELS,
             seed=np.random.default_rng([self.seed, 0]),
-        )  # fmt: skip
+        )
         return values
 
     def screening(self, results: Array) -> Screening:
@@ -120,9 +126,12 @@ class MorrisDesign:
         values = np.asarray(results, dtype=np.float64)
         refuse_unfinite(values, 'Morris screening')
         found = salib('analyze.morris').analyze(
-            self._problem(), self.samples(), values, num_levels=LEVELS,
+            self._problem(),
+            self.samples(),
+            values,
+            num_levels=LEVELS,
             seed=np.random.default_rng([self.seed, 1]),
-        )  # fmt: skip
+        )
         mean, half, scatter = (
             np.asarray(found[key], dtype=np.float64)
             for key in ('mu_star', 'mu_star_conf', 'sigma')

@@ -36,10 +36,12 @@ def outcomes(off: Array, length: float) -> Outcomes:
     square += normal * normal
     largest = np.sqrt(square.max(axis=-1))
     return Outcomes(
-        largest / length, largest, np.sqrt(square.mean(axis=-1)),
+        largest / length,
+        largest,
+        np.sqrt(square.mean(axis=-1)),
         np.maximum(across.max(axis=-1), -across.min(axis=-1)),
         np.maximum(normal.max(axis=-1), -normal.min(axis=-1)),
-    )  # fmt: skip
+    )
 
 
 def joined(parts: list[Outcomes]) -> Outcomes:

@@ -21,6 +21,4 @@ def salib(module: str) -> Any:
     try:
         return import_module(f'SALib.{module}')
     except ImportError:
-        raise DataError(
-            'Morris measures need SALib; install it with: pip install SALib'
-        ) from None
+        raise DataError('Morris measures need SALib; install it with: pip install SALib') from None

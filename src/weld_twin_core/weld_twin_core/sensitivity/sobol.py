@@ -71,18 +71,27 @@ class SobolIndices:
         """Return plain numbers and lists."""
         rows = [
             {
-                'name': name, 'S1': float(self.first[k]), 'S1_half': float(self.first_half[k]),
-                'ST': float(self.total[k]), 'ST_half': float(self.total_half[k]),
+                'name': name,
+                'S1': float(self.first[k]),
+                'S1_half': float(self.first_half[k]),
+                'ST': float(self.total[k]),
+                'ST_half': float(self.total_half[k]),
             }
             for k, name in enumerate(self.names)
-        ]  # fmt: skip
+        ]
         return {
-            'base_samples': self.base_samples, 'runs': self.runs, 'seed': self.seed,
-            'confidence': CONFIDENCE, 'mean': self.mean, 'std': self.std,
-            'sum_S1': float(self.first.sum()), 'converged': self.converged,
-            'largest_ST_half': float(self.total_half.max()), 'largest_ST_change': self.change,
+            'base_samples': self.base_samples,
+            'runs': self.runs,
+            'seed': self.seed,
+            'confidence': CONFIDENCE,
+            'mean': self.mean,
+            'std': self.std,
+            'sum_S1': float(self.first.sum()),
+            'converged': self.converged,
+            'largest_ST_half': float(self.total_half.max()),
+            'largest_ST_change': self.change,
             'indices': rows,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -157,15 +166,29 @@ class SobolDesign:
         change = float(np.abs(total - before).max())
         settled = max(change, float(total_half.max())) < SETTLED
         return SobolIndices(
-            self.labels, first, first_half, total, total_half, self.base_samples, values.size,
-            float(values.mean()), float(values.std()), change, settled, self.seed,
-        )  # fmt: skip
+            self.labels,
+            first,
+            first_half,
+            total,
+            total_half,
+            self.base_samples,
+            values.size,
+            float(values.mean()),
+            float(values.std()),
+            change,
+            settled,
+            self.seed,
+        )
 
 
 def sobol_indices(
-    function: Function, names: Sequence[str], base_samples: int = 1024, *,
-    groups: Sequence[str] | None = None, seed: int = 0,
-) -> SobolIndices:  # fmt: skip
+    function: Function,
+    names: Sequence[str],
+    base_samples: int = 1024,
+    *,
+    groups: Sequence[str] | None = None,
+    seed: int = 0,
+) -> SobolIndices:
     """
     Return the Sobol indices of a function of independent inputs.
 

@@ -88,7 +88,9 @@ class ToleranceStack:
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and lists."""
         return {
-            'runs': self.runs, 'seed': self.seed, 'tolerance': asdict(self.tolerance),
+            'runs': self.runs,
+            'seed': self.seed,
+            'tolerance': asdict(self.tolerance),
             'percentiles': {
                 key: [
                     {'percent': p, 'value': float(v), 'low': float(a), 'high': float(b)}
@@ -97,10 +99,12 @@ class ToleranceStack:
                 for key, rows in self.percentiles.items()
             },
             'inside': {
-                'across': asdict(self.inside_across), 'stickout': asdict(self.inside_stickout),
-                'both': asdict(self.inside_both), 'widest_half': self.half,
+                'across': asdict(self.inside_across),
+                'stickout': asdict(self.inside_stickout),
+                'both': asdict(self.inside_both),
+                'widest_half': self.half,
             },
-        }  # fmt: skip
+        }
 
 
 def probabilities(runs: int, inputs: int, seed: int = 0) -> Array:
@@ -135,9 +139,14 @@ def tolerance_stack(
     across, stickout = found.across_m <= limits.across_m, found.stickout_m <= limits.stickout_m
     keys = ('d_norm', 'max_m', 'across_m', 'stickout_m')
     return ToleranceStack(
-        len(found.d_norm), seed, {key: _percentiles(getattr(found, key)) for key in keys},
-        _frequency(across), _frequency(stickout), _frequency(across & stickout), limits,
-    )  # fmt: skip
+        len(found.d_norm),
+        seed,
+        {key: _percentiles(getattr(found, key)) for key in keys},
+        _frequency(across),
+        _frequency(stickout),
+        _frequency(across & stickout),
+        limits,
+    )
 
 
 def _frequency(inside: np.ndarray) -> Probability:

@@ -61,10 +61,14 @@ class Sweep:
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and lists."""
         return {
-            'name': self.name, 'unit': self.unit, 'values': self.values.tolist(),
-            'd_norm': (self.max_m / self.length).tolist(), 'max_m': self.max_m.tolist(),
-            'mean_m': self.mean_m.tolist(), 'departure': self.departure.tolist(),
-        }  # fmt: skip
+            'name': self.name,
+            'unit': self.unit,
+            'values': self.values.tolist(),
+            'd_norm': (self.max_m / self.length).tolist(),
+            'max_m': self.max_m.tolist(),
+            'mean_m': self.mean_m.tolist(),
+            'departure': self.departure.tolist(),
+        }
 
 
 def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
@@ -81,9 +85,14 @@ def together(study: Study, tolerances: Sequence[Tolerance], values: Array, name:
     distance = np.linalg.norm(exact_deviations(study, tolerances, draws), axis=-1)
     largest = distance.max(axis=-1)
     return Sweep(
-        name, tolerances[0].unit, sizes[1:], largest[1:], distance[1:].mean(axis=-1),
-        largest[0] / small * np.abs(sizes[1:]), study.length,
-    )  # fmt: skip
+        name,
+        tolerances[0].unit,
+        sizes[1:],
+        largest[1:],
+        distance[1:].mean(axis=-1),
+        largest[0] / small * np.abs(sizes[1:]),
+        study.length,
+    )
 
 
 def default_values(tolerance: Tolerance, count: int = 25) -> Array:

@@ -79,9 +79,13 @@ class ProfileResult:
 
 
 def compare_profiles(
-    robot: Robot, path: Path, tolerances: Sequence[Tolerance], *,
-    profiles: Sequence[str] = tuple(PROFILES), points: int = 400,
-) -> tuple[ProfileResult, ...]:  # fmt: skip
+    robot: Robot,
+    path: Path,
+    tolerances: Sequence[Tolerance],
+    *,
+    profiles: Sequence[str] = tuple(PROFILES),
+    points: int = 400,
+) -> tuple[ProfileResult, ...]:
     """Return what time laws do to the same seam, compared over arc length."""
     studies = {name: planned_study(robot, path, name, points=points) for name in profiles}
     slowest = max(float(study.t[-1]) for study in studies.values())
@@ -89,10 +93,15 @@ def compare_profiles(
     for name, study in studies.items():
         each = expected_deviation(study, tolerances)
         same = stretched(study, slowest / float(study.t[-1]))
-        out.append(ProfileResult(
-            name, float(study.t[-1]), expected_rms(study, tolerances), float(each.max()),
-            expected_rms(same, tolerances),
-        ))  # fmt: skip
+        out.append(
+            ProfileResult(
+                name,
+                float(study.t[-1]),
+                expected_rms(study, tolerances),
+                float(each.max()),
+                expected_rms(same, tolerances),
+            )
+        )
     return tuple(out)
 
 
@@ -151,10 +160,15 @@ class PlacementResult:
         """Return plain numbers."""
         p = self.placement
         return {
-            'free': self.label, 'rotation_rad': p.rotation, 'x_m': p.x, 'y_m': p.y,
-            'yaw_rad': p.yaw, 'expected_m': self.expected_m,
-            'limit_margin_rad': self.limit_margin_rad, 'condition': self.condition,
-        }  # fmt: skip
+            'free': self.label,
+            'rotation_rad': p.rotation,
+            'x_m': p.x,
+            'y_m': p.y,
+            'yaw_rad': p.yaw,
+            'expected_m': self.expected_m,
+            'limit_margin_rad': self.limit_margin_rad,
+            'condition': self.condition,
+        }
 
 
 @dataclass(frozen=True)
@@ -168,9 +182,15 @@ class Room:
 
 
 def advise(
-    robot: Robot, path: Path, tolerances: Sequence[Tolerance], *, torch: Torch | None = None,
-    room: Room | None = None, tries: int = 32, seed: int = 0,
-) -> tuple[PlacementResult, ...]:  # fmt: skip
+    robot: Robot,
+    path: Path,
+    tolerances: Sequence[Tolerance],
+    *,
+    torch: Torch | None = None,
+    room: Room | None = None,
+    tries: int = 32,
+    seed: int = 0,
+) -> tuple[PlacementResult, ...]:
     """
     Return the best torch rotation, base place and both, after the placement as given.
 
@@ -194,9 +214,13 @@ def advise(
 
 class _Search:
     def __init__(
-        self, robot: Robot, path: Path, tolerances: tuple[Tolerance, ...], torch: Torch,
+        self,
+        robot: Robot,
+        path: Path,
+        tolerances: tuple[Tolerance, ...],
+        torch: Torch,
         room: Room,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.robot, self.path, self.tolerances = robot, path, tolerances
         self.torch, self.room = torch, room
         self.s = np.linspace(0.0, path.length, _POINTS)
@@ -230,9 +254,12 @@ class _Search:
         """Return the placement with its numbers."""
         study, solution = self.study(values)
         return PlacementResult(
-            label, Placement(*map(float, values)), expected_rms(study, self.tolerances),
-            float(solution.limit_margin.min()), float(solution.condition.max()),
-        )  # fmt: skip
+            label,
+            Placement(*map(float, values)),
+            expected_rms(study, self.tolerances),
+            float(solution.limit_margin.min()),
+            float(solution.condition.max()),
+        )
 
     def best(
         self, label: str, free: list[int], tries: int, seed: int, start: PlacementResult
@@ -256,11 +283,20 @@ class _Search:
         first = guesses[int(np.argmin(costs))]
         if not np.isfinite(min(costs)):
             return replace(start, label=label)
-        simplex = first + np.vstack([np.zeros(len(free)), np.diag(-0.1 * self.span[free])
-                                     * np.sign(first + 1e-12)])  # fmt: skip
-        found = minimize(bounded, first, method='Nelder-Mead', options={
-            'initial_simplex': simplex, 'maxfev': tries * len(free), 'xatol': 1e-4, 'fatol': 1e-9,
-        })  # fmt: skip
+        simplex = first + np.vstack(
+            [np.zeros(len(free)), np.diag(-0.1 * self.span[free]) * np.sign(first + 1e-12)]
+        )
+        found = minimize(
+            bounded,
+            first,
+            method='Nelder-Mead',
+            options={
+                'initial_simplex': simplex,
+                'maxfev': tries * len(free),
+                'xatol': 1e-4,
+                'fatol': 1e-9,
+            },
+        )
         values = full(found.x) if found.fun < min(costs) else full(first)
         return self.result(label, values)
 

@@ -26,10 +26,16 @@ from ..recording import JointMotion, Recording
 from .poses import Poses
 from .twin import Twin
 
-BEYOND_COMMANDS = frozenset({
-    'measurement_scale', 'measurement_noise', 'time_delay', 'drift', 'setup_step',
-    'setup_settling',
-})  # fmt: skip
+BEYOND_COMMANDS = frozenset(
+    {
+        'measurement_scale',
+        'measurement_noise',
+        'time_delay',
+        'drift',
+        'setup_step',
+        'setup_settling',
+    }
+)
 """Effects of the measurement, or new in every run: no joint command mends them."""
 _CLOSED = 1e-12
 _LEAST_SHARE = 1e-3

@@ -144,11 +144,16 @@ class LiveTwin:
     ) -> View:
         stamp = np.array([t])
         return View(
-            self.twin.robot, stamp, stamp - self._start, q[None],
-            np.zeros_like(q)[None] if qd is None else np.asarray(qd)[None], False,
-            None if wrench is None else np.asarray(wrench)[None], wrench_frame,
+            self.twin.robot,
+            stamp,
+            stamp - self._start,
+            q[None],
+            np.zeros_like(q)[None] if qd is None else np.asarray(qd)[None],
+            False,
+            None if wrench is None else np.asarray(wrench)[None],
+            wrench_frame,
             None if temperature is None else np.array([temperature]),
-        )  # fmt: skip
+        )
 
     def _remembered(self, view: View) -> View:
         """Run the effects with memory, each on what the one before left, and keep their states."""

@@ -260,10 +260,16 @@ def load_torque(view: View) -> Shift:
 
 def _view(robot: Robot, recording: Recording, t: Array, q: Array, qd: Array) -> View:
     return View(
-        robot, t, t - recording.joints.t[0], q, qd, recording.joints.static,
-        None if recording.wrench is None else recording.wrench.at(t), recording.wrench_frame,
+        robot,
+        t,
+        t - recording.joints.t[0],
+        q,
+        qd,
+        recording.joints.static,
+        None if recording.wrench is None else recording.wrench.at(t),
+        recording.wrench_frame,
         None if recording.temperature is None else recording.temperature.at(t),
-    )  # fmt: skip
+    )
 
 
 def _clock_view(robot: Robot, motion: JointMotion) -> View:

@@ -47,8 +47,11 @@ def test_contenders_take_turns_and_a_slow_one_has_one() -> None:
 
 def test_a_ratio_is_taken_round_by_round_and_to_all_who_share_the_job() -> None:
     load = Workload('study', 'run', [], 0.0, reference=('model', 'design'))
-    seconds = {'model': np.array([4.0, 6.0]), 'design': np.array([2.0, 2.0]),
-               'own': np.array([2.0, 4.0])}  # fmt: skip
+    seconds = {
+        'model': np.array([4.0, 6.0]),
+        'design': np.array([2.0, 2.0]),
+        'own': np.array([2.0, 4.0]),
+    }
     assert Outcome(load, seconds).ratio('own') == pytest.approx([3.0, 2.0])
     assert Outcome(load, {'own': seconds['own']}).ratio('own') is None
 

@@ -8,10 +8,16 @@ from __future__ import annotations
 def truth(kind='single', causes=(), *, name='case_0001', ratios=None, alike=(), **more):
     """Return a truth about causes, each an entry of an effects file."""
     return {
-        'name': name, 'kind': kind, 'robot': 'ur5', 'motion': 'free', 'causes': list(causes),
+        'name': name,
+        'kind': kind,
+        'robot': 'ur5',
+        'motion': 'free',
+        'causes': list(causes),
         'sites': [[cause['effect'], cause.get('joint')] for cause in causes],
-        'alike': list(alike), 'ratios': ratios or [5.0] * len(causes), **more,
-    }  # fmt: skip
+        'alike': list(alike),
+        'ratios': ratios or [5.0] * len(causes),
+        **more,
+    }
 
 
 def offset(joint, size=1e-3):
@@ -23,13 +29,14 @@ def diagnosis(status, *groups, confidence=0.9, effects=()):
     """Return what matters of a diagnosis: status and sets of (family, joint)."""
     return {
         'verdict': {
-            'status': status, 'confidence': confidence, 'effects': list(effects),
+            'status': status,
+            'confidence': confidence,
+            'effects': list(effects),
             'indistinguishable': [
-                [{'effect': family, 'joint': joint} for family, joint in group]
-                for group in groups
+                [{'effect': family, 'joint': joint} for family, joint in group] for group in groups
             ],
         },
-    }  # fmt: skip
+    }
 
 
 def found(family, joint, parameters, std):

@@ -25,8 +25,20 @@ def checked(tmp_path_factory):
     from weld_twin_nodes.cli import main
 
     out = tmp_path_factory.mktemp('blind') / 'check'
-    words = ['--cases', '2', '--seed', '3', '--kinds', 'none,single', '--seconds', '6,8',
-             '--workers', '1', '--out', str(out)]  # fmt: skip
+    words = [
+        '--cases',
+        '2',
+        '--seed',
+        '3',
+        '--kinds',
+        'none,single',
+        '--seconds',
+        '6,8',
+        '--workers',
+        '1',
+        '--out',
+        str(out),
+    ]
     assert main(['blind', 'run', *words]) == 0
     return out, words
 
@@ -48,8 +60,12 @@ def test_the_recordings_tell_nothing_of_the_truth(checked):
             with BagReader(cases / name / use) as bag:
                 assert set(bag.provenance) <= {'version', 'robot', 'static', 'schema'}
         assert set(layout.read(cases / name / layout.CASE)) == {
-            'schema', 'name', 'align', 'exclude', 'known',
-        }  # fmt: skip
+            'schema',
+            'name',
+            'align',
+            'exclude',
+            'known',
+        }
         assert not (cases / name / layout.TEST).exists()
         assert (truths / name / layout.TEST).exists()
 

@@ -147,7 +147,7 @@ def test_an_ambiguous_construction_is_what_its_like_can_be(name, arm):
     taken = Take(Command(moved.t, moved.q), 1)
     built = construct(name, robot, 6.0, rng)
     off = deviation(cell, built.causes, taken).ravel()
-    (family, joint), = built.alike[0]
+    ((family, joint),) = built.alike[0]
     columns = []
     for key, count in ((key, 3 if key in ('xyz', 'rotvec') else 1) for key in SIZES[family]):
         for k in range(count):

@@ -75,10 +75,13 @@ def test_family_and_joint_are_judged_apart():
 @pytest.mark.parametrize(
     ('status', 'groups', 'confidence', 'wrong'),
     [
-        ('identified', [[C]], 0.81, True), ('identified', [[C]], 0.8, False),
-        ('none', [], 0.97, True), ('unknown', [], 0.9, False), ('identified', [[A]], 0.99, False),
+        ('identified', [[C]], 0.81, True),
+        ('identified', [[C]], 0.8, False),
+        ('none', [], 0.97, True),
+        ('unknown', [], 0.9, False),
+        ('identified', [[A]], 0.99, False),
     ],
-)  # fmt: skip
+)
 def test_a_verdict_is_sure_and_wrong_only_when_it_claims_something(
     status, groups, confidence, wrong
 ):
@@ -93,12 +96,26 @@ def test_parameter_errors_are_in_standard_errors():
 
 
 def test_a_phase_has_no_error_of_a_whole_turn():
-    case = truth('single', [
-        {'effect': 'transmission_ripple', 'joint': 'a', 'amplitude': 2e-4, 'order': 3,
-         'phase': 3.1},
-    ])  # fmt: skip
-    effects = [found('transmission_ripple', 'a', {'amplitude': 1e-4, 'phase': -3.1},
-                     {'amplitude': 1e-4, 'phase': 0.1})]  # fmt: skip
+    case = truth(
+        'single',
+        [
+            {
+                'effect': 'transmission_ripple',
+                'joint': 'a',
+                'amplitude': 2e-4,
+                'order': 3,
+                'phase': 3.1,
+            },
+        ],
+    )
+    effects = [
+        found(
+            'transmission_ripple',
+            'a',
+            {'amplitude': 1e-4, 'phase': -3.1},
+            {'amplitude': 1e-4, 'phase': 0.1},
+        )
+    ]
     verdict = diagnosis('identified', [('transmission_ripple', 'a')], effects=effects)
     np.testing.assert_allclose(judge(case, verdict).z, [-1.0, 10.0 * (2.0 * np.pi - 6.2)])
 

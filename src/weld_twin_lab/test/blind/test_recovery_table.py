@@ -19,23 +19,41 @@ MADE = {'seed': 1, 'motion': 'free', 'engine': 'e' * 64, 'version': '0'}
 def row(verdict, size=3.0, arm='ur5', error=None):
     judged = judge(truth('single', [offset('a')], ratios=[size]), verdict)
     return {
-        'family': 'joint_offset', 'arm': arm, 'size': size, 'motion': 'free', 'not_shown': None,
-        'judged': judged.as_dict(), 'shrink': None, 'error': error, 'seconds': 2.0,
+        'family': 'joint_offset',
+        'arm': arm,
+        'size': size,
+        'motion': 'free',
+        'not_shown': None,
+        'judged': judged.as_dict(),
+        'shrink': None,
+        'error': error,
+        'seconds': 2.0,
         'processor_seconds': 1.0,
-    }  # fmt: skip
+    }
 
 
 def absent(size=10.0):
-    return {'family': 'vibration', 'arm': 'ur5', 'size': size, 'motion': 'free',
-            'not_shown': 'too stiff'}  # fmt: skip
+    return {
+        'family': 'vibration',
+        'arm': 'ur5',
+        'size': size,
+        'motion': 'free',
+        'not_shown': 'too stiff',
+    }
 
 
-@pytest.mark.parametrize(('verdict', 'name'), [
-    (diagnosis('identified', [A]), 'exact'), (diagnosis('ambiguous', [A, C]), 'exact'),
-    (diagnosis('identified', [A], [C]), 'more'), (diagnosis('identified', [B]), 'joint'),
-    (diagnosis('identified', [C]), 'wrong'), (diagnosis('unknown'), 'unknown'),
-    (diagnosis('none'), 'none'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('verdict', 'name'),
+    [
+        (diagnosis('identified', [A]), 'exact'),
+        (diagnosis('ambiguous', [A, C]), 'exact'),
+        (diagnosis('identified', [A], [C]), 'more'),
+        (diagnosis('identified', [B]), 'joint'),
+        (diagnosis('identified', [C]), 'wrong'),
+        (diagnosis('unknown'), 'unknown'),
+        (diagnosis('none'), 'none'),
+    ],
+)
 def test_a_mark_says_what_became_of_a_case(verdict, name):
     assert mark(row(verdict)) == name
 
@@ -46,8 +64,12 @@ def test_what_cannot_be_shown_or_fails_has_a_mark_of_its_own():
 
 
 def test_shares_count_shown_cases_only():
-    rows = [row(diagnosis('identified', [A])), row(diagnosis('identified', [B])),
-            row(diagnosis('identified', [C]), arm='panda'), absent()]  # fmt: skip
+    rows = [
+        row(diagnosis('identified', [A])),
+        row(diagnosis('identified', [B])),
+        row(diagnosis('identified', [C]), arm='panda'),
+        absent(),
+    ]
     sums = summary(rows)
     assert sums['all']['cases'] == 3
     assert sums['all']['family']['value'] == pytest.approx(2 / 3)
@@ -68,12 +90,28 @@ def test_the_table_has_a_row_for_a_family_and_names_what_was_missed():
 
 def test_a_cause_is_recovered_from_the_command_line(tmp_path, weld_twin):
     pytest.importorskip('mujoco')
-    words = ('blind', 'recovery', '--seed', '3', '--families', 'drift', '--robots', 'ur5',
-             '--sizes', '10', '--motion', 'stations', '--workers', '1', '--out', tmp_path)
+    words = (
+        'blind',
+        'recovery',
+        '--seed',
+        '3',
+        '--families',
+        'drift',
+        '--robots',
+        'ur5',
+        '--sizes',
+        '10',
+        '--motion',
+        'stations',
+        '--workers',
+        '1',
+        '--out',
+        tmp_path,
+    )
     first = weld_twin(*words)
     assert first.code == 0
     content = json.loads((tmp_path / 'recovery.json').read_text())
-    case, = content['cases']
+    (case,) = content['cases']
     assert case['judged']['said'] == 'drift'
     assert case['ratio'] == pytest.approx(10.0, rel=0.15)
     assert case['shrink']['ratio'] < 0.3

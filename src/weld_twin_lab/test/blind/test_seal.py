@@ -26,9 +26,13 @@ def sealed(tmp_path):
         (cases / name / 'train').mkdir(parents=True)
         (cases / name / 'train' / 'train.mcap').write_bytes(b'recording of ' + name.encode())
         layout.write(truths / name / layout.TRUTH, truth('single', [offset('a')], name=name))
-        entries.append({
-            'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name),
-        })  # fmt: skip
+        entries.append(
+            {
+                'name': name,
+                'case': seal.digest(cases / name),
+                'truth': seal.digest(truths / name),
+            }
+        )
     layout.write(cases / layout.CASES, {'seal': seal.seal_of(entries), 'cases': entries})
     layout.write(truths / layout.TRUTHS, {'seed': 1})
     return cases, truths
@@ -100,8 +104,17 @@ def test_a_list_sealed_anew_does_not_pass_for_the_one_published(sealed):
 
 def test_the_command_line_tells_of_a_broken_seal_in_one_line(sealed, weld_twin, tmp_path):
     change(sealed[1] / 'case_0001' / layout.TRUTH)
-    result = weld_twin('blind', 'score', sealed[0], '--truths', sealed[1], '--results',
-                       tmp_path / 'verdicts', '--out', tmp_path / 'score')  # fmt: skip
+    result = weld_twin(
+        'blind',
+        'score',
+        sealed[0],
+        '--truths',
+        sealed[1],
+        '--results',
+        tmp_path / 'verdicts',
+        '--out',
+        tmp_path / 'score',
+    )
     assert result.code == 2
     assert result.err.count('\n') == 1
     assert 'truth of case_0001 was changed' in result.err
@@ -136,7 +149,10 @@ def test_the_diagnosis_loads_neither_plant_nor_truths():
         'name in ("weld_twin_lab.blind.making", "weld_twin_lab.blind.judging")])'
     )
     out = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, check=True,
+        [sys.executable, '-c', code],
+        capture_output=True,
+        text=True,
+        check=True,
         env={'PYTHONPATH': ':'.join(sys.path)},
-    )  # fmt: skip
+    )
     assert out.stdout.strip() == '[]'

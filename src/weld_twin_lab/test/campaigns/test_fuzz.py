@@ -31,15 +31,20 @@ CASES = 15
 
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
-    lambda inner: st.lists(inner, max_size=4)
-    | st.dictionaries(st.text(max_size=8) | st.sampled_from(['kind', 'effect', 'joints']), inner,
-                      max_size=4),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(
+            st.text(max_size=8) | st.sampled_from(['kind', 'effect', 'joints']), inner, max_size=4
+        )
+    ),
     max_leaves=12,
-)  # fmt: skip
+)
 few = settings(
-    max_examples=60, deadline=None, derandomize=True,
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize('name', targets())
@@ -100,9 +105,11 @@ def test_what_is_compressed_is_unpacked_within_bounds(pack):
 def test_any_data_is_a_file_or_a_sentence(tmp_path, data):
     robot = catalog.load('ur5')
     readers = {
-        'robot.yaml': load_robot, 'effects.yaml': lambda path: read_effects(path, robot),
-        'path.yaml': read_path, 'model.json': lambda path: load_model(robot, path),
-    }  # fmt: skip
+        'robot.yaml': load_robot,
+        'effects.yaml': lambda path: read_effects(path, robot),
+        'path.yaml': read_path,
+        'model.json': lambda path: load_model(robot, path),
+    }
     for name, read in readers.items():
         path = tmp_path / name
         json_text = json.dumps({'schema': 'weld_twin/diagnosis/1', 'model': data})

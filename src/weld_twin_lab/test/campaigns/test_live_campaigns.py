@@ -48,9 +48,10 @@ def test_one_disturbed_turn_does_not_decide_a_race():
 def soak(**change):
     node = {'rss_slope_mib_per_h': 1.0}
     result = {
-        'nodes': {'twin': node}, 'health': {'twin: /joint_states': {'refused': 0}},
+        'nodes': {'twin': node},
+        'health': {'twin: /joint_states': {'refused': 0}},
         'recorded': {topic: {'messages': 5, 'missing': 0} for topic in EACH},
-    }  # fmt: skip
+    }
     for key, value in change.items():
         result[key] = {**result[key], **value}
     return result

@@ -12,38 +12,69 @@ HALF = np.pi / 2.0
 
 def _joints(rows: list[tuple], prefix: str = 'j') -> list[dict]:
     keys = ('a', 'alpha', 'd', 'theta_offset')
-    return [{'name': f'{prefix}{i}', **dict(zip(keys, row, strict=True))}
-            for i, row in enumerate(rows)]
+    return [
+        {'name': f'{prefix}{i}', **dict(zip(keys, row, strict=True))} for i, row in enumerate(rows)
+    ]
 
 
 # UR5, Universal Robots' published DH table and masses; frames of base and tool are made up
 UR5 = {
-    'name': 'ur5', 'convention': 'standard', 'gravity': [0.0, 0.0, -9.80665],
+    'name': 'ur5',
+    'convention': 'standard',
+    'gravity': [0.0, 0.0, -9.80665],
     'base': {'xyz': [0.1, 0.2, 0.3], 'quat_xyzw': [0.0, 0.0, 0.38268343, 0.92387953]},
     'tool': {'xyz': [0.02, 0.0, 0.15], 'quat_xyzw': [0.0, 0.25881905, 0.0, 0.96592583]},
-    'joints': _joints([(0.0, HALF, 0.089159, 0.0), (-0.425, 0.0, 0.0, 0.0),
-                       (-0.39225, 0.0, 0.0, 0.0), (0.0, HALF, 0.10915, 0.0),
-                       (0.0, -HALF, 0.09465, 0.0), (0.0, 0.0, 0.0823, 0.3)]),
-    'links': [{'mass': 3.7, 'com': [0.0, -0.02561, 0.00193]},
-              {'mass': 8.393, 'com': [0.2125, 0.0, 0.11336]},
-              {'mass': 2.33, 'com': [0.15, 0.0, 0.0265]},
-              {'mass': 1.219, 'com': [0.0, -0.0018, 0.01634]},
-              {'mass': 1.219, 'com': [0.0, 0.0018, 0.01634]},
-              {'mass': 0.1879, 'com': [0.0, 0.0, -0.001159]}],
+    'joints': _joints(
+        [
+            (0.0, HALF, 0.089159, 0.0),
+            (-0.425, 0.0, 0.0, 0.0),
+            (-0.39225, 0.0, 0.0, 0.0),
+            (0.0, HALF, 0.10915, 0.0),
+            (0.0, -HALF, 0.09465, 0.0),
+            (0.0, 0.0, 0.0823, 0.3),
+        ]
+    ),
+    'links': [
+        {'mass': 3.7, 'com': [0.0, -0.02561, 0.00193]},
+        {'mass': 8.393, 'com': [0.2125, 0.0, 0.11336]},
+        {'mass': 2.33, 'com': [0.15, 0.0, 0.0265]},
+        {'mass': 1.219, 'com': [0.0, -0.0018, 0.01634]},
+        {'mass': 1.219, 'com': [0.0, 0.0018, 0.01634]},
+        {'mass': 0.1879, 'com': [0.0, 0.0, -0.001159]},
+    ],
     'payload': {'mass': 2.0, 'com': [0.0, 0.01, 0.05]},
 }
 
 # Franka Panda's published modified DH table, on a made-up linear track
 PANDA_ON_TRACK = {
-    'name': 'panda_on_track', 'convention': 'modified',
+    'name': 'panda_on_track',
+    'convention': 'modified',
     'tool': {'xyz': [0.0, 0.0, 0.1], 'quat_xyzw': [0.0, 0.0, -0.38268343, 0.92387953]},
-    'joints': [{'name': 'track', 'type': 'prismatic', 'a': 0.0, 'alpha': -HALF, 'd': 0.2,
-                'theta_offset': HALF}]
-    + _joints([(0.0, HALF, 0.333, 0.0), (0.0, -HALF, 0.0, 0.0), (0.0, HALF, 0.316, 0.0),
-               (0.0825, HALF, 0.0, 0.0), (-0.0825, -HALF, 0.384, 0.0), (0.0, HALF, 0.0, 0.0),
-               (0.088, HALF, 0.107, 0.0)]),
-    'links': [{'mass': mass, 'com': [0.01, 0.02, -0.05]} for mass in
-              (8.0, 4.97, 0.65, 3.23, 3.59, 1.23, 1.67, 0.74)],
+    'joints': [
+        {
+            'name': 'track',
+            'type': 'prismatic',
+            'a': 0.0,
+            'alpha': -HALF,
+            'd': 0.2,
+            'theta_offset': HALF,
+        }
+    ]
+    + _joints(
+        [
+            (0.0, HALF, 0.333, 0.0),
+            (0.0, -HALF, 0.0, 0.0),
+            (0.0, HALF, 0.316, 0.0),
+            (0.0825, HALF, 0.0, 0.0),
+            (-0.0825, -HALF, 0.384, 0.0),
+            (0.0, HALF, 0.0, 0.0),
+            (0.088, HALF, 0.107, 0.0),
+        ]
+    ),
+    'links': [
+        {'mass': mass, 'com': [0.01, 0.02, -0.05]}
+        for mass in (8.0, 4.97, 0.65, 3.23, 3.59, 1.23, 1.67, 0.74)
+    ],
 }
 ROBOTS = {'standard': UR5, 'modified': PANDA_ON_TRACK}
 EXACT = Tracker()
@@ -82,11 +113,23 @@ def dh_links(robot: dict, q: np.ndarray, built: dict | None = None) -> list[np.n
         theta = row['theta_offset'] + (0.0 if slides else value)
         d = row['d'] + (value if slides else 0.0)
         if robot['convention'] == 'standard':
-            at = (at @ _about(2, theta) @ _along(2, d) @ _along(0, row['a'])
-                  @ _about(0, row['alpha']) @ _about(1, row['beta']))
+            at = (
+                at
+                @ _about(2, theta)
+                @ _along(2, d)
+                @ _along(0, row['a'])
+                @ _about(0, row['alpha'])
+                @ _about(1, row['beta'])
+            )
         else:
-            at = (at @ _about(0, row['alpha']) @ _about(1, row['beta']) @ _along(0, row['a'])
-                  @ _about(2, theta) @ _along(2, d))
+            at = (
+                at
+                @ _about(0, row['alpha'])
+                @ _about(1, row['beta'])
+                @ _along(0, row['a'])
+                @ _about(2, theta)
+                @ _along(2, d)
+            )
         out.append(at)
     return out
 
@@ -119,8 +162,9 @@ def gravity_torque(robot: dict, q: np.ndarray, payload: tuple | None = None) -> 
     step, out = 1e-5, np.zeros(len(q))
     for i in range(len(q)):
         move = step * np.eye(len(q))[i]
-        out[i] = -(potential(robot, q + move, payload)
-                   - potential(robot, q - move, payload)) / (2.0 * step)
+        out[i] = -(potential(robot, q + move, payload) - potential(robot, q - move, payload)) / (
+            2.0 * step
+        )
     return out
 
 
@@ -130,12 +174,18 @@ def stations(robot: dict, count: int, seed: int = 0, **rest) -> Command:
     return Command(10.0 * np.arange(count) + 100.0, q, static=True, **rest)
 
 
-def weave(robot: dict, duration: float = 20.0, rate: float = 125.0, frequency: float = 0.15,
-          reach: float = 0.5, **rest) -> Command:
+def weave(
+    robot: dict,
+    duration: float = 20.0,
+    rate: float = 125.0,
+    frequency: float = 0.15,
+    reach: float = 0.5,
+    **rest,
+) -> Command:
     """Return a smooth motion that starts at rest and reverses every joint."""
     t = np.arange(0.0, duration, 1.0 / rate)
     rise = np.clip(t, 0.0, 1.0)
-    rise = rise ** 3 * (10.0 - 15.0 * rise + 6.0 * rise ** 2)
+    rise = rise**3 * (10.0 - 15.0 * rise + 6.0 * rise**2)
     count = len(robot['joints'])
     middle = np.resize([0.3, -1.2, 1.4, -1.7, -1.5, 0.2], count)
     tones = frequency * (1.0 + 0.3 * np.arange(count))
@@ -143,18 +193,25 @@ def weave(robot: dict, duration: float = 20.0, rate: float = 125.0, frequency: f
     return Command(t, q, **rest)
 
 
-def record(robot: dict, effects: list, command: Command, tracker: Tracker = EXACT,
-           seed: int = 0, richness: float = 1.0):
+def record(
+    robot: dict,
+    effects: list,
+    command: Command,
+    tracker: Tracker = EXACT,
+    seed: int = 0,
+    richness: float = 1.0,
+):
     """Run the plant with a seed."""
     return run(robot, effects, command, tracker, np.random.default_rng(seed), richness)
 
 
-def joint_displacement(robot: dict, effects: list, command: Command, name: str,
-                       richness: float = 1.0) -> np.ndarray:
+def joint_displacement(
+    robot: dict, effects: list, command: Command, name: str, richness: float = 1.0
+) -> np.ndarray:
     """Return how far one joint is from the command [rad], from the tool's position alone."""
     got = record(robot, effects, command, richness=richness).position
     clean = record(robot, [], command).position
     step = 1e-6
     moved = record(robot, [{'effect': 'joint_offset', 'joint': name, 'offset': step}], command)
     lever = (moved.position - clean) / step
-    return np.sum((got - clean) * lever, axis=1) / np.sum(lever ** 2, axis=1)
+    return np.sum((got - clean) * lever, axis=1) / np.sum(lever**2, axis=1)

@@ -21,8 +21,13 @@ def test_gear_ratio():
 
 def test_transmission_ripple_of_several_orders():
     command = weave(UR5, 2.0)
-    ripple = {'effect': 'transmission_ripple', 'joint': 'j1', 'amplitude': [3e-4, 1e-4],
-              'order': [2, 31], 'phase': [0.4, 1.0]}
+    ripple = {
+        'effect': 'transmission_ripple',
+        'joint': 'j1',
+        'amplitude': [3e-4, 1e-4],
+        'order': [2, 31],
+        'phase': [0.4, 1.0],
+    }
     got = record(UR5, [ripple], command)
     q = command.q[:, 1]
     delta = 3e-4 * np.sin(2 * q + 0.4) + 1e-4 * np.sin(31 * q + 1.0)
@@ -71,16 +76,23 @@ def test_thermal_growth_of_all_links(extra, at):
     growth = {'effect': 'thermal_growth', 'coefficient': 2e-5, **extra}
     got = record(UR5, [growth], command)
     for q, warm, position in zip(command.q, temperature - at, got.position, strict=True):
-        built = {joint['name']: {'a': 2e-5 * warm * joint['a'], 'd': 2e-5 * warm * joint['d']}
-                 for joint in UR5['joints']}
+        built = {
+            joint['name']: {'a': 2e-5 * warm * joint['a'], 'd': 2e-5 * warm * joint['d']}
+            for joint in UR5['joints']
+        }
         assert np.allclose(position, dh_pose(UR5, q, built)[:3, 3], atol=1e-12)
     assert np.array_equal(got.temperature, temperature)
 
 
 def test_thermal_growth_of_one_link_by_a_curve():
     command = stations(UR5, 3)
-    growth = {'effect': 'thermal_growth', 'coefficient': 2e-5, 'links': ['j1'], 'rise': 10.0,
-              'time_constant': 15.0}
+    growth = {
+        'effect': 'thermal_growth',
+        'coefficient': 2e-5,
+        'links': ['j1'],
+        'rise': 10.0,
+        'time_constant': 15.0,
+    }
     got = record(UR5, [growth], command)
     warm = 10.0 * (1.0 - np.exp(-20.0 / 15.0))
     want = dh_pose(UR5, command.q[2], {'j1': {'a': -0.425 * 2e-5 * warm}})[:3, 3]
@@ -95,8 +107,9 @@ def test_thermal_growth_needs_a_temperature():
 def test_cartesian_compliance_is_in_the_tool_frame():
     wrench = np.tile([10.0, -20.0, 30.0, 0.0, 0.0, 0.0], (5, 1))
     command = stations(UR5, 5, wrench=wrench)
-    got = record(UR5, [{'effect': 'cartesian_compliance', 'compliance': [1e-6, 2e-6, 3e-6]}],
-                 command)
+    got = record(
+        UR5, [{'effect': 'cartesian_compliance', 'compliance': [1e-6, 2e-6, 3e-6]}], command
+    )
     for q, position in zip(command.q, got.position, strict=True):
         pose = dh_pose(UR5, q)
         give = pose[:3, :3] @ [1e-5, -4e-5, 9e-5]

@@ -12,10 +12,17 @@ FOLDER = Path(plant.__file__).parent
 
 
 def test_no_twin_is_imported():
-    code = ('import sys, weld_twin_lab.plant; twin = ("weld_twin_core", "weld_twin_msgs"); '
-            'print([name for name in sys.modules if name.startswith(twin)])')
-    out = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                         check=True, cwd=FOLDER.parent.parent)
+    code = (
+        'import sys, weld_twin_lab.plant; twin = ("weld_twin_core", "weld_twin_msgs"); '
+        'print([name for name in sys.modules if name.startswith(twin)])'
+    )
+    out = subprocess.run(
+        [sys.executable, '-c', code],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=FOLDER.parent.parent,
+    )
     assert out.stdout.strip() == '[]'
 
 

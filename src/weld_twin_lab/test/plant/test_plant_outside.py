@@ -36,7 +36,7 @@ def test_each_moves_the_tool_a_little(effect, static):
     command = stations(UR5, 15) if static else weave(UR5, 6.0)
     got = record(UR5, [{'effect': effect, **CASES[effect]}], command)
     gap = np.linalg.norm(got.position - dh_positions(UR5, command.q), axis=1)
-    assert 1e-5 < np.sqrt(np.mean(gap ** 2)) < 3e-3
+    assert 1e-5 < np.sqrt(np.mean(gap**2)) < 3e-3
 
 
 def test_station_step_is_a_step():
@@ -56,15 +56,17 @@ def test_quadratic_scale():
 
 
 def test_stick_slip_stays_within_its_amplitude():
-    moved = joint_displacement(UR5, [{'effect': 'stick_slip', **CASES['stick_slip']}],
-                               weave(UR5, 6.0), 'j2')
+    moved = joint_displacement(
+        UR5, [{'effect': 'stick_slip', **CASES['stick_slip']}], weave(UR5, 6.0), 'j2'
+    )
     assert 0.7e-3 < np.abs(moved).max() < 1.5e-3
 
 
 def test_loaded_play_follows_the_load():
     command = stations(UR5, 15)
-    moved = joint_displacement(UR5, [{'effect': 'loaded_play', **CASES['loaded_play']}],
-                               command, 'j1')
+    moved = joint_displacement(
+        UR5, [{'effect': 'loaded_play', **CASES['loaded_play']}], command, 'j1'
+    )
     load = np.array([gravity_torque(UR5, q)[1] for q in command.q])
     sure = np.abs(load) > 0.3 * np.abs(load).max()
     assert moved[sure] == pytest.approx(5e-4 * np.sign(load[sure]), rel=0.01)

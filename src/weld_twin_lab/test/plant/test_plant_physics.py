@@ -50,13 +50,18 @@ def test_servo_lag_effective_time_constant(richness):
     course = CubicSpline(command.t, command.q[:, 1])
 
     def residual(x):
-        sol = solve_ivp(lambda s, y: (course(s) - y) / x[0], (0.0, command.t[-1]),
-                        [course(0.0)], t_eval=command.t, max_step=0.02)
+        sol = solve_ivp(
+            lambda s, y: (course(s) - y) / x[0],
+            (0.0, command.t[-1]),
+            [course(0.0)],
+            t_eval=command.t,
+            max_step=0.02,
+        )
         return (sol.y[0] - course(command.t)) - moved
 
     fit = least_squares(residual, [0.02], diff_step=1e-4)
     assert fit.x[0] == pytest.approx(constant, rel=0.02)
-    assert np.sqrt(np.mean(fit.fun ** 2)) < 0.02 * np.sqrt(np.mean(moved ** 2))
+    assert np.sqrt(np.mean(fit.fun**2)) < 0.02 * np.sqrt(np.mean(moved**2))
 
 
 def test_servo_lag_on_every_joint_is_a_delay():
@@ -72,13 +77,16 @@ def test_servo_lag_on_every_joint_is_a_delay():
 def test_vibration_follows_its_equation(richness, share):
     command = weave(UR5, 6.0)
     omega, zeta, gain = 2.0 * np.pi * 9.0, 0.04, 0.7
-    shake = {'effect': 'vibration', 'joint': 'j1', 'frequency': 9.0, 'damping': zeta,
-             'gain': gain}
+    shake = {'effect': 'vibration', 'joint': 'j1', 'frequency': 9.0, 'damping': zeta, 'gain': gain}
     moved = joint_displacement(UR5, [shake], command, 'j1', richness)
     qdd = CubicSpline(command.t, command.q[:, 1]).derivative(2)
-    sol = solve_ivp(lambda s, y: [y[1], -gain * qdd(s) - 2 * zeta * omega * y[1]
-                                  - omega ** 2 * y[0]], (0.0, command.t[-1]), [0.0, 0.0],
-                    t_eval=command.t, max_step=1e-3)
+    sol = solve_ivp(
+        lambda s, y: [y[1], -gain * qdd(s) - 2 * zeta * omega * y[1] - omega**2 * y[0]],
+        (0.0, command.t[-1]),
+        [0.0, 0.0],
+        t_eval=command.t,
+        max_step=1e-3,
+    )
     error = np.sqrt(np.mean((moved - sol.y[0]) ** 2))
     assert error < share * np.sqrt(np.mean(sol.y[0] ** 2))
 
@@ -102,7 +110,7 @@ def test_backlash_of_every_joint_stays_close_to_the_textbook():
     clean = record(UR5, [], command).position
     ideal = record(UR5, play, command, richness=0.0).position - clean
     rich = record(UR5, play, command).position - clean
-    assert np.sqrt(np.mean((rich - ideal) ** 2)) < 0.02 * np.sqrt(np.mean(ideal ** 2))
+    assert np.sqrt(np.mean((rich - ideal) ** 2)) < 0.02 * np.sqrt(np.mean(ideal**2))
     assert np.abs(rich - ideal).max() > 1e-6
 
 
@@ -112,7 +120,7 @@ def test_backlash_holds_its_place_in_a_dwell():
     # up and down, then down by half a gap, so that the link is left in the middle of it
     q[:, 1] += 0.1 * np.sin(np.pi * np.clip(t / 2.0, 0.0, 1.0)) ** 2
     rest = np.clip((t - 3.0) / 1.0, 0.0, 1.0)
-    q[:, 1] += 5e-4 * rest ** 3 * (10.0 - 15.0 * rest + 6.0 * rest ** 2)
+    q[:, 1] += 5e-4 * rest**3 * (10.0 - 15.0 * rest + 6.0 * rest**2)
     play = {'effect': 'backlash', 'joint': 'j1', 'width': 1e-3}
     moved = joint_displacement(UR5, [play], Command(t, q), 'j1')
     assert np.abs(moved[t > 4.5]).max() < 1e-4
@@ -132,8 +140,10 @@ def test_backlash_at_rest_follows_the_approach():
 @pytest.mark.parametrize('richness, share', [(0.0, 1e-3), (1.0, 0.02)])
 def test_static_sag_is_compliance_times_torque(name, richness, share):
     robot, command = ROBOTS[name], stations(ROBOTS[name], 12)
-    springs = [{'effect': 'joint_compliance', 'joint': joint['name'], 'compliance': 2e-6}
-               for joint in robot['joints']]
+    springs = [
+        {'effect': 'joint_compliance', 'joint': joint['name'], 'compliance': 2e-6}
+        for joint in robot['joints']
+    ]
     got = record(robot, springs, command, richness=richness).position
     clean = dh_positions(robot, command.q)
     sagged = command.q + 2e-6 * np.array([gravity_torque(robot, q) for q in command.q])
@@ -143,8 +153,9 @@ def test_static_sag_is_compliance_times_torque(name, richness, share):
 
 def test_compliance_sags():
     command = stations(UR5, 8)
-    springs = [{'effect': 'joint_compliance', 'joint': f'j{i}', 'compliance': 1e-5}
-               for i in range(6)]
+    springs = [
+        {'effect': 'joint_compliance', 'joint': f'j{i}', 'compliance': 1e-5} for i in range(6)
+    ]
     got = record(UR5, springs, command).position - dh_positions(UR5, command.q)
     assert (got[:, 2] < 0.0).all()
 
@@ -152,12 +163,16 @@ def test_compliance_sags():
 @pytest.mark.parametrize('moving', [False, True])
 def test_tool_wrench_bends_the_joints(moving):
     robot = {key: value for key, value in UR5.items() if key not in ('links', 'payload')}
-    make = (lambda **rest: weave(robot, 1.0, reach=0.0, **rest)) if moving else (
-        lambda **rest: stations(robot, 125, **rest))
+    make = (
+        (lambda **rest: weave(robot, 1.0, reach=0.0, **rest))
+        if moving
+        else (lambda **rest: stations(robot, 125, **rest))
+    )
     load = np.array([20.0, -30.0, 40.0, 1.0, 2.0, -3.0])
     command = make(wrench=np.tile(load, (125, 1)))
-    springs = [{'effect': 'joint_compliance', 'joint': f'j{i}', 'compliance': 5e-6}
-               for i in range(6)]
+    springs = [
+        {'effect': 'joint_compliance', 'joint': f'j{i}', 'compliance': 5e-6} for i in range(6)
+    ]
     got = record(robot, springs, command).position[-1]
     q = command.q[-1]
     sagged = q + 5e-6 * _wrench_torque(robot, q, load)
@@ -190,31 +205,38 @@ def test_payload_is_seen_through_compliance_only():
 
 def test_moving_compliance_is_static_sag_plus_inertia():
     command = weave(UR5, 20.0, frequency=0.02)
-    springs = [{'effect': 'joint_compliance', 'joint': f'j{i}', 'compliance': 5e-6}
-               for i in range(6)]
+    springs = [
+        {'effect': 'joint_compliance', 'joint': f'j{i}', 'compliance': 5e-6} for i in range(6)
+    ]
     clean = record(UR5, [], command).position
     ideal = record(UR5, springs, command, richness=0.0).position - clean
     rich = record(UR5, springs, command).position - clean
-    error = np.sqrt(np.mean((rich - ideal) ** 2)) / np.sqrt(np.mean(ideal ** 2))
+    error = np.sqrt(np.mean((rich - ideal) ** 2)) / np.sqrt(np.mean(ideal**2))
     assert 1e-4 < error < 0.03
 
 
 def test_richness_sets_how_much_inertia_a_spring_feels():
     command = weave(UR5, 10.0, frequency=0.3)
-    springs = [{'effect': 'joint_compliance', 'joint': f'j{i}', 'compliance': 5e-6}
-               for i in range(6)]
+    springs = [
+        {'effect': 'joint_compliance', 'joint': f'j{i}', 'compliance': 5e-6} for i in range(6)
+    ]
     ideal = record(UR5, springs, command, richness=0.0).position
-    gaps = [np.sqrt(np.mean((record(UR5, springs, command, richness=rich).position - ideal) ** 2))
-            for rich in (0.05, 0.5, 1.0)]
+    gaps = [
+        np.sqrt(np.mean((record(UR5, springs, command, richness=rich).position - ideal) ** 2))
+        for rich in (0.05, 0.5, 1.0)
+    ]
     assert gaps[0] < 0.15 * gaps[2]
     assert gaps[1] == pytest.approx(0.5 * gaps[2], rel=0.1)
 
 
 def test_springs_of_a_slide_and_of_light_joints_hold_together():
     command = weave(PANDA_ON_TRACK, 5.0, reach=0.3)
-    springs = [{'effect': 'joint_compliance', 'joint': joint['name'], 'compliance': c}
-               for joint, c in zip(PANDA_ON_TRACK['joints'],
-                                   (1e-7, 1e-7, 1e-7, 1e-6, 1e-4, 1e-5, 1e-3, 1e-6), strict=True)]
+    springs = [
+        {'effect': 'joint_compliance', 'joint': joint['name'], 'compliance': c}
+        for joint, c in zip(
+            PANDA_ON_TRACK['joints'], (1e-7, 1e-7, 1e-7, 1e-6, 1e-4, 1e-5, 1e-3, 1e-6), strict=True
+        )
+    ]
     got = record(PANDA_ON_TRACK, springs, command).position
     assert np.abs(got - dh_positions(PANDA_ON_TRACK, command.q)).max() < 2e-2
 
@@ -225,13 +247,18 @@ def test_gap_and_spring_in_one_joint_add():
     spring = {'effect': 'joint_compliance', 'joint': 'j2', 'compliance': 1e-5}
     both = joint_displacement(UR5, [gap, spring], command, 'j2')
     ideal = joint_displacement(UR5, [gap, spring], command, 'j2', 0.0)
-    assert np.sqrt(np.mean((both - ideal) ** 2)) < 0.05 * np.sqrt(np.mean(ideal ** 2))
+    assert np.sqrt(np.mean((both - ideal) ** 2)) < 0.05 * np.sqrt(np.mean(ideal**2))
 
 
 def test_a_minute_takes_seconds():
-    effects = [{'effect': name, 'joint': joint, **rest} for name, joint, rest in (
-        ('backlash', 'j2', {'width': 5e-4}), ('joint_compliance', 'j1', {'compliance': 1e-5}),
-        ('servo_lag', 'j0', {'time_constant': 0.02}))]
+    effects = [
+        {'effect': name, 'joint': joint, **rest}
+        for name, joint, rest in (
+            ('backlash', 'j2', {'width': 5e-4}),
+            ('joint_compliance', 'j1', {'compliance': 1e-5}),
+            ('servo_lag', 'j0', {'time_constant': 0.02}),
+        )
+    ]
     command = weave(UR5, 60.0)
     start = time.process_time()
     record(UR5, effects, command)

@@ -22,8 +22,20 @@ def test_noise_of_position_and_orientation():
 
 def test_rates_drops_and_clocks():
     command = weave(UR5, 20.0)
-    got = record(UR5, [], command, Tracker(rate=50.0, drop=0.2, jitter=1e-3, clock_offset=0.5,
-                                           joint_rate=100.0, joint_jitter=1e-3, velocity=False))
+    got = record(
+        UR5,
+        [],
+        command,
+        Tracker(
+            rate=50.0,
+            drop=0.2,
+            jitter=1e-3,
+            clock_offset=0.5,
+            joint_rate=100.0,
+            joint_jitter=1e-3,
+            velocity=False,
+        ),
+    )
     assert 700 < len(got.t_measured) < 900
     assert 1990 < len(got.t_joint) <= 2000
     assert (np.diff(got.t_measured) > 0.0).all()
@@ -60,20 +72,25 @@ def test_a_slow_thermometer():
 def test_same_seed_same_recording():
     command = weave(UR5, 3.0)
     tracker = Tracker(rate=60.0, sigma=1e-5, jitter=1e-3, drop=0.1)
-    effects = [{'effect': 'backlash', 'joint': 'j2', 'width': 5e-4},
-               {'effect': 'friction_wander', 'joint': 'j1', 'amplitude': 1e-4,
-                'time_constant': 1.0}]
+    effects = [
+        {'effect': 'backlash', 'joint': 'j2', 'width': 5e-4},
+        {'effect': 'friction_wander', 'joint': 'j1', 'amplitude': 1e-4, 'time_constant': 1.0},
+    ]
     one, two, other = (record(UR5, effects, command, tracker, seed) for seed in (7, 7, 8))
     assert np.array_equal(one.position, two.position)
     assert np.array_equal(one.t_measured, two.t_measured)
     assert one.position.shape != other.position.shape or (one.position != other.position).any()
 
 
-@pytest.mark.parametrize('t, q, match', [
-    ([0.0, 1.0, 1.0, 2.0], np.zeros((4, 6)), 'increasing'),
-    ([0.0, 1.0, 3.0, 4.0], np.zeros((4, 6)), 'evenly'),
-    ([0.0, 1.0, 2.0, 3.0], np.zeros((3, 6)), 'q must be'),
-    ([0.0, 1.0, 2.0, 3.0], np.full((4, 6), np.nan), 'finite')])
+@pytest.mark.parametrize(
+    't, q, match',
+    [
+        ([0.0, 1.0, 1.0, 2.0], np.zeros((4, 6)), 'increasing'),
+        ([0.0, 1.0, 3.0, 4.0], np.zeros((4, 6)), 'evenly'),
+        ([0.0, 1.0, 2.0, 3.0], np.zeros((3, 6)), 'q must be'),
+        ([0.0, 1.0, 2.0, 3.0], np.full((4, 6), np.nan), 'finite'),
+    ],
+)
 def test_bad_commands_are_refused(t, q, match):
     with pytest.raises(ValueError, match=match):
         Command(np.array(t), q)

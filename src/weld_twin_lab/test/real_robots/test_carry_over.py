@@ -13,11 +13,14 @@ from weld_twin_core.twin.twin import Twin
 
 SECOND = 1_000_000_000
 ROBOT = catalog.load('ur10')
-EFFECTS = tuple(effect_from_mapping(e) for e in (
-    {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3},
-    {'effect': 'setup_settling', 'xyz': [1e-3, 0.0, 0.0], 'time_constant': 40.0, 'start': 0.0},
-    {'effect': 'setup_step', 'xyz': [0.0, 5e-4, 0.0], 'time': 60.5},
-))  # fmt: skip
+EFFECTS = tuple(
+    effect_from_mapping(e)
+    for e in (
+        {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3},
+        {'effect': 'setup_settling', 'xyz': [1e-3, 0.0, 0.0], 'time_constant': 40.0, 'start': 0.0},
+        {'effect': 'setup_step', 'xyz': [0.0, 5e-4, 0.0], 'time': 60.5},
+    )
+)
 
 
 def stations(first, count):

@@ -19,9 +19,7 @@ DATA = Path(__file__).parent / 'data'
 def cells(name, delimiter):
     with (DATA / name).open(newline='') as file:
         rows = list(csv.DictReader(file, delimiter=delimiter))
-    return {
-        key: np.array([float(row[key].replace(',', '.')) for row in rows]) for key in rows[0]
-    }
+    return {key: np.array([float(row[key].replace(',', '.')) for row in rows]) for key in rows[0]}
 
 
 @pytest.fixture(scope='module')
@@ -61,10 +59,13 @@ def test_the_ur10_has_decimal_commas_millimetres_and_intrinsic_angles(ur10):
     np.testing.assert_allclose(measured.sigma, sigma, rtol=1e-12)
 
 
-@pytest.mark.parametrize(('name', 'words'), [
-    ('ur5', ['plus difference', 'degrees', 'in mm', 'no stamps']),
-    ('ur10', ["separated by ';'", 'decimal', 'XYZ', 'do not increase', 'degC', 'in mm']),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('name', 'words'),
+    [
+        ('ur5', ['plus difference', 'degrees', 'in mm', 'no stamps']),
+        ('ur10', ["separated by ';'", 'decimal', 'XYZ', 'do not increase', 'degC', 'in mm']),
+    ],
+)
 def test_every_guess_is_put_into_words(name, words, request):
     said = ' | '.join(request.getfixturevalue(name).assumptions)
     for word in words:

@@ -72,10 +72,14 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
     (folder / 'benchmark.md').write_text(race_table.page(outcomes), encoding='utf-8')
     (folder / 'brief.md').write_text(race_table.brief(outcomes), encoding='utf-8')
     found = {
-        'schema': 'weld_twin/benchmark/1', 'machine': _machine(), 'left_out': missing,
-        'workloads': [outcome.as_dict() for outcome in outcomes], 'starts_s': starts,
-        'memory': memory, 'growth': curves,
-    }  # fmt: skip
+        'schema': 'weld_twin/benchmark/1',
+        'machine': _machine(),
+        'left_out': missing,
+        'workloads': [outcome.as_dict() for outcome in outcomes],
+        'starts_s': starts,
+        'memory': memory,
+        'growth': curves,
+    }
     text = json.dumps(found, indent=1) + '\n'
     (folder / 'benchmark.json').write_text(text, encoding='utf-8')
 
@@ -98,9 +102,12 @@ def _machine() -> dict[str, Any]:
         except PackageNotFoundError:
             continue
     return {
-        'processor': _processor(), 'processors': os.cpu_count(), 'load': os.getloadavg()[0],
-        'python': platform.python_version(), 'versions': versions,
-    }  # fmt: skip
+        'processor': _processor(),
+        'processors': os.cpu_count(),
+        'load': os.getloadavg()[0],
+        'python': platform.python_version(),
+        'versions': versions,
+    }
 
 
 def _processor() -> str:

@@ -31,11 +31,16 @@ def arm_of(joints: int) -> Robot:
     rng = np.random.default_rng(joints)
     wide = np.full(joints, 7.0)
     return Robot(
-        name=f'arm of {joints}', joint_names=tuple(f'joint{i}' for i in range(joints)),
-        **{key: rng.normal(size=joints) for key in DH_KEYS}, beta=np.zeros(joints),
-        prismatic=np.zeros(joints, dtype=bool), lower=-wide, upper=wide, max_velocity=wide,
+        name=f'arm of {joints}',
+        joint_names=tuple(f'joint{i}' for i in range(joints)),
+        **{key: rng.normal(size=joints) for key in DH_KEYS},
+        beta=np.zeros(joints),
+        prismatic=np.zeros(joints, dtype=bool),
+        lower=-wide,
+        upper=wide,
+        max_velocity=wide,
         max_acceleration=wide,
-    )  # fmt: skip
+    )
 
 
 def random_positions(arm: Robot, count: int, seed: int = 0) -> Array:

@@ -56,11 +56,14 @@ def _calibration(count: int, peers: set[str]) -> Workload:
     if 'pybotics' in peers:
         contenders.append(Contender('pybotics', _by_pybotics(robot, q, poses), 1, once=True))
     return Workload(
-        f'calibration of {len(channels)} numbers on {count:,} poses', 'fit', contenders, 1e-9,
+        f'calibration of {len(channels)} numbers on {count:,} poses',
+        'fit',
+        contenders,
+        1e-9,
         'scipy trf has the same analytic Jacobian; pybotics fits positions by differences, and is '
         f'stopped after {PYBOTICS_STEPS} steps',
         ('scipy trf',),
-    )  # fmt: skip
+    )
 
 
 def _by_trf(robot: Robot, q: Array, poses: Array) -> Robot:
@@ -74,9 +77,15 @@ def _by_trf(robot: Robot, q: Array, poses: Array) -> Robot:
         return -(_from_start(channels, values) @ columns).T
 
     found = least_squares(
-        residual, np.zeros(len(channels)), jacobian, method='trf', x_scale='jac', xtol=1e-12,
-        ftol=1e-15, gtol=1e-15,
-    )  # fmt: skip
+        residual,
+        np.zeros(len(channels)),
+        jacobian,
+        method='trf',
+        x_scale='jac',
+        xtol=1e-12,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
     return moved(robot, channels, found.x)
 
 
@@ -133,10 +142,13 @@ def _inverse(count: int, peers: set[str]) -> Workload:
         newton = _newton(robot, poses, q[0])
         contenders.append(Contender('pinocchio', newton, count, left(newton())))
     return Workload(
-        f'inverse kinematics along {count:,} points', 'point', contenders, CLOSED,
+        f'inverse kinematics along {count:,} points',
+        'point',
+        contenders,
+        CLOSED,
         "from a posture to start with, unless all are looked at; Pinocchio is given Newton's "
         'method from point to point',
-    )  # fmt: skip
+    )
 
 
 def _newton(robot: Robot, poses: Array, start: Array) -> Callable[[], Array]:

@@ -30,15 +30,22 @@ def growth(minutes: tuple[float, ...], quick: bool) -> dict[str, Any]:
     many = QUICK if quick else MANY
     turns = _channels(arm, ('theta', 'alpha'))
     return {
-        'poses': {'x': counts, 'pose': [_per_pose(arm, 0, n) for n in counts],
-                  'pose and Jacobian': [_per_pose(arm, arm.n, n) for n in counts]},
-        'joints': {'x': list(JOINTS), 'pose': [_per_pose(arm_of(n), 0, many) for n in JOINTS],
-                   'pose and Jacobian': [_per_pose(arm_of(n), n, many) for n in JOINTS]},
-        'parameters': {'x': [2 * k for k in range(len(turns) + 1)],
-                       'pose and derivatives': [_per_pose(arm, -k, many)
-                                                for k in range(len(turns) + 1)]},
+        'poses': {
+            'x': counts,
+            'pose': [_per_pose(arm, 0, n) for n in counts],
+            'pose and Jacobian': [_per_pose(arm, arm.n, n) for n in counts],
+        },
+        'joints': {
+            'x': list(JOINTS),
+            'pose': [_per_pose(arm_of(n), 0, many) for n in JOINTS],
+            'pose and Jacobian': [_per_pose(arm_of(n), n, many) for n in JOINTS],
+        },
+        'parameters': {
+            'x': [2 * k for k in range(len(turns) + 1)],
+            'pose and derivatives': [_per_pose(arm, -k, many) for k in range(len(turns) + 1)],
+        },
         'bag': _bags(minutes),
-    }  # fmt: skip
+    }
 
 
 def _channels(robot: Robot, kinds: tuple[str, ...]) -> list[tuple[str, int]]:
@@ -65,9 +72,11 @@ def _per_pose(robot: Robot, screws: int, count: int) -> float:
 def _bags(minutes: tuple[float, ...]) -> dict[str, Any]:
     found = [bag(length) for length in minutes]
     return {
-        'x': list(minutes), 'read': [f['read_s'] for f in found],
-        'align and compare': [f['compare_s'] for f in found], 'runs': found,
-    }  # fmt: skip
+        'x': list(minutes),
+        'read': [f['read_s'] for f in found],
+        'align and compare': [f['compare_s'] for f in found],
+        'runs': found,
+    }
 
 
 def draw(curves: dict[str, Any], path: Path) -> None:
@@ -79,9 +88,11 @@ def draw(curves: dict[str, Any], path: Path) -> None:
 
     figure = Figure(figsize=(10.0, 7.0), layout='constrained', dpi=120)
     labels = {
-        'poses': 'poses in one call', 'joints': 'joints of the arm',
-        'parameters': 'DH values derived by', 'bag': 'length of the bag [min]',
-    }  # fmt: skip
+        'poses': 'poses in one call',
+        'joints': 'joints of the arm',
+        'parameters': 'DH values derived by',
+        'bag': 'length of the bag [min]',
+    }
     for axes, (key, label) in zip(figure.subplots(2, 2).flat, labels.items(), strict=True):
         curve = curves[key]
         scale = 1.0 if key == 'bag' else 1e9

@@ -96,9 +96,12 @@ def _jacobians(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
         gap = _gap(peer.screws(part)[1], wanted)
         contenders.append(Contender(name, _call(peer.screws, part), len(part), gap))
     return Workload(
-        f'poses and Jacobians, N = {count:,}', 'pose', contenders, EXACT,
+        f'poses and Jacobians, N = {count:,}',
+        'pose',
+        contenders,
+        EXACT,
         'weld_twin leaves the Jacobians components first in memory',
-    )  # fmt: skip
+    )
 
 
 def _derivatives(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
@@ -116,9 +119,12 @@ def _derivatives(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
         gap = _gap(derivative, wanted[:, : derivative.shape[1]])
         contenders.append(Contender(name, _call(peer.dh, part), len(part), gap))
     return Workload(
-        f'poses and derivatives by {4 * robot.n} DH values, N = {count:,}', 'pose', contenders,
-        EXACT, 'weld_twin gives them as two screws a row; JAX that of the tool point alone',
-    )  # fmt: skip
+        f'poses and derivatives by {4 * robot.n} DH values, N = {count:,}',
+        'pose',
+        contenders,
+        EXACT,
+        'weld_twin gives them as two screws a row; JAX that of the tool point alone',
+    )
 
 
 def written_out(screws: Array) -> Array:

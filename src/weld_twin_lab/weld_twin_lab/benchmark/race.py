@@ -88,9 +88,13 @@ class Outcome:
             }
         load = self.workload
         return {
-            'title': load.title, 'item': load.item, 'reference': list(load.reference),
-            'tolerance': load.tolerance, 'note': load.note, 'contenders': rows,
-        }  # fmt: skip
+            'title': load.title,
+            'item': load.item,
+            'reference': list(load.reference),
+            'tolerance': load.tolerance,
+            'note': load.note,
+            'contenders': rows,
+        }
 
 
 def race(workload: Workload, rounds: int, least: float) -> Outcome:

@@ -39,13 +39,18 @@ def page(outcomes: list[Outcome]) -> str:
         own = outcome.seconds[OWN]
         others = [
             f'{c.name} {short(np.median(outcome.seconds[c.name]) / np.median(own))}'
-            for c in load.contenders if c.name != OWN and c.name not in load.reference
-        ]  # fmt: skip
+            for c in load.contenders
+            if c.name != OWN and c.name not in load.reference
+        ]
         reference = ' + '.join(load.reference)
-        rows.append((
-            load.title, f'{duration(float(np.median(own)))} per {load.item}',
-            f'{reference}: **{times(outcome, OWN)}**', ', '.join(others),
-        ))  # fmt: skip
+        rows.append(
+            (
+                load.title,
+                f'{duration(float(np.median(own)))} per {load.item}',
+                f'{reference}: **{times(outcome, OWN)}**',
+                ', '.join(others),
+            )
+        )
     return markdown.table(*rows)
 
 

@@ -112,10 +112,13 @@ def _sobol(robot: Robot, base: int, with_pinocchio: bool) -> Workload:
         contenders.append(Contender('pinocchio', lambda: peer(few), FEW, float(gap)))
         contenders.append(_salib(robot, q, base, own()))
     return Workload(
-        f'Sobol first and total, {inputs} inputs, {runs:,} runs of {POINTS} points', 'run',
-        contenders, 1e-9, 'SALib draws and estimates, Pinocchio runs the model: their sum counts',
+        f'Sobol first and total, {inputs} inputs, {runs:,} runs of {POINTS} points',
+        'run',
+        contenders,
+        1e-9,
+        'SALib draws and estimates, Pinocchio runs the model: their sum counts',
         ('pinocchio', 'SALib'),
-    )  # fmt: skip
+    )
 
 
 def _salib(robot: Robot, q: Array, base: int, wanted: tuple[Array, ...]) -> Contender:

@@ -73,9 +73,15 @@ def achieved(
     ratio, ends = left / first, np.asarray(claim['ci95'], dtype=float)
     narrow = claim['ratio'] + TO_90 * (ends - claim['ratio'])
     return Achieved(
-        first, left, ratio, float(claim['ratio']), bool(narrow[0] <= ratio <= narrow[1]),
-        bool(ends[0] <= ratio <= ends[1]), left / float(truth['floor_m']), str(truth['test']),
-    )  # fmt: skip
+        first,
+        left,
+        ratio,
+        float(claim['ratio']),
+        bool(narrow[0] <= ratio <= narrow[1]),
+        bool(ends[0] <= ratio <= ends[1]),
+        left / float(truth['floor_m']),
+        str(truth['test']),
+    )
 
 
 def _aligned(model: Model, recording: Recording, align: list[str]) -> Model:

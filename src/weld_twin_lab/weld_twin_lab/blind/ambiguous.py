@@ -29,9 +29,7 @@ class Construction(NamedTuple):
     alike: list[list[Site]]
 
 
-def construct(
-    name: str, robot: Robot, span: float, rng: np.random.Generator
-) -> Construction:
+def construct(name: str, robot: Robot, span: float, rng: np.random.Generator) -> Construction:
     """Return an ambiguous construction of its typical size."""
     return CONSTRUCTIONS[name](robot, span, rng)
 
@@ -85,14 +83,16 @@ def _pedestal(robot: Robot, span: float, rng: np.random.Generator) -> Constructi
 
 
 CONSTRUCTIONS: dict[str, Callable[..., Construction]] = {
-    'first axis': _first_axis, 'base turn': _base_turn, 'parallel axes': _parallel,
-    'equal lag': _lag_on_every_joint, 'last axis': _last_axis, 'pedestal': _pedestal,
-}  # fmt: skip
+    'first axis': _first_axis,
+    'base turn': _base_turn,
+    'parallel axes': _parallel,
+    'equal lag': _lag_on_every_joint,
+    'last axis': _last_axis,
+    'pedestal': _pedestal,
+}
 
 
-def _on(
-    family: str, robot: Robot, at: int, span: float, rng: np.random.Generator
-) -> Cause:
+def _on(family: str, robot: Robot, at: int, span: float, rng: np.random.Generator) -> Cause:
     return {**draw(family, robot, span, rng), 'joint': robot.joint_names[at]}
 
 
@@ -102,5 +102,5 @@ def _turned(point: np.ndarray, turn: np.ndarray) -> np.ndarray:
 
 def _linked(axes: np.ndarray, a: int, b: int) -> bool:
     """Tell whether the axes of joints a to b are parallel one after the other."""
-    run = axes[min(a, b):max(a, b) + 1]
+    run = axes[min(a, b) : max(a, b) + 1]
     return bool(np.abs(np.cross(run, run[0])).max() < PARALLEL)

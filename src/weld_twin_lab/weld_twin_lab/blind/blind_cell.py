@@ -70,28 +70,31 @@ class Take(NamedTuple):
     seed: int
 
 
-def draw_cell(
-    robot: str, kind: str, families: Sequence[str], rng: np.random.Generator
-) -> Cell:
+def draw_cell(robot: str, kind: str, families: Sequence[str], rng: np.random.Generator) -> Cell:
     """Return a cell in which causes of these families can be seen."""
     arm = catalog.load(robot).with_frames(tool=_torch(rng))
     known: tuple[Cause, ...] = ()
     if 'payload' in families:
         arm = replace(arm, payload_mass=float(rng.uniform(1.0, 4.0)))
         known = tuple(
-            {'effect': 'joint_compliance', 'joint': joint,
-             'compliance': float(rng.uniform(1e-5, 3e-5))}
+            {
+                'effect': 'joint_compliance',
+                'joint': joint,
+                'compliance': float(rng.uniform(1e-5, 3e-5)),
+            }
             for joint in arm.joint_names[1:4]
-        )  # fmt: skip
+        )
     spring = {'joint_compliance', 'loaded_play'} & set(families)
     return Cell(
-        arm, _tracker(kind, rng), known,
+        arm,
+        _tracker(kind, rng),
+        known,
         align=('base',) if rng.random() < 0.1 and 'base_pose' not in families else (),
         loaded='cartesian_compliance' in families or (bool(spring) and rng.random() < 0.5),
         warming='thermal_growth' in families or rng.random() < 0.2,
         # Springs given as known are exactly what they are said to be.
         richness=0.0 if known else float(rng.uniform(*RICHNESS)),
-    )  # fmt: skip
+    )
 
 
 def _torch(rng: np.random.Generator) -> Array:
@@ -108,18 +111,24 @@ def _tracker(kind: str, rng: np.random.Generator) -> Tracker:
     orientation = bool(rng.random() < 0.7)
     still = {'rate': None, 'drop': 0.0, 'jitter': 0.0}
     moving = {
-        'rate': 60.0, 'drop': float(rng.uniform(0.0, 0.03)),
+        'rate': 60.0,
+        'drop': float(rng.uniform(0.0, 0.03)),
         'jitter': float(rng.choice([0.0, 2e-5, 5e-5])),
         'joint_jitter': float(rng.choice([0.0, 2e-5])),
         'velocity': bool(rng.random() < 0.8),
-    }  # fmt: skip
+    }
     return Tracker(
-        sigma=sigma, sigma_orientation=float(rng.uniform(3e-5, 2e-4)), orientation=orientation,
+        sigma=sigma,
+        sigma_orientation=float(rng.uniform(3e-5, 2e-4)),
+        orientation=orientation,
         outlier_share=float(rng.choice([0.0, 0.002, 0.01])),
-        outlier_size=float(rng.uniform(1e-3, 5e-3)), wrench_sigma=0.2, temperature_rate=1.0,
-        temperature_lag=float(rng.uniform(0.0, 5.0)), temperature_sigma=0.03,
+        outlier_size=float(rng.uniform(1e-3, 5e-3)),
+        wrench_sigma=0.2,
+        temperature_rate=1.0,
+        temperature_lag=float(rng.uniform(0.0, 5.0)),
+        temperature_sigma=0.03,
         **(still if kind == 'stations' else moving),
-    )  # fmt: skip
+    )
 
 
 def take(cell: Cell, kind: str, span: float, rng: np.random.Generator) -> Take:
@@ -159,7 +168,11 @@ def record(
     rng = np.random.default_rng(taken.seed)
     effects = [*cell.known, *causes]
     return run(
-        cell.robot.to_mapping(), effects, taken.command, tracker or cell.tracker, rng,
+        cell.robot.to_mapping(),
+        effects,
+        taken.command,
+        tracker or cell.tracker,
+        rng,
         cell.richness,
     )
 
@@ -167,20 +180,29 @@ def record(
 def exact(tracker: Tracker) -> Tracker:
     """Return the instruments without their errors, sampling at the same instants."""
     return replace(
-        tracker, sigma=0.0, sigma_orientation=0.0, orientation=True, jitter=0.0,
-        outlier_share=0.0, joint_jitter=0.0, wrench_sigma=0.0, temperature_sigma=0.0,
-    )  # fmt: skip
+        tracker,
+        sigma=0.0,
+        sigma_orientation=0.0,
+        orientation=True,
+        jitter=0.0,
+        outlier_share=0.0,
+        joint_jitter=0.0,
+        wrench_sigma=0.0,
+        temperature_sigma=0.0,
+    )
 
 
 def as_recording(name: str, made: PlantRecording) -> Recording:
     """Return a plant's recording as the diagnosis takes it."""
     rotation = None if made.quaternion is None else matrix_from_quaternion(made.quaternion)
     return Recording(
-        name, JointMotion(made.t_joint, made.q, None if made.static else made.qd, made.static),
+        name,
+        JointMotion(made.t_joint, made.q, None if made.static else made.qd, made.static),
         Measurements(made.t_measured, made.position, rotation),
-        _signal(made.wrench_t, made.wrench), 'tool',
+        _signal(made.wrench_t, made.wrench),
+        'tool',
         _signal(made.temperature_t, made.temperature),
-    )  # fmt: skip
+    )
 
 
 def _signal(t: Array | None, value: Array | None) -> Signal | None:
@@ -226,9 +248,7 @@ def floor(cell: Cell, causes: Sequence[Cause], taken: Take) -> tuple[float, list
     return rms(left[~gross]), [int(k) for k in np.nonzero(gross)[0]]
 
 
-def _by_jitter(
-    cell: Cell, causes: Sequence[Cause], taken: Take, seen: PlantRecording
-) -> Array:
+def _by_jitter(cell: Cell, causes: Sequence[Cause], taken: Take, seen: PlantRecording) -> Array:
     """Return how far the tool moves between true instants and their stamps, shape (M, 3) [m]."""
     steady = record(cell, causes, taken, exact(cell.tracker))
     velocity = CubicSpline(steady.t_measured, steady.position)(steady.t_measured, 1)

@@ -15,30 +15,61 @@ Cause = dict[str, Any]
 """An entry of an effects file."""
 
 SIZES: dict[str, tuple[str, ...]] = {
-    'joint_offset': ('offset',), 'link_length': ('da',), 'link_offset': ('dd',),
-    'link_twist': ('dalpha',), 'axis_parallelism': ('dbeta',), 'base_pose': ('xyz', 'rotvec'),
-    'tool_pose': ('xyz', 'rotvec'), 'gear_ratio': ('scale',),
-    'transmission_ripple': ('amplitude',), 'joint_coupling': ('ratio',), 'backlash': ('width',),
-    'joint_compliance': ('compliance',), 'cartesian_compliance': ('compliance',),
-    'payload': ('mass',), 'servo_lag': ('time_constant',), 'time_delay': ('delay',),
-    'thermal_growth': ('coefficient',), 'drift': ('xyz_rate',), 'vibration': ('gain',),
-    'quantization': ('step',), 'measurement_scale': ('scale',),
-    'bearing_tilt': ('tilt',), 'station_step': ('xyz', 'rotvec'), 'tool_slip': ('xyz', 'rotvec'),
-    'quadratic_scale': ('coefficient',), 'column_bend': ('rotvec',), 'stick_slip': ('amplitude',),
-    'friction_wander': ('amplitude',), 'loaded_play': ('width',), 'dress_pack': ('amplitude',),
-}  # fmt: skip
+    'joint_offset': ('offset',),
+    'link_length': ('da',),
+    'link_offset': ('dd',),
+    'link_twist': ('dalpha',),
+    'axis_parallelism': ('dbeta',),
+    'base_pose': ('xyz', 'rotvec'),
+    'tool_pose': ('xyz', 'rotvec'),
+    'gear_ratio': ('scale',),
+    'transmission_ripple': ('amplitude',),
+    'joint_coupling': ('ratio',),
+    'backlash': ('width',),
+    'joint_compliance': ('compliance',),
+    'cartesian_compliance': ('compliance',),
+    'payload': ('mass',),
+    'servo_lag': ('time_constant',),
+    'time_delay': ('delay',),
+    'thermal_growth': ('coefficient',),
+    'drift': ('xyz_rate',),
+    'vibration': ('gain',),
+    'quantization': ('step',),
+    'measurement_scale': ('scale',),
+    'bearing_tilt': ('tilt',),
+    'station_step': ('xyz', 'rotvec'),
+    'tool_slip': ('xyz', 'rotvec'),
+    'quadratic_scale': ('coefficient',),
+    'column_bend': ('rotvec',),
+    'stick_slip': ('amplitude',),
+    'friction_wander': ('amplitude',),
+    'loaded_play': ('width',),
+    'dress_pack': ('amplitude',),
+}
 """The parameters of every cause that grow with it."""
 OUTSIDE = (
-    'bearing_tilt', 'station_step', 'tool_slip', 'quadratic_scale', 'column_bend', 'stick_slip',
-    'friction_wander', 'loaded_play', 'dress_pack',
-)  # fmt: skip
+    'bearing_tilt',
+    'station_step',
+    'tool_slip',
+    'quadratic_scale',
+    'column_bend',
+    'stick_slip',
+    'friction_wander',
+    'loaded_play',
+    'dress_pack',
+)
 FAMILIES = tuple(name for name in SIZES if name not in OUTSIDE)
 MOVING = frozenset({'servo_lag', 'time_delay', 'vibration', 'friction_wander', 'stick_slip'})
 """Causes that stations at rest cannot show."""
 SPREAD = (0.02, 20.0)
 """How many times its typical size a cause may be and still be plausible."""
-MOST = {'vibration': 6.0, 'servo_lag': 10.0, 'time_delay': 10.0, 'quantization': 5.0,
-        'payload': 10.0}  # fmt: skip
+MOST = {
+    'vibration': 6.0,
+    'servo_lag': 10.0,
+    'time_delay': 10.0,
+    'quantization': 5.0,
+    'payload': 10.0,
+}
 """The same for causes that become absurd sooner."""
 LEAST = {'servo_lag': 0.15, 'joint_compliance': 0.1}
 """The same for causes that the simulator cannot have any smaller: a servo or spring too stiff."""
@@ -84,11 +115,22 @@ def site(cause: Mapping[str, Any]) -> tuple[str, str | None]:
     return cause['effect'], cause.get('joint')
 
 
-_POSITIVE = frozenset({
-    'transmission_ripple', 'backlash', 'joint_compliance', 'cartesian_compliance', 'servo_lag',
-    'thermal_growth', 'vibration', 'quantization', 'payload', 'stick_slip', 'friction_wander',
-    'loaded_play',
-})  # fmt: skip
+_POSITIVE = frozenset(
+    {
+        'transmission_ripple',
+        'backlash',
+        'joint_compliance',
+        'cartesian_compliance',
+        'servo_lag',
+        'thermal_growth',
+        'vibration',
+        'quantization',
+        'payload',
+        'stick_slip',
+        'friction_wander',
+        'loaded_play',
+    }
+)
 
 
 def _joint(robot: Robot, rng: np.random.Generator) -> str:
@@ -115,9 +157,11 @@ def _frame(xyz: float, turn: float) -> Callable[..., Cause]:
 
 def _ripple(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     return {
-        'joint': _joint(robot, rng), 'amplitude': 2e-4, 'order': int(rng.choice(RIPPLE_ORDERS)),
+        'joint': _joint(robot, rng),
+        'amplitude': 2e-4,
+        'order': int(rng.choice(RIPPLE_ORDERS)),
         'phase': float(rng.uniform(-np.pi, np.pi)),
-    }  # fmt: skip
+    }
 
 
 def _coupling(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
@@ -141,9 +185,11 @@ def _payload(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
 
 def _vibration(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     return {
-        'joint': _joint(robot, rng), 'frequency': float(rng.uniform(4.0, 15.0)),
-        'damping': float(rng.uniform(0.02, 0.08)), 'gain': 0.5,
-    }  # fmt: skip
+        'joint': _joint(robot, rng),
+        'frequency': float(rng.uniform(4.0, 15.0)),
+        'damping': float(rng.uniform(0.02, 0.08)),
+        'gain': 0.5,
+    }
 
 
 def _tilt(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
@@ -164,20 +210,37 @@ def _wander(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
 
 
 _DRAWN: dict[str, Callable[..., Cause]] = {
-    'joint_offset': _one('offset', 5e-4), 'link_length': _one('da', 3e-4),
-    'link_offset': _one('dd', 3e-4), 'link_twist': _one('dalpha', 5e-4),
-    'axis_parallelism': _one('dbeta', 5e-4), 'base_pose': _frame(3e-4, 5e-4),
-    'tool_pose': _frame(3e-4, 1e-3), 'gear_ratio': _one('scale', 5e-4),
-    'transmission_ripple': _ripple, 'joint_coupling': _coupling, 'backlash': _one('width', 6e-4),
-    'joint_compliance': _compliance, 'cartesian_compliance': _give, 'payload': _payload,
-    'servo_lag': _one('time_constant', 0.008), 'time_delay': _whole('delay', 0.006),
+    'joint_offset': _one('offset', 5e-4),
+    'link_length': _one('da', 3e-4),
+    'link_offset': _one('dd', 3e-4),
+    'link_twist': _one('dalpha', 5e-4),
+    'axis_parallelism': _one('dbeta', 5e-4),
+    'base_pose': _frame(3e-4, 5e-4),
+    'tool_pose': _frame(3e-4, 1e-3),
+    'gear_ratio': _one('scale', 5e-4),
+    'transmission_ripple': _ripple,
+    'joint_coupling': _coupling,
+    'backlash': _one('width', 6e-4),
+    'joint_compliance': _compliance,
+    'cartesian_compliance': _give,
+    'payload': _payload,
+    'servo_lag': _one('time_constant', 0.008),
+    'time_delay': _whole('delay', 0.006),
     'thermal_growth': _whole('coefficient', 3e-5),
     'drift': lambda robot, span, rng: {'xyz_rate': _vector(1e-5, rng)},
-    'vibration': _vibration, 'quantization': _one('step', 6e-4),
-    'measurement_scale': _whole('scale', 1e-4), 'bearing_tilt': _tilt, 'station_step': _knock,
+    'vibration': _vibration,
+    'quantization': _one('step', 6e-4),
+    'measurement_scale': _whole('scale', 1e-4),
+    'bearing_tilt': _tilt,
+    'station_step': _knock,
     'tool_slip': _knock,
     'quadratic_scale': lambda robot, span, rng: {
-        'coefficient': 3e-4, 'origin': _vector(float(rng.uniform(0.0, 1.0)), rng)},
-    'column_bend': _bend, 'stick_slip': _one('amplitude', 6e-4), 'friction_wander': _wander,
-    'loaded_play': _one('width', 6e-4), 'dress_pack': _one('amplitude', 5e-4),
-}  # fmt: skip
+        'coefficient': 3e-4,
+        'origin': _vector(float(rng.uniform(0.0, 1.0)), rng),
+    },
+    'column_bend': _bend,
+    'stick_slip': _one('amplitude', 6e-4),
+    'friction_wander': _wander,
+    'loaded_play': _one('width', 6e-4),
+    'dress_pack': _one('amplitude', 5e-4),
+}

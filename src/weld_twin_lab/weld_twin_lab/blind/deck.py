@@ -21,20 +21,36 @@ from .cause_sizes import FAMILIES, OUTSIDE
 Card = TypeVar('Card')
 
 KINDS = {
-    'single': 16, 'double': 6, 'triple': 3, 'none': 4, 'outside': 4, 'withheld': 4,
+    'single': 16,
+    'double': 6,
+    'triple': 3,
+    'none': 4,
+    'outside': 4,
+    'withheld': 4,
     'ambiguous': 3,
-}  # fmt: skip
+}
 """Kinds of cases, and how many of 40 are of each."""
 STRATA = ((0.3, 1.0), (1.0, 3.0), (3.0, 10.0), (10.0, 40.0))
 """Effect RMS over measurement noise."""
 _STRATUM = {
-    'single': (0, 1, 1, 2, 2, 3), 'double': (1, 2, 2, 3), 'triple': (1, 2, 2, 3),
-    'outside': (1, 2, 2, 3), 'withheld': (1, 2, 2, 3), 'ambiguous': (1, 2, 2, 3), 'none': (0,),
-}  # fmt: skip
+    'single': (0, 1, 1, 2, 2, 3),
+    'double': (1, 2, 2, 3),
+    'triple': (1, 2, 2, 3),
+    'outside': (1, 2, 2, 3),
+    'withheld': (1, 2, 2, 3),
+    'ambiguous': (1, 2, 2, 3),
+    'none': (0,),
+}
 _COUNT = {'double': 2, 'triple': 3, 'none': 0}
 ROBOTS = (
-    'ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb120', 'abb_irb1600', 'fanuc_m10ia', 'franka_panda',
-)  # fmt: skip
+    'ur5',
+    'ur10',
+    'kuka_kr6_r900',
+    'abb_irb120',
+    'abb_irb1600',
+    'fanuc_m10ia',
+    'franka_panda',
+)
 MOTIONS = ('seams', 'free', 'free', 'stations')
 
 
@@ -97,10 +113,15 @@ def lots(
     for _ in range(count):
         kind = order.next()
         number = _COUNT.get(kind, 1)
-        out.append(Lot(
-            kind, robots.next(), motions.next(), decks[kind].several(number),
-            tuple(strata[kind].next() for _ in range(number)),
-        ))  # fmt: skip
+        out.append(
+            Lot(
+                kind,
+                robots.next(),
+                motions.next(),
+                decks[kind].several(number),
+                tuple(strata[kind].next() for _ in range(number)),
+            )
+        )
     return out
 
 

@@ -30,9 +30,13 @@ _KIB = 1024 if sys.platform != 'darwin' else 1
 
 
 def diagnose_cases(
-    cases: Path, out: Path, runner: Runner, *, allow_readable: bool = False,
+    cases: Path,
+    out: Path,
+    runner: Runner,
+    *,
+    allow_readable: bool = False,
     with_holdout: bool = True,
-) -> list[dict[str, Any]]:  # fmt: skip
+) -> list[dict[str, Any]]:
     """
     Diagnose all cases, write what was said, and return it case by case.
 
@@ -60,20 +64,31 @@ def diagnose_cases(
     listed = layout.read(cases / layout.CASES)
     engine = engine_digest()
     tasks = [
-        Task(diagnose_case, (str(cases / entry['name']), entry['case'], engine, with_holdout),
-             entry['name'])
+        Task(
+            diagnose_case,
+            (str(cases / entry['name']), entry['case'], engine, with_holdout),
+            entry['name'],
+        )
         for entry in listed['cases']
-    ]  # fmt: skip
+    ]
     verdicts = runner.run(tasks)
     for verdict in verdicts:
         content = verdict.pop('diagnosis')
         if content is not None:
             file = out / verdict['name'] / layout.DIAGNOSIS
             write_text(file, json.dumps(content, indent=1) + '\n', overwrite=True)
-    layout.write(out / layout.VERDICTS, {
-        'seal': listed['seal'], 'engine': engine, 'version': __version__,
-        'with_holdout': with_holdout, 'truths_readable': readable, 'verdicts': verdicts,
-    }, overwrite=True)  # fmt: skip
+    layout.write(
+        out / layout.VERDICTS,
+        {
+            'seal': listed['seal'],
+            'engine': engine,
+            'version': __version__,
+            'with_holdout': with_holdout,
+            'truths_readable': readable,
+            'verdicts': verdicts,
+        },
+        overwrite=True,
+    )
     return verdicts
 
 
@@ -110,10 +125,12 @@ def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> d
     except Exception as error:
         failure = f'{type(error).__name__}: {error}'
     return {
-        'name': directory.name, 'diagnosis': answer, 'error': failure,
+        'name': directory.name,
+        'diagnosis': answer,
+        'error': failure,
         'seconds': time.perf_counter() - start,
         'memory_bytes': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _KIB,
-    }  # fmt: skip
+    }
 
 
 def _diagnosis(directory: Path, with_holdout: bool) -> dict[str, Any]:
@@ -125,7 +142,11 @@ def _diagnosis(directory: Path, with_holdout: bool) -> dict[str, Any]:
         read_recording(directory / use, twin.robot) for use in (layout.TRAIN, *holdout)
     )
     result = diagnose(
-        [train], twin.robot, align=frozenset(case['align']), known=twin.effects,
-        exclude=case['exclude'], holdout=held,
-    )  # fmt: skip
+        [train],
+        twin.robot,
+        align=frozenset(case['align']),
+        known=twin.effects,
+        exclude=case['exclude'],
+        holdout=held,
+    )
     return dict(json.loads(diagnosis_text(result, ())))

@@ -103,14 +103,23 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
     kind = str(truth['kind'])
     exact = whole and len(groups) == len(answer)
     return Judged(
-        truth['name'], kind, truth['robot'], truth['motion'], _in_words(truth['sites']),
-        _said(groups), status, float(verdict.get('confidence', 0.0)),
+        truth['name'],
+        kind,
+        truth['robot'],
+        truth['motion'],
+        _in_words(truth['sites']),
+        _said(groups),
+        status,
+        float(verdict.get('confidence', 0.0)),
         float(min(truth['ratios'], default=0.0)),
-        _set(exact, matched, groups), whole and bool(answer) and status != 'error',
-        _all(_family, answers, groups), _all(_joint, answers, groups),
-        _right(kind, status, exact, whole), _breadth(groups),
+        _set(exact, matched, groups),
+        whole and bool(answer) and status != 'error',
+        _all(_family, answers, groups),
+        _all(_joint, answers, groups),
+        _right(kind, status, exact, whole),
+        _breadth(groups),
         _errors(truth, diagnosis, groups) if exact and diagnosis else (),
-    )  # fmt: skip
+    )
 
 
 def _sites(items: Iterable[Sequence[Any]]) -> list[Site]:
@@ -147,12 +156,11 @@ def _right(kind: str, status: str, exact: bool, whole: bool) -> bool:
     return exact and status in NAMING
 
 
-def _all(
-    told: Any, answers: Sequence[Sequence[Site]], groups: Sequence[set[Site]]
-) -> bool | None:
+def _all(told: Any, answers: Sequence[Sequence[Site]], groups: Sequence[set[Site]]) -> bool | None:
     """Return whether all parts of one answer are told, None where there is nothing to tell."""
     found = [
-        parts for parts in ([told(at, groups) for at in answer] for answer in answers)
+        parts
+        for parts in ([told(at, groups) for at in answer] for answer in answers)
         if any(part is not None for part in parts)
     ]
     if not found:

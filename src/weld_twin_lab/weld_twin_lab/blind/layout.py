@@ -25,10 +25,13 @@ SCORE = 'score.json'
 PAGE = 'score.html'
 
 SCHEMAS = {
-    CASES: 'weld_twin/blind/cases/1', CASE: 'weld_twin/blind/case/1',
-    TRUTHS: 'weld_twin/blind/truths/1', TRUTH: 'weld_twin/blind/truth/1',
-    VERDICTS: 'weld_twin/blind/verdicts/1', SCORE: 'weld_twin/blind/score/1',
-}  # fmt: skip
+    CASES: 'weld_twin/blind/cases/1',
+    CASE: 'weld_twin/blind/case/1',
+    TRUTHS: 'weld_twin/blind/truths/1',
+    TRUTH: 'weld_twin/blind/truth/1',
+    VERDICTS: 'weld_twin/blind/verdicts/1',
+    SCORE: 'weld_twin/blind/score/1',
+}
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -80,9 +80,14 @@ class Case:
 
 
 def make(
-    cases: Path, truths: Path, seed: int, count: int, runner: Runner, kinds: Sequence[str] = (),
+    cases: Path,
+    truths: Path,
+    seed: int,
+    count: int,
+    runner: Runner,
+    kinds: Sequence[str] = (),
     spans: tuple[float, float] = SPANS,
-) -> str:  # fmt: skip
+) -> str:
     """
     Make cases and truths, and return the seal; what the same request made already stays.
 
@@ -154,9 +159,7 @@ def _written(case: Case, name: str, cases: Path, truths: Path) -> dict[str, str]
         write_case(place, name, case)
     with new_directory(truths / name, mark=layout.TRUTH) as place:
         write_truth(place, name, case)
-    return {
-        'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name)
-    }  # fmt: skip
+    return {'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name)}
 
 
 def draw_case(lot: Lot, rng: np.random.Generator, spans: tuple[float, float] = SPANS) -> Case:
@@ -235,10 +238,15 @@ def write_case(place: Path, name: str, case: Case) -> None:
     for use, taken in ((layout.TRAIN, case.train), (layout.HOLDOUT, case.holdout)):
         made = as_recording(use, record(cell, case.causes, taken))
         write_recording(place / use, made, cell.robot)
-    layout.write(place / layout.CASE, {
-        'name': name, 'align': list(cell.align), 'exclude': list(case.excluded),
-        'known': bool(cell.known),
-    })  # fmt: skip
+    layout.write(
+        place / layout.CASE,
+        {
+            'name': name,
+            'align': list(cell.align),
+            'exclude': list(case.excluded),
+            'known': bool(cell.known),
+        },
+    )
 
 
 def write_truth(place: Path, name: str, case: Case) -> None:
@@ -248,13 +256,27 @@ def write_truth(place: Path, name: str, case: Case) -> None:
     write_recording(place / layout.TEST, as_recording(layout.TEST, tested), cell.robot)
     reachable, outliers = floor(cell, case.causes, case.test)
     every = rms(deviation(cell, case.causes, case.train)) / cell.noise if case.causes else 0.0
-    layout.write(place / layout.TRUTH, {
-        'name': name, 'salt': secrets.token_hex(16), 'kind': lot.kind, 'robot': lot.robot,
-        'motion': lot.motion, 'construction': lot.families[0] if case.alike else None,
-        'causes': case.causes, 'sites': [site(cause) for cause in case.causes],
-        'alike': case.alike, 'ratios': case.ratios, 'ratio': every,
-        'excluded': list(case.excluded), 'orientation': cell.tracker.orientation,
-        'sigma_m': cell.tracker.sigma, 'richness': cell.richness, 'align': list(cell.align),
-        'test': 'new motion' if case.fresh else 'same motion',
-        'floor_m': reachable, 'outliers': outliers,
-    })  # fmt: skip
+    layout.write(
+        place / layout.TRUTH,
+        {
+            'name': name,
+            'salt': secrets.token_hex(16),
+            'kind': lot.kind,
+            'robot': lot.robot,
+            'motion': lot.motion,
+            'construction': lot.families[0] if case.alike else None,
+            'causes': case.causes,
+            'sites': [site(cause) for cause in case.causes],
+            'alike': case.alike,
+            'ratios': case.ratios,
+            'ratio': every,
+            'excluded': list(case.excluded),
+            'orientation': cell.tracker.orientation,
+            'sigma_m': cell.tracker.sigma,
+            'richness': cell.richness,
+            'align': list(cell.align),
+            'test': 'new motion' if case.fresh else 'same motion',
+            'floor_m': reachable,
+            'outliers': outliers,
+        },
+    )

@@ -70,43 +70,81 @@ def verdict_measures(cases: Sequence[Judged]) -> list[Measure]:
     )
     known = [c for c in cases if c.in_library]
     return [
-        Measure('single_family', 'one cause, 3 sigma or more: family named',
-                _of(clear, _family), .98),
-        Measure('single_joint', 'the same: joint named', _of(clear, _joint), .98),
+        Measure(
+            'single_family', 'one cause, 3 sigma or more: family named', _of(clear, _family), 0.98
+        ),
+        Measure('single_joint', 'the same: joint named', _of(clear, _joint), 0.98),
         Measure('single_exact', 'the same: nothing else named', _of(clear, _exact)),
-        Measure('faint_named', 'one cause, 1-3 sigma: named, or in the set that is',
-                _of(faint, _named), .85),
-        Measure('double_named', 'two causes, both 3 sigma or more: both named',
-                _of(two, _named), .90),
-        Measure('triple_named', 'three causes, all 3 sigma or more: all named',
-                _of(three, _named), .80),
-        Measure('ambiguous_named', 'ambiguous by construction: truth or its like named',
-                _of(ambiguous, _named)),
-        Measure('ambiguous_said', 'the same: and said to be ambiguous',
-                _of(ambiguous, lambda c: c.named and c.status == 'ambiguous')),
-        Measure('false_alarm', 'no cause: something named or found',
-                _of(nothing, lambda c: c.status != 'none'), .01, False),
-        Measure('withheld_honest', "family withheld: 'unknown' or a set, no wrong name",
-                _of(withheld, lambda c: c.status in ('unknown', 'ambiguous')), .90),
+        Measure(
+            'faint_named',
+            'one cause, 1-3 sigma: named, or in the set that is',
+            _of(faint, _named),
+            0.85,
+        ),
+        Measure(
+            'double_named', 'two causes, both 3 sigma or more: both named', _of(two, _named), 0.90
+        ),
+        Measure(
+            'triple_named',
+            'three causes, all 3 sigma or more: all named',
+            _of(three, _named),
+            0.80,
+        ),
+        Measure(
+            'ambiguous_named',
+            'ambiguous by construction: truth or its like named',
+            _of(ambiguous, _named),
+        ),
+        Measure(
+            'ambiguous_said',
+            'the same: and said to be ambiguous',
+            _of(ambiguous, lambda c: c.named and c.status == 'ambiguous'),
+        ),
+        Measure(
+            'false_alarm',
+            'no cause: something named or found',
+            _of(nothing, lambda c: c.status != 'none'),
+            0.01,
+            False,
+        ),
+        Measure(
+            'withheld_honest',
+            "family withheld: 'unknown' or a set, no wrong name",
+            _of(withheld, lambda c: c.status in ('unknown', 'ambiguous')),
+            0.90,
+        ),
         Measure('withheld_unknown', "the same: 'unknown'", _of(withheld, _unknown)),
-        Measure('outside_unknown', "cause outside the library: 'unknown'",
-                _of(outside, _unknown)),
-        Measure('false_unknown', "cause in the library, or none: 'unknown' all the same",
-                _of([*known, *nothing], _unknown), .03, False),
-        Measure('confident_wrong', 'sure (> 0.8) and wrong',
-                _of(cases, lambda c: c.confidently_wrong), .01, False),
-    ]  # fmt: skip
+        Measure('outside_unknown', "cause outside the library: 'unknown'", _of(outside, _unknown)),
+        Measure(
+            'false_unknown',
+            "cause in the library, or none: 'unknown' all the same",
+            _of([*known, *nothing], _unknown),
+            0.03,
+            False,
+        ),
+        Measure(
+            'confident_wrong',
+            'sure (> 0.8) and wrong',
+            _of(cases, lambda c: c.confidently_wrong),
+            0.01,
+            False,
+        ),
+    ]
 
 
 def alias_measure(cases: Sequence[Judged], shrinks: Mapping[str, Achieved]) -> Measure:
     """Return how often a cause no library knows is unknown, or what is named does as well."""
+
     def told(case: Judged) -> bool:
         shrink = shrinks.get(case.name)
         return case.status == 'unknown' or (shrink is not None and shrink.over_floor < AS_GOOD)
 
     foreign = [case for case in cases if case.kind in NOT_IN_LIBRARY]
-    return Measure('alias', "withheld or outside: 'unknown', or as good on the sealed recording",
-                   _of(foreign, told))  # fmt: skip
+    return Measure(
+        'alias',
+        "withheld or outside: 'unknown', or as good on the sealed recording",
+        _of(foreign, told),
+    )
 
 
 def calibration_measures(cases: Sequence[Judged]) -> list[Measure]:
@@ -114,11 +152,12 @@ def calibration_measures(cases: Sequence[Judged]) -> list[Measure]:
     told = [c for c in cases if c.status != 'error']
     known = [c for c in told if c.kind not in NOT_IN_LIBRARY]
     return [
-        Measure('ece', 'expected calibration error', _calibrated(told), .03, False),
+        Measure('ece', 'expected calibration error', _calibrated(told), 0.03, False),
         Measure('ece_library', 'the same, causes in the library and none', _calibrated(known)),
-        Measure('brier', 'Brier score',
-                brier([c.confidence for c in told], [c.right for c in told])),
-    ]  # fmt: skip
+        Measure(
+            'brier', 'Brier score', brier([c.confidence for c in told], [c.right for c in told])
+        ),
+    ]
 
 
 def shrink_measures(shrinks: Sequence[Achieved]) -> list[Measure]:
@@ -126,29 +165,48 @@ def shrink_measures(shrinks: Sequence[Achieved]) -> list[Measure]:
     same = [s for s in shrinks if s.test == 'same motion']
     other = [s for s in shrinks if s.test != 'same motion']
     return [
-        Measure('shrink_off', 'median distance of claimed and achieved shrink', _off(shrinks),
-                .03, False),
+        Measure(
+            'shrink_off',
+            'median distance of claimed and achieved shrink',
+            _off(shrinks),
+            0.03,
+            False,
+        ),
         Measure('shrink_off_same', 'the same, motion repeated', _off(same)),
         Measure('shrink_off_new', 'the same, another motion', _off(other)),
-        Measure('shrink_cover', '90 % interval of the shrink holds the achieved (85-95 %)',
-                share([s.covered_90 for s in shrinks]), .85),
-        Measure('shrink_cover_same', 'the same, motion repeated',
-                share([s.covered_90 for s in same])),
-        Measure('shrink_cover_new', 'the same, another motion',
-                share([s.covered_90 for s in other])),
-        Measure('over_floor', 'RMS left over what the true causes leave, median',
-                bootstrap([s.over_floor for s in shrinks]), 1.05, False),
-    ]  # fmt: skip
+        Measure(
+            'shrink_cover',
+            '90 % interval of the shrink holds the achieved (85-95 %)',
+            share([s.covered_90 for s in shrinks]),
+            0.85,
+        ),
+        Measure(
+            'shrink_cover_same', 'the same, motion repeated', share([s.covered_90 for s in same])
+        ),
+        Measure(
+            'shrink_cover_new', 'the same, another motion', share([s.covered_90 for s in other])
+        ),
+        Measure(
+            'over_floor',
+            'RMS left over what the true causes leave, median',
+            bootstrap([s.over_floor for s in shrinks]),
+            1.05,
+            False,
+        ),
+    ]
 
 
 def parameter_measures(cases: Sequence[Judged]) -> list[Measure]:
     """Return whether parameters are within their standard errors."""
     z = [value for case in cases for value in case.z]
     return [
-        Measure('z_spread', 'errors of parameters over their standard errors: RMS, outer 2 % cut',
-                bootstrap(_trimmed(z), lambda v, axis: np.sqrt((v**2).mean(axis=axis)))),
+        Measure(
+            'z_spread',
+            'errors of parameters over their standard errors: RMS, outer 2 % cut',
+            bootstrap(_trimmed(z), lambda v, axis: np.sqrt((v**2).mean(axis=axis))),
+        ),
         Measure('z_inside', 'the same: share within 1.96', share([abs(v) < 1.96 for v in z])),
-    ]  # fmt: skip
+    ]
 
 
 def semi_real_measures(cases: Sequence[Judged], own: Mapping[str, str]) -> list[Measure]:
@@ -164,10 +222,13 @@ def semi_real_measures(cases: Sequence[Judged], own: Mapping[str, str]) -> list[
     """
     new = [c for c in cases if c.truth not in own.get(c.motion, '')]
     return [
-        Measure(f'semi_real_{k}', f'cause put into a real bag, {label} of its noise: named',
-                _of([c for c in new if low <= c.stratum < high], _named))
+        Measure(
+            f'semi_real_{k}',
+            f'cause put into a real bag, {label} of its noise: named',
+            _of([c for c in new if low <= c.stratum < high], _named),
+        )
         for k, (low, high, label) in enumerate(BINS)
-    ]  # fmt: skip
+    ]
 
 
 def by_stratum(cases: Sequence[Judged]) -> list[dict[str, Any]]:
@@ -193,13 +254,16 @@ def row(name: str, cases: Sequence[Judged]) -> dict[str, Any]:
     """Return the measures that every group of cases has."""
     sets = [c.set for c in cases]
     return {
-        'group': name, 'count': len(cases), 'right': share([c.right for c in cases])._asdict(),
-        'family': _of(cases, _family)._asdict(), 'joint': _of(cases, _joint)._asdict(),
+        'group': name,
+        'count': len(cases),
+        'right': share([c.right for c in cases])._asdict(),
+        'family': _of(cases, _family)._asdict(),
+        'joint': _of(cases, _joint)._asdict(),
         'sets': {key: sets.count(key) for key in ('exact', 'partial', 'wrong', 'silent')},
         'statuses': _counts(c.status for c in cases),
         'confidently_wrong': sum(c.confidently_wrong for c in cases),
         'breadth': float(np.mean([c.breadth for c in cases])),
-    }  # fmt: skip
+    }
 
 
 def _counts(values: Any) -> dict[str, int]:

@@ -56,9 +56,15 @@ class Wish:
 
 
 def make_semi_real(
-    cases: Path, truths: Path, bags: Sequence[str], robot: str, align: Sequence[str],
-    seed: int, count: int, runner: Runner,
-) -> str:  # fmt: skip
+    cases: Path,
+    truths: Path,
+    bags: Sequence[str],
+    robot: str,
+    align: Sequence[str],
+    seed: int,
+    count: int,
+    runner: Runner,
+) -> str:
     """
     Make cases and truths from real bags, and return the seal.
 
@@ -85,9 +91,7 @@ def make_semi_real(
     layout.write(truths / layout.TRUTHS, {'seed': seed, 'count': count})
     families, strata = Deck(FAMILIES, seed, 0), Deck(range(len(STRATA)), seed, 1)
     wishes = [Wish(bag, '', 0) for bag in bags]
-    wishes += [
-        Wish(bags[k % len(bags)], families.next(), strata.next()) for k in range(count)
-    ]
+    wishes += [Wish(bags[k % len(bags)], families.next(), strata.next()) for k in range(count)]
     tasks = [
         Task(make_one, (seed, k, wish, robot, tuple(align), str(cases), str(truths)), wish.bag)
         for k, wish in enumerate(wishes)
@@ -100,9 +104,14 @@ def make_semi_real(
 
 
 def make_one(
-    seed: int, number: int, wish: Wish, robot: str, align: tuple[str, ...], cases: str,
+    seed: int,
+    number: int,
+    wish: Wish,
+    robot: str,
+    align: tuple[str, ...],
+    cases: str,
     truths: str,
-) -> dict[str, str]:  # fmt: skip
+) -> dict[str, str]:
     """Write one case and its truth; return its name and the hashes of both."""
     rng = np.random.default_rng([seed, 2000 + number])
     arm = load_robot(robot)
@@ -113,23 +122,43 @@ def make_one(
     with new_directory(Path(cases) / name, mark=layout.CASE) as place:
         write_robot_yaml(place / layout.ROBOT, arm)
         write_recording(place / layout.TRAIN, train, arm)
-        layout.write(place / layout.CASE, {
-            'name': name, 'align': list(align), 'exclude': [], 'known': False,
-        })  # fmt: skip
+        layout.write(
+            place / layout.CASE,
+            {
+                'name': name,
+                'align': list(align),
+                'exclude': [],
+                'known': False,
+            },
+        )
     with new_directory(Path(truths) / name, mark=layout.TRUTH) as place:
         write_recording(place / layout.TEST, test, arm)
-        layout.write(place / layout.TRUTH, {
-            'name': name, 'salt': secrets.token_hex(16), 'robot': arm.name,
-            'kind': SEMI_REAL if cause else AS_IT_IS, 'motion': Path(wish.bag).name,
-            'construction': None, 'causes': [cause] if cause else [],
-            'sites': [site(cause)] if cause else [], 'alike': [],
-            'ratios': [ratio] if cause else [], 'ratio': ratio, 'excluded': [],
-            'align': list(align), 'test': 'same motion', 'floor_m': None, 'outliers': [],
-        })  # fmt: skip
+        layout.write(
+            place / layout.TRUTH,
+            {
+                'name': name,
+                'salt': secrets.token_hex(16),
+                'robot': arm.name,
+                'kind': SEMI_REAL if cause else AS_IT_IS,
+                'motion': Path(wish.bag).name,
+                'construction': None,
+                'causes': [cause] if cause else [],
+                'sites': [site(cause)] if cause else [],
+                'alike': [],
+                'ratios': [ratio] if cause else [],
+                'ratio': ratio,
+                'excluded': [],
+                'align': list(align),
+                'test': 'same motion',
+                'floor_m': None,
+                'outliers': [],
+            },
+        )
     return {
-        'name': name, 'case': seal.digest(Path(cases) / name),
+        'name': name,
+        'case': seal.digest(Path(cases) / name),
         'truth': seal.digest(Path(truths) / name),
-    }  # fmt: skip
+    }
 
 
 def _mixed(
@@ -181,14 +210,15 @@ def _command(real: Recording) -> Command:
         q = joints.at(t)[0]
     in_tool = real.wrench is not None and real.wrench_frame == 'tool'
     return Command(
-        t, q, joints.static, real.wrench.at(t) if real.wrench is not None and in_tool else None,
+        t,
+        q,
+        joints.static,
+        real.wrench.at(t) if real.wrench is not None and in_tool else None,
         None if real.temperature is None else real.temperature.at(t),
-    )  # fmt: skip
+    )
 
 
-def _with(
-    cell: Cell, cause: Cause, taken: Take, real: Recording
-) -> tuple[Recording, float]:
+def _with(cell: Cell, cause: Cause, taken: Take, real: Recording) -> tuple[Recording, float]:
     """Return the recording with a cause added, and the RMS of what was added [m]."""
     measured = real.measured
     if measured is None:
@@ -223,8 +253,10 @@ def _split(whole: Recording) -> tuple[Recording, Recording]:
     """Return the recording up to a time, and after it."""
     t = whole.joints.t
     parts = []
-    for use, chosen in ((layout.TRAIN, slice(None, int(TRAINING * t.size))),
-                        (layout.TEST, slice(int(TRAINING * t.size), None))):  # fmt: skip
+    for use, chosen in (
+        (layout.TRAIN, slice(None, int(TRAINING * t.size))),
+        (layout.TEST, slice(int(TRAINING * t.size), None)),
+    ):
         joints = whole.joints
         velocity = None if joints.qd is None else joints.qd[chosen]
         motion = JointMotion(t[chosen], joints.q[chosen], velocity, joints.static)

@@ -43,9 +43,13 @@ NAME = 'case'
 
 
 def recover(
-    runner: Runner, seed: int, arms: Sequence[str] = ARMS, families: Sequence[str] = FAMILIES,
-    sizes: Sequence[float] = SIZES, motion: str = 'free',
-) -> list[dict[str, Any]]:  # fmt: skip
+    runner: Runner,
+    seed: int,
+    arms: Sequence[str] = ARMS,
+    families: Sequence[str] = FAMILIES,
+    sizes: Sequence[float] = SIZES,
+    motion: str = 'free',
+) -> list[dict[str, Any]]:
     """
     Return what the diagnosis made of every family on every arm at every size.
 
@@ -66,19 +70,29 @@ def recover(
         An unknown arm, family or motion, or a negative seed.
 
     """
-    for what, given, known in (('arm', arms, ROBOTS), ('family', families, FAMILIES),
-                               ('motion', (motion,), MOTIONS)):  # fmt: skip
+    for what, given, known in (
+        ('arm', arms, ROBOTS),
+        ('family', families, FAMILIES),
+        ('motion', (motion,), MOTIONS),
+    ):
         for name in given:
             if name not in known:
                 raise DataError(f'there is no {what} {name!r}; choose among {", ".join(known)}')
     if seed < 0:
         raise DataError(f'the seed must not be negative, got {seed}')
     engine = engine_digest()
-    return runner.run([
-        Task(recover_one, (seed, family, arm, size, _motion(family, motion), engine),
-             f'{family} on {arm}, {size:g} times the noise')
-        for family in families for arm in arms for size in sizes
-    ])  # fmt: skip
+    return runner.run(
+        [
+            Task(
+                recover_one,
+                (seed, family, arm, size, _motion(family, motion), engine),
+                f'{family} on {arm}, {size:g} times the noise',
+            )
+            for family in families
+            for arm in arms
+            for size in sizes
+        ]
+    )
 
 
 def _motion(family: str, wanted: str) -> str:
@@ -127,8 +141,18 @@ def _case(seed: int, family: str, arm: str, size: float, motion: str) -> Case:
             reason = error
             continue
         lot = Lot('single', arm, motion, (family,), ())
-        return Case(lot, cell, [cause], [], [rms(off) / cell.noise], (), train,
-                    again(train, rng), again(train, rng), fresh=False)  # fmt: skip
+        return Case(
+            lot,
+            cell,
+            [cause],
+            [],
+            [rms(off) / cell.noise],
+            (),
+            train,
+            again(train, rng),
+            again(train, rng),
+            fresh=False,
+        )
     raise Unseen(str(reason))
 
 
@@ -149,8 +173,12 @@ def _worth(case: Case, place: Path) -> dict[str, Any]:
         write_text(file, json.dumps(diagnosis))
         shrink = achieved(cases, truths, truth, file, diagnosis['shrink'])._asdict()
     return {
-        'ratio': case.ratios[0], 'richness': case.cell.richness,
-        'orientation': case.cell.tracker.orientation, 'judged': judged.as_dict(),
-        'shrink': shrink, 'error': verdict['error'], 'seconds': verdict['seconds'],
+        'ratio': case.ratios[0],
+        'richness': case.cell.richness,
+        'orientation': case.cell.tracker.orientation,
+        'judged': judged.as_dict(),
+        'shrink': shrink,
+        'error': verdict['error'],
+        'seconds': verdict['seconds'],
         'processor_seconds': processor,
-    }  # fmt: skip
+    }

@@ -13,9 +13,15 @@ from .statistics import Estimate, share
 
 Row = Mapping[str, Any]
 MARKS = {
-    'exact': '●', 'more': '◐', 'joint': '○', 'unknown': '?', 'none': '-', 'wrong': 'x',
-    'error': '!', 'not shown': ' ',
-}  # fmt: skip
+    'exact': '●',
+    'more': '◐',
+    'joint': '○',
+    'unknown': '?',
+    'none': '-',
+    'wrong': 'x',
+    'error': '!',
+    'not shown': ' ',
+}
 LEGEND = (
     '● named, alone or in the set that holds it, and nothing else; ◐ named, and something else '
     'besides; ○ the family named, on another joint; ? said to be unknown; - nothing found; '
@@ -42,10 +48,11 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
     """Return shares, errors and costs: over all, by family, by arm and by size."""
     shown = [row for row in rows if not row['not_shown']]
     return {
-        'all': _sums(shown), 'family': _by(shown, lambda row: row['family']),
+        'all': _sums(shown),
+        'family': _by(shown, lambda row: row['family']),
         'arm': _by(shown, lambda row: row['arm']),
         'size': _by(shown, lambda row: f'{row["size"]:g}'),
-    }  # fmt: skip
+    }
 
 
 def _by(rows: Sequence[Row], key: Callable[[Row], str]) -> dict[str, Any]:
@@ -72,7 +79,7 @@ def _sums(rows: Sequence[Row]) -> dict[str, Any]:
         'seconds': _median([row['seconds'] for row in rows]),
         'processor_seconds': _median([row['processor_seconds'] for row in rows]),
         'most_processor_seconds': max((row['processor_seconds'] for row in rows), default=None),
-    }  # fmt: skip
+    }
 
 
 def _median(values: Sequence[float]) -> float | None:
@@ -99,41 +106,73 @@ def table(rows: Sequence[Row], made: Mapping[str, Any]) -> str:
 
 def _families(rows: Sequence[Row], sums: Mapping[str, Any]) -> Iterator[str]:
     arms = list(dict.fromkeys(row['arm'] for row in rows))
-    heads = ['cause', *arms, 'family', 'joint', '\\|z\\|, median', 'shrink claimed / achieved',
-             'processor s']  # fmt: skip
+    heads = [
+        'cause',
+        *arms,
+        'family',
+        'joint',
+        '\\|z\\|, median',
+        'shrink claimed / achieved',
+        'processor s',
+    ]
     yield from _head(heads)
     for family in dict.fromkeys(row['family'] for row in rows):
         marks = [
-            ''.join(MARKS[mark(row)] for row in rows
-                    if (row['family'], row['arm']) == (family, arm))
+            ''.join(
+                MARKS[mark(row)] for row in rows if (row['family'], row['arm']) == (family, arm)
+            )
             for arm in arms
-        ]  # fmt: skip
+        ]
         if family in sums:
             yield _line([family, *(f'`{text}`' for text in marks), *_told(sums[family])])
 
 
 def _told(sums: Mapping[str, Any]) -> list[str]:
     return [
-        _count(sums['family']), _count(sums['joint']), _number(sums['z_median']),
+        _count(sums['family']),
+        _count(sums['joint']),
+        _number(sums['z_median']),
         f'{_number(sums["shrink_claimed"])} / {_number(sums["shrink_achieved"])}',
         _number(sums['processor_seconds'], 1),
-    ]  # fmt: skip
+    ]
 
 
 def _groups(sums: Mapping[str, Any]) -> Iterator[str]:
-    yield from _head(['', 'cases', 'family', 'joint', 'nothing else named', 'sure and wrong',
-                      'z within 1.96', 'claimed and achieved differ by', 'over the floor',
-                      'processor s, median / most'])  # fmt: skip
-    named = {'all': sums['all'], **sums['arm'],
-             **{f'{size} times the noise': value for size, value in sums['size'].items()}}
+    yield from _head(
+        [
+            '',
+            'cases',
+            'family',
+            'joint',
+            'nothing else named',
+            'sure and wrong',
+            'z within 1.96',
+            'claimed and achieved differ by',
+            'over the floor',
+            'processor s, median / most',
+        ]
+    )
+    named = {
+        'all': sums['all'],
+        **sums['arm'],
+        **{f'{size} times the noise': value for size, value in sums['size'].items()},
+    }
     for name, item in named.items():
-        yield _line([
-            name, str(item['cases']), _percent(item['family']), _percent(item['joint']),
-            _percent(item['exact']), str(item['confidently_wrong']), _percent(item['z_inside']),
-            _number(item['shrink_off'], 3), _number(item['over_floor'], 3),
-            f'{_number(item["processor_seconds"], 1)} / '
-            f'{_number(item["most_processor_seconds"], 1)}',
-        ])  # fmt: skip
+        yield _line(
+            [
+                name,
+                str(item['cases']),
+                _percent(item['family']),
+                _percent(item['joint']),
+                _percent(item['exact']),
+                str(item['confidently_wrong']),
+                _percent(item['z_inside']),
+                _number(item['shrink_off'], 3),
+                _number(item['over_floor'], 3),
+                f'{_number(item["processor_seconds"], 1)} / '
+                f'{_number(item["most_processor_seconds"], 1)}',
+            ]
+        )
 
 
 def _failures(rows: Sequence[Row]) -> Iterator[str]:
@@ -146,8 +185,16 @@ def _failures(rows: Sequence[Row]) -> Iterator[str]:
     for row in missed:
         judged = row['judged']
         said = row['error'] or f'{judged["status"]}: {judged["said"] or DASH}'
-        yield _line([f'`{MARKS[mark(row)]}`', judged['truth'], row['arm'], f'{row["size"]:g}',
-                     said, f'{judged["confidence"]:.2f}'])  # fmt: skip
+        yield _line(
+            [
+                f'`{MARKS[mark(row)]}`',
+                judged['truth'],
+                row['arm'],
+                f'{row["size"]:g}',
+                said,
+                f'{judged["confidence"]:.2f}',
+            ]
+        )
 
 
 def _head(names: Sequence[str]) -> Iterator[str]:
@@ -168,9 +215,11 @@ def _count(estimate: Mapping[str, Any]) -> str:
 def _percent(estimate: Mapping[str, Any]) -> str:
     """Return a share with its interval."""
     value, low, high = (estimate[key] for key in ('value', 'low', 'high'))
-    return DASH if value is None else (
-        f'{100.0 * value:.1f} % ({100.0 * low:.0f} to {100.0 * high:.0f})'
-    )  # fmt: skip
+    return (
+        DASH
+        if value is None
+        else (f'{100.0 * value:.1f} % ({100.0 * low:.0f} to {100.0 * high:.0f})')
+    )
 
 
 def _number(value: float | None, places: int = 2) -> str:

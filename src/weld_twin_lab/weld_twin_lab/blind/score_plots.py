@@ -38,8 +38,15 @@ def reliability_plot(cases: Sequence[Judged]) -> Html:
             continue
         axes.plot([b.confidence] * 2, [low, high], color=BLUE, lw=1.5)
         axes.plot(b.confidence, value, 'o', color=BLUE, ms=3.0 + 1.2 * np.sqrt(count))
-        axes.annotate(f'{count}', (b.confidence, value), (8, -9), textcoords='offset points',
-                      color=INK, fontsize=8, ha='right')  # fmt: skip
+        axes.annotate(
+            f'{count}',
+            (b.confidence, value),
+            (8, -9),
+            textcoords='offset points',
+            color=INK,
+            fontsize=8,
+            ha='right',
+        )
     axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel='confidence', ylabel='share that was right')
     return _svg(figure, 'Reliability: share of right verdicts over their confidence')
 
@@ -64,10 +71,12 @@ def outcome_plot(cases: Sequence[Judged]) -> Html:
     known = [c for c in cases if c.in_library]
     bottom = np.zeros(len(BINS))
     for outcome, colour in OUTCOMES.items():
-        height = np.array([
-            sum(low <= c.stratum < high and c.set == outcome for c in known)
-            for low, high, _ in BINS
-        ])  # fmt: skip
+        height = np.array(
+            [
+                sum(low <= c.stratum < high and c.set == outcome for c in known)
+                for low, high, _ in BINS
+            ]
+        )
         axes.bar([label for *_, label in BINS], height, 0.7, bottom, color=colour, label=outcome)
         bottom += height
     axes.legend(frameon=False, labelcolor=INK, fontsize=8)
@@ -111,5 +120,5 @@ def _svg(figure: Figure, title: str) -> Html:
     with matplotlib.rc_context({'svg.hashsalt': title, 'svg.fonttype': 'none'}):
         figure.savefig(stream, format='svg', transparent=True, metadata={'Date': None})
     text = stream.getvalue()
-    picture = text[text.index('<svg'):].replace(INK, 'currentColor')
+    picture = text[text.index('<svg') :].replace(INK, 'currentColor')
     return Html(picture.replace('<svg', f'<svg role="img" aria-label="{title}"', 1))

@@ -72,10 +72,12 @@ class Score:
         if self.own:
             return semi_real_measures(self.cases, self.own)
         return [
-            *verdict_measures(self.cases), alias_measure(self.cases, self.shrinks),
-            *calibration_measures(self.cases), *shrink_measures(self.known_shrinks),
+            *verdict_measures(self.cases),
+            alias_measure(self.cases, self.shrinks),
+            *calibration_measures(self.cases),
+            *shrink_measures(self.known_shrinks),
             *parameter_measures(self.cases),
-        ]  # fmt: skip
+        ]
 
     @property
     def known_shrinks(self) -> list[Achieved]:
@@ -93,26 +95,35 @@ class Score:
         told = [c for c in self.cases if c.status != 'error']
         bins = reliability([c.confidence for c in told], [c.right for c in told])
         return {
-            'made': self.made, 'count': len(self.cases),
+            'made': self.made,
+            'count': len(self.cases),
             'measures': [measure.as_dict() for measure in self.measures],
             'by_kind': by(self.cases, lambda c: c.kind),
             'by_stratum': by_stratum(self.cases),
             'by_robot': by(self.cases, lambda c: c.robot),
             'by_motion': by(self.cases, lambda c: c.motion),
-            'by_cause': by([c for c in self.cases if c.kind not in ('double', 'triple')],
-                           lambda c: f'{c.truth.partition(" ")[0]} ({c.kind})'),
+            'by_cause': by(
+                [c for c in self.cases if c.kind not in ('double', 'triple')],
+                lambda c: f'{c.truth.partition(" ")[0]} ({c.kind})',
+            ),
             'reliability': [{**b._asdict(), 'right': b.right._asdict()} for b in bins],
-            'costs': self.costs, 'errors': dict(self.errors), 'reasons': dict(self.reasons),
+            'costs': self.costs,
+            'errors': dict(self.errors),
+            'reasons': dict(self.reasons),
             'own': dict(self.own),
             'shrinks': {name: value._asdict() for name, value in self.shrinks.items()},
             'cases': [case.as_dict() for case in self.cases],
-        }  # fmt: skip
+        }
 
 
 def score(
-    cases: Path, truths: Path, results: Path, *, seal_given: str = '',
+    cases: Path,
+    truths: Path,
+    results: Path,
+    *,
+    seal_given: str = '',
     reasons: Mapping[str, str] | None = None,
-) -> Score:  # fmt: skip
+) -> Score:
     """
     Return the score of verdicts.
 
@@ -151,10 +162,14 @@ def score(
     told = {key: value for key, value in listed.items() if key not in ('schema', 'verdicts')}
     made = {'seed': layout.read(truths / layout.TRUTHS)['seed'], **told}
     return Score(
-        made, judged, shrinks,
-        _costs(list(verdicts.values())), reasons or {},
-        {name: verdict['error'] for name, verdict in verdicts.items() if verdict['error']}, own,
-    )  # fmt: skip
+        made,
+        judged,
+        shrinks,
+        _costs(list(verdicts.values())),
+        reasons or {},
+        {name: verdict['error'] for name, verdict in verdicts.items() if verdict['error']},
+        own,
+    )
 
 
 def _verdicts_on(cases: Path, results: Path) -> dict[str, Any]:
@@ -168,6 +183,8 @@ def _costs(verdicts: list[dict[str, Any]]) -> dict[str, float]:
     seconds = [verdict['seconds'] for verdict in verdicts]
     memory = [verdict['memory_bytes'] / MIB for verdict in verdicts]
     return {
-        'median_seconds': float(np.median(seconds)), 'most_seconds': float(np.max(seconds)),
-        'median_memory_mib': float(np.median(memory)), 'most_memory_mib': float(np.max(memory)),
-    }  # fmt: skip
+        'median_seconds': float(np.median(seconds)),
+        'most_seconds': float(np.max(seconds)),
+        'median_memory_mib': float(np.median(memory)),
+        'most_memory_mib': float(np.max(memory)),
+    }

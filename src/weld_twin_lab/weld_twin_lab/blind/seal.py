@@ -96,7 +96,5 @@ def _one(cases: Path, truths: Path, entry: Mapping[str, Any]) -> dict[str, Any]:
         if not place.is_dir():
             raise DataError(f"the {key} of {name} is missing: there is no '{place}'")
         if digest(place) != entry[key]:
-            raise DataError(
-                f"the {key} of {name} was changed after it was sealed; see '{place}'"
-            )
+            raise DataError(f"the {key} of {name} was changed after it was sealed; see '{place}'")
     return layout.read(truths / name / layout.TRUTH)

@@ -50,9 +50,12 @@ def sized(cell: Cell, cause: Cause, taken: Take, wanted: float) -> tuple[Cause, 
 
 
 def draw_causes(
-    cell: Cell, families: Sequence[str], strata: Sequence[int], taken: Take,
+    cell: Cell,
+    families: Sequence[str],
+    strata: Sequence[int],
+    taken: Take,
     rng: np.random.Generator,
-) -> tuple[list[Cause], list[float]]:  # fmt: skip
+) -> tuple[list[Cause], list[float]]:
     """
     Return causes of the families, and how many times the noise each is.
 
@@ -72,9 +75,13 @@ def draw_causes(
 
 
 def _one(
-    cell: Cell, family: str, stratum: tuple[float, float], taken: Take,
-    others: Sequence[Array], rng: np.random.Generator,
-) -> tuple[Cause, Array]:  # fmt: skip
+    cell: Cell,
+    family: str,
+    stratum: tuple[float, float],
+    taken: Take,
+    others: Sequence[Array],
+    rng: np.random.Generator,
+) -> tuple[Cause, Array]:
     if taken.command.static and family in MOVING:
         raise Unseen(f'{family} shows in motion only')
     span = float(taken.command.t[-1] - taken.command.t[0])

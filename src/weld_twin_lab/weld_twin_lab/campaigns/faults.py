@@ -47,9 +47,11 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
         recorded = _recorded(bag)
     passed = all(row['passed'] for row in rows) and all(row['refused'] for row in parameters)
     return {
-        'passed': passed and recorded['opens'], 'faults': rows, 'parameters': parameters,
+        'passed': passed and recorded['opens'],
+        'faults': rows,
+        'parameters': parameters,
         'bag': recorded,
-    }  # fmt: skip
+    }
 
 
 def _tried(bench: Any, fault: Any) -> dict[str, Any]:
@@ -87,21 +89,26 @@ def _recorded(bag: Any) -> dict[str, Any]:
 
 
 COLUMNS = {
-    'forward_kinematics_twin': 'twin', 'error_injector': 'injector',
-    'deviation_analyzer': 'analyzer', 'deviation_markers': 'markers',
-    'live_diagnosis': 'diagnosis', 'recorder': 'recorder',
-}  # fmt: skip
+    'forward_kinematics_twin': 'twin',
+    'error_injector': 'injector',
+    'deviation_analyzer': 'analyzer',
+    'deviation_markers': 'markers',
+    'live_diagnosis': 'diagnosis',
+    'recorder': 'recorder',
+}
 
 
 def table(result: dict[str, Any]) -> str:
     """Return what each node told under each fault, and what else there is to say."""
     rows = [
         (
-            row['fault'], *(row['nodes'].get(name, {}).get('told', '') for name in COLUMNS),
-            sum(node['wrong'] for node in row['nodes'].values()), 'yes' if row['passed'] else 'no',
+            row['fault'],
+            *(row['nodes'].get(name, {}).get('told', '') for name in COLUMNS),
+            sum(node['wrong'] for node in row['nodes'].values()),
+            'yes' if row['passed'] else 'no',
         )
         for row in result['faults']
-    ]  # fmt: skip
+    ]
     refused = sum(row['refused'] for row in result['parameters'])
     return markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows) + (
         f'\nAbsurd parameter values refused in a sentence: {refused} of '

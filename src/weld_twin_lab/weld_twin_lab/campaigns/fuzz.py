@@ -17,8 +17,13 @@ from weld_twin_nodes.report import markdown
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('--cases', type=int, default=5000, metavar='N',
-                        help='broken files of each kind (default: 5000)')  # fmt: skip
+    parser.add_argument(
+        '--cases',
+        type=int,
+        default=5000,
+        metavar='N',
+        help='broken files of each kind (default: 5000)',
+    )
     parser.add_argument('--seed', type=int, default=1, metavar='S')
     parser.add_argument('--only', default='', metavar='LIST', help='kinds, comma-separated')
 
@@ -51,16 +56,22 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
         tell(f'{name}: {outcome}')
     passed = not found and all(text.startswith('refused') for text in malicious.values())
     return {
-        'passed': passed, 'seed': args.seed, 'cases_of_each': args.cases,
-        'cpu_limit_s': CPU_LIMIT, 'memory_limit_mb': MEMORY_LIMIT / 1e6, 'kinds': kinds,
-        'findings': [asdict(finding) for finding in found.values()], 'malicious': malicious,
-    }  # fmt: skip
+        'passed': passed,
+        'seed': args.seed,
+        'cases_of_each': args.cases,
+        'cpu_limit_s': CPU_LIMIT,
+        'memory_limit_mb': MEMORY_LIMIT / 1e6,
+        'kinds': kinds,
+        'findings': [asdict(finding) for finding in found.values()],
+        'malicious': malicious,
+    }
 
 
 def table(result: dict[str, Any]) -> str:
     """Return a row for each kind of file."""
-    kinds = [(name, row['right'], row['refused'], row['wrong'])
-             for name, row in result['kinds'].items()]  # fmt: skip
+    kinds = [
+        (name, row['right'], row['refused'], row['wrong']) for name, row in result['kinds'].items()
+    ]
     outcomes = result['malicious'].values()
     refused = sum(text.startswith('refused') for text in outcomes)
     kinds.append(('malicious', 0, refused, len(outcomes) - refused))

@@ -25,9 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--times', type=int, default=200, metavar='N', help='kills (default: 200)')
     parser.add_argument('--seed', type=int, default=1, metavar='S')
     parser.add_argument(
-        '--longest', type=float, default=3.0, metavar='SECONDS',
+        '--longest',
+        type=float,
+        default=3.0,
+        metavar='SECONDS',
         help='latest moment of a kill (default: 3)',
-    )  # fmt: skip
+    )
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -60,13 +63,15 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     def share(chosen: list[dict[str, Any]]) -> dict[str, Any]:
         missing = [row['missing_s'] for row in chosen] or [0.0]
         return {
-            'kills': len(chosen), 'faults': sum(bool(row['fault']) for row in chosen),
+            'kills': len(chosen),
+            'faults': sum(bool(row['fault']) for row in chosen),
             'missing_s': {
-                'median': round(float(np.median(missing)), 3), 'max': round(max(missing), 3),
+                'median': round(float(np.median(missing)), 3),
+                'max': round(max(missing), 3),
             },
             'sent': sum(row['sent'] for row in chosen),
             'recovered': sum(row['recovered'] for row in chosen),
-        }  # fmt: skip
+        }
 
     groups = {
         storage: share([row for row in rows if row['storage'] == storage])

@@ -49,9 +49,13 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     worst = max(row['ratio'][key] for row in rates for key in COMPARED)
     return {
         'passed': worst <= LIMIT and all(row['twin']['lost'] == 0 for row in rates),
-        'limit': LIMIT, 'worst_ratio': worst, 'turns': args.turns, 'turn_s': args.seconds,
-        'rates': rates, 'beside_live_diagnosis': beside,
-    }  # fmt: skip
+        'limit': LIMIT,
+        'worst_ratio': worst,
+        'turns': args.turns,
+        'turn_s': args.seconds,
+        'rates': rates,
+        'beside_live_diagnosis': beside,
+    }
 
 
 def _at(
@@ -66,9 +70,7 @@ def _at(
     for contender in race.contenders:
         row[contender.name] = contender.result()
         tell(f'{rate:6.0f} Hz  {contender.name:10} {row[contender.name]}')
-    row['ratio'] = {
-        key: round(row['twin'][key] / row['relay'][key], 3) for key in COMPARED
-    }
+    row['ratio'] = {key: round(row['twin'][key] / row['relay'][key], 3) for key in COMPARED}
     tell(f'{rate:6.0f} Hz  twin / relay {row["ratio"]}')
     return row
 
@@ -118,16 +120,23 @@ def _job() -> Any:
 
 def table(result: dict[str, Any]) -> str:
     """Return a row for each rate: latency in ms, CPU time in us."""
+
     def ms(row: dict[str, float]) -> str:
         return f'{row["p50_us"] / 1e3:.2f} / {row["p99_us"] / 1e3:.2f}'
 
     head = 'Hz', 'relay p50 / p99', 'raw relay', 'twin', 'twin / relay'
-    return markdown.table((*head, 'CPU relay / twin', 'ratio'), *(
-        (
-            f'{row["rate_hz"]:g}', ms(row['relay']), ms(row['raw_relay']), ms(row['twin']),
-            f'{row["ratio"]["p50_us"]:.2f} / {row["ratio"]["p99_us"]:.2f}',
-            f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}',
-            f'{row["ratio"]["cpu_us"]:.2f}',
-        )
-        for row in result['rates']
-    ))  # fmt: skip
+    return markdown.table(
+        (*head, 'CPU relay / twin', 'ratio'),
+        *(
+            (
+                f'{row["rate_hz"]:g}',
+                ms(row['relay']),
+                ms(row['raw_relay']),
+                ms(row['twin']),
+                f'{row["ratio"]["p50_us"]:.2f} / {row["ratio"]["p99_us"]:.2f}',
+                f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}',
+                f'{row["ratio"]["cpu_us"]:.2f}',
+            )
+            for row in result['rates']
+        ),
+    )

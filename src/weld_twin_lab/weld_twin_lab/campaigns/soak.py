@@ -51,28 +51,40 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
             soak.finish()
             lost = losses(bag, soak.sent)
     result = {
-        'minutes': round(soak.sent / args.rate / 60.0, 2), 'rate_hz': args.rate,
-        'sent': soak.sent, 'cores': args.cores,
-        'nodes': nodes, 'health': health, 'recorded': lost,
+        'minutes': round(soak.sent / args.rate / 60.0, 2),
+        'rate_hz': args.rate,
+        'sent': soak.sent,
+        'cores': args.cores,
+        'nodes': nodes,
+        'health': health,
+        'recorded': lost,
         'cpu_share_total': round(sum(node['cpu_share'] for node in nodes.values()), 3),
-    }  # fmt: skip
+    }
     picture(Path(args.out).with_suffix('.png'), soak.samples)
     return {'passed': verdict(result, FLAT), **result}
 
 
 def table(result: dict[str, Any]) -> str:
     """Return a row for each node; what it missed is over all its inputs."""
+
     def missed(node: str) -> int:
         return sum(
-            row.get('missing', 0) for name, row in result['health'].items()
+            row.get('missing', 0)
+            for name, row in result['health'].items()
             if name.partition(': ')[0] == node
-        )  # fmt: skip
+        )
 
     head = ('node', 'share of a core', 'memory', 'its slope', 'messages missed')
-    return markdown.table(head, *(
-        (
-            name.replace('_', ' '), f'{100.0 * row["cpu_share"]:.0f} %',
-            f'{row["rss_mib"]:.0f} MiB', f'{row["rss_slope_mib_per_h"]:+.1f} MiB/h', missed(name),
-        )
-        for name, row in result['nodes'].items()
-    ))  # fmt: skip
+    return markdown.table(
+        head,
+        *(
+            (
+                name.replace('_', ' '),
+                f'{100.0 * row["cpu_share"]:.0f} %',
+                f'{row["rss_mib"]:.0f} MiB',
+                f'{row["rss_slope_mib_per_h"]:+.1f} MiB/h',
+                missed(name),
+            )
+            for name, row in result['nodes'].items()
+        ),
+    )

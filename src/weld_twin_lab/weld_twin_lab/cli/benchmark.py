@@ -13,10 +13,12 @@ import argparse
 import os
 
 ONE_THREAD = {
-    'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1', 'MKL_NUM_THREADS': '1',
+    'OMP_NUM_THREADS': '1',
+    'OPENBLAS_NUM_THREADS': '1',
+    'MKL_NUM_THREADS': '1',
     'XLA_FLAGS': '--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1',
     'JAX_PLATFORMS': 'cpu',
-}  # fmt: skip
+}
 """Read by the libraries when they are imported."""
 
 

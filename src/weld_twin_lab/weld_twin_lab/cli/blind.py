@@ -22,9 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         module = import_module(f'weld_twin_lab.cli.blind_jobs.{name.replace("-", "_")}')
         text = getdoc(module) or ''
         job = jobs.add_parser(
-            name, help=text.partition('\n')[0], description=text,
+            name,
+            help=text.partition('\n')[0],
+            description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
-        )  # fmt: skip
+        )
         module.add_arguments(job)
 
 

@@ -25,14 +25,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         module = import_module(f'{campaigns.__name__}.{name}')
         text = getdoc(module) or ''
         job = jobs.add_parser(
-            name, help=text.partition('\n')[0], description=text,
+            name,
+            help=text.partition('\n')[0],
+            description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
-        )  # fmt: skip
+        )
         module.add_arguments(job)
         job.add_argument(
-            '--out', required=True, metavar='FILE',
+            '--out',
+            required=True,
+            metavar='FILE',
             help='JSON file to write, or to replace if it is of the same campaign',
-        )  # fmt: skip
+        )
 
 
 def run(args: argparse.Namespace) -> int:

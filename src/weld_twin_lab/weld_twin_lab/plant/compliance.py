@@ -36,8 +36,10 @@ class Compliant:
     """
 
     def __init__(self, robot: Mapping, arm: Arm, causes: Causes, richness: float) -> None:
-        extra = [(float(item['mass']), np.array(item.get('com', [0.0] * 3), dtype=float))
-                 for item in causes.of('payload')]
+        extra = [
+            (float(item['mass']), np.array(item.get('com', [0.0] * 3), dtype=float))
+            for item in causes.of('payload')
+        ]
         self.robot, self.arm, self.richness = robot, arm, richness
         self.load = mujoco_model.load_from(robot, extra)
         self.width = causes.per_joint('backlash', 'width')
@@ -54,8 +56,9 @@ class Compliant:
         poses = np.random.default_rng(0).uniform(-np.pi, np.pi, (RATING_POSES, len(self.width)))
         return np.abs(self.torque(np.where(self.arm.sliding, 0.0, poses), None)).max(axis=0)
 
-    def stiffening(self, deflection: np.ndarray | float,
-                   peak: np.ndarray | float) -> np.ndarray | float:
+    def stiffening(
+        self, deflection: np.ndarray | float, peak: np.ndarray | float
+    ) -> np.ndarray | float:
         """Return stiffness over the stated one: softer at no load, harder at the peak."""
         gain = HARDENING * self.richness
         return 1.0 - 0.5 * gain + gain * (deflection / peak) ** 2

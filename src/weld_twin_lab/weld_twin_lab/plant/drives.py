@@ -77,14 +77,19 @@ def _rotor(lag: float, shaking: list, swing: list[float], richness: float) -> mu
     options = rollout.follower()
     if lag:
         loop = 1.0 / (LOOP_SHARE * richness * lag + 1e-6)
-        options |= {'stiffness': [rollout.HEAVY * loop / lag, 0.0, 0.0],
-                    'damping': [rollout.HEAVY * loop, 0.0, 0.0]}
+        options |= {
+            'stiffness': [rollout.HEAVY * loop / lag, 0.0, 0.0],
+            'damping': [rollout.HEAVY * loop, 0.0, 0.0],
+        }
     rotor.add_joint(axis=[0, 0, 1], **options)
     for item, reach in zip(shaking, swing, strict=True):
         k = _omega(item) ** 2
         cubic = HARDENING * richness * k / max(reach, 1e-9) ** 2
-        _wheel(rotor).add_joint(axis=[0, 0, 1], stiffness=[k, 0.0, cubic],
-                                damping=[2.0 * float(item['damping']) * _omega(item), 0.0, 0.0])
+        _wheel(rotor).add_joint(
+            axis=[0, 0, 1],
+            stiffness=[k, 0.0, cubic],
+            damping=[2.0 * float(item['damping']) * _omega(item), 0.0, 0.0],
+        )
     return spec.compile()
 
 

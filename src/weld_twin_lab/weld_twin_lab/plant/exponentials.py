@@ -97,18 +97,26 @@ def arm_from(robot: Mapping) -> Arm:
     def column(key: str) -> np.ndarray:
         return np.array([float(joint.get(key, 0.0)) for joint in joints])
 
-    rows = Rows(column('theta_offset'), column('d'), column('a'), column('alpha'),
-                np.zeros(len(joints)))
+    rows = Rows(
+        column('theta_offset'), column('d'), column('a'), column('alpha'), np.zeros(len(joints))
+    )
     sliding = np.array([joint.get('type', 'revolute') == 'prismatic' for joint in joints])
     names = tuple(joint['name'] for joint in joints)
-    return Arm(names, rows, sliding, convention == 'modified',
-               _frame(robot.get('base')), _frame(robot.get('tool')))
+    return Arm(
+        names,
+        rows,
+        sliding,
+        convention == 'modified',
+        _frame(robot.get('base')),
+        _frame(robot.get('tool')),
+    )
 
 
 def _frame(entry: Mapping | None) -> Motion:
     entry = entry or {}
-    return screws.from_quaternion(entry.get('quat_xyzw', [0.0, 0.0, 0.0, 1.0]),
-                                  entry.get('xyz', [0.0, 0.0, 0.0]))
+    return screws.from_quaternion(
+        entry.get('quat_xyzw', [0.0, 0.0, 0.0, 1.0]), entry.get('xyz', [0.0, 0.0, 0.0])
+    )
 
 
 def home(arm: Arm, rows: Rows | None = None) -> Home:
@@ -145,8 +153,13 @@ def home(arm: Arm, rows: Rows | None = None) -> Home:
 
     axis, point = stack(axes), stack(points)
     slides = arm.sliding[:, None]
-    return Home(np.where(slides, 0.0, axis), np.where(slides, axis, np.cross(point, axis)),
-                point, stack(acrosses), tuple(links))
+    return Home(
+        np.where(slides, 0.0, axis),
+        np.where(slides, axis, np.cross(point, axis)),
+        point,
+        stack(acrosses),
+        tuple(links),
+    )
 
 
 def flange(arm: Arm, at: Home, q: np.ndarray, wobble: np.ndarray | None = None) -> Motion:

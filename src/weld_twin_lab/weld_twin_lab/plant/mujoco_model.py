@@ -20,8 +20,8 @@ from .exponentials import Arm
 from .screws import Motion
 
 MASSLESS = 1e-6  # kg; MuJoCo wants some mass on every moving body
-GYRATION = 0.3   # radius of gyration of a link, whose inertia is not known, per length
-SMALL = 0.03     # m, the least radius of gyration
+GYRATION = 0.3  # radius of gyration of a link, whose inertia is not known, per length
+SMALL = 0.03  # m, the least radius of gyration
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 
 
@@ -68,8 +68,12 @@ def add_links(spec: mujoco.MjSpec, robot: Mapping, arm: Arm, load: Load) -> list
     # the wrench acts at a body's centre of mass, so the tool needs one, at its tip
     _weigh(tool, MASSLESS, np.zeros(3), 1e-9)
     if load.mass > 0.0:
-        _weigh(_add_body(tool, 'payload', screws.identity()), load.mass, load.com,
-               load.mass * SMALL ** 2)
+        _weigh(
+            _add_body(tool, 'payload', screws.identity()),
+            load.mass,
+            load.com,
+            load.mass * SMALL**2,
+        )
     return bodies
 
 
@@ -101,8 +105,7 @@ def add_hinge(body, arm: Arm, at: exponentials.Home, i: int, name: str, **option
     axis = at.v[i] if arm.sliding[i] else at.omega[i]
     kind = mujoco.mjtJoint.mjJNT_SLIDE if arm.sliding[i] else mujoco.mjtJoint.mjJNT_HINGE
     anchor = screws.compose(screws.inverse(link), Motion(np.eye(3), at.point[i])).position
-    return body.add_joint(name=name, type=kind, axis=link.rotation.T @ axis, pos=anchor,
-                          **options)
+    return body.add_joint(name=name, type=kind, axis=link.rotation.T @ axis, pos=anchor, **options)
 
 
 def rigid(robot: Mapping, arm: Arm, load: Load) -> mujoco.MjModel:
@@ -140,8 +143,15 @@ class Statics:
             tau[k] = -data.qfrc_bias
             if wrench is not None and wrench[k].any():
                 turn = data.xmat[self._tool].reshape(3, 3)
-                mujoco.mj_applyFT(self.model, data, turn @ wrench[k, :3], turn @ wrench[k, 3:],
-                                  data.xpos[self._tool], self._tool, tau[k])
+                mujoco.mj_applyFT(
+                    self.model,
+                    data,
+                    turn @ wrench[k, :3],
+                    turn @ wrench[k, 3:],
+                    data.xpos[self._tool],
+                    self._tool,
+                    tau[k],
+                )
         return tau
 
     def inertia(self, q: np.ndarray) -> np.ndarray:

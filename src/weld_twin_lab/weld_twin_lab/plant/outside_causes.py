@@ -26,16 +26,26 @@ from . import screws
 from .screws import Motion
 from .textbook_effects import Causes
 
-STUCK_AFTER = 0.3   # share of the wind-up that a jump leaves
-SLOW = 0.01         # rad/s, below which friction gives way smoothly
+STUCK_AFTER = 0.3  # share of the wind-up that a jump leaves
+SLOW = 0.01  # rad/s, below which friction gives way smoothly
 FLANK_TORQUE = 0.1  # share of the largest load at which the flank is certain
 JOINT_LEVEL = frozenset({'stick_slip', 'friction_wander', 'loaded_play', 'dress_pack'})
-OUTSIDE = JOINT_LEVEL | {'bearing_tilt', 'station_step', 'tool_slip', 'quadratic_scale',
-                         'column_bend'}
+OUTSIDE = JOINT_LEVEL | {
+    'bearing_tilt',
+    'station_step',
+    'tool_slip',
+    'quadratic_scale',
+    'column_bend',
+}
 
 
-def on_joints(causes: Causes, t: np.ndarray, q: np.ndarray,
-              torque: Callable[[], np.ndarray], rng: np.random.Generator) -> np.ndarray:
+def on_joints(
+    causes: Causes,
+    t: np.ndarray,
+    q: np.ndarray,
+    torque: Callable[[], np.ndarray],
+    rng: np.random.Generator,
+) -> np.ndarray:
     """
     Return the displacement of the links, shape (N, n) [rad or m].
 
@@ -84,7 +94,7 @@ def _stick_slip(q: np.ndarray, amplitude: float) -> np.ndarray:
 def _wander(t: np.ndarray, time_constant: float, rng: np.random.Generator) -> np.ndarray:
     """Return a stationary random walk of unit variance (Ornstein-Uhlenbeck) at the times."""
     keep = np.exp(-np.diff(t, prepend=t[0]) / time_constant)
-    kick = np.sqrt(1.0 - keep ** 2) * rng.standard_normal(len(t))
+    kick = np.sqrt(1.0 - keep**2) * rng.standard_normal(len(t))
     out, level = np.empty(len(t)), rng.standard_normal()
     for k in range(len(t)):
         level = keep[k] * level + kick[k]

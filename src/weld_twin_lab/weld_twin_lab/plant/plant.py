@@ -43,8 +43,14 @@ class _Cell:
         return float(self.course.command.t[0])
 
 
-def run(robot: Mapping, effects: Sequence[Mapping], command: Command, tracker: Tracker,
-        rng: np.random.Generator, richness: float = 1.0) -> PlantRecording:
+def run(
+    robot: Mapping,
+    effects: Sequence[Mapping],
+    command: Command,
+    tracker: Tracker,
+    rng: np.random.Generator,
+    richness: float = 1.0,
+) -> PlantRecording:
     """
     Move a robot with flaws and record it.
 
@@ -71,8 +77,9 @@ def run(robot: Mapping, effects: Sequence[Mapping], command: Command, tracker: T
         raise ValueError(f'richness must be within 0 and 3, got {richness}')
     arm = exponentials.arm_from(robot)
     if command.q.shape[1] != len(arm.names):
-        raise ValueError(f'the command moves {command.q.shape[1]} joints, '
-                         f'the robot has {len(arm.names)}')
+        raise ValueError(
+            f'the command moves {command.q.shape[1]} joints, the robot has {len(arm.names)}'
+        )
     causes = library.causes_from(effects, arm, KNOWN)
     cell = _Cell(robot, arm, causes, Course(command), richness)
     return _record(cell, tracker, rng)
@@ -95,11 +102,16 @@ def _record(cell: _Cell, instrument: Tracker, rng: np.random.Generator) -> Plant
     position, quaternion = sensors.observe(instrument, pose, sigma, rng)
     late = float(cell.causes.total('time_delay', 'delay')) + instrument.clock_offset
     return PlantRecording(
-        joint_stamps, cell.course.q(t_joint),
+        joint_stamps,
+        cell.course.q(t_joint),
         cell.course.q(t_joint, 1) if instrument.velocity else None,
-        stamps + late, position, quaternion,
+        stamps + late,
+        position,
+        quaternion,
         *sensors.wrench_stream(instrument, cell.course, rng),
-        *sensors.temperature_stream(instrument, cell.course, rng), static)
+        *sensors.temperature_stream(instrument, cell.course, rng),
+        static,
+    )
 
 
 def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
@@ -136,12 +148,14 @@ def _at_rest(cell: _Cell, compliant: Compliant, rng: np.random.Generator) -> np.
     command = cell.course.command
     q = command.q + library.gearing(cell.causes, command.q)
     give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, command.wrench)
-    return give + outside_causes.on_joints(cell.causes, command.t, q,
-                                    lambda: compliant.torque(q, command.wrench), rng)
+    return give + outside_causes.on_joints(
+        cell.causes, command.t, q, lambda: compliant.torque(q, command.wrench), rng
+    )
 
 
-def _in_motion(cell: _Cell, compliant: Compliant, lost: CubicSpline | None,
-               rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray | float]:
+def _in_motion(
+    cell: _Cell, compliant: Compliant, lost: CubicSpline | None, rng: np.random.Generator
+) -> Callable[[np.ndarray], np.ndarray | float]:
     """Return what gives as a function of time."""
     flawed = any(item['effect'] in outside_causes.JOINT_LEVEL for item in cell.causes.items)
     if compliant.rigid and not flawed:
@@ -151,8 +165,9 @@ def _in_motion(cell: _Cell, compliant: Compliant, lost: CubicSpline | None,
     motor = cell.course.q(grid) + (0.0 if lost is None else lost(grid))
     geared = motor + library.gearing(cell.causes, motor)
     wrench = cell.course.wrench(grid)
-    give = outside_causes.on_joints(cell.causes, grid, geared,
-                             lambda: compliant.torque(geared, wrench), rng)
+    give = outside_causes.on_joints(
+        cell.causes, grid, geared, lambda: compliant.torque(geared, wrench), rng
+    )
     if not compliant.rigid:
         give = give + tree.moving(compliant, grid, CubicSpline(grid, geared), wrench)
     return CubicSpline(grid, give)

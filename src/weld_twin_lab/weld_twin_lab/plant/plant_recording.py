@@ -36,8 +36,12 @@ class Command:
     def __post_init__(self) -> None:
         """Keep read-only copies of the arrays, of the right shape."""
         count = np.shape(self.t)[0]
-        for name, shape in (('t', (count,)), ('q', (count, np.shape(self.q)[-1])),
-                            ('wrench', (count, 6)), ('temperature', (count,))):
+        for name, shape in (
+            ('t', (count,)),
+            ('q', (count, np.shape(self.q)[-1])),
+            ('wrench', (count, 6)),
+            ('temperature', (count,)),
+        ):
             value = getattr(self, name)
             if value is None:
                 continue

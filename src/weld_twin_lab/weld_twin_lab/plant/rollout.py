@@ -7,8 +7,8 @@ import mujoco.rollout
 import numpy as np
 
 CHUNK = 30000
-HEAVY = 1e4     # kg m^2; a motor side this heavy feels nothing of what it drives
-SERVO = 200.0   # rad/s, of the spring that keeps a motor side on its course
+HEAVY = 1e4  # kg m^2; a motor side this heavy feels nothing of what it drives
+SERVO = 200.0  # rad/s, of the spring that keeps a motor side on its course
 
 
 def grid(start: float, end: float, step: float) -> np.ndarray:
@@ -23,7 +23,7 @@ def follower() -> dict:
     It has no damper: MuJoCo takes dampers into its step but not into its constraint forces, and
     on a mass this heavy the difference would rattle the gaps.
     """
-    return {'armature': HEAVY, 'stiffness': [HEAVY * SERVO ** 2, 0.0, 0.0]}
+    return {'armature': HEAVY, 'stiffness': [HEAVY * SERVO**2, 0.0, 0.0]}
 
 
 def follow(q: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -45,14 +45,19 @@ def follow(q: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
         To start with.
 
     """
-    acceleration = np.diff(q, 2, prepend=q[0], append=q[-1]) / step ** 2
+    acceleration = np.diff(q, 2, prepend=q[0], append=q[-1]) / step**2
     acceleration[0], acceleration[-1] = acceleration[1], acceleration[-2]
     velocity = (q[1] - q[0]) / step - step * acceleration[0]
-    return HEAVY * (acceleration + SERVO ** 2 * q), velocity
+    return HEAVY * (acceleration + SERVO**2 * q), velocity
 
 
-def run(model: mujoco.MjModel, start: np.ndarray, velocity: np.ndarray,
-        force: np.ndarray, pull: np.ndarray | None = None) -> np.ndarray:
+def run(
+    model: mujoco.MjModel,
+    start: np.ndarray,
+    velocity: np.ndarray,
+    force: np.ndarray,
+    pull: np.ndarray | None = None,
+) -> np.ndarray:
     """
     Return the joint positions at every step, the start included.
 
@@ -81,12 +86,13 @@ def run(model: mujoco.MjModel, start: np.ndarray, velocity: np.ndarray,
     mujoco.mj_getState(model, data, state, full)
     out = [np.array(start, dtype=float)[None]]
     for first in range(0, len(force) - 1, CHUNK):
-        control = np.ascontiguousarray(force[first:min(first + CHUNK, len(force) - 1)])
-        states, _ = mujoco.rollout.rollout(model, data, state[None], control[None],
-                                           control_spec=spec)
+        control = np.ascontiguousarray(force[first : min(first + CHUNK, len(force) - 1)])
+        states, _ = mujoco.rollout.rollout(
+            model, data, state[None], control[None], control_spec=spec
+        )
         # after a warning the rollout stands still, which would look like a recording
         if not np.isfinite(states).all() or any(entry.number for entry in data.warning):
             raise FloatingPointError('the simulated arm came apart; effects out of range?')
-        out.append(states[0, :, 1:1 + model.nv].copy())
+        out.append(states[0, :, 1 : 1 + model.nv].copy())
         state = states[0, -1].copy()
     return np.concatenate(out)

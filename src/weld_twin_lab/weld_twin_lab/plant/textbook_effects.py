@@ -18,13 +18,32 @@ from .exponentials import Arm, Rows
 from .screws import Motion
 
 REFERENCE_TEMPERATURE = 20.0
-ROW_EFFECTS = {'link_length': ('a', 'da'), 'link_offset': ('d', 'dd'),
-               'link_twist': ('alpha', 'dalpha'), 'axis_parallelism': ('beta', 'dbeta')}
+ROW_EFFECTS = {
+    'link_length': ('a', 'da'),
+    'link_offset': ('d', 'dd'),
+    'link_twist': ('alpha', 'dalpha'),
+    'axis_parallelism': ('beta', 'dbeta'),
+}
 LIBRARY = frozenset(ROW_EFFECTS) | {
-    'joint_offset', 'base_pose', 'tool_pose', 'gear_ratio', 'transmission_ripple',
-    'joint_coupling', 'backlash', 'joint_compliance', 'cartesian_compliance', 'payload',
-    'servo_lag', 'time_delay', 'thermal_growth', 'drift', 'vibration', 'quantization',
-    'measurement_scale', 'measurement_noise'}
+    'joint_offset',
+    'base_pose',
+    'tool_pose',
+    'gear_ratio',
+    'transmission_ripple',
+    'joint_coupling',
+    'backlash',
+    'joint_compliance',
+    'cartesian_compliance',
+    'payload',
+    'servo_lag',
+    'time_delay',
+    'thermal_growth',
+    'drift',
+    'vibration',
+    'quantization',
+    'measurement_scale',
+    'measurement_noise',
+}
 
 
 @dataclass(frozen=True)
@@ -63,8 +82,9 @@ class Causes:
     def total(self, effect: str, key: str, width: int | None = None) -> np.ndarray:
         """Return the sum of one parameter of a robot effect, a number or a vector (width,)."""
         zero = np.zeros(() if width is None else width)
-        return sum((np.asarray(item.get(key, zero), dtype=float) for item in self.of(effect)),
-                   start=zero)
+        return sum(
+            (np.asarray(item.get(key, zero), dtype=float) for item in self.of(effect)), start=zero
+        )
 
 
 def causes_from(effects: Sequence[Mapping], arm: Arm, known: frozenset[str]) -> Causes:
@@ -72,8 +92,9 @@ def causes_from(effects: Sequence[Mapping], arm: Arm, known: frozenset[str]) -> 
     causes = Causes(tuple(effects), arm.names)
     for item in causes.items:
         if item.get('effect') not in known:
-            raise ValueError(f'unknown effect {item.get("effect")!r}; '
-                             f'known: {", ".join(sorted(known))}')
+            raise ValueError(
+                f'unknown effect {item.get("effect")!r}; known: {", ".join(sorted(known))}'
+            )
         for key in ('joint', 'source'):
             if item.get(key) is not None:
                 causes.joint(item[key])
@@ -101,8 +122,7 @@ def warm_up(item: Mapping, t: np.ndarray, temperature: np.ndarray | None) -> np.
     return float(item['rise']) * (1.0 - np.exp(-t / float(item['time_constant'])))
 
 
-def rows_as_built(causes: Causes, arm: Arm, t: np.ndarray,
-                  temperature: np.ndarray | None) -> Rows:
+def rows_as_built(causes: Causes, arm: Arm, t: np.ndarray, temperature: np.ndarray | None) -> Rows:
     """Return the DH rows as they really are, each (n,), or (len(t), n) while they warm up."""
     rows = arm.rows
     for effect, (column, key) in ROW_EFFECTS.items():
@@ -132,8 +152,12 @@ def gearing(causes: Causes, q: np.ndarray) -> np.ndarray:
     error += causes.per_joint('joint_offset', 'offset')
     for item in causes.of('transmission_ripple'):
         i = causes.joint(item['joint'])
-        waves = np.broadcast_arrays(*(np.atleast_1d(np.asarray(item.get(key, 0.0), dtype=float))
-                                      for key in ('amplitude', 'order', 'phase')))
+        waves = np.broadcast_arrays(
+            *(
+                np.atleast_1d(np.asarray(item.get(key, 0.0), dtype=float))
+                for key in ('amplitude', 'order', 'phase')
+            )
+        )
         for amplitude, order, phase in zip(*waves, strict=True):
             error[..., i] += amplitude * np.sin(order * q[..., i] + phase)
     for item in causes.of('joint_coupling'):
@@ -151,13 +175,17 @@ def rounding(causes: Causes, q: np.ndarray) -> np.ndarray:
 
 def frames(causes: Causes, arm: Arm) -> tuple[Motion, Motion]:
     """Return the base in the world and the tool on the flange, as they really are."""
+
     def error(effect: str) -> Motion:
-        return screws.from_rotvec(causes.total(effect, 'rotvec', 3),
-                                  causes.total(effect, 'xyz', 3))
+        return screws.from_rotvec(
+            causes.total(effect, 'rotvec', 3), causes.total(effect, 'xyz', 3)
+        )
 
     base, tool = error('base_pose'), error('tool_pose')
-    return (Motion(base.rotation @ arm.base.rotation, arm.base.position + base.position),
-            Motion(arm.tool.rotation @ tool.rotation, arm.tool.position + tool.position))
+    return (
+        Motion(base.rotation @ arm.base.rotation, arm.base.position + base.position),
+        Motion(arm.tool.rotation @ tool.rotation, arm.tool.position + tool.position),
+    )
 
 
 def yielding(causes: Causes, pose: Motion, wrench: np.ndarray | None) -> Motion:

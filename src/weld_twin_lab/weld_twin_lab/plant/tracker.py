@@ -69,8 +69,9 @@ class Tracker:
     temperature_sigma: float = 0.0
 
 
-def instants(t: np.ndarray, rate: float | None, drop: float,
-             rng: np.random.Generator) -> np.ndarray:
+def instants(
+    t: np.ndarray, rate: float | None, drop: float, rng: np.random.Generator
+) -> np.ndarray:
     """Return true sampling instants within a command's times, some of them lost, (M,) [s]."""
     if rate is not None:
         # the sensor's clock does not start with the command's
@@ -91,8 +92,9 @@ def stamped(t: np.ndarray, jitter: float, rng: np.random.Generator) -> np.ndarra
     return t + np.clip(jitter * rng.standard_normal(len(t)), -limit, limit)
 
 
-def observe(tracker: Tracker, pose: Motion, sigma: float,
-            rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray | None]:
+def observe(
+    tracker: Tracker, pose: Motion, sigma: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray | None]:
     """
     Return what the tracker reads of true poses.
 

@@ -22,18 +22,19 @@ from . import exponentials, mujoco_model, rollout
 from .compliance import HARDENING, Compliant
 
 STEP = 1e-3
-DAMPING = 0.1         # damping ratio of a spring with the links beyond it
-EDGE_SHARE = 0.02     # share of the width that the edges of a gap give
-UNBALANCED = 0.2      # share of the load a counterbalance leaves to the gap
-GRIP = 2.0            # friction over the largest torque that would move a link by itself
-FASTEST = 0.5         # square of the fastest swing in radians per step
-COARSE = 0.02         # s, spacing at which torques are worth computing
+DAMPING = 0.1  # damping ratio of a spring with the links beyond it
+EDGE_SHARE = 0.02  # share of the width that the edges of a gap give
+UNBALANCED = 0.2  # share of the load a counterbalance leaves to the gap
+GRIP = 2.0  # friction over the largest torque that would move a link by itself
+FASTEST = 0.5  # square of the fastest swing in radians per step
+COARSE = 0.02  # s, spacing at which torques are worth computing
 SOFTEST = 10.0
-STIFFEST = 9e3        # of a gap's edge, in 1/(tc^2 inverse weight); MuJoCo allows 1e4
+STIFFEST = 9e3  # of a gap's edge, in 1/(tc^2 inverse weight); MuJoCo allows 1e4
 
 
-def moving(parts: Compliant, t: np.ndarray, motor: CubicSpline,
-           wrench: np.ndarray | None) -> np.ndarray:
+def moving(
+    parts: Compliant, t: np.ndarray, motor: CubicSpline, wrench: np.ndarray | None
+) -> np.ndarray:
     """
     Return gaps and springs of the moving arm, shape (N, n) [rad or m].
 
@@ -108,7 +109,7 @@ class Tree:
 
         No mode of the arm can then swing faster than the step can follow, whatever the links.
         """
-        return STEP ** 2 / (FASTEST * self.parts.compliance[i])
+        return STEP**2 / (FASTEST * self.parts.compliance[i])
 
     def _spring(self, i: int) -> dict:
         k = 1.0 / self.parts.compliance[i]
@@ -117,9 +118,12 @@ class Tree:
         idle = self.parts.stiffening(0.0, 1.0)
         light = self._light(i)
         damper = 2.0 * DAMPING * np.sqrt(k * (self.inertia[i] + light))
-        cubic = HARDENING * self.parts.richness * k / peak ** 2
-        return {'stiffness': [idle * k, 0.0, cubic], 'damping': [damper, 0.0, 0.0],
-                'armature': light}
+        cubic = HARDENING * self.parts.richness * k / peak**2
+        return {
+            'stiffness': [idle * k, 0.0, cubic],
+            'damping': [damper, 0.0, 0.0],
+            'armature': light,
+        }
 
     def friction(self, i: int) -> float:
         """Return the dry friction [N m] that makes the link stay where it was left."""
@@ -133,12 +137,23 @@ class Tree:
 
     def _add_gap(self, spec: mujoco.MjSpec, body, at: exponentials.Home, i: int) -> None:
         half = 0.5 * self.parts.width[i] * (1.0 - 2.0 * self._edge())
-        mujoco_model.add_hinge(body, self.parts.arm, at, i, f'gap{i}', armature=self._gear(i),
-                        limited=mujoco.mjtLimited.mjLIMITED_TRUE, range=[-half, half])
+        mujoco_model.add_hinge(
+            body,
+            self.parts.arm,
+            at,
+            i,
+            f'gap{i}',
+            armature=self._gear(i),
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            range=[-half, half],
+        )
         # dry friction against the link before: on motor plus gap, the gear's output
-        hold = spec.add_tendon(name=f'hold{i}', frictionloss=self.friction(i),
-                               solref_friction=[2.0 * STEP, 1.0],
-                               solimp_friction=[0.9999, 0.9999, 1e-3, 0.5, 2.0])
+        hold = spec.add_tendon(
+            name=f'hold{i}',
+            frictionloss=self.friction(i),
+            solref_friction=[2.0 * STEP, 1.0],
+            solimp_friction=[0.9999, 0.9999, 1e-3, 0.5, 2.0],
+        )
         hold.wrap_joint(f'motor{i}', 1.0)
         hold.wrap_joint(f'gap{i}', 1.0)
 

@@ -28,9 +28,14 @@ if TYPE_CHECKING:
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 _STYLE = 'figure { margin: 0 0 1.5rem; } figure img { width: 100%; background: #fff; }'
 _HEADS = (
-    'Fitted on; judged on', 'Frames only: mean / max', 'Got: mean / max', 'RMS', 'Orientation',
-    'Goal', 'Left: claimed (95 %) / got',
-)  # fmt: skip
+    'Fitted on; judged on',
+    'Frames only: mean / max',
+    'Got: mean / max',
+    'RMS',
+    'Orientation',
+    'Goal',
+    'Left: claimed (95 %) / got',
+)
 
 
 def robot_page(robot: str, sources: Sequence[Source], judged: Sequence[Judged]) -> str:
@@ -48,30 +53,44 @@ def robot_page(robot: str, sources: Sequence[Source], judged: Sequence[Judged]) 
     main = judged[-1]
     diagnosis = main.diagnosis
     body = tag(
-        'main', tag('header', tag('p', f'{robot.upper()} under a laser tracker', class_='kind')),
-        opening(diagnosis), _held_out(judged), _advice(main), _maps(main),
-        where_section(diagnosis), causes_section(diagnosis), _ripple(main), _blind(main),
-        shrink_section(diagnosis), checks_section(diagnosis), _recipe(sources),
-    )  # fmt: skip
+        'main',
+        tag('header', tag('p', f'{robot.upper()} under a laser tracker', class_='kind')),
+        opening(diagnosis),
+        _held_out(judged),
+        _advice(main),
+        _maps(main),
+        where_section(diagnosis),
+        causes_section(diagnosis),
+        _ripple(main),
+        _blind(main),
+        shrink_section(diagnosis),
+        checks_section(diagnosis),
+        _recipe(sources),
+    )
     css = (files('weld_twin_nodes.report') / 'page.css').read_text(encoding='utf-8')
-    head = joined([
-        tag('meta', charset='utf-8'),
-        tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
-        tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
-        tag('meta', name_='color-scheme', content='light dark'),
-        tag('title', f'{robot.upper()}: positional accuracy'), tag('style', Html(css + _STYLE)),
-    ])  # fmt: skip
+    head = joined(
+        [
+            tag('meta', charset='utf-8'),
+            tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
+            tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
+            tag('meta', name_='color-scheme', content='light dark'),
+            tag('title', f'{robot.upper()}: positional accuracy'),
+            tag('style', Html(css + _STYLE)),
+        ]
+    )
     return f'<!doctype html>\n{tag("html", tag("head", head), tag("body", body), lang="en")}\n'
 
 
 def _held_out(judged: Sequence[Judged]) -> Html:
     rows = [_row(each) for each in judged]
     return section(
-        'On poses never used for fitting', table(_HEADS, rows), id_='held-out',
+        'On poses never used for fitting',
+        table(_HEADS, rows),
+        id_='held-out',
         lead='Base and tool stay as fitted on the training poses. Left is RMS over RMS with only '
         'the frames fitted; claimed is what the diagnosis says of itself from stretches of its '
         'training poses.',
-    )  # fmt: skip
+    )
 
 
 def _row(judged: Judged) -> list[Child]:
@@ -83,19 +102,22 @@ def _row(judged: Judged) -> list[Child]:
         wanted.append(milliradians(goal.orientation_rad))
     low, high = judged.diagnosis.shrink.ci95
     return [
-        judged.split.title, f'{millimetres(before.mean_m)} / {millimetres(before.max_m)}',
-        f'{millimetres(after.mean_m)} / {millimetres(after.max_m)}', millimetres(after.rms_m),
+        judged.split.title,
+        f'{millimetres(before.mean_m)} / {millimetres(before.max_m)}',
+        f'{millimetres(after.mean_m)} / {millimetres(after.max_m)}',
+        millimetres(after.rms_m),
         milliradians(after.orientation_rms_rad),
         ', '.join(wanted) + (': reached' if judged.reached else ': missed'),
         f'{100 * low:.1f} to {100 * high:.1f} % / {100 * after.rms_m / before.rms_m:.1f} %'
         + ('' if judged.within else ', outside'),
-    ]  # fmt: skip
+    ]
 
 
 def _advice(judged: Judged) -> Html:
     items = [tag('li', text) for text in owner_advice(judged.diagnosis)]
-    return section('What an owner of this arm should do', tag('ul', *items, class_='sentences'),
-                   id_='owner')  # fmt: skip
+    return section(
+        'What an owner of this arm should do', tag('ul', *items, class_='sentences'), id_='owner'
+    )
 
 
 def _blind(judged: Judged) -> Html:
@@ -109,21 +131,29 @@ def _maps(judged: Judged) -> Html:
     picture = workspace(measured.position, judged.before_parts[:3], judged.after_parts[:3])
     share = percent(judged.after.rms_m / judged.before.rms_m)
     return section(
-        'The held-out poses from above', _figure(picture, f'{share} of the RMS error is left.'),
-        id_='maps', lead='The colour scales of the two maps differ.',
-    )  # fmt: skip
+        'The held-out poses from above',
+        _figure(picture, f'{share} of the RMS error is left.'),
+        id_='maps',
+        lead='The colour scales of the two maps differ.',
+    )
 
 
 def _ripple(judged: Judged) -> Html:
     diagnosis = judged.diagnosis
     return section(
         'Ripple of the gears',
-        _figure(ripple_over_range(diagnosis), 'What each gear does to its joint over the range '
-                'that was moved, offset and slope taken off.'),
-        _figure(ripple_spectrum(diagnosis), 'The same by order. Dense to order 100; above, only '
-                'lines that stand out by themselves.'),
+        _figure(
+            ripple_over_range(diagnosis),
+            'What each gear does to its joint over the range '
+            'that was moved, offset and slope taken off.',
+        ),
+        _figure(
+            ripple_spectrum(diagnosis),
+            'The same by order. Dense to order 100; above, only '
+            'lines that stand out by themselves.',
+        ),
         id_='ripple',
-    )  # fmt: skip
+    )
 
 
 def _figure(svg: str, caption: str) -> Html:
@@ -137,5 +167,9 @@ def _recipe(sources: Sequence[Source]) -> Html:
         tag('li', tag('b', source.path.name), ': ', '; '.join(source.assumptions))
         for source in sources
     ]
-    return section('How the tables were read', tag('ul', *items, class_='sentences'),
-                   tag('p', f'weld_twin {__version__}', class_='note'), id_='recipe')  # fmt: skip
+    return section(
+        'How the tables were read',
+        tag('ul', *items, class_='sentences'),
+        tag('p', f'weld_twin {__version__}', class_='note'),
+        id_='recipe',
+    )

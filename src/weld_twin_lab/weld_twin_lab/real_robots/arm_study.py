@@ -63,9 +63,10 @@ class Judged:
         """Return whether every goal of the split is reached."""
         goal, got = self.split.goal, self.after
         pairs = [
-            (goal.mean_m, got.mean_m), (goal.max_m, got.max_m),
+            (goal.mean_m, got.mean_m),
+            (goal.max_m, got.max_m),
             (goal.orientation_rad, got.orientation_rms_rad),
-        ]  # fmt: skip
+        ]
         return all(g is None or (v is not None and v <= g) for g, v in pairs)
 
 
@@ -125,12 +126,15 @@ def judge(split: Split, tell: Callable[[str], None] = lambda text: None) -> Judg
 def _entry(sources: tuple[Source, ...], judged: list[Judged]) -> dict[str, Any]:
     return {
         'tables': [
-            {'name': s.path.name, 'sha256': hashed('table', s.path).sha256,
-             'assumptions': list(s.assumptions)}
+            {
+                'name': s.path.name,
+                'sha256': hashed('table', s.path).sha256,
+                'assumptions': list(s.assumptions),
+            }
             for s in sources
         ],
         'splits': {each.split.name: _split(each) for each in judged},
-    }  # fmt: skip
+    }
 
 
 def _split(judged: Judged) -> dict[str, Any]:
@@ -142,7 +146,8 @@ def _split(judged: Judged) -> dict[str, Any]:
         'got': judged.after.as_dict(),
         'reached': judged.reached,
         'claimed': {
-            'ratio': diagnosis.shrink.ratio, 'ci95': list(diagnosis.shrink.ci95),
+            'ratio': diagnosis.shrink.ratio,
+            'ci95': list(diagnosis.shrink.ci95),
             'rms_after_m': diagnosis.shrink.rms_after_m,
         },
         'achieved_ratio': judged.after.rms_m / judged.before.rms_m,
@@ -155,9 +160,12 @@ def _split(judged: Judged) -> dict[str, Any]:
             {'effect': f.effect, 'named': f.named, 'rms_m': f.rms_m} for f in diagnosis.families
         ],
         'ripple': [
-            {'joint': r.joint, 'rms_rad': r.rms,
-             'strongest': [{'order': n, 'amplitude_rad': a} for n, a in r.lines]}
+            {
+                'joint': r.joint,
+                'rms_rad': r.rms,
+                'strongest': [{'order': n, 'amplitude_rad': a} for n, a in r.lines],
+            }
             for r in ripples(diagnosis)
         ],
         'seconds': round(judged.seconds, 1),
-    }  # fmt: skip
+    }

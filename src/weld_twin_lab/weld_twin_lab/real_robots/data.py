@@ -59,9 +59,7 @@ def tables(robot: str, directory: Path) -> tuple[Source, ...]:
     """
     names = (GRID, RANDOM) if robot == 'ur5' else (POSES,)
     model = catalog.load(robot)
-    return tuple(
-        Source(directory / name, *read_table(directory / name, model)) for name in names
-    )
+    return tuple(Source(directory / name, *read_table(directory / name, model)) for name in names)
 
 
 def ur5_splits(sources: tuple[Source, ...]) -> Iterator[Split]:
@@ -70,11 +68,23 @@ def ur5_splits(sources: tuple[Source, ...]) -> Iterator[Split]:
     count = _count(grid)
     yield Split('ur5_random', 'ur5', 'grid; 20 random poses', grid, random, Goal(58e-6, 115e-6))
     train, test = _shuffled(count)
-    yield Split('ur5_permuted', 'ur5', '80 % of the grid, shuffled; the rest',
-                part(grid, train), part(grid, test), Goal(50e-6))  # fmt: skip
+    yield Split(
+        'ur5_permuted',
+        'ur5',
+        '80 % of the grid, shuffled; the rest',
+        part(grid, train),
+        part(grid, test),
+        Goal(50e-6),
+    )
     cut = int(SHARE * count)
-    yield Split('ur5_last', 'ur5', 'first 80 % of the grid; the rest',
-                part(grid, np.arange(cut)), part(grid, np.arange(cut, count)), Goal(62e-6))
+    yield Split(
+        'ur5_last',
+        'ur5',
+        'first 80 % of the grid; the rest',
+        part(grid, np.arange(cut)),
+        part(grid, np.arange(cut, count)),
+        Goal(62e-6),
+    )
 
 
 def ur10_splits(sources: tuple[Source, ...]) -> Iterator[Split]:
@@ -82,12 +92,23 @@ def ur10_splits(sources: tuple[Source, ...]) -> Iterator[Split]:
     poses = sources[0].recording
     count = _count(poses)
     cut = 1 + int(SHARE * (count - 1))
-    yield Split('ur10_last', 'ur10', 'first 80 %; the rest', part(poses, np.arange(1, cut)),
-                part(poses, np.arange(cut, count)), Goal(65e-6, None, 0.20e-3))  # fmt: skip
+    yield Split(
+        'ur10_last',
+        'ur10',
+        'first 80 %; the rest',
+        part(poses, np.arange(1, cut)),
+        part(poses, np.arange(cut, count)),
+        Goal(65e-6, None, 0.20e-3),
+    )
     train, test = _shuffled(count)
-    yield Split('ur10_permuted', 'ur10', '80 %, shuffled; the rest',
-                part(poses, train[train != 0]), part(poses, test[test != 0]),
-                Goal(68e-6, 240e-6))  # fmt: skip
+    yield Split(
+        'ur10_permuted',
+        'ur10',
+        '80 %, shuffled; the rest',
+        part(poses, train[train != 0]),
+        part(poses, test[test != 0]),
+        Goal(68e-6, 240e-6),
+    )
 
 
 def part(recording: Recording, rows: Array) -> Recording:

@@ -67,8 +67,9 @@ def workspace(position: Array, before: Array, after: Array) -> str:
         figure.colorbar(dots, ax=axis, shrink=0.8)
     top = float(np.percentile(sizes[0], 99.0))
     for size, name, colour in zip(sizes, names, (COLOURS[1], COLOURS[0]), strict=True):
-        axes[2].hist(size, bins=np.linspace(0.0, top, 60), histtype='step', color=colour,
-                     label=name)  # fmt: skip
+        axes[2].hist(
+            size, bins=np.linspace(0.0, top, 60), histtype='step', color=colour, label=name
+        )
     axes[2].set(xlabel='error [mm]', ylabel='held-out poses')
     axes[2].legend(frameon=False, fontsize=8.0)
     return svg(figure)

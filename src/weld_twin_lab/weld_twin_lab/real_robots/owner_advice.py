@@ -81,7 +81,7 @@ def blind_spots(diagnosis: Diagnosis) -> list[str]:
     if _first(diagnosis, 'setup_settling') is not None:
         out.append(
             'Whether base, instrument or the arm itself crept while warming up: a common motion '
-            'of all poses is one and the same in these data. It is taken as the set-up\'s and not '
+            "of all poses is one and the same in these data. It is taken as the set-up's and not "
             'carried over to other recordings.'
         )
     return out

@@ -17,13 +17,15 @@ def data():
 
 @pytest.fixture
 def robot():
-    return Robot.from_mapping({
-        'name': 'two',
-        'joints': [
-            {'name': 'shoulder', 'a': 1.0, 'alpha': 0.3, 'd': 0.2, 'max_velocity': 3.0},
-            {'name': 'elbow', 'a': 0.5, 'lower': -3.0, 'upper': 3.0},
-        ],
-    })
+    return Robot.from_mapping(
+        {
+            'name': 'two',
+            'joints': [
+                {'name': 'shoulder', 'a': 1.0, 'alpha': 0.3, 'd': 0.2, 'max_velocity': 3.0},
+                {'name': 'elbow', 'a': 0.5, 'lower': -3.0, 'upper': 3.0},
+            ],
+        }
+    )
 
 
 @pytest.fixture
@@ -36,11 +38,13 @@ def recording():
         'cell',
         JointMotion(t, rng.normal(size=(400, 2)), rng.normal(size=(400, 2))),
         Measurements(
-            tm, rng.normal(size=(90, 3)), rotation_matrix(rng.normal(size=(90, 3))),
+            tm,
+            rng.normal(size=(90, 3)),
+            rotation_matrix(rng.normal(size=(90, 3))),
             rng.uniform(1e-5, 3e-5, 90),
         ),
         Signal(t[::2], rng.normal(size=(200, 6))),
         'base',
         Signal(t[::100], rng.uniform(20.0, 30.0, 4)),
         epoch_ns=1_700_000_000_123_456_789,
-    )  # fmt: skip
+    )

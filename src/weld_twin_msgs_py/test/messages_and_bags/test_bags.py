@@ -132,9 +132,14 @@ def test_poses_win_over_points_with_a_note(tmp_path, robot):
     make = bag_messages()
     pose = make.pose(SECOND, np.ones(3), np.eye(3))
     point = make.point(SECOND, np.zeros(3))
-    write_messages(tmp_path / 'bag', [
-        *joint_states([SECOND]), ('/measured/tool_point', point), ('/measured/tool_pose', pose),
-    ])  # fmt: skip
+    write_messages(
+        tmp_path / 'bag',
+        [
+            *joint_states([SECOND]),
+            ('/measured/tool_point', point),
+            ('/measured/tool_pose', pose),
+        ],
+    )
     back = read_recording(tmp_path / 'bag', robot)
     np.testing.assert_array_equal(back.measured.position, np.ones((1, 3)))
     assert "'/measured/tool_pose' is used, '/measured/tool_point' beside it is not" in back.notes
@@ -145,9 +150,13 @@ def test_results_are_written_beside_the_inputs(tmp_path, robot, recording):
     n = recording.joints.t.size
     twin = (np.ones((n, 3)), np.tile(np.eye(3), (n, 1, 1)))
     write_recording(
-        tmp_path / 'bag', recording, robot, actual=recording.joints.q + 1.0, twin=twin,
+        tmp_path / 'bag',
+        recording,
+        robot,
+        actual=recording.joints.q + 1.0,
+        twin=twin,
         deviation=m.position * 2.0,
-    )  # fmt: skip
+    )
     with BagReader(tmp_path / 'bag') as bag:
         deviations = [m.message.vector.x for m in bag.messages(['/deviation'])]
         actual = [m.message.position[1] for m in bag.messages(['/actual/joint_states'])]
@@ -216,12 +225,15 @@ def test_a_missing_bag_is_named(tmp_path, robot):
         read_recording(tmp_path / 'nowhere', robot)
 
 
-@pytest.mark.parametrize(('name', 'words'), [
-    ('notes.txt', 'expected a rosbag2 directory, a .mcap or a .db3 file'),
-    ('old.bag', 'is a ROS 1 bag; convert it with rosbags-convert first'),
-    ('empty.mcap', 'damaged or was cut short'),
-    ('empty.db3', 'damaged or was cut short'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('name', 'words'),
+    [
+        ('notes.txt', 'expected a rosbag2 directory, a .mcap or a .db3 file'),
+        ('old.bag', 'is a ROS 1 bag; convert it with rosbags-convert first'),
+        ('empty.mcap', 'damaged or was cut short'),
+        ('empty.db3', 'damaged or was cut short'),
+    ],
+)
 def test_files_that_are_no_bag_are_refused(tmp_path, robot, name, words):
     (tmp_path / name).write_bytes(b'')
     with pytest.raises(DataError, match=words):
@@ -362,9 +374,15 @@ def test_a_gripper_on_the_same_topic_is_passed_over(tmp_path, robot):
     assert back.notes == ("1 messages of '/joint_states' hold no joint of the robot",)
 
 
-@pytest.mark.parametrize(('frame', 'expected'), [
-    ('', 'tool'), ('tool0', 'tool'), ('base_link', 'base'), ('world', 'base'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('frame', 'expected'),
+    [
+        ('', 'tool'),
+        ('tool0', 'tool'),
+        ('base_link', 'base'),
+        ('world', 'base'),
+    ],
+)
 def test_the_wrench_is_in_the_frame_its_header_names(tmp_path, robot, frame, expected):
     wrench = bag_messages().wrench(SECOND, np.arange(6.0), frame)
     write_messages(tmp_path / 'bag', [*joint_states([SECOND]), ('/tool_wrench', wrench)])
@@ -378,9 +396,10 @@ def stations(spacing, seed=0):
     rng = np.random.default_rng(seed)
     t = np.arange(30) * spacing
     return Recording(
-        'stations', JointMotion(t, rng.uniform(-2.0, 2.0, (30, 2))),
+        'stations',
+        JointMotion(t, rng.uniform(-2.0, 2.0, (30, 2))),
         Measurements(t + 0.01 * spacing, rng.normal(size=(30, 3))),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize('spacing', [1.0, 60.0, 0.1])

@@ -22,88 +22,148 @@ JOINTS = [{'name': 'j0'}, {'name': 'j1'}]
 DATA = [
     (lambda: readonly('x', (None,), 'q'), "q must be numbers, got 'x'"),
     (lambda: readonly([[1]], (None,), 'q'), 'q must have shape (any), got (1, 1)'),
-    (lambda: readonly([1, np.nan, np.inf], (3,), 'q'),
-     'q has 2 value(s) that are not finite, the first at index (1,); drop or repair those '
-     'samples'),
-    (lambda: increasing([0, 1, 0.5], 't'),
-     't must increase, but sample 2 is 0.5 s before sample 1; sort the samples or drop the '
-     'repeated ones'),
-    (lambda: increasing([0, 1, 1], 't'),
-     't must increase, but sample 2 is at the same time as sample 1; sort the samples or drop the '
-     'repeated ones'),
+    (
+        lambda: readonly([1, np.nan, np.inf], (3,), 'q'),
+        'q has 2 value(s) that are not finite, the first at index (1,); drop or repair those '
+        'samples',
+    ),
+    (
+        lambda: increasing([0, 1, 0.5], 't'),
+        't must increase, but sample 2 is 0.5 s before sample 1; sort the samples or drop the '
+        'repeated ones',
+    ),
+    (
+        lambda: increasing([0, 1, 1], 't'),
+        't must increase, but sample 2 is at the same time as sample 1; sort the samples or drop the '
+        'repeated ones',
+    ),
     (lambda: JointMotion([], []), 'the joint stream is empty'),
-    (lambda: JointMotion([0.0], np.zeros((2, 6))),
-     'joint positions must have shape (1, any), got (2, 6)'),
-    (lambda: JointMotion([0.0], np.zeros((1, 6)), np.zeros((1, 5))),
-     'joint velocities must have shape (1, 6), got (1, 5)'),
-    (lambda: Measurements([0.0], [[0, 0, 0]], sigma=[-1.0]),
-     'sigma of the measurements is negative at sample 0'),
+    (
+        lambda: JointMotion([0.0], np.zeros((2, 6))),
+        'joint positions must have shape (1, any), got (2, 6)',
+    ),
+    (
+        lambda: JointMotion([0.0], np.zeros((1, 6)), np.zeros((1, 5))),
+        'joint velocities must have shape (1, 6), got (1, 5)',
+    ),
+    (
+        lambda: Measurements([0.0], [[0, 0, 0]], sigma=[-1.0]),
+        'sigma of the measurements is negative at sample 0',
+    ),
     (lambda: Signal([], []), 'a signal is empty; leave it out of the recording'),
     (lambda: Signal([0.0], np.zeros((1, 3))), 'signal values must have shape (1, 6), got (1, 3)'),
-    (lambda: Recording('r', MOTION, wrench_frame='world'),
-     "wrench_frame must be one of tool, base, got 'world'"),
-    (lambda: Recording('r', MOTION, wrench=Signal([0.0], [1.0])),
-     "wrench of recording 'r' must have shape (K, 6), got (1,)"),
-    (lambda: Recording('r', MOTION, temperature=Signal([0.0], np.zeros((1, 6)))),
-     "temperature of recording 'r' must have shape (K,), got (1, 6)"),
-]  # fmt: skip
+    (
+        lambda: Recording('r', MOTION, wrench_frame='world'),
+        "wrench_frame must be one of tool, base, got 'world'",
+    ),
+    (
+        lambda: Recording('r', MOTION, wrench=Signal([0.0], [1.0])),
+        "wrench of recording 'r' must have shape (K, 6), got (1,)",
+    ),
+    (
+        lambda: Recording('r', MOTION, temperature=Signal([0.0], np.zeros((1, 6)))),
+        "temperature of recording 'r' must have shape (K,), got (1, 6)",
+    ),
+]
 
 ROBOTS = [
     ([], 'a robot file must be a mapping of keys, got list'),
     ({'name': 'r'}, "robot 'r' needs a list 'joints' in chain order"),
     ({'name': 'r', 'joints': [{'a': 1}]}, "joint 0 of robot 'r' needs a 'name'"),
-    ({'name': 'r', 'joints': JOINTS * 2},
-     "robot 'r' uses a joint name twice: ('j0', 'j1', 'j0', 'j1')"),
-    ({'name': 'r', 'joints': [{'name': 'j0', 'type': 'ball'}]},
-     "joint 'j0': type must be revolute or prismatic, got 'ball'"),
-    ({'name': 'r', 'joints': [{'name': 'j0', 'a': 'long'}]},
-     "robot 'r': a of robot 'r' must be numbers, got ['long']"),
-    ({'name': 'r', 'joints': JOINTS, 'links': [{'mass': 1.0}]},
-     "robot 'r' has 1 links for 2 joints; give one per joint"),
-    ({'name': 'r', 'joints': JOINTS, 'convention': 'craig'},
-     "convention of robot 'r' must be one of standard, modified, got 'craig'"),
-    ({'name': 'r', 'joints': JOINTS, 'tool': {'quat_xyzw': [0, 0, 0, 0]}},
-     "robot 'r': tool quat_xyzw 0 has length 0, a rotation needs 1; check the order (x y z w) and "
-     'that it is not left at zero'),
-    ({'name': 'r', 'joints': [{'name': 'j0', 'lower': 1.0, 'upper': -1.0}]},
-     "joint 'j0': lower limit is not below upper"),
-]  # fmt: skip
+    (
+        {'name': 'r', 'joints': JOINTS * 2},
+        "robot 'r' uses a joint name twice: ('j0', 'j1', 'j0', 'j1')",
+    ),
+    (
+        {'name': 'r', 'joints': [{'name': 'j0', 'type': 'ball'}]},
+        "joint 'j0': type must be revolute or prismatic, got 'ball'",
+    ),
+    (
+        {'name': 'r', 'joints': [{'name': 'j0', 'a': 'long'}]},
+        "robot 'r': a of robot 'r' must be numbers, got ['long']",
+    ),
+    (
+        {'name': 'r', 'joints': JOINTS, 'links': [{'mass': 1.0}]},
+        "robot 'r' has 1 links for 2 joints; give one per joint",
+    ),
+    (
+        {'name': 'r', 'joints': JOINTS, 'convention': 'craig'},
+        "convention of robot 'r' must be one of standard, modified, got 'craig'",
+    ),
+    (
+        {'name': 'r', 'joints': JOINTS, 'tool': {'quat_xyzw': [0, 0, 0, 0]}},
+        "robot 'r': tool quat_xyzw 0 has length 0, a rotation needs 1; check the order (x y z w) and "
+        'that it is not left at zero',
+    ),
+    (
+        {'name': 'r', 'joints': [{'name': 'j0', 'lower': 1.0, 'upper': -1.0}]},
+        "joint 'j0': lower limit is not below upper",
+    ),
+]
 
 EFFECTS = [
     ('backlash', "an effect must be a mapping with the key 'effect', got 'backlash'"),
-    ({'effect': 'joint_offset', 'joint': 'j9'},
-     "robot 'ur5' has no joint 'j9'; its joints are j0, j1, j2, j3, j4, j5"),
+    (
+        {'effect': 'joint_offset', 'joint': 'j9'},
+        "robot 'ur5' has no joint 'j9'; its joints are j0, j1, j2, j3, j4, j5",
+    ),
     ({'effect': 'joint_offset', 'joint': None}, 'joint_offset needs a joint'),
-    ({'effect': 'joint_offset'},
-     "effect 'joint_offset': JointOffset.__init__() missing 1 required positional argument: "
-     "'joint'"),
-    ({'effect': 'joint_offset', 'joint': 'j0', 'angle': 1.0},
-     "effect 'joint_offset' has no parameter 'angle'; it takes joint, offset"),
-    ({'effect': 'joint_offset', 'joint': 'j0', 'offset': 'big'},
-     "effect 'joint_offset': offset must be a number, got 'big'"),
-    ({'effect': 'joint_offset', 'joint': 'j0', 'offset': [1.0, 2.0]},
-     "effect 'joint_offset': offset must be one number, got [1.0, 2.0]"),
-    ({'effect': 'joint_offset', 'joint': 'j0', 'offset': float('nan')},
-     'joint_offset: offset is not finite'),
-    ({'effect': 'base_pose', 'xyz': [0.0, 1.0]},
-     "effect 'base_pose': xyz must be 3 numbers, got [0.0, 1.0]"),
-    ({'effect': 'backlash', 'joint': 'j0', 'width': -1e-3},
-     'backlash: width = -0.001 rad is outside [0, inf]'),
-    ({'effect': 'backlash', 'joint': 'j0', 'form': 'gap'},
-     "backlash: form must be one of ('play', 'reversal', 'coast'), got 'gap'"),
+    (
+        {'effect': 'joint_offset'},
+        "effect 'joint_offset': JointOffset.__init__() missing 1 required positional argument: "
+        "'joint'",
+    ),
+    (
+        {'effect': 'joint_offset', 'joint': 'j0', 'angle': 1.0},
+        "effect 'joint_offset' has no parameter 'angle'; it takes joint, offset",
+    ),
+    (
+        {'effect': 'joint_offset', 'joint': 'j0', 'offset': 'big'},
+        "effect 'joint_offset': offset must be a number, got 'big'",
+    ),
+    (
+        {'effect': 'joint_offset', 'joint': 'j0', 'offset': [1.0, 2.0]},
+        "effect 'joint_offset': offset must be one number, got [1.0, 2.0]",
+    ),
+    (
+        {'effect': 'joint_offset', 'joint': 'j0', 'offset': float('nan')},
+        'joint_offset: offset is not finite',
+    ),
+    (
+        {'effect': 'base_pose', 'xyz': [0.0, 1.0]},
+        "effect 'base_pose': xyz must be 3 numbers, got [0.0, 1.0]",
+    ),
+    (
+        {'effect': 'backlash', 'joint': 'j0', 'width': -1e-3},
+        'backlash: width = -0.001 rad is outside [0, inf]',
+    ),
+    (
+        {'effect': 'backlash', 'joint': 'j0', 'form': 'gap'},
+        "backlash: form must be one of ('play', 'reversal', 'coast'), got 'gap'",
+    ),
     ({'effect': 'joint_coupling', 'joint': 'j0'}, 'joint_coupling needs a source joint'),
-    ({'effect': 'joint_coupling', 'joint': 'j0', 'source': 'j0'},
-     'joint_coupling: source and joint are the same; use gear_ratio'),
-    ({'effect': 'thermal_growth', 'links': 'j0'},
-     "thermal_growth: links must be a list, got 'j0'"),
-    ({'effect': 'thermal_growth', 'reference': 'warm'},
-     "thermal_growth: reference must be a number, got 'warm'"),
-    ({'effect': 'thermal_growth', 'warmup': [10.0, 0.0]},
-     'thermal_growth: warmup must be [rise in K, time constant in s above zero], got [10.0, 0.0]'),
-    ({'effect': 'transmission_ripple', 'joint': 'j0', 'amplitude': [1, 2], 'order': [1, 2, 3]},
-     'transmission_ripple: amplitude, order and phase must be numbers or lists of one length, '
-     'got lengths [2, 3]'),
-]  # fmt: skip
+    (
+        {'effect': 'joint_coupling', 'joint': 'j0', 'source': 'j0'},
+        'joint_coupling: source and joint are the same; use gear_ratio',
+    ),
+    (
+        {'effect': 'thermal_growth', 'links': 'j0'},
+        "thermal_growth: links must be a list, got 'j0'",
+    ),
+    (
+        {'effect': 'thermal_growth', 'reference': 'warm'},
+        "thermal_growth: reference must be a number, got 'warm'",
+    ),
+    (
+        {'effect': 'thermal_growth', 'warmup': [10.0, 0.0]},
+        'thermal_growth: warmup must be [rise in K, time constant in s above zero], got [10.0, 0.0]',
+    ),
+    (
+        {'effect': 'transmission_ripple', 'joint': 'j0', 'amplitude': [1, 2], 'order': [1, 2, 3]},
+        'transmission_ripple: amplitude, order and phase must be numbers or lists of one length, '
+        'got lengths [2, 3]',
+    ),
+]
 
 
 @pytest.mark.parametrize(('call', 'sentence'), DATA)
@@ -139,9 +199,12 @@ def test_thermal_growth_without_any_temperature_is_refused(arm):
 
 
 def test_positions_in_degrees_are_recognised():
-    robot = Robot.from_mapping({
-        'name': 'r', 'joints': [{'name': 'j0', 'lower': -3.0, 'upper': 3.0}],
-    })  # fmt: skip
+    robot = Robot.from_mapping(
+        {
+            'name': 'r',
+            'joints': [{'name': 'j0', 'lower': -3.0, 'upper': 3.0}],
+        }
+    )
     robot.check_positions(np.array([[3.0], [-3.0]]))
     with pytest.raises(DataError) as error:
         robot.check_positions(np.array([[0.0], [90.0]]))
@@ -171,8 +234,13 @@ def test_a_robot_survives_its_file(robot):
 
 @pytest.mark.parametrize('name', sorted(REGISTRY))
 def test_an_effect_survives_its_file(name, arm):
-    given = {'joint': 'j1', 'source': 'j2', 'links': ['j0'], 'warmup': [1.0, 2.0],
-             'form': 'reversal'}  # fmt: skip
+    given = {
+        'joint': 'j1',
+        'source': 'j2',
+        'links': ['j0'],
+        'warmup': [1.0, 2.0],
+        'form': 'reversal',
+    }
     kind = REGISTRY[name]
     fields = set(kind.__dataclass_fields__)
     entry = {'effect': name} | {key: value for key, value in given.items() if key in fields}
@@ -194,9 +262,18 @@ def test_nobody_can_change_a_model_or_a_recording_afterwards(arm):
     mine[:] = xyz[:] = 1.0
     assert not motion.q.any()
     assert not base.xyz.any()
-    for array in (motion.q, motion.t, motion.velocity, base.xyz, arm.a, arm.T_world_base, arm.com,
-                  arm.prismatic, Signal([0.0], [1.0]).value,
-                  Measurements([0.0], [[0, 0, 0]]).position):  # fmt: skip
+    for array in (
+        motion.q,
+        motion.t,
+        motion.velocity,
+        base.xyz,
+        arm.a,
+        arm.T_world_base,
+        arm.com,
+        arm.prismatic,
+        Signal([0.0], [1.0]).value,
+        Measurements([0.0], [[0, 0, 0]]).position,
+    ):
         with pytest.raises(ValueError, match='read-only'):
             array[...] = 1.0
     with pytest.raises(AttributeError):
@@ -206,8 +283,10 @@ def test_nobody_can_change_a_model_or_a_recording_afterwards(arm):
 def test_running_the_twin_leaves_its_inputs_alone(arm, make_recording):
     recording = make_recording(arm)
     at = np.array(recording.joints.t)
-    entries = [{'effect': 'backlash', 'joint': 'j1', 'width': 0.1},
-               {'effect': 'time_delay', 'delay': 0.1}]  # fmt: skip
+    entries = [
+        {'effect': 'backlash', 'joint': 'j1', 'width': 0.1},
+        {'effect': 'time_delay', 'delay': 0.1},
+    ]
     Twin(arm, effects_from_list(entries, arm)).linearise(recording, at)
     np.testing.assert_array_equal(at, recording.joints.t)
 
@@ -215,11 +294,17 @@ def test_running_the_twin_leaves_its_inputs_alone(arm, make_recording):
 def test_core_imports_neither_ros_nor_files_nor_pictures():
     program = (
         'import sys, time; start = time.perf_counter(); import weld_twin_core.twin.twin, '
-        'weld_twin_core.metrics.deviation, weld_twin_core.metrics.iso9283; took = time.perf_counter() - start; '
+        'weld_twin_core.metrics.deviation, weld_twin_core.metrics.iso9283; '
+        'took = time.perf_counter() - start; '
         'print(took, *sorted({name.split(".")[0] for name in sys.modules}))'
     )
-    run = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
-                         check=True, env={'PYTHONPATH': ':'.join(sys.path)})  # fmt: skip
+    run = subprocess.run(
+        [sys.executable, '-c', program],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={'PYTHONPATH': ':'.join(sys.path)},
+    )
     took, *modules = run.stdout.split()
     barred = {'rclpy', 'rosbags', 'yaml', 'matplotlib', 'SALib', 'pandas', 'weld_twin_msgs_py'}
     assert not barred & set(modules)

@@ -32,20 +32,28 @@ def cdr(message, little=True):
 SAMPLES = {
     'geometry_msgs/msg/PoseStamped': (
         MAKE.pose(NS, np.arange(3.0), TURN, 'tracker'),
-        lambda m: [*from_messages.pose(m)[0], *from_messages.pose(m)[1].flat]),
+        lambda m: [*from_messages.pose(m)[0], *from_messages.pose(m)[1].flat],
+    ),
     'geometry_msgs/msg/PointStamped': (MAKE.point(NS, np.arange(3.0), 'a'), from_messages.point),
-    'geometry_msgs/msg/Vector3Stamped': (MAKE.vector3(NS, np.arange(3.0), ''), from_messages.vector3),
+    'geometry_msgs/msg/Vector3Stamped': (
+        MAKE.vector3(NS, np.arange(3.0), ''),
+        from_messages.vector3,
+    ),
     'geometry_msgs/msg/WrenchStamped': (MAKE.wrench(NS, np.arange(6.0)), from_messages.wrench),
     'sensor_msgs/msg/Temperature': (MAKE.temperature(NS, 21.5, 'arm'), from_messages.temperature),
     'trajectory_msgs/msg/JointTrajectory': (
         MAKE.joint_trajectory(NS, ('b', 'a'), MOTION),
-        lambda m: from_messages.joint_trajectory(m, ('a', 'b')).q),
+        lambda m: from_messages.joint_trajectory(m, ('a', 'b')).q,
+    ),
     'nav_msgs/msg/Path': (
-        MAKE.path(NS, np.tile(np.eye(4), (3, 1, 1)), 'world'), from_messages.path_points),
+        MAKE.path(NS, np.tile(np.eye(4), (3, 1, 1)), 'world'),
+        from_messages.path_points,
+    ),
     'std_msgs/msg/String': (
         TYPES.types['std_msgs/msg/String'](data='<robot name="Schweißer"/>'),
-        lambda m: [ord(c) for c in m.data]),
-}  # fmt: skip
+        lambda m: [ord(c) for c in m.data],
+    ),
+}
 
 
 @pytest.mark.parametrize('kind', READERS)
@@ -61,8 +69,10 @@ def test_every_input_type_reads_as_rosbags_wrote_it(kind, little):
 
 @given(
     st.lists(st.text('ab_c/', min_size=1, max_size=9), unique=True, max_size=8),
-    st.text('world', max_size=6), st.booleans(), st.booleans(),
-)  # fmt: skip
+    st.text('world', max_size=6),
+    st.booleans(),
+    st.booleans(),
+)
 def test_joint_states_read_the_same_the_first_time_and_again(names, frame, fast, little):
     decode_joints = JointStateDecoder()
     for k in range(3):

@@ -110,9 +110,14 @@ def test_nan_in_a_point_is_refused(make):
         from_messages.point(make.point(NS, np.array([0.0, np.nan, 0.0])))
 
 
-@pytest.mark.parametrize(('celsius', 'words'), [
-    (np.nan, 'no temperature'), (-300.0, 'no temperature'), (296.0, 'looks like kelvin'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('celsius', 'words'),
+    [
+        (np.nan, 'no temperature'),
+        (-300.0, 'no temperature'),
+        (296.0, 'looks like kelvin'),
+    ],
+)
 def test_impossible_temperatures_are_refused(make, celsius, words):
     with pytest.raises(DataError, match=words):
         from_messages.temperature(make.temperature(NS, celsius))

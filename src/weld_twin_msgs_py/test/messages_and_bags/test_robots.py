@@ -108,8 +108,10 @@ def test_a_urdf_written_and_read_again_has_the_same_poses(case, tmp_path):
 def test_pinocchio_reads_our_urdf_of_a_bundled_robot_with_its_gear_errors(name, tmp_path):
     nominal = catalog.load(name)
     rng = np.random.default_rng(3)
-    shifts = {key: getattr(nominal, key) + rng.normal(0.0, 1e-3, nominal.n)
-              for key in ('a', 'd', 'alpha', 'theta', 'beta')}  # fmt: skip
+    shifts = {
+        key: getattr(nominal, key) + rng.normal(0.0, 1e-3, nominal.n)
+        for key in ('a', 'd', 'alpha', 'theta', 'beta')
+    }
     robot = Robot(**{**nominal.__dict__, **shifts})
     write_urdf(tmp_path / 'r.urdf', robot)
     reference = Reference(tmp_path / 'r.urdf', 'world', 'tool', robot.joint_names)
@@ -129,8 +131,17 @@ def test_nearly_parallel_axes_keep_their_numbers_small(tmp_path):
 
 
 def test_modified_convention_is_written_exactly(tmp_path):
-    rows = [{'name': f'j{k}', 'a': 0.1 * k, 'alpha': 0.7 - k, 'd': 0.3, 'theta_offset': 0.2 * k,
-             'type': 'prismatic' if k == 1 else 'revolute'} for k in range(4)]  # fmt: skip
+    rows = [
+        {
+            'name': f'j{k}',
+            'a': 0.1 * k,
+            'alpha': 0.7 - k,
+            'd': 0.3,
+            'theta_offset': 0.2 * k,
+            'type': 'prismatic' if k == 1 else 'revolute',
+        }
+        for k in range(4)
+    ]
     robot = Robot.from_mapping({'name': 'm', 'convention': 'modified', 'joints': rows})
     write_urdf(tmp_path / 'm.urdf', robot)
     q = random_positions(robot)
@@ -155,21 +166,26 @@ def test_exponents_without_a_point_are_numbers(tmp_path):
 BOMB = 'a: &a [x, x]\nb: &b [*a, *a]\n'
 
 
-@pytest.mark.parametrize(('text', 'words'), [
-    ('name: r\njoints: [\n', "robot file '{}' line 3: "),
-    ('name: r\njoints:\n- {name: j, a: 1}\n- {name: j, a: 1}\n', 'uses a joint name twice'),
-    ('name: r\nname: s\n', "robot file '{}' line 2: the key 'name' is given twice"),
-    (BOMB, "robot file '{}' line 2: aliases are not accepted"),
-    ('name: !!python/object:os.system x\n', 'could not determine a constructor'),
-    ('name: r\njoints:\n- {name: j, alpha: 90}\n',
-     "robot file '{}': joint 'j': alpha is 90, which looks like degrees in a radian field"),
-    ('name: r\njoints:\n- {name: j, lower: -170, upper: 170}\n', 'lower is -170, which looks'),
-    ('name: r\njoints:\n- {name: j, a: 425}\n', 'a is 425, which looks like millimetres'),
-    ('name: r\njoints:\n- {name: j, b: 1}\n', "joint 'j' has the unknown key 'b'"),
-    ('', 'a robot file must be a mapping of keys, got NoneType'),
-    ('[' * 100_000, 'nested too deeply'),
-    ('x' * 1_100_000, 'is larger than 1 MB'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('name: r\njoints: [\n', "robot file '{}' line 3: "),
+        ('name: r\njoints:\n- {name: j, a: 1}\n- {name: j, a: 1}\n', 'uses a joint name twice'),
+        ('name: r\nname: s\n', "robot file '{}' line 2: the key 'name' is given twice"),
+        (BOMB, "robot file '{}' line 2: aliases are not accepted"),
+        ('name: !!python/object:os.system x\n', 'could not determine a constructor'),
+        (
+            'name: r\njoints:\n- {name: j, alpha: 90}\n',
+            "robot file '{}': joint 'j': alpha is 90, which looks like degrees in a radian field",
+        ),
+        ('name: r\njoints:\n- {name: j, lower: -170, upper: 170}\n', 'lower is -170, which looks'),
+        ('name: r\njoints:\n- {name: j, a: 425}\n', 'a is 425, which looks like millimetres'),
+        ('name: r\njoints:\n- {name: j, b: 1}\n', "joint 'j' has the unknown key 'b'"),
+        ('', 'a robot file must be a mapping of keys, got NoneType'),
+        ('[' * 100_000, 'nested too deeply'),
+        ('x' * 1_100_000, 'is larger than 1 MB'),
+    ],
+)
 def test_bad_robot_files_are_refused_in_one_sentence(tmp_path, text, words):
     path = tmp_path / 'r.yaml'
     path.write_text(text)
@@ -191,26 +207,41 @@ def turning(kind='revolute', inside=''):
     return urdf(('j', kind, 'a', 'b', inside), ('k', 'revolute', 'b', 'c', ''))
 
 
-@pytest.mark.parametrize(('text', 'words'), [
-    ('<robot', 'is not well-formed XML'),
-    ('<!DOCTYPE r [<!ENTITY a "b">]><robot name="r"/>', 'has a document type or entities'),
-    ('<model name="r"/>', 'its outermost tag is <model>, not <robot>'),
-    ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:m/></robot>', 'is a xacro file'),
-    ('<robot name="r"/>', 'there is no link in it'),
-    (urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'fixed', 'a', 'c', '')),
-     'the chain has several ends (b, c); say which with --tip-link'),
-    (urdf(('j', 'fixed', 'a', 'b', ''), ('k', 'fixed', 'b', 'c', '')), 'no joint moves'),
-    (turning('floating'), "joint 'j' is floating"),
-    (turning(inside='<axis xyz="0 0 0"/>'), "the axis of joint 'j' has no direction"),
-    (turning(inside='<mimic joint="k"/>'), "joint 'j' mimics another"),
-    (urdf(('j', 'revolute', 'a', 'z', '')), "joint 'j' names a link 'z' that is not there"),
-    (urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'revolute', 'c', 'b', '')),
-     "link 'b' hangs on two joints"),
-    (urdf(('j', 'revolute', 'b', 'c', ''), ('k', 'revolute', 'c', 'b', '')), 'no chain of joints'),
-    (turning(inside='<origin xyz="1 2"/>'), "URDF '"),
-    (turning(inside='<origin xyz="1 2 nan"/>'),
-     "origin xyz of joint 'j' has 1 value(s) that are not finite"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('<robot', 'is not well-formed XML'),
+        ('<!DOCTYPE r [<!ENTITY a "b">]><robot name="r"/>', 'has a document type or entities'),
+        ('<model name="r"/>', 'its outermost tag is <model>, not <robot>'),
+        (
+            '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:m/></robot>',
+            'is a xacro file',
+        ),
+        ('<robot name="r"/>', 'there is no link in it'),
+        (
+            urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'fixed', 'a', 'c', '')),
+            'the chain has several ends (b, c); say which with --tip-link',
+        ),
+        (urdf(('j', 'fixed', 'a', 'b', ''), ('k', 'fixed', 'b', 'c', '')), 'no joint moves'),
+        (turning('floating'), "joint 'j' is floating"),
+        (turning(inside='<axis xyz="0 0 0"/>'), "the axis of joint 'j' has no direction"),
+        (turning(inside='<mimic joint="k"/>'), "joint 'j' mimics another"),
+        (urdf(('j', 'revolute', 'a', 'z', '')), "joint 'j' names a link 'z' that is not there"),
+        (
+            urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'revolute', 'c', 'b', '')),
+            "link 'b' hangs on two joints",
+        ),
+        (
+            urdf(('j', 'revolute', 'b', 'c', ''), ('k', 'revolute', 'c', 'b', '')),
+            'no chain of joints',
+        ),
+        (turning(inside='<origin xyz="1 2"/>'), "URDF '"),
+        (
+            turning(inside='<origin xyz="1 2 nan"/>'),
+            "origin xyz of joint 'j' has 1 value(s) that are not finite",
+        ),
+    ],
+)
 def test_bad_urdfs_are_refused_in_one_sentence(tmp_path, capfd, text, words):
     path = tmp_path / 'r.urdf'
     path.write_text(text)
@@ -226,12 +257,15 @@ def test_links_that_are_not_there_are_named(tmp_path):
         load_robot(str(tmp_path / 'r.urdf'), tip_link='tool')
 
 
-@pytest.mark.parametrize(('spec', 'words'), [
-    ('ur7', "'ur7' is neither a bundled robot (ur5, "),
-    ('nowhere.yaml', "robot file 'nowhere.yaml' cannot be read: No such file"),
-    ('nowhere.urdf', "URDF 'nowhere.urdf' cannot be read: No such file"),
-    ('arm.urdf.xacro', "is a xacro file; run 'xacro arm.urdf.xacro'"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('spec', 'words'),
+    [
+        ('ur7', "'ur7' is neither a bundled robot (ur5, "),
+        ('nowhere.yaml', "robot file 'nowhere.yaml' cannot be read: No such file"),
+        ('nowhere.urdf', "URDF 'nowhere.urdf' cannot be read: No such file"),
+        ('arm.urdf.xacro', "is a xacro file; run 'xacro arm.urdf.xacro'"),
+    ],
+)
 def test_a_robot_that_is_not_there_is_named(spec, words):
     with pytest.raises(ModelError, match=re.escape(words)):
         load_robot(spec)
@@ -256,10 +290,15 @@ def test_files_are_not_overwritten_unless_asked(tmp_path, robot):
 def test_effects_round_trip(tmp_path, robot):
     entries = [
         {'effect': 'backlash', 'joint': 'elbow', 'width': 0.0005},
-        {'effect': 'transmission_ripple', 'joint': 'elbow', 'amplitude': [1e-5, 2e-5],
-         'order': [1.0, 2.0], 'phase': [0.1, 0.2]},
+        {
+            'effect': 'transmission_ripple',
+            'joint': 'elbow',
+            'amplitude': [1e-5, 2e-5],
+            'order': [1.0, 2.0],
+            'phase': [0.1, 0.2],
+        },
         {'effect': 'base_pose', 'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 1e-3]},
-    ]  # fmt: skip
+    ]
     write_effects(tmp_path / 'e.yaml', map(effect_from_mapping, entries))
     back = read_effects(tmp_path / 'e.yaml', robot)
     for effect, entry in zip(back, entries, strict=True):
@@ -267,13 +306,18 @@ def test_effects_round_trip(tmp_path, robot):
         assert {key: mapping[key] for key in entry} == entry
 
 
-@pytest.mark.parametrize(('text', 'words'), [
-    ('- {effect: backlash, joint: wrist, width: 1e-4}\n',
-     "effect 0: robot 'two' has no joint 'wrist'; its joints are shoulder, elbow"),
-    ('- {effect: slack}\n', "effect 0: unknown effect 'slack'"),
-    ('effect: backlash\n', 'an effects file must be a list of effects'),
-    ('- {effect: backlash\n', 'line 2: '),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        (
+            '- {effect: backlash, joint: wrist, width: 1e-4}\n',
+            "effect 0: robot 'two' has no joint 'wrist'; its joints are shoulder, elbow",
+        ),
+        ('- {effect: slack}\n', "effect 0: unknown effect 'slack'"),
+        ('effect: backlash\n', 'an effects file must be a list of effects'),
+        ('- {effect: backlash\n', 'line 2: '),
+    ],
+)
 def test_bad_effects_files_name_file_and_entry(tmp_path, robot, text, words):
     path = tmp_path / 'e.yaml'
     path.write_text(text)

@@ -122,9 +122,12 @@ def test_the_order_of_the_angles_follows_from_the_arm(tmp_path, ur5, order, unit
     angles = turned.as_euler(order, degrees=unit == 'deg')
     columns = angles[:, [order.index(axis) for axis in 'XYZ']]
     path = table(
-        tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z', 'rx', 'ry', 'rz'], q,
-        world.apply(T[:, :3, 3]), columns,
-    )  # fmt: skip
+        tmp_path / 't.csv',
+        [*JOINTS, 'x', 'y', 'z', 'rx', 'ry', 'rz'],
+        q,
+        world.apply(T[:, :3, 3]),
+        columns,
+    )
     recording, said = read_table(path, ur5)
     np.testing.assert_allclose(recording.measured.rotation, turned.as_matrix(), atol=1e-12)
     assert any(f'Euler {order} (intrinsic)' in sentence for sentence in said)
@@ -216,27 +219,42 @@ HEAD = 'j1,j2,j3,j4,j5,j6,x,y,z'
 ROW = '0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9'
 
 
-@pytest.mark.parametrize(('text', 'words'), [
-    ('', "table '{}' needs a header line and at least one row"),
-    (f'{ROW}\n{ROW}\n', "table '{}' has numbers in its first line; put a header line above"),
-    (f'{HEAD}\n{ROW},1\n{ROW}\n', "table '{}' line 2 has 10 cells, the header has 9"),
-    ('a b\n1 2\n', '--delimiter decides'),
-    (f'{HEAD}\n{ROW}\n{ROW.replace("0.3", "abc")}\n',
-     "table '{}' line 3, column 'j3': 'abc' is no number with decimal '.'"),
-    (f'{HEAD},x\n{ROW},1\n', "table '{}' has two columns called 'x'; rename one"),
-    (f'{HEAD.replace("j6", "w")}\n{ROW}\n',
-     "table '{}': the table has no columns for the 6 joints of robot 'ur5' (shoulder_pan_joint, "),
-    (f'{HEAD.replace("z", "w")}\n{ROW}\n',
-     "table '{}': the table has no columns with measured positions, nor target and difference; "
-     '--position-columns'),
-    ('j1;j2;j3;j4;j5;j6;x;y;z\n0,1;0,2;0,3;0,4;0,5;0,6;7.1;8.1;9.1\n', '--decimal decides'),
-    (HEAD.replace('x,y,z', 'measured_x,measured_y,measured_z,laser_x,laser_y,laser_z') + '\n'
-     + f'{ROW},1,2,3\n', 'several columns could serve (measured_x, measured_y, measured_z; '
-     'laser_x, laser_y, laser_z); --position-columns decides'),
-    (f'{HEAD}\n{ROW.replace("0.9", "")}\n', "table '{}' has no complete row"),
-    (f'{HEAD}\n{ROW}\n{ROW.replace("0.9", "-1e308")}\n',
-     "table '{}' line 3, column 'z': -1e+308 is far beyond any robot's"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('', "table '{}' needs a header line and at least one row"),
+        (f'{ROW}\n{ROW}\n', "table '{}' has numbers in its first line; put a header line above"),
+        (f'{HEAD}\n{ROW},1\n{ROW}\n', "table '{}' line 2 has 10 cells, the header has 9"),
+        ('a b\n1 2\n', '--delimiter decides'),
+        (
+            f'{HEAD}\n{ROW}\n{ROW.replace("0.3", "abc")}\n',
+            "table '{}' line 3, column 'j3': 'abc' is no number with decimal '.'",
+        ),
+        (f'{HEAD},x\n{ROW},1\n', "table '{}' has two columns called 'x'; rename one"),
+        (
+            f'{HEAD.replace("j6", "w")}\n{ROW}\n',
+            "table '{}': the table has no columns for the 6 joints of robot 'ur5' (shoulder_pan_joint, ",
+        ),
+        (
+            f'{HEAD.replace("z", "w")}\n{ROW}\n',
+            "table '{}': the table has no columns with measured positions, nor target and difference; "
+            '--position-columns',
+        ),
+        ('j1;j2;j3;j4;j5;j6;x;y;z\n0,1;0,2;0,3;0,4;0,5;0,6;7.1;8.1;9.1\n', '--decimal decides'),
+        (
+            HEAD.replace('x,y,z', 'measured_x,measured_y,measured_z,laser_x,laser_y,laser_z')
+            + '\n'
+            + f'{ROW},1,2,3\n',
+            'several columns could serve (measured_x, measured_y, measured_z; '
+            'laser_x, laser_y, laser_z); --position-columns decides',
+        ),
+        (f'{HEAD}\n{ROW.replace("0.9", "")}\n', "table '{}' has no complete row"),
+        (
+            f'{HEAD}\n{ROW}\n{ROW.replace("0.9", "-1e308")}\n',
+            "table '{}' line 3, column 'z': -1e+308 is far beyond any robot's",
+        ),
+    ],
+)
 def test_bad_tables_are_refused_in_one_sentence(tmp_path, ur5, text, words):
     path = tmp_path / 't.csv'
     path.write_text(text)
@@ -296,18 +314,19 @@ def test_angles_that_fit_several_conventions_need_the_user(tmp_path, ur5):
     there = forward(ur5, q)
     turned = Rotation.from_matrix(T[0, :3, :3]).inv() * Rotation.from_matrix(there[:, :3, :3])
     header = [*JOINTS, 'x', 'y', 'z', 'rx', 'ry', 'rz']
-    path = table(
-        tmp_path / 't.csv', header, q, there[:, :3, 3], turned.as_rotvec()
-    )
+    path = table(tmp_path / 't.csv', header, q, there[:, :3, 3], turned.as_rotvec())
     with pytest.raises(DataError, match='--rotation decides'):
         read_table(path, ur5, TableOptions(length_unit='m'))
 
 
-@pytest.mark.parametrize(('options', 'words'), [
-    ({'difference': 'times'}, "--difference must be one of add, subtract, got 'times'"),
-    ({'rotation': 'ABC'}, '--rotation must be one of XYZ, '),
-    ({'position_columns': ('x', 'y')}, '--position-columns needs 3 column names, got 2'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        ({'difference': 'times'}, "--difference must be one of add, subtract, got 'times'"),
+        ({'rotation': 'ABC'}, '--rotation must be one of XYZ, '),
+        ({'position_columns': ('x', 'y')}, '--position-columns needs 3 column names, got 2'),
+    ],
+)
 def test_options_that_mean_nothing_are_refused(options, words):
     with pytest.raises(DataError, match=re.escape(words)):
         TableOptions(**options)

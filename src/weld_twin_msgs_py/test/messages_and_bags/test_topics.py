@@ -38,9 +38,11 @@ def test_our_subscribers_receive_from_our_publishers(name):
 
 def _foreign(qos, reliability):
     return qos.QoSProfile(
-        depth=5, reliability=reliability, durability=qos.DurabilityPolicy.VOLATILE,
+        depth=5,
+        reliability=reliability,
+        durability=qos.DurabilityPolicy.VOLATILE,
         liveliness=qos.LivelinessPolicy.AUTOMATIC,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize('name', INPUTS)

@@ -152,10 +152,19 @@ def _describe(
     median = float(np.median(forward)) if forward.size else 0.0
     gaps = forward[forward > GAP * median]
     return TopicInfo(
-        name, kind, count, use, int(ns.min()), int(ns.max()),
-        1e9 / median if median else None, int(gaps.size), float(gaps.max(initial=0)) * 1e-9,
-        int((steps < 0).sum()), int((steps == 0).sum()), unstamped,
-    )  # fmt: skip
+        name,
+        kind,
+        count,
+        use,
+        int(ns.min()),
+        int(ns.max()),
+        1e9 / median if median else None,
+        int(gaps.size),
+        float(gaps.max(initial=0)) * 1e-9,
+        int((steps < 0).sum()),
+        int((steps == 0).sum()),
+        unstamped,
+    )
 
 
 def _judge(
@@ -185,9 +194,11 @@ def _judge(
             notes.append(f'no {use}: {effects} cannot be told from other causes')
     for topic in used.values():
         for number, what in (
-            (topic.unstamped, 'without a stamp'), (topic.unordered, 'out of order'),
-            (topic.repeated, 'with a repeated stamp'), (topic.gaps, 'after a gap'),
-        ):  # fmt: skip
+            (topic.unstamped, 'without a stamp'),
+            (topic.unordered, 'out of order'),
+            (topic.repeated, 'with a repeated stamp'),
+            (topic.gaps, 'after a gap'),
+        ):
             if number:
                 notes.append(f"{number} messages of '{topic.name}' {what}")
     return tuple(missing), tuple(notes)

@@ -45,9 +45,7 @@ class _Role:
     row: Callable[[Any], Any]
 
 
-def read_recording(
-    path: Path | str, robot: Robot, topics: TopicNames | None = None
-) -> Recording:
+def read_recording(path: Path | str, robot: Robot, topics: TopicNames | None = None) -> Recording:
     """
     Read a bag in one pass.
 
@@ -108,7 +106,9 @@ def _roles(
         names.point: _Role((MEASURED_POINT.type,), 3, from_messages.point),
         names.sigma: _Role((MEASURED_SIGMA.type,), 3, from_messages.vector3),
         names.wrench: _Role((TOOL_WRENCH.type,), 6, from_messages.wrench),
-        names.temperature: _Role((TEMPERATURE.type,), 1, lambda m: (from_messages.temperature(m),)),
+        names.temperature: _Role(
+            (TEMPERATURE.type,), 1, lambda m: (from_messages.temperature(m),)
+        ),
     }
     defaults = set(vars(TopicNames()).values())
     for topic in list(roles):
@@ -205,9 +205,15 @@ def _assemble(
     if wrench_frames:
         frame = _wrench_frame(wrench_frames, robot)
     return Recording(
-        name, motion, measured, signal(names.wrench, 6), frame, signal(names.temperature, 1),
-        epoch, tuple(notes),
-    )  # fmt: skip
+        name,
+        motion,
+        measured,
+        signal(names.wrench, 6),
+        frame,
+        signal(names.temperature, 1),
+        epoch,
+        tuple(notes),
+    )
 
 
 def _measurements(

@@ -47,9 +47,14 @@ class GrowingBag:
     """
 
     def __init__(
-        self, path: Path | str, *, storage: str = 'mcap', split_bytes: int = 0, split_ns: int = 0,
+        self,
+        path: Path | str,
+        *,
+        storage: str = 'mcap',
+        split_bytes: int = 0,
+        split_ns: int = 0,
         provenance: Mapping[str, Any] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.path = Path(path)
         self.folder = unfinished(self.path)
         self._storage = check_storage(storage)

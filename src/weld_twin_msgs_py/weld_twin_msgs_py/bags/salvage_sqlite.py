@@ -79,10 +79,12 @@ def _channels(base: sqlite3.Connection) -> dict[Any, Channel]:
         raise sqlite3.DatabaseError('it lacks the tables of a bag')
     texts: dict[str, str] = {}
     if 'message_definitions' in tables:
-        texts = dict(base.execute(
-            'SELECT topic_type, encoded_message_definition FROM message_definitions '
-            "WHERE encoding = 'ros2msg'"
-        ))  # fmt: skip
+        texts = dict(
+            base.execute(
+                'SELECT topic_type, encoded_message_definition FROM message_definitions '
+                "WHERE encoding = 'ros2msg'"
+            )
+        )
     known = {row[1] for row in base.execute('PRAGMA table_info(topics)')}
     qos = 'offered_qos_profiles' if 'offered_qos_profiles' in known else "''"
     return {

@@ -189,9 +189,12 @@ class Segment:
         if not channel.definition or not channel.digest:
             raise DataError(f"topic '{topic}' has the type {kind!r}, which no bag here holds")
         return self._writer.add_connection(
-            topic, kind, msgdef=channel.definition, rihs01=channel.digest,
+            topic,
+            kind,
+            msgdef=channel.definition,
+            rihs01=channel.digest,
             offered_qos_profiles=qos,
-        )  # fmt: skip
+        )
 
     def _part(self) -> None:
         """Close the pending chunk of an mcap, with its checksum."""

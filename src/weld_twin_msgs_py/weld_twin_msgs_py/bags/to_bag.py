@@ -118,20 +118,20 @@ class _Entries:
             )
         if temperature is not None:
             yield self._each(
-                TEMPERATURE.name, temperature.t,
+                TEMPERATURE.name,
+                temperature.t,
                 lambda ns, k: make.temperature(ns, temperature.value[k]),
-            )  # fmt: skip
+            )
 
-    def joints(
-        self, topic: str, robot: Robot, q: Array, qd: Array | None
-    ) -> Iterator[_Entry]:
+    def joints(self, topic: str, robot: Robot, q: Array, qd: Array | None) -> Iterator[_Entry]:
         """Return the joint states, q and qd shape (N, n)."""
         return self._each(
-            topic, self.recording.joints.t,
+            topic,
+            self.recording.joints.t,
             lambda ns, k: self.make.joint_state(
                 ns, robot.joint_names, q[k], None if qd is None else qd[k]
             ),
-        )  # fmt: skip
+        )
 
     def measured(self, measured: Measurements) -> Iterator[Iterator[_Entry]]:
         """Yield poses or points, and their standard deviations where they are known."""
@@ -147,9 +147,7 @@ class _Entries:
                 MEASURED_SIGMA.name, measured.t, np.repeat(sigma[:, None], 3, axis=1)
             )
 
-    def poses(
-        self, topic: str, t: Array, position: Array, rotation: Array
-    ) -> Iterator[_Entry]:
+    def poses(self, topic: str, t: Array, position: Array, rotation: Array) -> Iterator[_Entry]:
         """Return poses, shapes (K, 3) and (K, 3, 3)."""
         return self._each(topic, t, lambda ns, k: self.make.pose(ns, position[k], rotation[k]))
 
@@ -157,8 +155,6 @@ class _Entries:
         """Return vectors, shape (K, 3)."""
         return self._each(topic, t, lambda ns, k: self.make.vector3(ns, vectors[k]))
 
-    def _each(
-        self, topic: str, t: Array, maker: Callable[[int, int], Any]
-    ) -> Iterator[_Entry]:
+    def _each(self, topic: str, t: Array, maker: Callable[[int, int], Any]) -> Iterator[_Entry]:
         stamps = self.epoch + np.round(t * 1e9).astype(np.int64)
         return ((int(ns), topic, maker(int(ns), k)) for k, ns in enumerate(stamps))

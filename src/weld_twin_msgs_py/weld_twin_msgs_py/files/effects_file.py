@@ -33,9 +33,7 @@ def read_effects(path: Path | str, robot: Robot) -> tuple[Effect, ...]:
         raise ModelError(f"effects file '{path}': {error}") from None
 
 
-def write_effects(
-    path: Path | str, effects: Iterable[Effect], *, overwrite: bool = False
-) -> None:
+def write_effects(path: Path | str, effects: Iterable[Effect], *, overwrite: bool = False) -> None:
     """
     Write an effects file.
 

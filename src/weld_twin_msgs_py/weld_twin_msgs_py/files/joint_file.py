@@ -43,10 +43,12 @@ def write_joint_motion(path: Path, motion: Mapping[str, Any], comment: str) -> N
 
     """
     content = {
-        'kind': KIND, 'stations': bool(motion['static']),
+        'kind': KIND,
+        'stations': bool(motion['static']),
         'joint_names': list(motion['joint_names']),
-        't': np.asarray(motion['t']).tolist(), 'q': np.asarray(motion['q']).tolist(),
-    }  # fmt: skip
+        't': np.asarray(motion['t']).tolist(),
+        'q': np.asarray(motion['q']).tolist(),
+    }
     write_text(path, f'# {comment}\n{yaml_text(content)}', overwrite=True)
 
 

@@ -154,6 +154,10 @@ _Dumper.ignore_aliases = lambda self, data: True  # type: ignore[method-assign]
 def yaml_text(data: Any) -> str:
     """Return the YAML text of plain data; floats round trip exactly."""
     return yaml.dump(
-        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=99,
+        data,
+        Dumper=_Dumper,
+        sort_keys=False,
+        allow_unicode=True,
+        width=99,
         default_flow_style=False,
-    )  # fmt: skip
+    )

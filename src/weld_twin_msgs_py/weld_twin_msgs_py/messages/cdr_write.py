@@ -33,9 +33,12 @@ class PoseEncoder:
     def __call__(self, ns: int, position: Array, rotation: Array) -> bytes:
         """Return the message of a stamp [ns], a position (3,) [m] and a rotation (3, 3)."""
         return self._body.pack(
-            b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head,
-            *position.tolist(), *quaternion(rotation),
-        )  # fmt: skip
+            b'\0\1\0\0',
+            *divmod(ns, NANOSECONDS),
+            self._head,
+            *position.tolist(),
+            *quaternion(rotation),
+        )
 
 
 class Vector3Encoder:
@@ -53,9 +56,7 @@ class Vector3Encoder:
 
     def __call__(self, ns: int, vector: Array) -> bytes:
         """Return the message of a stamp [ns] and a vector (3,)."""
-        return self._body.pack(
-            b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *vector.tolist()
-        )
+        return self._body.pack(b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *vector.tolist())
 
 
 class JointStateEncoder:

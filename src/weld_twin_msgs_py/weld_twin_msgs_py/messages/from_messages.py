@@ -272,8 +272,7 @@ def path_points(message: Any) -> Array:
 def diagnostics(message: Any) -> dict[str, dict[str, str]]:
     """Return the key-value pairs of each status of a DiagnosticArray, by status name."""
     return {
-        status.name: {pair.key: pair.value for pair in status.values}
-        for status in message.status
+        status.name: {pair.key: pair.value for pair in status.values} for status in message.status
     }
 
 

@@ -56,11 +56,13 @@ class Messages:
         """Return a JointState from positions and velocities, shape (n,) each [rad, rad/s]."""
         empty = np.zeros(0)
         return self._make(
-            'sensor_msgs/msg/JointState', header=self.header(ns, frame_id), name=list(names),
+            'sensor_msgs/msg/JointState',
+            header=self.header(ns, frame_id),
+            name=list(names),
             position=self._numbers(np.asarray(q, dtype=np.float64)),
             velocity=self._numbers(empty if qd is None else np.asarray(qd, dtype=np.float64)),
             effort=self._numbers(empty),
-        )  # fmt: skip
+        )
 
     def _xyz(self, kind: str, value: Array) -> Any:
         x, y, z = (float(v) for v in value)
@@ -81,22 +83,25 @@ class Messages:
         """Return a PointStamped, (3,) [m]."""
         return self._make(
             'geometry_msgs/msg/PointStamped',
-            header=self.header(ns, frame_id), point=self._xyz('Point', position),
-        )  # fmt: skip
+            header=self.header(ns, frame_id),
+            point=self._xyz('Point', position),
+        )
 
     def vector3(self, ns: int, vector: Array, frame_id: str = 'base') -> Any:
         """Return a Vector3Stamped, (3,)."""
         return self._make(
             'geometry_msgs/msg/Vector3Stamped',
-            header=self.header(ns, frame_id), vector=self._xyz('Vector3', vector),
-        )  # fmt: skip
+            header=self.header(ns, frame_id),
+            vector=self._xyz('Vector3', vector),
+        )
 
     def wrench(self, ns: int, wrench: Array, frame_id: str = 'tool') -> Any:
         """Return a WrenchStamped from force and torque, (6,) [N, N m]."""
         inner = self._make(
             'geometry_msgs/msg/Wrench',
-            force=self._xyz('Vector3', wrench[:3]), torque=self._xyz('Vector3', wrench[3:]),
-        )  # fmt: skip
+            force=self._xyz('Vector3', wrench[:3]),
+            torque=self._xyz('Vector3', wrench[3:]),
+        )
         return self._make(
             'geometry_msgs/msg/WrenchStamped', header=self.header(ns, frame_id), wrench=inner
         )
@@ -105,13 +110,20 @@ class Messages:
         """Return a Temperature [degC]; its variance is left unknown (zero)."""
         return self._make(
             'sensor_msgs/msg/Temperature',
-            header=self.header(ns, frame_id), temperature=float(celsius), variance=0.0,
-        )  # fmt: skip
+            header=self.header(ns, frame_id),
+            temperature=float(celsius),
+            variance=0.0,
+        )
 
     def diagnostics(
-        self, ns: int, name: str, values: Mapping[str, Any], level: int = 0, message: str = '',
+        self,
+        ns: int,
+        name: str,
+        values: Mapping[str, Any],
+        level: int = 0,
+        message: str = '',
         hardware_id: str = '',
-    ) -> Any:  # fmt: skip
+    ) -> Any:
         """Return a DiagnosticArray with one status; numbers are written to round trip."""
         status = Status(name, level, message, values, hardware_id)
         return self.statuses(ns, [status])
@@ -119,9 +131,10 @@ class Messages:
     def statuses(self, ns: int, statuses: Sequence[Status]) -> Any:
         """Return a DiagnosticArray."""
         return self._make(
-            'diagnostic_msgs/msg/DiagnosticArray', header=self.header(ns, ''),
+            'diagnostic_msgs/msg/DiagnosticArray',
+            header=self.header(ns, ''),
             status=[self._status(status) for status in statuses],
-        )  # fmt: skip
+        )
 
     def _status(self, status: Status) -> Any:
         pairs = [
@@ -129,26 +142,37 @@ class Messages:
             for k, v in status.values.items()
         ]
         return self._make(
-            'diagnostic_msgs/msg/DiagnosticStatus', level=self._level(status.level),
-            name=status.name, message=status.message, hardware_id=status.hardware_id,
+            'diagnostic_msgs/msg/DiagnosticStatus',
+            level=self._level(status.level),
+            name=status.name,
+            message=status.message,
+            hardware_id=status.hardware_id,
             values=pairs,
-        )  # fmt: skip
+        )
 
     def joint_trajectory(self, ns: int, names: Sequence[str], motion: JointMotion) -> Any:
         """Return a JointTrajectory of a motion; its first point is at time zero."""
         points = []
         for t, q, qd in zip(motion.t - motion.t[0], motion.q, motion.velocity, strict=True):
             sec, nanosec = divmod(round(float(t) * NANOSECONDS), NANOSECONDS)
-            points.append(self._make(
-                'trajectory_msgs/msg/JointTrajectoryPoint', positions=self._numbers(q),
-                velocities=self._numbers(qd), accelerations=self._numbers(np.zeros(0)),
-                effort=self._numbers(np.zeros(0)), time_from_start=self._make(
-                    'builtin_interfaces/msg/Duration', sec=sec, nanosec=nanosec),
-            ))  # fmt: skip
+            points.append(
+                self._make(
+                    'trajectory_msgs/msg/JointTrajectoryPoint',
+                    positions=self._numbers(q),
+                    velocities=self._numbers(qd),
+                    accelerations=self._numbers(np.zeros(0)),
+                    effort=self._numbers(np.zeros(0)),
+                    time_from_start=self._make(
+                        'builtin_interfaces/msg/Duration', sec=sec, nanosec=nanosec
+                    ),
+                )
+            )
         return self._make(
-            'trajectory_msgs/msg/JointTrajectory', header=self.header(ns, ''),
-            joint_names=list(names), points=points,
-        )  # fmt: skip
+            'trajectory_msgs/msg/JointTrajectory',
+            header=self.header(ns, ''),
+            joint_names=list(names),
+            points=points,
+        )
 
     def path(self, ns: int, poses: Array, frame_id: str = 'world') -> Any:
         """Return a Path through tool poses, shape (N, 4, 4)."""
@@ -160,7 +184,7 @@ class Messages:
         return self._make(
             'visualization_msgs/msg/MarkerArray',
             markers=[self._lines(ns, frame_id, item) for item in markers],
-        )  # fmt: skip
+        )
 
     def _lines(self, ns: int, frame_id: str, lines: Lines) -> Any:
         kinds = self._lookup('visualization_msgs/msg/Marker')
@@ -169,12 +193,17 @@ class Messages:
             for r, g, b in lines.colors
         ]
         return self._make(
-            'visualization_msgs/msg/Marker', header=self.header(ns, frame_id), ns=lines.name,
-            id=0, type=kinds.LINE_STRIP if lines.strip else kinds.LINE_LIST, action=kinds.ADD,
+            'visualization_msgs/msg/Marker',
+            header=self.header(ns, frame_id),
+            ns=lines.name,
+            id=0,
+            type=kinds.LINE_STRIP if lines.strip else kinds.LINE_LIST,
+            action=kinds.ADD,
             pose=self._make('geometry_msgs/msg/Pose'),
             scale=self._xyz('Vector3', np.array([lines.width, 0.0, 0.0])),
-            points=[self._xyz('Point', point) for point in lines.points], colors=colors,
-        )  # fmt: skip
+            points=[self._xyz('Point', point) for point in lines.points],
+            colors=colors,
+        )
 
 
 class Status(NamedTuple):
@@ -264,6 +293,4 @@ def bag_messages() -> Messages:
     """Return the factory of rosbags messages, the ones a `BagWriter` serialises."""
     from ..bags.typestore import TYPES
 
-    return Messages(
-        lambda kind: TYPES.types[kind], lambda values: values, lambda level: level
-    )
+    return Messages(lambda kind: TYPES.types[kind], lambda values: values, lambda level: level)

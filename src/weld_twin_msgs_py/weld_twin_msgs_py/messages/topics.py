@@ -84,88 +84,140 @@ def _latched(name: str, kind: str, meaning: str) -> Topic:
 
 
 JOINT_STATES = _stream(
-    '/joint_states', 'sensor_msgs/msg/JointState', 1000,
+    '/joint_states',
+    'sensor_msgs/msg/JointState',
+    1000,
     'commanded joint motion: position [rad or m], velocity where known',
-)  # fmt: skip
+)
 ACTUAL_JOINT_STATES = _result(
-    '/actual/joint_states', 'sensor_msgs/msg/JointState', 1000,
+    '/actual/joint_states',
+    'sensor_msgs/msg/JointState',
+    1000,
     'joint motion with the joint-space effects in it',
-)  # fmt: skip
+)
 MEASURED_POSE = _stream(
-    '/measured/tool_pose', 'geometry_msgs/msg/PoseStamped', 1000,
+    '/measured/tool_pose',
+    'geometry_msgs/msg/PoseStamped',
+    1000,
     'where the tool really is, in the measuring frame [m]',
-)  # fmt: skip
+)
 MEASURED_POINT = _stream(
-    '/measured/tool_point', 'geometry_msgs/msg/PointStamped', 1000,
+    '/measured/tool_point',
+    'geometry_msgs/msg/PointStamped',
+    1000,
     'the same from an instrument that gives no orientation [m]',
-)  # fmt: skip
+)
 MEASURED_SIGMA = _stream(
-    '/measured/sigma', 'geometry_msgs/msg/Vector3Stamped', 1000,
+    '/measured/sigma',
+    'geometry_msgs/msg/Vector3Stamped',
+    1000,
     'standard deviation of the measured position of the same stamp, per axis [m]',
-)  # fmt: skip
+)
 TWIN_POSE = _result(
-    '/twin/tool_pose', 'geometry_msgs/msg/PoseStamped', 1000,
+    '/twin/tool_pose',
+    'geometry_msgs/msg/PoseStamped',
+    1000,
     'where the twin says the tool is [m]',
-)  # fmt: skip
+)
 DEVIATION = _result(
-    '/deviation', 'geometry_msgs/msg/Vector3Stamped', 1000,
+    '/deviation',
+    'geometry_msgs/msg/Vector3Stamped',
+    1000,
     'measured minus twin in the base frame, at the stamp of the measurement [m]',
-)  # fmt: skip
+)
 DEVIATION_METRICS = _result(
-    '/deviation/metrics', 'diagnostic_msgs/msg/DiagnosticArray', 10,
-    'D(t), D_norm, D_cum, RMS, max, samples, dropped', steady=False,
-)  # fmt: skip
+    '/deviation/metrics',
+    'diagnostic_msgs/msg/DiagnosticArray',
+    10,
+    'D(t), D_norm, D_cum, RMS, max, samples, dropped',
+    steady=False,
+)
 DIAGNOSIS = _result(
-    '/diagnosis', 'diagnostic_msgs/msg/DiagnosticArray', 10,
-    'verdict over the last minute: status, effects found, gap before and after', steady=False,
-)  # fmt: skip
+    '/diagnosis',
+    'diagnostic_msgs/msg/DiagnosticArray',
+    10,
+    'verdict over the last minute: status, effects found, gap before and after',
+    steady=False,
+)
 TOOL_WRENCH = _stream(
-    '/tool_wrench', 'geometry_msgs/msg/WrenchStamped', 100,
+    '/tool_wrench',
+    'geometry_msgs/msg/WrenchStamped',
+    100,
     'load on the tool, in the tool frame unless the header names another [N, N m]',
-)  # fmt: skip
+)
 TEMPERATURE = _stream(
-    '/temperature', 'sensor_msgs/msg/Temperature', 10,
+    '/temperature',
+    'sensor_msgs/msg/Temperature',
+    10,
     'temperature of the arm or around it [degC]',
-)  # fmt: skip
+)
 
 TOPICS = (
-    JOINT_STATES, ACTUAL_JOINT_STATES, MEASURED_POSE, MEASURED_POINT, MEASURED_SIGMA, TWIN_POSE,
-    DEVIATION, DEVIATION_METRICS, DIAGNOSIS, TOOL_WRENCH, TEMPERATURE,
-)  # fmt: skip
+    JOINT_STATES,
+    ACTUAL_JOINT_STATES,
+    MEASURED_POSE,
+    MEASURED_POINT,
+    MEASURED_SIGMA,
+    TWIN_POSE,
+    DEVIATION,
+    DEVIATION_METRICS,
+    DIAGNOSIS,
+    TOOL_WRENCH,
+    TEMPERATURE,
+)
 """What a recording of the cell holds."""
 
 ROBOT_DESCRIPTION = _latched(
-    '/robot_description', 'std_msgs/msg/String',
+    '/robot_description',
+    'std_msgs/msg/String',
     'URDF of the cell, as robot_state_publisher tells it',
-)  # fmt: skip
+)
 JOINT_TRAJECTORY = _result(
-    '/joint_trajectory', 'trajectory_msgs/msg/JointTrajectory', 10,
-    'motion the trajectory generator is to run, planned by somebody else', steady=False,
-)  # fmt: skip
+    '/joint_trajectory',
+    'trajectory_msgs/msg/JointTrajectory',
+    10,
+    'motion the trajectory generator is to run, planned by somebody else',
+    steady=False,
+)
 PATH = _result(
-    '/path', 'nav_msgs/msg/Path', 10,
-    'seam the trajectory generator is to plan and run, in the measuring frame', steady=False,
-)  # fmt: skip
+    '/path',
+    'nav_msgs/msg/Path',
+    10,
+    'seam the trajectory generator is to plan and run, in the measuring frame',
+    steady=False,
+)
 PLANNED_TRAJECTORY = _latched(
-    '/planned/joint_trajectory', 'trajectory_msgs/msg/JointTrajectory',
+    '/planned/joint_trajectory',
+    'trajectory_msgs/msg/JointTrajectory',
     'the motion the trajectory generator runs',
-)  # fmt: skip
+)
 PLANNED_PATH = _latched(
-    '/planned/path', 'nav_msgs/msg/Path', 'the tool path of that motion',
-)  # fmt: skip
+    '/planned/path',
+    'nav_msgs/msg/Path',
+    'the tool path of that motion',
+)
 MARKERS = _result(
-    '/deviation/markers', 'visualization_msgs/msg/MarkerArray', 10,
+    '/deviation/markers',
+    'visualization_msgs/msg/MarkerArray',
+    10,
     'the seam coloured by deviation, and the deviations magnified',
-)  # fmt: skip
+)
 DIAGNOSTICS = _result(
-    '/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 10,
+    '/diagnostics',
+    'diagnostic_msgs/msg/DiagnosticArray',
+    10,
     'health of every node: each input with its rate, age, refusals and the last reason',
-)  # fmt: skip
+)
 
 AROUND = (
-    ROBOT_DESCRIPTION, JOINT_TRAJECTORY, PATH, PLANNED_TRAJECTORY, PLANNED_PATH, MARKERS,
+    ROBOT_DESCRIPTION,
+    JOINT_TRAJECTORY,
+    PATH,
+    PLANNED_TRAJECTORY,
+    PLANNED_PATH,
+    MARKERS,
     DIAGNOSTICS,
-)  # fmt: skip
+)
 """What surrounds it; recorded on request."""
 BY_NAME = {topic.name: topic for topic in (*TOPICS, *AROUND)}
 

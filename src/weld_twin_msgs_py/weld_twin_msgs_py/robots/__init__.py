@@ -7,5 +7,10 @@ from .urdf_read import parse_urdf, read_urdf
 from .urdf_write import write_urdf
 
 __all__ = [
-    'load_robot', 'parse_urdf', 'read_robot_yaml', 'read_urdf', 'write_robot_yaml', 'write_urdf',
-]  # fmt: skip
+    'load_robot',
+    'parse_urdf',
+    'read_robot_yaml',
+    'read_urdf',
+    'write_robot_yaml',
+    'write_urdf',
+]

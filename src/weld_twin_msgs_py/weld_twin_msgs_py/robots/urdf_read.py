@@ -57,9 +57,7 @@ def parse_urdf(
     return _of_tree(parse_tree(text, source), source, base_link, tip_link)
 
 
-def _of_tree(
-    tree: Tree, path: Path | str, base_link: str | None, tip_link: str | None
-) -> Robot:
+def _of_tree(tree: Tree, path: Path | str, base_link: str | None, tip_link: str | None) -> Robot:
     try:
         base = _base(tree, base_link)
         tip = _tip(tree, base, tip_link)
@@ -136,14 +134,25 @@ def _robot(tree: Tree, chain: list[Joint], base: str, source: str) -> Robot:
     theta, d, a, alpha, beta = np.array(rows).T
     limits = np.array([(joint.lower, joint.upper, joint.velocity) for joint in moving])
     return Robot(
-        name=tree.name, joint_names=tuple(joint.name for joint in moving),
-        theta=theta, d=d, a=a, alpha=alpha, beta=beta,
+        name=tree.name,
+        joint_names=tuple(joint.name for joint in moving),
+        theta=theta,
+        d=d,
+        a=a,
+        alpha=alpha,
+        beta=beta,
         prismatic=np.array([axis.prismatic for axis in axes]),
-        lower=limits[:, 0], upper=limits[:, 1], max_velocity=limits[:, 2],
+        lower=limits[:, 0],
+        upper=limits[:, 1],
+        max_velocity=limits[:, 2],
         max_acceleration=np.full(len(moving), np.inf),
-        T_world_base=T_base_first, T_flange_tool=inverse(frames[-1]) @ T,
-        mass=mass, com=com, gravity=gravity, source=source,
-    )  # fmt: skip
+        T_world_base=T_base_first,
+        T_flange_tool=inverse(frames[-1]) @ T,
+        mass=mass,
+        com=com,
+        gravity=gravity,
+        source=source,
+    )
 
 
 def _masses(tree: Tree, link: str, T: Array, on_chain: set[str]) -> list[tuple[float, Array]]:

@@ -26,10 +26,17 @@ from weld_twin_core.errors import DataError, ModelError
 from ..files.yaml_file import read_text
 
 _KEPT = {
-    'link': {'name'}, 'joint': {'name', 'type'}, 'inertial': set(), 'mass': {'value'},
-    'origin': {'xyz', 'rpy'}, 'axis': {'xyz'}, 'parent': {'link'}, 'child': {'link'},
-    'limit': {'lower', 'upper', 'effort', 'velocity'}, 'mimic': {'joint', 'multiplier', 'offset'},
-}  # fmt: skip
+    'link': {'name'},
+    'joint': {'name', 'type'},
+    'inertial': set(),
+    'mass': {'value'},
+    'origin': {'xyz', 'rpy'},
+    'axis': {'xyz'},
+    'parent': {'link'},
+    'child': {'link'},
+    'limit': {'lower', 'upper', 'effort', 'velocity'},
+    'mimic': {'joint', 'multiplier', 'offset'},
+}
 """Tags the reading needs and their attributes; the parser complains on stderr of any other."""
 MOVABLE = {'revolute', 'continuous', 'prismatic'}
 
@@ -175,9 +182,17 @@ def _joint(item: Any) -> Joint:
         raise ModelError(f'the axis of {where} has no direction')
     lower, upper, velocity = _limits(item)
     return Joint(
-        item.name, item.type, item.parent, item.child, _frame(item.origin, where),
-        axis / max(length, 1e-300), lower, upper, velocity, item.mimic is not None,
-    )  # fmt: skip
+        item.name,
+        item.type,
+        item.parent,
+        item.child,
+        _frame(item.origin, where),
+        axis / max(length, 1e-300),
+        lower,
+        upper,
+        velocity,
+        item.mimic is not None,
+    )
 
 
 def _limits(item: Any) -> tuple[float, float, float]:

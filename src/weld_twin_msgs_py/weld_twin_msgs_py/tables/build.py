@@ -95,10 +95,13 @@ def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) ->
         temperature = Signal(t, values)
         said.append(f'temperature is {columns.temperature!r} in degC')
     recording = Recording(
-        cells.path.stem, JointMotion(t, q, static=True),
-        Measurements(t, position, rotation, sigma), temperature=temperature,
-        epoch_ns=max(epoch, 0), notes=tuple(said),
-    )  # fmt: skip
+        cells.path.stem,
+        JointMotion(t, q, static=True),
+        Measurements(t, position, rotation, sigma),
+        temperature=temperature,
+        epoch_ns=max(epoch, 0),
+        notes=tuple(said),
+    )
     return Table(recording, tuple(said))
 
 
@@ -126,8 +129,9 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
         asked[row - 1] = True
     gaps = np.flatnonzero(~whole & ~asked)
     if gaps.size:
-        said.append(f'{gaps.size} rows with empty cells left out, the first in line '
-                    f'{cells.lines[gaps[0]]}')  # fmt: skip
+        said.append(
+            f'{gaps.size} rows with empty cells left out, the first in line {cells.lines[gaps[0]]}'
+        )
     keep = np.flatnonzero(whole & ~asked)
     if not keep.size:
         raise DataError(f"table '{cells.path}' has no complete row")
@@ -138,9 +142,13 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
             'decimal signs, or leave the row out with --skip-rows'
         )
     return Cells(
-        cells.path, cells.header, [cells.rows[k] for k in keep], [cells.lines[k] for k in keep],
-        cells.decimal, cells.said,
-    )  # fmt: skip
+        cells.path,
+        cells.header,
+        [cells.rows[k] for k in keep],
+        [cells.lines[k] for k in keep],
+        cells.decimal,
+        cells.said,
+    )
 
 
 def _joints(

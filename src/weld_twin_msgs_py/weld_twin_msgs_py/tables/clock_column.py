@@ -46,6 +46,6 @@ def _parsed(cells: Cells, column: str) -> Array | None:
         times = [datetime.fromisoformat(text) for text in cells.column(column)]
     except ValueError:
         return None
-    return np.array([
-        (t if t.tzinfo else t.replace(tzinfo=timezone.utc)).timestamp() for t in times
-    ])
+    return np.array(
+        [(t if t.tzinfo else t.replace(tzinfo=timezone.utc)).timestamp() for t in times]
+    )

@@ -169,16 +169,12 @@ def _one_group(
             groups.setdefault(part.stem, {})[part.axis] = part.name
     whole = {stem: group for stem, group in groups.items() if set(axes) <= set(group)}
     spread = SIGMA | DIFFERENCE
-    named = [
-        stem for stem in whole if set(stem) & words and not (set(stem) - words) & spread
-    ]
+    named = [stem for stem in whole if set(stem) & words and not (set(stem) - words) & spread]
     if not named and bare and () in whole:
         named = [()]
     if len(named) > 1:
         listed = '; '.join(', '.join(whole[stem][axis] for axis in axes) for stem in named)
-        raise DataError(
-            f'several columns could serve ({listed}); {flag_of(option)} decides'
-        )
+        raise DataError(f'several columns could serve ({listed}); {flag_of(option)} decides')
     return tuple(whole[named[0]][axis] for axis in axes) if named else ()
 
 

@@ -19,8 +19,13 @@ _CHOICES = {
     'rotation': (*EULER_ORDERS, ROTATION_VECTOR),
     'difference': ('add', 'subtract'),
 }
-_LENGTHS = {'position_columns': (3,), 'target_columns': (3,), 'difference_columns': (3,),
-            'rotation_columns': (3, 4), 'sigma_columns': (1, 3)}  # fmt: skip
+_LENGTHS = {
+    'position_columns': (3,),
+    'target_columns': (3,),
+    'difference_columns': (3,),
+    'rotation_columns': (3, 4),
+    'sigma_columns': (1, 3),
+}
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,10 @@ pytest.importorskip('rclpy', reason='needs ROS 2')
 def demo(out):
     return subprocess.run(
         [sys.executable, '-m', 'weld_twin_nodes', 'demo', '--out', str(out)],
-        capture_output=True, text=True, timeout=120,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
 
 
 @pytest.mark.slow

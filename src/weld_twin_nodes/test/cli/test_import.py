@@ -21,10 +21,17 @@ def table(tmp_path):
     q = rng.uniform(-1.5, 1.5, size=(30, 6))
     position = forward(ROBOT, q)[:, :3, 3] + [2e-3, 0.0, 0.0]
     file = tmp_path / 'table.csv'
-    header = ','.join([f'joint_{k}' for k in range(1, 7)] + ['x_measured', 'y_measured',
-                                                             'z_measured'])  # fmt: skip
-    np.savetxt(file, np.hstack([np.degrees(q), position * 1e3]), delimiter=',', header=header,
-               comments='', fmt='%.17g')  # fmt: skip
+    header = ','.join(
+        [f'joint_{k}' for k in range(1, 7)] + ['x_measured', 'y_measured', 'z_measured']
+    )
+    np.savetxt(
+        file,
+        np.hstack([np.degrees(q), position * 1e3]),
+        delimiter=',',
+        header=header,
+        comments='',
+        fmt='%.17g',
+    )
     return file, q, position
 
 
@@ -42,20 +49,33 @@ def test_degrees_and_millimetres_arrive_as_radians_and_metres(weld_twin, tmp_pat
 
 def test_deviations_come_as_table_and_picture_too(weld_twin, tmp_path, table):
     csv, png = tmp_path / 'off.csv', tmp_path / 'off.png'
-    weld_twin('import', table[0], '--robot', 'ur5', '--out', tmp_path / 'bag', '--table', csv,
-              '--picture', png)  # fmt: skip
+    weld_twin(
+        'import',
+        table[0],
+        '--robot',
+        'ur5',
+        '--out',
+        tmp_path / 'bag',
+        '--table',
+        csv,
+        '--picture',
+        png,
+    )
     rows = np.genfromtxt(csv, delimiter=',', names=True)
     np.testing.assert_allclose(rows['dx_m'], 2e-3, atol=1e-9)
     np.testing.assert_allclose(rows['dz_m'], 0.0, atol=1e-9)
     assert png.read_bytes().startswith(b'\x89PNG')
 
 
-@pytest.mark.parametrize(('words', 'sentence'), [
-    (('--joint-columns', 'a,b,c,d,e,f'), "no column 'a'"),
-    (('--angle-unit', 'rad'), 'wrong robot'),
-    (('--position-columns', 'x_measured'), 'needs 3 column names'),
-    (('--skip-rows', '99'), 'names row 99'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('words', 'sentence'),
+    [
+        (('--joint-columns', 'a,b,c,d,e,f'), "no column 'a'"),
+        (('--angle-unit', 'rad'), 'wrong robot'),
+        (('--position-columns', 'x_measured'), 'needs 3 column names'),
+        (('--skip-rows', '99'), 'names row 99'),
+    ],
+)
 def test_a_table_misread_is_refused_with_the_option_that_decides(
     weld_twin, tmp_path, table, words, sentence
 ):

@@ -33,9 +33,12 @@ def effects(tmp_path):
 def test_without_effects_the_deviation_vanishes(weld_twin, tmp_path):
     """The paper's baseline scenario: line, constant speed, no error."""
     out = tmp_path / 'bag'
-    assert weld_twin(
-        'simulate', '--robot', 'ur5', '--path', 'line', '--profile', 'constant', '--out', out
-    ).code == 0  # fmt: skip
+    assert (
+        weld_twin(
+            'simulate', '--robot', 'ur5', '--path', 'line', '--profile', 'constant', '--out', out
+        ).code
+        == 0
+    )
     last = from_messages.metrics(rows(out, '/deviation/metrics')[-1])
     assert last['D_norm'] < 1e-12
     assert last['samples'] > 1000
@@ -47,8 +50,21 @@ def test_a_joint_offset_moves_the_tool_as_the_arm_turned_by_it(
     weld_twin, tmp_path, effects, profile
 ):
     out = tmp_path / 'bag'
-    result = weld_twin('simulate', '--robot', 'ur5', '--effects', effects, '--rate', 40,
-                       '--path', 'weave', '--profile', profile, '--out', out)  # fmt: skip
+    result = weld_twin(
+        'simulate',
+        '--robot',
+        'ur5',
+        '--effects',
+        effects,
+        '--rate',
+        40,
+        '--path',
+        'weave',
+        '--profile',
+        profile,
+        '--out',
+        out,
+    )
     assert result.code == 0, result.err
     recording = read_recording(out, ROBOT)
     assert ('slowed down' in result.out) == (profile == 'aggressive')
@@ -65,8 +81,19 @@ def test_a_joint_offset_moves_the_tool_as_the_arm_turned_by_it(
 
 def test_a_model_that_knows_the_effects_leaves_no_deviation(weld_twin, tmp_path, effects):
     out = tmp_path / 'bag'
-    weld_twin('simulate', '--robot', 'ur5', '--effects', effects, '--model', effects,
-              '--profile', 'aggressive', '--out', out)  # fmt: skip
+    weld_twin(
+        'simulate',
+        '--robot',
+        'ur5',
+        '--effects',
+        effects,
+        '--model',
+        effects,
+        '--profile',
+        'aggressive',
+        '--out',
+        out,
+    )
     assert from_messages.metrics(rows(out, '/deviation/metrics')[-1])['max'] < 1e-12
 
 
@@ -87,8 +114,9 @@ def test_a_path_file_with_torch_angles_is_followed(weld_twin, tmp_path):
         'kind: line\nstart: [0.4, -0.1, 0.1]\nend: [0.4, 0.1, 0.1]\n'
         'torch: {travel: 0.2, work: -0.1}\n'
     )
-    result = weld_twin('simulate', '--robot', 'ur5', '--path', file, '--speed', 0.05,
-                       '--rate', 50, '--out', out)  # fmt: skip
+    result = weld_twin(
+        'simulate', '--robot', 'ur5', '--path', file, '--speed', 0.05, '--rate', 50, '--out', out
+    )
     assert result.code == 0, result.err
     position = read_recording(out, ROBOT).measured.position
     np.testing.assert_allclose(position[0], [0.4, -0.1, 0.1], atol=1e-8)
@@ -138,16 +166,17 @@ BAD = {
     'malformed effects': (('--effects', '- {effect: '), 'line'),
     'missing effects file': (('--effects', None), 'No such file'),
     'unknown joint': (
-        ('--effects', '[{effect: joint_offset, joint: knee, offset: 1}]'), "no joint 'knee'"),
+        ('--effects', '[{effect: joint_offset, joint: knee, offset: 1}]'),
+        "no joint 'knee'",
+    ),
     'unknown profile': (('--profile', 'hasty'), "no profile is called 'hasty'"),
-    'unreachable seam': (
-        ('--path', 'kind: line\nstart: [3, 0, 0]\nend: [3, 1, 0]'), 'reach'),
+    'unreachable seam': (('--path', 'kind: line\nstart: [3, 0, 0]\nend: [3, 1, 0]'), 'reach'),
     'too fast': (('--speed', '9', '--profile', 'constant'), 'its limit is'),
     'unknown kind of seam': (('--path', 'kind: heart'), "'heart'"),
     'malformed seam': (('--path', 'kind: line\nstart: [0, 0'), 'line'),
     'no samples': (('--rate', '0'), 'rate must be positive'),
     'negative seed': (('--seed', '-1'), '--seed'),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize('what', BAD)

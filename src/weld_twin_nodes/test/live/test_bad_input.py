@@ -71,9 +71,7 @@ class Bench:
         self.node.refuse = self._note(self.node.refuse)
         self.out = cell.collect(output)
         self.send = {topic.name: cell.publisher(topic).publish for topic in topics}
-        cell.wait(
-            lambda: cell.node.count_publishers(output) > 0, f'a publisher of {output}'
-        )
+        cell.wait(lambda: cell.node.count_publishers(output) > 0, f'a publisher of {output}')
         self.stamp = S
 
     def _note(self, refuse):
@@ -115,8 +113,9 @@ def test_a_bad_joint_state_costs_a_sentence_and_nothing_else(twin, robot, what):
         twin.send['/joint_states'](message)
     twin.cell.wait(lambda: len(twin.out) == before + 2, 'the two good poses')
     assert [from_messages.stamp_ns(m) for m in twin.out.messages[-2:]] == [
-        from_messages.stamp_ns(good[0]), from_messages.stamp_ns(good[2]),
-    ]  # fmt: skip
+        from_messages.stamp_ns(good[0]),
+        from_messages.stamp_ns(good[2]),
+    ]
     assert twin.node.refused == refused + 1
     assert len(twin.said) == 1
     assert sentence in twin.said[0]
@@ -228,9 +227,7 @@ def test_a_diagnosis_can_be_the_model_of_the_twin(cell, robot, tmp_path):
         '{"schema": "weld_twin/diagnosis/1", "verdict": {"effects": [{"effect": "joint_offset", '
         '"joint": "elbow_joint", "parameters": {"offset": 0.001}, "std": {"offset": 1e-5}}]}}'
     )
-    bench = Bench(
-        cell, ForwardKinematicsTwin, [JOINT_STATES], TWIN_POSE.name, model=str(file)
-    )
+    bench = Bench(cell, ForwardKinematicsTwin, [JOINT_STATES], TWIN_POSE.name, model=str(file))
     moved = Q + [0.0, 0.0, 0.001, 0.0, 0.0, 0.0]
     assert isinstance(bench.node.stream.twin, Twin)
     bench.send['/joint_states'](joint_state(bench, robot))
@@ -241,5 +238,5 @@ def test_a_diagnosis_can_be_the_model_of_the_twin(cell, robot, tmp_path):
             for m in bench.out.messages
         ),
         'a pose with the diagnosed offset',
-    )  # fmt: skip
+    )
     bench.close()

@@ -73,9 +73,12 @@ def test_the_robot_description_is_the_model_of_the_twin(shared, run, robot, tmp_
     assert node.robot.joint_names == robot.joint_names
     poses = shared.collect(TWIN_POSE.name)
     until_heard(
-        shared, shared.publisher(),
-        lambda k: shared.messages.joint_state(k * S, robot.joint_names, Q), poses, 'a pose',
-    )  # fmt: skip
+        shared,
+        shared.publisher(),
+        lambda k: shared.messages.joint_state(k * S, robot.joint_names, Q),
+        poses,
+        'a pose',
+    )
     np.testing.assert_allclose(
         from_messages.pose(poses.last)[0], forward(robot, Q)[:3, 3], rtol=0.0, atol=1e-12
     )
@@ -89,8 +92,11 @@ def test_joints_of_two_publishers_make_one_pose(shared, run, robot):
     def told():
         told.count += 1
         for publisher, part in ((first, slice(0, 2)), (second, slice(2, 6))):
-            publisher.publish(make.joint_state(
-                told.count * S, robot.joint_names[part], Q[part], np.zeros(6)[part]))
+            publisher.publish(
+                make.joint_state(
+                    told.count * S, robot.joint_names[part], Q[part], np.zeros(6)[part]
+                )
+            )
         return len(poses) > 0
 
     told.count = 0
@@ -104,9 +110,10 @@ def test_a_publisher_that_offers_too_little_is_told_of(shared, run):
     node = run(ForwardKinematicsTwin)
     health = HealthListener(shared.node)
     hasty = shared.node.create_publisher(
-        JOINT_STATES.message_class(), JOINT_STATES.name,
+        JOINT_STATES.message_class(),
+        JOINT_STATES.name,
         QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT),
-    )  # fmt: skip
+    )
 
     def said():
         return [text for _, text in health.told[node.get_name()] if 'reliability' in text]
@@ -125,9 +132,13 @@ def trajectory(robot):
 
 def generator_of(run, source):
     return run(
-        TrajectoryGenerator, source=source, rate=100.0, start_stamp_ns=S, playback=0.0,
+        TrajectoryGenerator,
+        source=source,
+        rate=100.0,
+        start_stamp_ns=S,
+        playback=0.0,
         wait_for_subscribers=1,
-    )  # fmt: skip
+    )
 
 
 def test_a_joint_trajectory_is_run_by_cubics_through_its_points(shared, run, robot):
@@ -136,9 +147,12 @@ def test_a_joint_trajectory_is_run_by_cubics_through_its_points(shared, run, rob
     names = robot.joint_names[::-1]
     turned = JointMotion(motion.t, motion.q[:, ::-1], motion.qd[:, ::-1])
     until_heard(
-        shared, shared.publisher(JOINT_TRAJECTORY),
-        lambda _: shared.messages.joint_trajectory(S, names, turned), states, 'a joint state',
-    )  # fmt: skip
+        shared,
+        shared.publisher(JOINT_TRAJECTORY),
+        lambda _: shared.messages.joint_trajectory(S, names, turned),
+        states,
+        'a joint state',
+    )
     shared.wait(lambda: len(states) >= 101, 'the whole motion')
     t = (states.stamps[:101] - S) * 1e-9
     np.testing.assert_allclose(t, np.arange(101) * 0.01, atol=1e-9)
@@ -156,9 +170,12 @@ def test_a_path_is_planned_and_run_and_the_plan_is_told_to_latecomers(shared, ru
     frames[:, :3, 3] = points
     states = shared.collect(JOINT_STATES.name)
     until_heard(
-        shared, shared.publisher(PATH),
-        lambda _: shared.messages.path(S, frames), states, 'a joint state',
-    )  # fmt: skip
+        shared,
+        shared.publisher(PATH),
+        lambda _: shared.messages.path(S, frames),
+        states,
+        'a joint state',
+    )
     planned = shared.collect('/planned/path')
     trajectories = shared.collect('/planned/joint_trajectory')
     shared.wait(lambda: len(planned) > 0 and len(trajectories) > 0, 'the plan')
@@ -188,4 +205,3 @@ def test_markers_show_the_deviation_where_it_is(shared, run):
     assert (seam.ns, strokes.ns) == ('seam', 'deviation')
     begin, end = strokes.points[0], strokes.points[1]
     np.testing.assert_allclose([begin.y, end.y], [0.2, 0.3], atol=1e-9)
-

@@ -36,27 +36,46 @@ def run_cell(folder, plan, robot, effects, seed=7):
     with Cell(folder) as cell:
         sure = {'reliable_inputs': True}
         recorder = cell.start('recorder', out=str(folder / 'live'), **sure)
-        cell.start('deviation_analyzer', wait_for_subscribers=2, path_length=plan.length,
-                   metrics_idle=0.3, **sure)  # fmt: skip
+        cell.start(
+            'deviation_analyzer',
+            wait_for_subscribers=2,
+            path_length=plan.length,
+            metrics_idle=0.3,
+            **sure,
+        )
         cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
         cell.start('error_injector', effects=effects, seed=seed, wait_for_subscribers=2, **sure)
         metrics = cell.collect('/deviation/metrics')
         cell.start(
-            'trajectory_generator', path='line', profile='aggressive', rate=RATE, playback=0.0,
-            follow='/deviation', start_stamp_ns=START, wait_for_subscribers=3, **sure,
-        )  # fmt: skip
+            'trajectory_generator',
+            path='line',
+            profile='aggressive',
+            rate=RATE,
+            playback=0.0,
+            follow='/deviation',
+            start_stamp_ns=START,
+            wait_for_subscribers=3,
+            **sure,
+        )
         delayed = 1 if 'time_delay' in effects else 0
         cell.wait(
-            lambda: bool(metrics.messages)
-            and from_messages.metrics(metrics.last)['samples'] >= plan.motion.t.size - delayed,
+            lambda: (
+                bool(metrics.messages)
+                and from_messages.metrics(metrics.last)['samples'] >= plan.motion.t.size - delayed
+            ),
             'the last metrics',
         )
         n = plan.motion.t.size
-        cell.wait_recorded({
-            '/joint_states': n, '/actual/joint_states': n, '/measured/tool_pose': n,
-            '/twin/tool_pose': n, '/deviation': n - delayed,
-            '/deviation/metrics': len(metrics),
-        })  # fmt: skip
+        cell.wait_recorded(
+            {
+                '/joint_states': n,
+                '/actual/joint_states': n,
+                '/measured/tool_pose': n,
+                '/twin/tool_pose': n,
+                '/deviation': n - delayed,
+                '/deviation/metrics': len(metrics),
+            }
+        )
         recorder.interrupt()
         assert recorder.end() == 0
     return folder / 'live'
@@ -66,11 +85,15 @@ def content(path):
     """Return stamps and numbers of every topic of a bag."""
     read = {
         'sensor_msgs/msg/JointState': lambda m: [*m.position, *m.velocity],
-        'geometry_msgs/msg/PoseStamped': lambda m: [*from_messages.pose(m)[0], *from_messages.pose(m)[1].flat],
+        'geometry_msgs/msg/PoseStamped': lambda m: [
+            *from_messages.pose(m)[0],
+            *from_messages.pose(m)[1].flat,
+        ],
         'geometry_msgs/msg/Vector3Stamped': from_messages.vector3,
         'diagnostic_msgs/msg/DiagnosticArray': lambda m: [
-            v for k, v in from_messages.metrics(m).items() if k != 'waiting'],
-    }  # fmt: skip
+            v for k, v in from_messages.metrics(m).items() if k != 'waiting'
+        ],
+    }
     rows = defaultdict(list)
     with BagReader(path) as bag:
         for topic, kind, _, message in bag.messages([t for t, (_, n) in bag.topics.items() if n]):
@@ -88,9 +111,13 @@ def live_and_offline(tmp_path_factory):
     plan = plan_motion(robot, 'line', 'aggressive', RATE)
     live = run_cell(folder, plan, robot, EFFECTS)
     simulation = Simulation(
-        build_twin(robot, effects=EFFECTS), build_twin(robot), plan.motion,
-        stamps(plan.motion.t, START), 7, plan.length,
-    )  # fmt: skip
+        build_twin(robot, effects=EFFECTS),
+        build_twin(robot),
+        plan.motion,
+        stamps(plan.motion.t, START),
+        7,
+        plan.length,
+    )
     write_simulation(folder / 'offline', simulation)
     return live, folder / 'offline', robot
 
@@ -105,9 +132,7 @@ def test_the_recorded_bag_holds_what_the_offline_twin_computes(live_and_offline)
     live['/deviation/metrics'] = stamp[due], values[due]
     for topic, (stamp, values) in offline.items():
         np.testing.assert_array_equal(live[topic][0], stamp, err_msg=topic)
-        np.testing.assert_allclose(
-            live[topic][1], values, rtol=1e-10, atol=1e-12, err_msg=topic
-        )
+        np.testing.assert_allclose(live[topic][1], values, rtol=1e-10, atol=1e-12, err_msg=topic)
 
 
 def test_the_recorded_bag_says_how_it_came_about(live_and_offline):

@@ -104,7 +104,7 @@ def test_joints_spread_over_publishers_are_put_together_by_equal_stamps():
     with pytest.raises(DataError, match="no joint 'wrist_1_joint'"):
         joints.take(state(NAMES[:3], Q[:3]))
     out = [joints.take(state(NAMES[3:][::-1], Q[3:][::-1], qd=np.ones(3)))]
-    out += [joints.take(state(NAMES[k:k + 3], Q[k:k + 3], NS + 1)) for k in (0, 3)]
+    out += [joints.take(state(NAMES[k : k + 3], Q[k : k + 3], NS + 1)) for k in (0, 3)]
     assert [sample and sample.stamp for sample in out] == [NS, None, NS + 1]
     for sample in (out[0], out[2]):
         assert sample.qd is None
@@ -163,8 +163,9 @@ def test_the_views_show_topics_that_exist():
     shown = {
         item[key]['Value']
         for item in rviz['Visualization Manager']['Displays']
-        for key in ('Topic', 'Description Topic') if key in item
-    }  # fmt: skip
+        for key in ('Topic', 'Description Topic')
+        if key in item
+    }
     layout = json.loads((CONFIG / 'cell.foxglove.json').read_text())
     panels = layout['configById']
     shown |= set(panels['3D!cell']['topics']) | {panels['RawMessages!verdict']['topicPath']}

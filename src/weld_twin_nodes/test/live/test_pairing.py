@@ -62,10 +62,13 @@ def test_a_measurement_waits_until_the_twin_has_passed_it():
     assert (pairing.waiting, pairing.dropped) == (0, 0)
 
 
-@pytest.mark.parametrize(('twin', 'measured', 'why'), [
-    ([10, 20], [5], 'before the first pose'),
-    ([10, 900], [400], 'in a gap of the twin'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('twin', 'measured', 'why'),
+    [
+        ([10, 20], [5], 'before the first pose'),
+        ([10, 900], [400], 'in a gap of the twin'),
+    ],
+)
 def test_what_cannot_be_paired_is_counted(twin, measured, why):
     pairing, pairs = paired([ns * MS for ns in twin], [ns * MS for ns in measured])
     assert (pairs, pairing.dropped) == ([], 1), why
@@ -165,9 +168,14 @@ def test_running_metrics_are_those_of_the_whole_run():
         running.add(vector, position)
     whole, told = deviation_metrics(twin + off, twin), running.as_dict()
     for key, value in {
-        'RMS': whole.rms_m, 'mean': whole.mean_m, 'max': whole.max_m, 'D_norm': whole.d_norm,
-        'D_cum': whole.d_cum_m, 'samples': 200, 'path_length': whole.path_length_m,
-    }.items():  # fmt: skip
+        'RMS': whole.rms_m,
+        'mean': whole.mean_m,
+        'max': whole.max_m,
+        'D_norm': whole.d_norm,
+        'D_cum': whole.d_cum_m,
+        'samples': 200,
+        'path_length': whole.path_length_m,
+    }.items():
         assert told[key] == pytest.approx(value, rel=1e-10), key
     assert told['D(t)'] == pytest.approx(np.linalg.norm(off[-1]))
 

@@ -40,16 +40,32 @@ def recorded():
 def same(messages, recorded, topic):
     assert [from_messages.stamp_ns(m) for m in messages] == [ns for ns, _ in recorded[topic]]
     np.testing.assert_allclose(
-        [READ[topic](m) for m in messages], [v for _, v in recorded[topic]],
-        rtol=1e-10, atol=1e-12, err_msg=topic,
-    )  # fmt: skip
+        [READ[topic](m) for m in messages],
+        [v for _, v in recorded[topic]],
+        rtol=1e-10,
+        atol=1e-12,
+        err_msg=topic,
+    )
 
 
 def player(cell, *topics, options=()):
-    return cell.start([
-        sys.executable, '-m', 'weld_twin_nodes', 'play', str(BAG), '--rate', '6', '--wait', '60',
-        '--clock', *options, '--topics', *topics,
-    ])  # fmt: skip
+    return cell.start(
+        [
+            sys.executable,
+            '-m',
+            'weld_twin_nodes',
+            'play',
+            str(BAG),
+            '--rate',
+            '6',
+            '--wait',
+            '60',
+            '--clock',
+            *options,
+            '--topics',
+            *topics,
+        ]
+    )
 
 
 SIM = {'use_sim_time': True, 'reliable_inputs': True, 'wait_for_subscribers': 1}
@@ -94,11 +110,14 @@ def test_a_bag_in_a_loop_begins_anew_each_time_and_says_so_once(cell, recorded):
         assert len(told(node)) == 1
 
 
-@pytest.mark.parametrize(('how', 'sentence'), [
-    (Playing(rate=0.0), 'the rate must be positive, got 0'),
-    (Playing(rate=float('nan')), 'the rate must be positive'),
-    (Playing(topics=['/torch']), "no topic '/torch'; it has /"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('how', 'sentence'),
+    [
+        (Playing(rate=0.0), 'the rate must be positive, got 0'),
+        (Playing(rate=float('nan')), 'the rate must be positive'),
+        (Playing(topics=['/torch']), "no topic '/torch'; it has /"),
+    ],
+)
 def test_what_cannot_be_played_is_said_in_a_sentence(cell, how, sentence):
     with pytest.raises(DataError, match=sentence):
         play(BAG, how, print)

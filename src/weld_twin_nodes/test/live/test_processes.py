@@ -96,9 +96,12 @@ def mcap_messages(folder):
 def test_a_killed_recorder_leaves_what_it_had_flushed(tmp_path, robot, storage):
     with Cell(tmp_path / 'cell') as cell:
         recorder = cell.start(
-            'recorder', out=str(tmp_path / 'bag'), storage=storage, flush_every=0.1,
+            'recorder',
+            out=str(tmp_path / 'bag'),
+            storage=storage,
+            flush_every=0.1,
             reliable_inputs=True,
-        )  # fmt: skip
+        )
         cell.feed(motion(robot, 60), robot.joint_names)
         cell.wait_recorded({'/joint_states': 60})
         held = {'mcap': mcap_messages, 'sqlite3': sqlite_messages}[storage]
@@ -112,9 +115,12 @@ def test_a_killed_recorder_leaves_what_it_had_flushed(tmp_path, robot, storage):
 
 def test_simulated_time_drives_the_generator(cell):
     cell.start(
-        'trajectory_generator', use_sim_time=True, profile='aggressive', rate=100.0,
+        'trajectory_generator',
+        use_sim_time=True,
+        profile='aggressive',
+        rate=100.0,
         wait_for_subscribers=1,
-    )  # fmt: skip
+    )
     states = cell.collect('/joint_states')
     clock = cell.node.create_publisher(Clock, '/clock', 10)
     cell.wait(lambda: clock.get_subscription_count() > 0, 'a subscriber of /clock')
@@ -158,8 +164,11 @@ def test_topics_can_be_remapped(cell, robot):
     publisher = cell.publisher()
 
     def told():
-        publisher.publish(cell.messages.joint_state(
-            cell.node.get_clock().now().nanoseconds, robot.joint_names, np.zeros(6)))
+        publisher.publish(
+            cell.messages.joint_state(
+                cell.node.get_clock().now().nanoseconds, robot.joint_names, np.zeros(6)
+            )
+        )
         return len(poses) > 0
 
     cell.wait(told, 'a pose on the new topic')
@@ -176,5 +185,7 @@ def test_a_bag_is_played_into_the_cell(cell, robot):
     cell.wait(lambda: len(deviations) == len(recorded), 'every deviation')
     np.testing.assert_allclose(
         [from_messages.vector3(m) for m in deviations.messages],
-        [from_messages.vector3(m) for m in recorded], rtol=0.0, atol=1e-15,
-    )  # fmt: skip
+        [from_messages.vector3(m) for m in recorded],
+        rtol=0.0,
+        atol=1e-15,
+    )

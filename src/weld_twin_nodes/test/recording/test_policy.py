@@ -26,10 +26,12 @@ PERMISSIONS = {
 }
 WAYS = {
     'trajectory_generator': [
-        {'follow': '/deviation'}, {'source': 'path'}, {'source': 'joint_trajectory'},
+        {'follow': '/deviation'},
+        {'source': 'path'},
+        {'source': 'joint_trajectory'},
     ],
     'recorder': [{'topics': list(BY_NAME)}],
-}  # fmt: skip
+}
 """Parameters that between them bring out everything a node can do."""
 
 
@@ -41,9 +43,11 @@ def allowed(profile, kind, permission):
     """Return absolute names, as the graph tells them."""
     own = f'/{profile.get("node")}'
     names = [
-        item.text for block in profile.findall(kind) if block.get(permission) == 'ALLOW'
+        item.text
+        for block in profile.findall(kind)
+        if block.get(permission) == 'ALLOW'
         for item in block
-    ]  # fmt: skip
+    ]
     assert len(names) == len(set(names))
     return {own + name[1:] if name.startswith('~') else f'/{name}' for name in names}
 
@@ -51,10 +55,12 @@ def allowed(profile, kind, permission):
 def node_class(name):
     module = import_module(MODULES[name])
     return next(
-        item for item in vars(module).values()
-        if isinstance(item, type) and issubclass(item, CellNode)
+        item
+        for item in vars(module).values()
+        if isinstance(item, type)
+        and issubclass(item, CellNode)
         and item.__module__ == module.__name__
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize('name', MODULES)

@@ -62,9 +62,9 @@ def test_a_recorder_on_a_full_disk_ends_with_a_sentence_and_loses_nothing_flushe
 
     def publish(numbers):
         for number in numbers:
-            publisher.publish(cell.messages.joint_state(
-                NUMBERED + number, ROBOT.joint_names, np.zeros(ROBOT.n)
-            ))  # fmt: skip
+            publisher.publish(
+                cell.messages.joint_state(NUMBERED + number, ROBOT.joint_names, np.zeros(ROBOT.n))
+            )
 
     publish(range(150))
     cell.wait_recorded({'/joint_states': 150})
@@ -83,9 +83,12 @@ def test_a_recorder_on_a_full_disk_ends_with_a_sentence_and_loses_nothing_flushe
 
 def test_a_recorder_splits_its_bag_and_tells_what_it_holds(cell, tmp_path, numbers, storage):
     recorder = cell.start(
-        'recorder', out=str(tmp_path / 'bag'), storage=storage, split_size=0.02,
+        'recorder',
+        out=str(tmp_path / 'bag'),
+        storage=storage,
+        split_size=0.02,
         reliable_inputs=True,
-    )  # fmt: skip
+    )
     cell.feed(motion(300), ROBOT.joint_names, start_ns=NUMBERED)
     cell.wait_recorded({'/joint_states': 300})
     told = json.loads(cell.trigger('/recorder/counts').message)

@@ -42,9 +42,12 @@ def cut_short(tmp_path, storage, numbered):
 def last_file(folder):
     """Return the file that was growing."""
     return next(
-        file for item in folder.iterdir() if item.is_dir()
-        for file in item.iterdir() if file.suffix in ('.mcap', '.db3')
-    )  # fmt: skip
+        file
+        for item in folder.iterdir()
+        if item.is_dir()
+        for file in item.iterdir()
+        if file.suffix in ('.mcap', '.db3')
+    )
 
 
 def record_until_killed(path, storage, messages, told):
@@ -90,9 +93,7 @@ def test_what_was_flushed_is_recovered_and_the_original_stays(cut_short, numbers
 
 
 @pytest.mark.parametrize('tail', [b'', b'\0' * 5000, os.urandom(5000), b'\x06\xff' * 500])
-def test_a_tail_the_disk_never_got_costs_only_itself(
-    tmp_path, storage, numbered, numbers, tail
-):
+def test_a_tail_the_disk_never_got_costs_only_itself(tmp_path, storage, numbered, numbers, tail):
     """After a power cut a file may have grown by blocks whose content was never written."""
     bag = GrowingBag(tmp_path / 'bag', storage=storage).open()
     for number in range(FLUSHED):

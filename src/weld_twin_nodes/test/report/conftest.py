@@ -26,17 +26,26 @@ class Seen(NamedTuple):
 class Browser:
     def __init__(self, program, folder):
         self.command = [
-            program, '--headless', '--no-sandbox', '--disable-gpu', '--hide-scrollbars',
-            f'--user-data-dir={folder / "profile"}', '--virtual-time-budget=4000',
-            '--enable-logging=stderr', '--no-first-run',
-        ]  # fmt: skip
+            program,
+            '--headless',
+            '--no-sandbox',
+            '--disable-gpu',
+            '--hide-scrollbars',
+            f'--user-data-dir={folder / "profile"}',
+            '--virtual-time-budget=4000',
+            '--enable-logging=stderr',
+            '--no-first-run',
+        ]
         self.folder = folder
 
     def run(self, page, *options, width=1100, height=3000):
         result = subprocess.run(
             [*self.command, f'--window-size={width},{height}', *options, page.as_uri()],
-            capture_output=True, text=True, timeout=90, check=False,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            timeout=90,
+            check=False,
+        )
         return result.stdout, re.findall(r'CONSOLE[^"]*"(.*)"', result.stderr)
 
     def look(self, text, **size):

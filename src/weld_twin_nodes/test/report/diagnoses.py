@@ -27,9 +27,16 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 
 REGRESSORS = (
-    'constant', 'angle, low order', 'angle, high order', 'reversal', 'speed', 'acceleration',
-    'load', 'temperature', 'time',
-)  # fmt: skip
+    'constant',
+    'angle, low order',
+    'angle, high order',
+    'reversal',
+    'speed',
+    'acceleration',
+    'load',
+    'temperature',
+    'time',
+)
 NOISE = 2e-5
 
 
@@ -82,23 +89,43 @@ def diagnosis(status, robot, true, believed, recordings, **changes):
         gap=Gap(before, 0.9 * before, 2.0 * before, 4e-4, 1234, np.sqrt(3) * NOISE),
         where=_where(robot, found, lines, recordings),
         status=status,
-        effects=tuple(Found(e, {k: _error(v) for k, v in e.to_mapping().items()
-                                if k not in ('effect', 'joint', 'order')}) for e in found),
-        confidence=0.97, indistinguishable=tuple((Site(e.name, e.site),) for e in found),
-        reasons=(), candidates=_candidates(robot, found, before, after),
-        shrink=Shrink(before, after, after / before, (0.9 * after / before, 1.2 * after / before),
-                      'blocked cross-validation', tuple(zip(sites, falls.tolist(), strict=True)),
-                      tuple((s, 0.8 * before) for s in sites)),
-        unexplained=Unexplained(after, False), next_experiment=None, actions=(),
+        effects=tuple(
+            Found(
+                e,
+                {
+                    k: _error(v)
+                    for k, v in e.to_mapping().items()
+                    if k not in ('effect', 'joint', 'order')
+                },
+            )
+            for e in found
+        ),
+        confidence=0.97,
+        indistinguishable=tuple((Site(e.name, e.site),) for e in found),
+        reasons=(),
+        candidates=_candidates(robot, found, before, after),
+        shrink=Shrink(
+            before,
+            after,
+            after / before,
+            (0.9 * after / before, 1.2 * after / before),
+            'blocked cross-validation',
+            tuple(zip(sites, falls.tolist(), strict=True)),
+            tuple((s, 0.8 * before) for s in sites),
+        ),
+        unexplained=Unexplained(after, False),
+        next_experiment=None,
+        actions=(),
         checks=(
             Check('units', 'ok', 'Joint angles are in rad and lengths in m.'),
             Check('clocks', 'note', 'The two clocks agree within 0.4 ms.'),
             Check('outliers', 'warning', '3 of 1234 measurements lie far off and count little.'),
         ),
         model=Model(robot, tuple(robot.T_world_base for _ in recordings), (), found),
-        traces=lines, absent={'cartesian_compliance': 'no tool wrench was recorded'},
+        traces=lines,
+        absent={'cartesian_compliance': 'no tool wrench was recorded'},
         recordings=recordings,
-    )  # fmt: skip
+    )
     return replace(out, **changes)
 
 
@@ -113,23 +140,39 @@ def _where(robot, found, lines, recordings):
     for site in sites[:2]:
         shares[robot.index(site), 3] = 0.9
         shares[robot.index(site), 0] = 0.4
-    joints = sorted(zip(robot.joint_names, shares.max(axis=1).tolist(), strict=True),
-                    key=lambda item: -item[1])  # fmt: skip
+    joints = sorted(
+        zip(robot.joint_names, shares.max(axis=1).tolist(), strict=True), key=lambda item: -item[1]
+    )
     path = []
     for r, b in zip(recordings, lines.before, strict=True):
         for index in np.array_split(np.arange(len(b)), max(1, 12 // len(recordings))):
             t = r.measured.t[index]
             path.append((float(t[0]), float(t[-1]), 0.1, rms([b[index]])))
-    regimes = {'static': 0.1, 'reversal': 0.88, 'speed': 0.02, 'acceleration': 0.0, 'load': 0.03,
-               'temperature': 0.0, 'time': 0.001}  # fmt: skip
+    regimes = {
+        'static': 0.1,
+        'reversal': 0.88,
+        'speed': 0.02,
+        'acceleration': 0.0,
+        'load': 0.03,
+        'temperature': 0.0,
+        'time': 0.001,
+    }
     direction = {'along_m': 3e-4, 'across_m': 1.1e-4, 'normal_m': 4e-5}
-    return Where(tuple(joints), regimes, tuple(path), direction, REGRESSORS,
-                 tuple(map(tuple, shares.tolist())))  # fmt: skip
+    return Where(
+        tuple(joints),
+        regimes,
+        tuple(path),
+        direction,
+        REGRESSORS,
+        tuple(map(tuple, shares.tolist())),
+    )
 
 
 def _candidates(robot, found, before, after):
-    out = [Candidate(Site(e.name, e.site), 0.9 / (k + 1), after, 1 - after / before)
-           for k, e in enumerate(found[:3])]  # fmt: skip
+    out = [
+        Candidate(Site(e.name, e.site), 0.9 / (k + 1), after, 1 - after / before)
+        for k, e in enumerate(found[:3])
+    ]
     last = Site('joint_compliance', robot.joint_names[1])
     return (*out, Candidate(last, 0.004, 0.7 * before, 0.3))
 
@@ -138,7 +181,11 @@ def backlash():
     robot = load('ur5')
     effect = {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 1.2e-3}
     return diagnosis(
-        'identified', robot, [effect], [effect], [moving(robot), moving(robot, 'weave')],
+        'identified',
+        robot,
+        [effect],
+        [effect],
+        [moving(robot), moving(robot, 'weave')],
         actions=('Service the gear of elbow_joint: its play of 1.2 mrad is the gap.',),
     )
 
@@ -149,39 +196,69 @@ def ambiguous():
     true = [{'effect': 'joint_offset', 'joint': first, 'offset': 8e-4}]
     pair = (Site('joint_offset', first), Site('base_pose', None))
     return diagnosis(
-        'ambiguous', robot, true, true, [moving(robot, 'line', 'smooth')], confidence=0.93,
+        'ambiguous',
+        robot,
+        true,
+        true,
+        [moving(robot, 'line', 'smooth')],
+        confidence=0.93,
         indistinguishable=(pair,),
-        reasons=(f'joint_offset of {first}, base_pose move the tool alike on these data: their '
-                 'fits differ by less than the noise',),
-        next_experiment={'why': 'Only the base can be surveyed apart from the arm.',
-                         'measure': 'three reference points on the pedestal', 'stations': 3},
+        reasons=(
+            f'joint_offset of {first}, base_pose move the tool alike on these data: their '
+            'fits differ by less than the noise',
+        ),
+        next_experiment={
+            'why': 'Only the base can be surveyed apart from the arm.',
+            'measure': 'three reference points on the pedestal',
+            'stations': 3,
+        },
         actions=(f'Survey the base, then re-master {first} if it is not at fault.',),
-    )  # fmt: skip
+    )
 
 
 def unknown():
     robot = load('abb_irb120')
     j = robot.joint_names
-    true = [{'effect': 'vibration', 'joint': j[0], 'frequency': 6.0, 'damping': 0.04, 'gain': 0.5},
-            {'effect': 'backlash', 'joint': j[2], 'width': 2e-3}]
+    true = [
+        {'effect': 'vibration', 'joint': j[0], 'frequency': 6.0, 'damping': 0.04, 'gain': 0.5},
+        {'effect': 'backlash', 'joint': j[2], 'width': 2e-3},
+    ]
     return diagnosis(
-        'unknown', robot, true, [], [moving(robot, 'polyline')], confidence=0.9,
-        unexplained=Unexplained(4e-4, True, (
-            f'the speed and acceleration of {j[0]}', 'the place in the workspace')),
-    )  # fmt: skip
+        'unknown',
+        robot,
+        true,
+        [],
+        [moving(robot, 'polyline')],
+        confidence=0.9,
+        unexplained=Unexplained(
+            4e-4, True, (f'the speed and acceleration of {j[0]}', 'the place in the workspace')
+        ),
+    )
 
 
 def calibration():
     robot = load('fanuc_m10ia')
     rng = np.random.default_rng(7)
-    families = (('joint_offset', 'offset', 8e-4), ('link_length', 'da', 3e-4),
-                ('link_offset', 'dd', 3e-4), ('link_twist', 'dalpha', 4e-4))  # fmt: skip
+    families = (
+        ('joint_offset', 'offset', 8e-4),
+        ('link_length', 'da', 3e-4),
+        ('link_offset', 'dd', 3e-4),
+        ('link_twist', 'dalpha', 4e-4),
+    )
     true = [
         {'effect': family, 'joint': joint, key: float(rng.normal(scale=size))}
-        for family, key, size in families for joint in robot.joint_names
-    ]  # fmt: skip
-    true.append({'effect': 'transmission_ripple', 'joint': robot.joint_names[1],
-                 'amplitude': [2e-4, 1e-4], 'order': [1.0, 40.0], 'phase': [0.3, -1.0]})
+        for family, key, size in families
+        for joint in robot.joint_names
+    ]
+    true.append(
+        {
+            'effect': 'transmission_ripple',
+            'joint': robot.joint_names[1],
+            'amplitude': [2e-4, 1e-4],
+            'order': [1.0, 40.0],
+            'phase': [0.3, -1.0],
+        }
+    )
     true.append({'effect': 'tool_pose', 'xyz': [2e-4, -1e-4, 5e-4], 'rotvec': [0, 0, 1e-3]})
     return diagnosis('identified', robot, true, true, [stations(robot)])
 
@@ -191,5 +268,10 @@ def nothing():
     return diagnosis('none', robot, [], [], [moving(robot, 'circle', 'smooth')])
 
 
-ALL = {'backlash': backlash, 'ambiguous': ambiguous, 'unknown': unknown,
-       'calibration': calibration, 'nothing': nothing}  # fmt: skip
+ALL = {
+    'backlash': backlash,
+    'ambiguous': ambiguous,
+    'unknown': unknown,
+    'calibration': calibration,
+    'nothing': nothing,
+}

@@ -96,18 +96,23 @@ def test_a_gear_error_is_compensated_in_position_and_speed():
 
 def test_springs_under_gravity_and_process_force_are_closed():
     robot = load('ur5')
-    soft = [{'effect': 'joint_compliance', 'joint': j, 'compliance': 3e-5}
-            for j in robot.joint_names[:3]]  # fmt: skip
+    soft = [
+        {'effect': 'joint_compliance', 'joint': j, 'compliance': 3e-5}
+        for j in robot.joint_names[:3]
+    ]
     motion = seam(robot).joints
     force = Signal(motion.t[[0, -1]], np.array([[0, 0, 80.0, 0, 0, 0], [40.0, 0, 0, 0, 0, 0]]))
     result = compensate(robot, effects(robot, *soft), Recording('seam', motion, wrench=force))
     assert result.rms[0] > 1e-4 and np.abs(result.after).max() < 1e-9
 
 
-@pytest.mark.parametrize(('entry', 'gain'), [
-    ({'effect': 'servo_lag', 'time_constant': 0.02}, 200.0),
-    ({'effect': 'backlash', 'width': 1e-3}, 20.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('entry', 'gain'),
+    [
+        ({'effect': 'servo_lag', 'time_constant': 0.02}, 200.0),
+        ({'effect': 'backlash', 'width': 1e-3}, 20.0),
+    ],
+)
 def test_effects_with_memory_shrink_by_iteration(entry, gain):
     robot = load('ur5')
     acting = effects(robot, {**entry, 'joint': 'shoulder_pan_joint'})
@@ -117,17 +122,28 @@ def test_effects_with_memory_shrink_by_iteration(entry, gain):
 
 def test_a_resonance_never_makes_it_worse():
     robot = load('ur5')
-    shaky = effects(robot, {'effect': 'vibration', 'joint': 'shoulder_pan_joint',
-                            'frequency': 8.0, 'damping': 0.05, 'gain': 0.3})  # fmt: skip
+    shaky = effects(
+        robot,
+        {
+            'effect': 'vibration',
+            'joint': 'shoulder_pan_joint',
+            'frequency': 8.0,
+            'damping': 0.05,
+            'gain': 0.3,
+        },
+    )
     before, after = compensate(robot, shaky, seam(robot, 'aggressive')).rms
     assert after <= before
 
 
 def test_errors_of_the_instrument_are_left_alone():
     robot = load('ur5')
-    own = effects(robot, {'effect': 'time_delay', 'delay': 0.02},
-                  {'effect': 'measurement_scale', 'scale': 1e-3},
-                  {'effect': 'drift', 'xyz_rate': [1e-5, 0, 0]})  # fmt: skip
+    own = effects(
+        robot,
+        {'effect': 'time_delay', 'delay': 0.02},
+        {'effect': 'measurement_scale', 'scale': 1e-3},
+        {'effect': 'drift', 'xyz_rate': [1e-5, 0, 0]},
+    )
     recording = seam(robot)
     result = compensate(robot, own, recording)
     assert np.array_equal(result.motion.q, recording.joints.q)
@@ -146,8 +162,15 @@ def test_stations_are_compensated_one_by_one():
 
 
 def test_constant_errors_go_into_the_numbers_of_the_robot(robot):
-    ripple = effects(robot, {'effect': 'transmission_ripple', 'joint': robot.joint_names[0],
-                             'amplitude': 1e-4, 'order': 2.0})  # fmt: skip
+    ripple = effects(
+        robot,
+        {
+            'effect': 'transmission_ripple',
+            'joint': robot.joint_names[0],
+            'amplitude': 1e-4,
+            'order': 2.0,
+        },
+    )
     got, left = corrected(robot, geometric(robot) + ripple)
     wanted = in_numbers(robot)
     for key in ('a', 'alpha', 'd', 'theta', 'beta', 'T_world_base', 'T_flange_tool'):
@@ -160,8 +183,9 @@ def test_the_offset_of_a_slide_goes_into_its_travel():
     data = load('ur5').to_mapping()
     data['joints'][0] |= {'type': 'prismatic'}
     robot = Robot.from_mapping(data)
-    error = effects(robot, {'effect': 'joint_offset', 'joint': robot.joint_names[0],
-                            'offset': 1e-3})  # fmt: skip
+    error = effects(
+        robot, {'effect': 'joint_offset', 'joint': robot.joint_names[0], 'offset': 1e-3}
+    )
     got, _ = corrected(robot, error)
     assert got.d[0] == pytest.approx(robot.d[0] + 1e-3) and np.array_equal(got.theta, robot.theta)
 

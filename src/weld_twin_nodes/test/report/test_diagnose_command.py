@@ -22,9 +22,14 @@ from weld_twin_nodes.cli import main
 
 WIDTH, OFFSET, DELAY = 1.0e-3, 1.5e-3, 0.012
 FILES = {
-    'diagnosis.json', 'report.html', 'effects.yaml', 'robot.yaml', 'robot.urdf',
-    'joint_offsets.csv', 'robot_effects.yaml',
-}  # fmt: skip
+    'diagnosis.json',
+    'report.html',
+    'effects.yaml',
+    'robot.yaml',
+    'robot.urdf',
+    'joint_offsets.csv',
+    'robot_effects.yaml',
+}
 
 
 def run(*words):
@@ -40,9 +45,23 @@ def cell(tmp_path_factory):
         '- {effect: measurement_noise, sigma: 2.0e-5}\n'
     )
     for name, path, seed in (('first', 'line', 1), ('second', 'arc', 2)):
-        code = run('simulate', '--robot', 'ur5', '--effects', folder / 'true.yaml', '--path', path,
-                   '--profile', 'aggressive', '--rate', 60, '--seed', seed,
-                   '--out', folder / name)  # fmt: skip
+        code = run(
+            'simulate',
+            '--robot',
+            'ur5',
+            '--effects',
+            folder / 'true.yaml',
+            '--path',
+            path,
+            '--profile',
+            'aggressive',
+            '--rate',
+            60,
+            '--seed',
+            seed,
+            '--out',
+            folder / name,
+        )
         assert code == 0
     return folder
 
@@ -51,8 +70,19 @@ def cell(tmp_path_factory):
 def found(cell):
     """What diagnose leaves behind, judged on the other run."""
     out = cell / 'found'
-    assert run('diagnose', cell / 'first', '--robot', 'ur5', '--holdout', cell / 'second',
-               '--out', out) == 0  # fmt: skip
+    assert (
+        run(
+            'diagnose',
+            cell / 'first',
+            '--robot',
+            'ur5',
+            '--holdout',
+            cell / 'second',
+            '--out',
+            out,
+        )
+        == 0
+    )
     return out
 
 
@@ -91,30 +121,51 @@ def test_the_verdict_is_printed(cell, tmp_path, capsys):
 
 
 def test_what_is_known_is_in_the_twin_from_the_start(cell, tmp_path):
-    run('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known', cell / 'true.yaml',
-        '--out', tmp_path / 'rest')  # fmt: skip
+    run(
+        'diagnose',
+        cell / 'first',
+        '--robot',
+        'ur5',
+        '--effects-known',
+        cell / 'true.yaml',
+        '--out',
+        tmp_path / 'rest',
+    )
     data = json.loads((tmp_path / 'rest' / 'diagnosis.json').read_text())
     assert data['gap']['rms_m'] < 1.1 * np.sqrt(3) * 2e-5
     assert data['model']['known'][0] == {
-        'effect': 'backlash', 'joint': 'elbow_joint', 'width': WIDTH,
-    }  # fmt: skip
+        'effect': 'backlash',
+        'joint': 'elbow_joint',
+        'width': WIDTH,
+    }
 
 
 def test_an_excluded_family_is_never_named(cell, tmp_path):
-    run('diagnose', cell / 'first', '--robot', 'ur5', '--exclude-effect', 'backlash',
-        '--out', tmp_path / 'd')  # fmt: skip
+    run(
+        'diagnose',
+        cell / 'first',
+        '--robot',
+        'ur5',
+        '--exclude-effect',
+        'backlash',
+        '--out',
+        tmp_path / 'd',
+    )
     data = json.loads((tmp_path / 'd' / 'diagnosis.json').read_text())
     named = {e['effect'] for e in data['verdict']['effects'] + data['candidates']}
     assert 'backlash' not in named
 
 
-@pytest.mark.parametrize(('words', 'reason'), [
-    (['--align', 'bas'], '--align takes base, tool or base,tool'),
-    (['--exclude-effect', 'rust'], "no effect 'rust'"),
-    (['--holdout', 'nowhere'], "no bag at 'nowhere'"),
-    (['--effects-known', 'nowhere.json'], 'cannot be read'),
-    (['--pose-topic', '/camera'], "no message on '/camera'"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('words', 'reason'),
+    [
+        (['--align', 'bas'], '--align takes base, tool or base,tool'),
+        (['--exclude-effect', 'rust'], "no effect 'rust'"),
+        (['--holdout', 'nowhere'], "no bag at 'nowhere'"),
+        (['--effects-known', 'nowhere.json'], 'cannot be read'),
+        (['--pose-topic', '/camera'], "no message on '/camera'"),
+    ],
+)
 def test_wrong_use_is_one_line_and_leaves_nothing(cell, tmp_path, capsys, words, reason):
     out = tmp_path / 'd'
     assert run('diagnose', cell / 'first', '--robot', 'ur5', '--out', out, *words) == 2
@@ -132,8 +183,13 @@ def test_a_directory_of_something_else_is_not_replaced(cell, tmp_path, capsys):
 
 def twin_poses(bag):
     with BagReader(bag) as reader:
-        rows = [(m.message.header.stamp.sec * 10**9 + m.message.header.stamp.nanosec,
-                 m.message.pose.position) for m in reader.messages(['/twin/tool_pose'])]
+        rows = [
+            (
+                m.message.header.stamp.sec * 10**9 + m.message.header.stamp.nanosec,
+                m.message.pose.position,
+            )
+            for m in reader.messages(['/twin/tool_pose'])
+        ]
     return np.array([ns for ns, _ in rows]), np.array([[p.x, p.y, p.z] for _, p in rows])
 
 
@@ -152,13 +208,20 @@ def test_predict_adds_what_was_found_at_every_joint_state(cell, found, tmp_path)
 
 
 def write_model(path, robot, effects, bases, tool=None, inputs=()):
-    path.write_text(json.dumps({
-        'schema': 'weld_twin/diagnosis/1', 'inputs': list(inputs),
-        'model': {
-            'tool': (robot.T_flange_tool if tool is None else tool).tolist(),
-            'bases': [base.tolist() for base in bases], 'known': [], 'found': effects,
-        },
-    }))  # fmt: skip
+    path.write_text(
+        json.dumps(
+            {
+                'schema': 'weld_twin/diagnosis/1',
+                'inputs': list(inputs),
+                'model': {
+                    'tool': (robot.T_flange_tool if tool is None else tool).tolist(),
+                    'bases': [base.tolist() for base in bases],
+                    'known': [],
+                    'found': effects,
+                },
+            }
+        )
+    )
     return path
 
 
@@ -167,8 +230,9 @@ def test_predicted_poses_are_those_of_the_instrument_at_the_same_stamp(cell, tmp
     robot = load('ur5')
     base, tool = np.eye(4), np.eye(4)
     base[:3, 3], tool[:3, 3] = [0.5, -0.2, 1.0], [0.0, 0.01, 0.15]
-    model = write_model(tmp_path / 'm.json', robot,
-                        [{'effect': 'time_delay', 'delay': DELAY}], [base], tool)  # fmt: skip
+    model = write_model(
+        tmp_path / 'm.json', robot, [{'effect': 'time_delay', 'delay': DELAY}], [base], tool
+    )
     out = tmp_path / 'p'
     assert run('predict', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
     _, position = twin_poses(out)
@@ -176,8 +240,10 @@ def test_predicted_poses_are_those_of_the_instrument_at_the_same_stamp(cell, tmp
     nominal = Twin(robot.with_frames(tool=tool))
     late = nominal.poses(Recording('r', motion), motion.t - DELAY).position + base[:3, 3]
     assert np.abs(position - late).max() < 1e-12
-    assert np.abs(position - nominal.poses(Recording('r', motion)).position
-                  - base[:3, 3]).max() > 1e-4  # fmt: skip
+    assert (
+        np.abs(position - nominal.poses(Recording('r', motion)).position - base[:3, 3]).max()
+        > 1e-4
+    )
 
 
 def test_with_several_set_ups_the_bag_tells_which_is_meant(cell, tmp_path, capsys):
@@ -210,10 +276,26 @@ def offset_model(tmp_path):
 
 
 def test_exports_carry_the_correction_and_leave_the_rest_as_effects(offset_model, tmp_path):
-    for form, name in (('yaml', 'r.yaml'), ('urdf', 'r.urdf'), ('offsets', 'o.csv'),
-                       ('left-over', 'l.yaml'), ('effects', 'e.yaml')):  # fmt: skip
-        assert run('export', offset_model, '--robot', 'ur5', '--format', form,
-                   '--out', tmp_path / name) == 0  # fmt: skip
+    for form, name in (
+        ('yaml', 'r.yaml'),
+        ('urdf', 'r.urdf'),
+        ('offsets', 'o.csv'),
+        ('left-over', 'l.yaml'),
+        ('effects', 'e.yaml'),
+    ):
+        assert (
+            run(
+                'export',
+                offset_model,
+                '--robot',
+                'ur5',
+                '--format',
+                form,
+                '--out',
+                tmp_path / name,
+            )
+            == 0
+        )
     q = np.array([[0.1, -1.0, 1.2, 0.3, -0.5, 0.2]])
     shifted = q + OFFSET * np.eye(6)[2]
     wanted = Twin(load('ur5')).poses(Recording('r', _at(shifted))).position
@@ -238,9 +320,11 @@ def test_an_export_is_printed_where_no_file_is_named(offset_model, capsys):
 
 def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path, capsys):
     model = write_model(
-        tmp_path / 'm.json', load('ur5'),
-        [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': OFFSET}], [np.eye(4)],
-    )  # fmt: skip
+        tmp_path / 'm.json',
+        load('ur5'),
+        [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': OFFSET}],
+        [np.eye(4)],
+    )
     out = tmp_path / 'commands'
     assert run('compensate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
     nominal = read_recording(cell / 'first', load('ur5')).joints
@@ -250,12 +334,20 @@ def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path, c
     assert 'and 0.0000 mm with these' in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(('content', 'reason'), [
-    ('[]', 'is no diagnosis'), ('{"schema": "other/1"}', 'is no diagnosis'),
-    ('{', 'is not JSON'), ('{"schema": "weld_twin/diagnosis/1"}', 'holds no model'),
-    ('{"schema": "weld_twin/diagnosis/1", "model": {"tool": [[1]], "bases": []}}', 'model.tool'),
-    ('{"schema": "weld_twin/diagnosis/1", "model": {"bases": []}}', "lacks 'tool'"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('content', 'reason'),
+    [
+        ('[]', 'is no diagnosis'),
+        ('{"schema": "other/1"}', 'is no diagnosis'),
+        ('{', 'is not JSON'),
+        ('{"schema": "weld_twin/diagnosis/1"}', 'holds no model'),
+        (
+            '{"schema": "weld_twin/diagnosis/1", "model": {"tool": [[1]], "bases": []}}',
+            'model.tool',
+        ),
+        ('{"schema": "weld_twin/diagnosis/1", "model": {"bases": []}}', "lacks 'tool'"),
+    ],
+)
 def test_a_file_that_is_no_diagnosis_is_told_in_one_line(tmp_path, capsys, content, reason):
     path = tmp_path / 'm.json'
     path.write_text(content)

@@ -44,6 +44,11 @@ def test_every_option_is_told(capsys):
         main(['diagnose', '--help'])
     told = capsys.readouterr().out
     for option in set(re.findall(r'--[a-z-]+', told)) - {
-        '--help', '--base-link', '--tip-link', '--out', '--robot', '--robots',
-    }:  # fmt: skip
+        '--help',
+        '--base-link',
+        '--tip-link',
+        '--out',
+        '--robot',
+        '--robots',
+    }:
         assert option in GUIDE, option

@@ -21,10 +21,13 @@ from weld_twin_nodes.live.diagnosis_window import LONGEST, Window
 from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker
 
 START = 1_700_000_000_000_000_000
-ONE_JOINT = Robot.from_mapping({
-    'name': 'one', 'convention': 'standard',
-    'joints': [{'name': 'a', 'a': 0.5, 'alpha': 0.0, 'd': 0.0, 'theta_offset': 0.0}],
-})  # fmt: skip
+ONE_JOINT = Robot.from_mapping(
+    {
+        'name': 'one',
+        'convention': 'standard',
+        'joints': [{'name': 'a', 'a': 0.5, 'alpha': 0.0, 'd': 0.0, 'theta_offset': 0.0}],
+    }
+)
 OFFSET = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3}
 
 

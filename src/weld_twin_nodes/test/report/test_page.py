@@ -154,12 +154,15 @@ def test_outliers_are_counted_and_not_drawn():
 
 def test_a_measurement_to_make_is_told_in_sentences_without_its_stations():
     wanted = {
-        'kind': 'bidirectional', 'sentence': 'Measure base_pose anew.', 'reason': 'It shows.',
-        'expected_separation_sigma': 12.3, 'cost': 20.0,
+        'kind': 'bidirectional',
+        'sentence': 'Measure base_pose anew.',
+        'reason': 'It shows.',
+        'expected_separation_sigma': 12.3,
+        'cost': 20.0,
         'motion': {'static': True, 't': [0.125], 'q': [[0.625]]},
-    }  # fmt: skip
+    }
     page = report_page(replace(diagnoses.ambiguous(), next_experiment=wanted))
-    part = page[page.index('id="next"'):page.index('id="checks"')]
+    part = page[page.index('id="next"') : page.index('id="checks"')]
     assert 'Measure base pose error anew.' in part
     assert 'about 20 min' in part
     assert '12 standard deviations' in part

@@ -22,25 +22,45 @@ def plain(text):
     return text.replace('\N{NO-BREAK SPACE}', ' ').replace('\N{MINUS SIGN}', '-')
 
 
-@pytest.mark.parametrize(('metres', 'text'), [
-    (4.213e-4, '0.421 mm'), (0.0123456, '12.35 mm'), (0.0, '0.000 mm'), (3e-7, '< 0.001 mm'),
-    (None, '\N{EN DASH}'), (float('nan'), '\N{EN DASH}'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('metres', 'text'),
+    [
+        (4.213e-4, '0.421 mm'),
+        (0.0123456, '12.35 mm'),
+        (0.0, '0.000 mm'),
+        (3e-7, '< 0.001 mm'),
+        (None, '\N{EN DASH}'),
+        (float('nan'), '\N{EN DASH}'),
+    ],
+)
 def test_lengths_are_told_in_millimetres(metres, text):
     assert plain(millimetres(metres)) == text
 
 
-@pytest.mark.parametrize(('share', 'text'), [
-    (0.0, '0 %'), (0.002, '< 1 %'), (0.93, '93 %'), (0.9999, '> 99 %'), (1.0, '100 %'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('share', 'text'),
+    [
+        (0.0, '0 %'),
+        (0.002, '< 1 %'),
+        (0.93, '93 %'),
+        (0.9999, '> 99 %'),
+        (1.0, '100 %'),
+    ],
+)
 def test_a_share_close_to_all_or_nothing_is_not_told_as_such(share, text):
     assert plain(percent(share)) == text
 
 
-@pytest.mark.parametrize(('value', 'std', 'text'), [
-    (5.00123e-4, 1.234e-5, '0.500 ± 0.012 mrad'), (-0.02, 3e-4, '-20.00 ± 0.30 mrad'),
-    (1.2e-3, None, '1.2 mrad'), (1.2e-3, 0.0, '1.2 mrad'), (0.12, 0.34, '120 ± 340 mrad'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('value', 'std', 'text'),
+    [
+        (5.00123e-4, 1.234e-5, '0.500 ± 0.012 mrad'),
+        (-0.02, 3e-4, '-20.00 ± 0.30 mrad'),
+        (1.2e-3, None, '1.2 mrad'),
+        (1.2e-3, 0.0, '1.2 mrad'),
+        (0.12, 0.34, '120 ± 340 mrad'),
+    ],
+)
 def test_a_value_has_as_many_digits_as_its_error_allows(value, std, text):
     assert plain(uncertain(value, std, 1e3, 'mrad')) == text
 
@@ -53,9 +73,15 @@ def test_an_effect_of_the_user_is_named_by_its_own_name():
     assert cause('tooth_wear', 'joint_2') == 'tooth wear of joint_2'
 
 
-@pytest.mark.parametrize(('names', 'text'), [
-    ([], ''), (['a'], 'a'), (['a', 'b'], 'a and b'), (['a', 'b', 'c'], 'a, b and c'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('names', 'text'),
+    [
+        ([], ''),
+        (['a'], 'a'),
+        (['a', 'b'], 'a and b'),
+        (['a', 'b', 'c'], 'a, b and c'),
+    ],
+)
 def test_lists_read_as_prose(names, text):
     assert listed(names) == text
 
@@ -111,10 +137,15 @@ def test_no_gap_is_told_against_the_noise():
 
 
 def test_the_orders_of_a_ripple_are_told_largest_first():
-    ripple = effect_from_mapping({
-        'effect': 'transmission_ripple', 'joint': 'j', 'amplitude': [1e-4, 3e-4],
-        'order': [1, 80], 'phase': [0.5, -1.0],
-    })  # fmt: skip
+    ripple = effect_from_mapping(
+        {
+            'effect': 'transmission_ripple',
+            'joint': 'j',
+            'amplitude': [1e-4, 3e-4],
+            'order': [1, 80],
+            'phase': [0.5, -1.0],
+        }
+    )
     rows = parameter_rows(ripple, {'amplitude': [1e-5, 1e-5], 'phase': [0.1, 0.1]})
     assert [(name, plain(text)) for name, text in rows] == [
         ('order 80', '0.300 ± 0.010 mrad at -1.00 ± 0.10 rad'),
@@ -147,8 +178,9 @@ def test_what_only_turns_the_tool_is_told_in_angles():
     robot = diagnoses.load('ur5')
     turned = [{'effect': 'tool_pose', 'xyz': [0.0, 0.0, 0.0], 'rotvec': [0.0, 2e-3, 0.0]}]
     told = diagnoses.diagnosis('identified', robot, turned, turned, [diagnoses.moving(robot)])
-    shrink = replace(told.shrink, ratio=1.0, rms_after_m=told.shrink.rms_before_m,
-                     orientation_rad=(2e-3, 5e-5))  # fmt: skip
+    shrink = replace(
+        told.shrink, ratio=1.0, rms_after_m=told.shrink.rms_before_m, orientation_rad=(2e-3, 5e-5)
+    )
     first, second = map(plain, verdict(replace(told, shrink=shrink)))
     assert first.startswith('The orientation gap of 0.400 mrad comes from tool pose error')
     assert '2.000 mrad shrinks to 0.050 mrad' in second

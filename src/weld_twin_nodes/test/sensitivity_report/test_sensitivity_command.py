@@ -9,8 +9,20 @@ import pytest
 
 from weld_twin_nodes.cli import main
 
-SMALL = ['--samples', '32', '--runs', '200', '--trajectories', '2', '--placements', '2',
-         '--points', '40', '--workers', '1']  # fmt: skip
+SMALL = [
+    '--samples',
+    '32',
+    '--runs',
+    '200',
+    '--trajectories',
+    '2',
+    '--placements',
+    '2',
+    '--points',
+    '40',
+    '--workers',
+    '1',
+]
 
 
 @pytest.fixture
@@ -54,8 +66,9 @@ def test_one_command_writes_figures_indices_and_a_page(tmp_path, two_effects, ca
     result = json.loads((out / 'sensitivity.json').read_text())
     assert set(result['motions']) == {'smooth', 'aggressive'}
     assert {row['motion'] for row in csv.DictReader((out / 'indices.csv').open())} == {
-        'smooth', 'aggressive',
-    }  # fmt: skip
+        'smooth',
+        'aggressive',
+    }
     before = (out / 'sensitivity.json').read_bytes()
     assert main([*words, *SMALL]) == 0
     assert (out / 'sensitivity.json').read_bytes() == before
@@ -67,21 +80,25 @@ def test_one_figure_is_drawn_alone_and_alike_every_time(tmp_path):
         out = tmp_path / name
         assert main(['sensitivity', '--robot', 'ur5', '--figure', '12', '--out', str(out)]) == 0
         assert sorted(p.name for p in (out / 'figures').iterdir()) == [
-            'figure-12.csv', 'figure-12.svg',
-        ]  # fmt: skip
+            'figure-12.csv',
+            'figure-12.svg',
+        ]
         texts.append((out / 'figures' / 'figure-12.svg').read_text())
     assert texts[0] == texts[1]
 
 
-@pytest.mark.parametrize(('words', 'message'), [
-    ([], 'give --robot R or a BAG'),
-    (['--robot', 'ur5', '--samples', '100'], 'power of two'),
-    (['--robot', 'ur5', '--figure', '3'], "no figure is called '3'"),
-    (['--robot', 'ur5', '--figure', 'recorded'], 'cannot be drawn of a planned seam'),
-    (['--robot', 'ur5', '--across', '0'], 'weld tolerances must be positive'),
-    (['--robot', 'ur5', '--points', '1'], 'at least 2 path points'),
-    (['--robot', 'ur5', '--tolerances', 'nowhere.yaml'], 'nowhere.yaml'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('words', 'message'),
+    [
+        ([], 'give --robot R or a BAG'),
+        (['--robot', 'ur5', '--samples', '100'], 'power of two'),
+        (['--robot', 'ur5', '--figure', '3'], "no figure is called '3'"),
+        (['--robot', 'ur5', '--figure', 'recorded'], 'cannot be drawn of a planned seam'),
+        (['--robot', 'ur5', '--across', '0'], 'weld tolerances must be positive'),
+        (['--robot', 'ur5', '--points', '1'], 'at least 2 path points'),
+        (['--robot', 'ur5', '--tolerances', 'nowhere.yaml'], 'nowhere.yaml'),
+    ],
+)
 def test_a_wrong_question_is_one_line_and_code_two(tmp_path, capsys, words, message):
     assert main(['sensitivity', *words, '--out', str(tmp_path / 'out')]) == 2
     error = capsys.readouterr().err

@@ -69,9 +69,10 @@ def _commands() -> dict[str, str]:
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser; only the subcommand in use is loaded with its options."""
     parser = argparse.ArgumentParser(
-        prog='weld-twin', description="Digital twin of a welding robot's positional accuracy.",
+        prog='weld-twin',
+        description="Digital twin of a welding robot's positional accuracy.",
         epilog='weld-twin COMMAND --help tells more. Angles are rad, lengths m unless said.',
-    )  # fmt: skip
+    )
     parser.add_argument('--version', action='version', version=_version())
     subparsers = parser.add_subparsers(required=True, metavar='COMMAND')
     commands = _commands()
@@ -84,9 +85,11 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         module = import_module(commands[name])
         text = getdoc(module) or ''
         sub = subparsers.add_parser(
-            name, help=text.partition('\n')[0], description=text,
+            name,
+            help=text.partition('\n')[0],
+            description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
-        )  # fmt: skip
+        )
         module.add_arguments(sub)
         sub.set_defaults(run=module.run)
     return parser

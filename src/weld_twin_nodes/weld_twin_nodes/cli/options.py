@@ -17,9 +17,11 @@ TOPIC_OPTIONS = ('joint', 'pose', 'point', 'wrench', 'temperature')
 def add_robot(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Add the options that name a robot."""
     parser.add_argument(
-        '--robot', required=required, metavar='R',
+        '--robot',
+        required=required,
+        metavar='R',
         help='bundled robot (weld-twin info --robots lists them), robot file or URDF',
-    )  # fmt: skip
+    )
     parser.add_argument('--base-link', metavar='LINK', help='first link of a chain in a URDF')
     parser.add_argument('--tip-link', metavar='LINK', help='last link of a chain in a URDF')
 

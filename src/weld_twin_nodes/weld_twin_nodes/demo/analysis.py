@@ -31,6 +31,10 @@ def analyse(job: Job, _: object) -> None:
     tangent, normal = job.plan.seam.tangent[place], job.plan.seam.normal[place]
     job.seam_deviation = seam_components(job.deviation, tangent, normal)
     job.metrics = deviation_metrics(
-        actual, expected, t=measured.t, path_length_m=job.plan.length,
-        tangent=tangent, normal=normal,
-    )  # fmt: skip
+        actual,
+        expected,
+        t=measured.t,
+        path_length_m=job.plan.length,
+        tangent=tangent,
+        normal=normal,
+    )

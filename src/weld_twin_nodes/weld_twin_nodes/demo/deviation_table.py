@@ -19,9 +19,9 @@ def write_table(job: Job, _: object) -> None:
     """Write ``deviation.csv`` and ``summary.txt``."""
     measured = job.recording.measured
     assert measured is not None
-    rows = np.column_stack([
-        measured.t, job.deviation, job.seam_deviation, deviation(job.deviation)
-    ])  # fmt: skip
+    rows = np.column_stack(
+        [measured.t, job.deviation, job.seam_deviation, deviation(job.deviation)]
+    )
     np.savetxt(
         job.folder / 'deviation.csv', rows, delimiter=',', header=COLUMNS, comments='', fmt='%.9g'
     )

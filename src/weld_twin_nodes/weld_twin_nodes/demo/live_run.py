@@ -48,17 +48,19 @@ def _start(cell: Cell, job: Job) -> Tap:
     """Start the nodes; what listens comes before what speaks, and each waits for the next."""
     common = {'robot': job.robot.name, 'reliable_inputs': True}
     cell.start('recorder', out=str(job.bag), reliable_inputs=True)
-    cell.start(
-        'deviation_analyzer', path_length=job.plan.length, wait_for_subscribers=2, **common
-    )
+    cell.start('deviation_analyzer', path_length=job.plan.length, wait_for_subscribers=2, **common)
     cell.start('forward_kinematics_twin', wait_for_subscribers=2, **common)
     effects = yaml_text([effect.to_mapping() for effect in job.effects])
-    cell.start(
-        'error_injector', effects=effects, seed=job.seed, wait_for_subscribers=2, **common
-    )
+    cell.start('error_injector', effects=effects, seed=job.seed, wait_for_subscribers=2, **common)
     deviations = cell.collect('/deviation')
     cell.start(
-        'trajectory_generator', robot=job.robot.name, path=job.seam, rate=job.rate, playback=0.0,
-        follow='/deviation', wait_for_subscribers=3, exit_when_done=True,
-    )  # fmt: skip
+        'trajectory_generator',
+        robot=job.robot.name,
+        path=job.seam,
+        rate=job.rate,
+        playback=0.0,
+        follow='/deviation',
+        wait_for_subscribers=3,
+        exit_when_done=True,
+    )
     return deviations

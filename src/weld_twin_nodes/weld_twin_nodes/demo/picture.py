@@ -44,9 +44,13 @@ def _seam(axes: Any, job: Job) -> None:
     axes.plot(*flat.T * 1e3, color='black', lw=1.2, label='seam, as the twin has it')
     size = deviation(job.deviation) * 1e3
     marks = axes.scatter(
-        *shown.T * 1e3, c=size, cmap='viridis', s=7, zorder=3,
+        *shown.T * 1e3,
+        c=size,
+        cmap='viridis',
+        s=7,
+        zorder=3,
         label=f'measured, deviation magnified {factor:g} times',
-    )  # fmt: skip
+    )
     for k in np.linspace(0, len(flat) - 1, 40).astype(int):
         axes.plot(*np.stack([flat[k], shown[k]]).T * 1e3, color='0.6', lw=0.6, zorder=1)
     axes.annotate('start', flat[0] * 1e3, xytext=(0, -14), textcoords='offset points', ha='center')

@@ -122,9 +122,12 @@ class Cell:
         return self.processes[-1]
 
     def add(
-        self, make: Callable[..., N], *args: Any, cli_args: list[str] | None = None,
+        self,
+        make: Callable[..., N],
+        *args: Any,
+        cli_args: list[str] | None = None,
         **parameters: Any,
-    ) -> N:  # fmt: skip
+    ) -> N:
         """
         Put a node into this process; it is served while the cell waits.
 
@@ -141,9 +144,7 @@ class Cell:
 
         """
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-        node = make(
-            *args, context=self._context, parameter_overrides=overrides, cli_args=cli_args
-        )
+        node = make(*args, context=self._context, parameter_overrides=overrides, cli_args=cli_args)
         self._executor.add_node(node)
         self._nodes.append(node)
         return node
@@ -190,9 +191,11 @@ class Cell:
         if row is None and kind is None:
             raise TwinError(f'{topic!r} is not in the table of topics; say its message class')
         self.node.create_subscription(
-            kind or row.message_class(), topic, tap.messages.append,
+            kind or row.message_class(),
+            topic,
+            tap.messages.append,
             DEEP if row is None else replace(row.offered, depth=DEEP).to_rclpy(),
-        )  # fmt: skip
+        )
         return tap
 
     def publisher(self, topic: Topic = JOINT_STATES) -> Any:
@@ -205,10 +208,15 @@ class Cell:
         return out
 
     def feed(
-        self, motion: JointMotion, joint_names: Sequence[str], *,
-        start_ns: int = FIRST_STAMP, listeners: int = 1, follow: Tap | None = None,
+        self,
+        motion: JointMotion,
+        joint_names: Sequence[str],
+        *,
+        start_ns: int = FIRST_STAMP,
+        listeners: int = 1,
+        follow: Tap | None = None,
         window: int = BURST,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """
         Publish a motion as joint states, as fast as the cell keeps up.
 
@@ -232,9 +240,11 @@ class Cell:
             if follow:
                 pump.answer(from_messages.stamp_ns(follow.last))
             for k in pump.due(time.monotonic_ns(), BURST):
-                publisher.publish(self.messages.joint_state(
-                    int(marks[k]), joint_names, motion.q[k], motion.velocity[k]
-                ))  # fmt: skip
+                publisher.publish(
+                    self.messages.joint_state(
+                        int(marks[k]), joint_names, motion.q[k], motion.velocity[k]
+                    )
+                )
             return pump.done
 
         self.wait(send, 'the motion to be taken', limit=LIMIT + 0.01 * motion.t.size)
@@ -261,6 +271,7 @@ class Cell:
 
     def wait_recorded(self, counts: Mapping[str, int]) -> None:
         """Wait until the recorder holds at least so many messages of each topic."""
+
         def all_there() -> bool:
             held = json.loads(self.trigger('/recorder/counts').message)
             return all(held[topic] >= count for topic, count in counts.items())
@@ -332,4 +343,3 @@ class Cell:
             process.interrupt()
         for process in self.processes:
             process.stop()
-

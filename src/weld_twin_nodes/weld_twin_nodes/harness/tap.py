@@ -37,4 +37,6 @@ class Tap:
     @property
     def stamps(self) -> np.ndarray:
         """Return the header stamps, int64 [ns]."""
-        return np.array([from_messages.stamp_ns(message) for message in self.messages], dtype=np.int64)
+        return np.array(
+            [from_messages.stamp_ns(message) for message in self.messages], dtype=np.int64
+        )

@@ -31,12 +31,20 @@ HEALTH_EVERY = 1.0
 """Seconds between two health messages."""
 
 SHARED = (
-    Setting('wait_for_subscribers', 0,
-            'take no input before the main outputs have this many subscribers [1]', 0, 100),
-    Setting('reliable_inputs', False,
-            'request reliable delivery; only for inputs whose publishers offer it'),
+    Setting(
+        'wait_for_subscribers',
+        0,
+        'take no input before the main outputs have this many subscribers [1]',
+        0,
+        100,
+    ),
+    Setting(
+        'reliable_inputs',
+        False,
+        'request reliable delivery; only for inputs whose publishers offer it',
+    ),
     Setting('stale_after', 1.0, 'silence after which an input counts as stale [s]', 0.05, 3600.0),
-)  # fmt: skip
+)
 
 
 class CellNode(Node):
@@ -71,6 +79,7 @@ class CellNode(Node):
 
     def every(self, period: float, action: Callable[[], None]) -> Any:
         """Return a timer [s] that runs on whether or not simulated time stands still."""
+
         def guarded() -> None:
             try:
                 action()
@@ -87,19 +96,25 @@ class CellNode(Node):
     def offer(self, topic: Topic, *, awaited: bool = True) -> Any:
         """Return a publisher of a topic of the table; ``wait_for_subscribers`` is for awaited."""
         publisher = self.create_publisher(
-            topic.message_class(), topic.name, topic.offered.to_rclpy(),
+            topic.message_class(),
+            topic.name,
+            topic.offered.to_rclpy(),
             event_callbacks=qos_events.of_publisher(
                 topic.name, topic.offered, partial(self._mismatch, topic.name)
             ),
-        )  # fmt: skip
+        )
         if awaited:
             self._outputs.append(publisher)
         return publisher
 
     def listen(
-        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False,
+        self,
+        topic: Topic,
+        callback: Callable[[Any], None],
+        *,
+        raw: bool = False,
         required: bool = False,
-    ) -> Input:  # fmt: skip
+    ) -> Input:
         """
         Subscribe to a topic of the table once the outputs have their subscribers.
 
@@ -132,11 +147,15 @@ class CellNode(Node):
             if self.setting('reliable_inputs'):
                 wanted = replace(wanted, reliability=topic.offered.reliability)
             self.create_subscription(
-                topic.message_class(), topic.name, guarded, wanted.to_rclpy(), raw=True,
+                topic.message_class(),
+                topic.name,
+                guarded,
+                wanted.to_rclpy(),
+                raw=True,
                 event_callbacks=qos_events.of_subscription(
                     topic.name, wanted, partial(self._mismatch, topic.name)
                 ),
-            )  # fmt: skip
+            )
 
         self.when_ready(subscribe)
         return state
@@ -197,6 +216,6 @@ class CellNode(Node):
         for name in [name for name in self.health.lasting if name.startswith('/')]:
             if not self.count_publishers(name) * self.count_subscribers(name):
                 del self.health.lasting[name]
-        self._diagnostics.publish(self.messages.statuses(
-            self.get_clock().now().nanoseconds, self.health.statuses()
-        ))  # fmt: skip
+        self._diagnostics.publish(
+            self.messages.statuses(self.get_clock().now().nanoseconds, self.health.statuses())
+        )

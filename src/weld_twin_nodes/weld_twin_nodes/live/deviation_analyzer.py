@@ -30,21 +30,29 @@ class DeviationAnalyzer(CellNode):
 
     settings = (
         *ROBOT_SETTINGS,
-        Setting('path_length', 0.0, 'length of the seam [m]; 0: the way the twin has gone',
-                0.0, 1e4),
+        Setting(
+            'path_length', 0.0, 'length of the seam [m]; 0: the way the twin has gone', 0.0, 1e4
+        ),
         Setting('buffer', 2000, 'samples of each stream kept for pairing [1]', 10, 1_000_000),
-        Setting('max_gap', 0.5, 'longest step of the twin that is interpolated, if its usual step '
-                'allows [s]', 0.0, 60.0),
+        Setting(
+            'max_gap',
+            0.5,
+            'longest step of the twin that is interpolated, if its usual step allows [s]',
+            0.0,
+            60.0,
+        ),
         Setting('metrics_every', 50, 'deviations between two metrics messages [1]', 1, 100_000),
         Setting('metrics_idle', 1.0, 'wait for more before the last metrics [s]', 0.05, 60.0),
-    )  # fmt: skip
+    )
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('deviation_analyzer', **kwargs)
         self._deviations = Deviations(
-            robot_of(self), self.setting('path_length'),
-            self.setting('buffer'), self.setting('max_gap'),
-        )  # fmt: skip
+            robot_of(self),
+            self.setting('path_length'),
+            self.setting('buffer'),
+            self.setting('max_gap'),
+        )
         self._vector = self.offer(DEVIATION)
         self._encode = Vector3Encoder(BASE)
         self._metrics = self.offer(DEVIATION_METRICS, awaited=False)

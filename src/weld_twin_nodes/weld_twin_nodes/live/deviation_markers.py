@@ -27,7 +27,7 @@ class DeviationMarkers(CellNode):
         Setting('spacing', 0.001, 'shortest way between two points drawn [m]', 0.0, 1.0),
         Setting('points', 1000, 'points kept of the seam [1]', 2, 100_000),
         Setting('every', 0.5, 'time between two pictures [s]', 0.05, 60.0),
-    )  # fmt: skip
+    )
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('deviation_markers', **kwargs)
@@ -42,9 +42,11 @@ class DeviationMarkers(CellNode):
     def time_went_back(self) -> None:
         """Begin the picture anew."""
         self._lines = DeviationLines(
-            self.setting('magnification'), self.setting('tolerance'), self.setting('spacing'),
+            self.setting('magnification'),
+            self.setting('tolerance'),
+            self.setting('spacing'),
             self.setting('points'),
-        )  # fmt: skip
+        )
         self._drawn = 0
 
     def _on_pose(self, message: Any) -> None:
@@ -61,9 +63,7 @@ class DeviationMarkers(CellNode):
         if self._lines.count == self._drawn:
             return
         self._drawn = self._lines.count
-        self._markers.publish(
-            self.messages.markers(self._lines.stamp, self._lines.drawn(), WORLD)
-        )
+        self._markers.publish(self.messages.markers(self._lines.stamp, self._lines.drawn(), WORLD))
 
 
 def main(args: list[str] | None = None) -> int:

@@ -69,7 +69,9 @@ class Window:
     def take_pose(self, message: Any) -> None:
         """Take a measured pose."""
         position, rotation = from_messages.pose(message)
-        self._add('pose', from_messages.stamp_ns(message), np.concatenate([position, rotation.ravel()]))
+        self._add(
+            'pose', from_messages.stamp_ns(message), np.concatenate([position, rotation.ravel()])
+        )
 
     def take_point(self, message: Any) -> None:
         """Take a measured point."""
@@ -118,10 +120,14 @@ class Window:
         qd = None if np.isnan(values[:, n:]).any() else values[:, n:]
         inside = list(dropwhile(lambda row: row[0] < epoch, measured))
         return Recording(
-            'live', JointMotion(_seconds(joints, epoch), values[:, :n], qd),
-            _measurements(inside, epoch), self._signal('wrench', epoch), self._wrench_frame,
-            self._signal('temperature', epoch), epoch,
-        )  # fmt: skip
+            'live',
+            JointMotion(_seconds(joints, epoch), values[:, :n], qd),
+            _measurements(inside, epoch),
+            self._signal('wrench', epoch),
+            self._wrench_frame,
+            self._signal('temperature', epoch),
+            epoch,
+        )
 
     def _signal(self, name: str, epoch: int) -> Signal | None:
         stream = self._streams.get(name)

@@ -74,9 +74,11 @@ class Worker:
         """Begin a job; the one before must be finished."""
         self._result = None
         self._process = subprocess.Popen(
-            [sys.executable, '-m', _MODULE], stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            [sys.executable, '-m', _MODULE],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
         # Handing over the data waits for the other interpreter to be up: not in the caller's time.
         self._thread = threading.Thread(target=self._exchange, args=(self._process, job))
         self._thread.start()
@@ -114,10 +116,13 @@ def find(job: Job) -> Finding:
     )
     gap, shrink = diagnosis.gap, diagnosis.shrink
     values: dict[str, Any] = {
-        'status': diagnosis.status, 'confidence': diagnosis.confidence,
-        'gap_rms_m': gap.rms_m, 'noise_floor_m': gap.noise_floor_m,
-        'rms_after_m': shrink.rms_after_m, 'shrink_ratio': shrink.ratio,
-    }  # fmt: skip
+        'status': diagnosis.status,
+        'confidence': diagnosis.confidence,
+        'gap_rms_m': gap.rms_m,
+        'noise_floor_m': gap.noise_floor_m,
+        'rms_after_m': shrink.rms_after_m,
+        'shrink_ratio': shrink.ratio,
+    }
     for found in diagnosis.effects:
         entry = found.effect.to_mapping()
         values[found_name(found)] = {

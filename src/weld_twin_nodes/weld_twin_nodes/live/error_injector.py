@@ -44,9 +44,7 @@ class ErrorInjector(ModelNode):
         """Publish where the joints and the tool really are."""
         self._joints.publish(self._encode_joints(sample.stamp, sample.q))
         position = sample.poses.position + self._noise.draw(1)[0]
-        self._pose.publish(
-            self._encode_pose(sample.pose_stamp, position, sample.poses.rotation)
-        )
+        self._pose.publish(self._encode_pose(sample.pose_stamp, position, sample.poses.rotation))
 
 
 def main(args: list[str] | None = None) -> int:

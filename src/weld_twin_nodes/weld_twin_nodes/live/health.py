@@ -55,11 +55,13 @@ class Input:
             self._rates.append(rate)
         self._before = (now, self.received, self.refused, self.others)
         values = {
-            'received': self.received, 'refused': self.refused,
-            'rate_hz': round(rate, 1), 'publishers': self.publishers,
+            'received': self.received,
+            'refused': self.refused,
+            'rate_hz': round(rate, 1),
+            'publishers': self.publishers,
             'age_s': round(now - self.last, 3) if self.received else 'never',
             'last_reason': self.last_reason,
-        }  # fmt: skip
+        }
         return Status(f'{node}: {self.topic}', level, message, values)
 
     def _judge(self, now: float, n: int, bad: int, rate: float, others: int) -> tuple[int, str]:
@@ -108,8 +110,10 @@ class Health:
         now = time.monotonic()
         told = [*self.lasting.values(), *self._said[-3:]]
         own = Status(
-            self._node, WARN if told else OK, '; '.join(told) or 'running',
+            self._node,
+            WARN if told else OK,
+            '; '.join(told) or 'running',
             {'inputs': len(self.inputs), 'told': self._said_in_all},
-        )  # fmt: skip
+        )
         self._said.clear()
         return [own, *(item.status(self._node, now) for item in self.inputs.values())]

@@ -46,7 +46,7 @@ class LiveDiagnosis(CellNode):
         Setting('window', 60.0, 'length of the window [s]', 1.0, 600.0),
         Setting('least', 5.0, 'shortest stretch that is diagnosed [s]', 0.5, 600.0),
         Setting('every', 15.0, 'shortest time from one diagnosis to the next [s]', 0.0, 3600.0),
-    )  # fmt: skip
+    )
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('live_diagnosis', **kwargs)
@@ -94,10 +94,16 @@ class LiveDiagnosis(CellNode):
             self.refuse('window', result)
         elif result is not None and (self._speaking or result.status != 'none'):
             self._speaking = True
-            self._verdict.publish(self.messages.diagnostics(
-                result.stamp, 'weld_twin: diagnosis', result.values, LEVELS[result.status],
-                result.sentence, self._twin.robot.name,
-            ))  # fmt: skip
+            self._verdict.publish(
+                self.messages.diagnostics(
+                    result.stamp,
+                    'weld_twin: diagnosis',
+                    result.values,
+                    LEVELS[result.status],
+                    result.sentence,
+                    self._twin.robot.name,
+                )
+            )
 
 
 def _frames(text: str) -> frozenset[str]:

@@ -23,10 +23,13 @@ from .settings import Setting
 
 MODEL_SETTINGS = (
     *ROBOT_SETTINGS,
-    Setting('model', '', 'effects file, or diagnosis.json with the effects found; ~/reload '
-            'reads it again'),
+    Setting(
+        'model',
+        '',
+        'effects file, or diagnosis.json with the effects found; ~/reload reads it again',
+    ),
     Setting('effects', '', 'more effects, as the YAML list of an effects file', live=True),
-)  # fmt: skip
+)
 
 
 class ModelNode(CellNode):

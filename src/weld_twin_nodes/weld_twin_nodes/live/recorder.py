@@ -58,14 +58,15 @@ class Recorder(CellNode):
             raise DataError(f'cannot record {unknown[0]!r}; topics are {", ".join(BY_NAME)}')
         self._bag = BackgroundBag(
             GrowingBag(
-                self.setting('out'), storage=self.setting('storage'),
+                self.setting('out'),
+                storage=self.setting('storage'),
                 split_bytes=int(self.setting('split_size') * 1e6),
                 split_ns=int(self.setting('split_duration') * 1e9),
                 provenance={'version': __version__},
             ),
             flush_every=self.setting('flush_every'),
             most_bytes=int(self.setting('buffer') * 1e6),
-        )  # fmt: skip
+        )
         for name in self.setting('topics'):
             topic = BY_NAME[name]
             self.listen(topic, partial(self._write, topic.name, topic.type), raw=True)
@@ -133,9 +134,13 @@ class Recorder(CellNode):
         for parameter in event.changed_parameters:
             if node in ASKED and parameter.name == 'effects':
                 now = self.get_clock().now().nanoseconds
-                self._changes.append({
-                    'node': node, 'log_ns': now, 'effects': parameter.value.string_value,
-                })  # fmt: skip
+                self._changes.append(
+                    {
+                        'node': node,
+                        'log_ns': now,
+                        'effects': parameter.value.string_value,
+                    }
+                )
                 self._bag.note('effects_changes', self._changes)
 
 

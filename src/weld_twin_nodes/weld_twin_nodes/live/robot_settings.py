@@ -18,11 +18,15 @@ from .cell_node import CellNode
 from .settings import Setting
 
 ROBOT_SETTINGS = (
-    Setting('robot', 'ur5', "bundled robot, path of a robot file or URDF, or 'topic' "
-            '(or /robot_description) to wait for the URDF that robot_state_publisher tells'),
+    Setting(
+        'robot',
+        'ur5',
+        "bundled robot, path of a robot file or URDF, or 'topic' "
+        '(or /robot_description) to wait for the URDF that robot_state_publisher tells',
+    ),
     Setting('base_link', '', 'first link of the chain in a URDF; empty: its root'),
     Setting('tip_link', '', 'last link of the chain in a URDF; empty: its only leaf'),
-)  # fmt: skip
+)
 LOOK = 0.1
 """Seconds of one turn of the loop that waits for a description."""
 
@@ -50,9 +54,12 @@ def _described(node: CellNode, topic: str) -> str:
     texts: list[str] = []
     decode = decoder(ROBOT_DESCRIPTION.type)
     subscription = node.create_subscription(
-        ROBOT_DESCRIPTION.message_class(), topic, lambda data: texts.append(decode(data).data),
-        ROBOT_DESCRIPTION.requested.to_rclpy(), raw=True,
-    )  # fmt: skip
+        ROBOT_DESCRIPTION.message_class(),
+        topic,
+        lambda data: texts.append(decode(data).data),
+        ROBOT_DESCRIPTION.requested.to_rclpy(),
+        raw=True,
+    )
     node.get_logger().info(f'waiting for the robot on {topic}')
     node.health.lasting['robot'] = f'waiting for the robot on {topic}'
     runner = SingleThreadedExecutor(context=node.context)

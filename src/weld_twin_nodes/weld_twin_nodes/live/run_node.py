@@ -66,8 +66,11 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass
     except (
-        TwinError, OSError, InvalidParameterValueException, InvalidParameterTypeException,
-    ) as error:  # fmt: skip
+        TwinError,
+        OSError,
+        InvalidParameterValueException,
+        InvalidParameterTypeException,
+    ) as error:
         return _told(error)
     except Exception:
         if rclpy.ok():

@@ -47,22 +47,36 @@ class TrajectoryGenerator(CellNode):
 
     settings = (
         *ROBOT_SETTINGS,
-        Setting('source', 'plan', 'where the motion is from: plan, or the messages of '
-                'joint_trajectory or path, each run when it comes'),
+        Setting(
+            'source',
+            'plan',
+            'where the motion is from: plan, or the messages of '
+            'joint_trajectory or path, each run when it comes',
+        ),
         Setting('path', 'line', 'kind of the bundled seam, or path of a path file'),
         Setting('profile', 'smooth', 'time law: constant, trapezoid, s-curve, smooth, aggressive'),
         Setting('speed', 0.0, "speed along the seam [m/s]; 0: the time law's own", 0.0, 10.0),
         Setting('rate', 125.0, 'samples of the motion [1/s]', 1.0, 10_000.0),
-        Setting('repeat', 1, 'how often, there and back by turns [1]; 0: until stopped',
-                0, 1_000_000),
-        Setting('playback', 1.0, 'speed against real time [1]; 0: as fast as the subscribers '
-                'keep up', 0.0, 1000.0),
-        Setting('follow', '', 'topic of the last result of a joint state, whose stamps tell '
-                'that the subscribers kept up'),
+        Setting(
+            'repeat', 1, 'how often, there and back by turns [1]; 0: until stopped', 0, 1_000_000
+        ),
+        Setting(
+            'playback',
+            1.0,
+            'speed against real time [1]; 0: as fast as the subscribers keep up',
+            0.0,
+            1000.0,
+        ),
+        Setting(
+            'follow',
+            '',
+            'topic of the last result of a joint state, whose stamps tell '
+            'that the subscribers kept up',
+        ),
         Setting('window', 100, 'joint states that may be under way [1]', 1, 100_000),
         Setting('start_stamp_ns', 0, 'stamp of the first sample [ns]; 0: now', 0, 2**62),
         Setting('exit_when_done', False, 'end the node after the last sample'),
-    )  # fmt: skip
+    )
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('trajectory_generator', **kwargs)
@@ -151,16 +165,18 @@ class TrajectoryGenerator(CellNode):
     def _stamp(self, start: int) -> None:
         self._stamps = stamps(self._motion.t, start)
         self._pump = Pump(
-            self._stamps, playback=self._playback, window=self.setting('window'),
+            self._stamps,
+            playback=self._playback,
+            window=self.setting('window'),
             answered=bool(self.setting('follow')),
-        )  # fmt: skip
+        )
 
     def _send(self) -> None:
         assert self._pump is not None
         for k in self._pump.due(self.get_clock().now().nanoseconds, BURST):
-            self._publisher.publish(self._encode(
-                int(self._stamps[k]), self._motion.q[k], self._motion.velocity[k]
-            ))  # fmt: skip
+            self._publisher.publish(
+                self._encode(int(self._stamps[k]), self._motion.q[k], self._motion.velocity[k])
+            )
         if self._pump.done and self._rounds:
             self._turn()
         if self._pump.done or (self._playback == 0.0 and not self.setting('follow')):

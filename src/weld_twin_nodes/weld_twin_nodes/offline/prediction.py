@@ -28,9 +28,12 @@ from .told_twin import build_twin
 
 
 def prediction_twin(
-    robot: Robot, path: Path | str, bag: Path | str, recording: Recording,
+    robot: Robot,
+    path: Path | str,
+    bag: Path | str,
+    recording: Recording,
     setup: int | None = None,
-) -> Twin:  # fmt: skip
+) -> Twin:
     """
     Return the twin of a model file for a bag.
 
@@ -61,9 +64,10 @@ def prediction_twin(
     if len(model.bases) == 1:
         return timed(path, model, 0, recording)
     known = [
-        item['sha256'] for item in read_diagnosis(path).get('inputs', [])
+        item['sha256']
+        for item in read_diagnosis(path).get('inputs', [])
         if item['use'] == 'recording'
-    ]  # fmt: skip
+    ]
     own = hashed('recording', bag).sha256
     if own not in known:
         if one_base(model):
@@ -76,9 +80,13 @@ def prediction_twin(
 
 
 def write_prediction(
-    path: Path | str, twin: Twin, recording: Recording, *, storage: str = 'mcap',
+    path: Path | str,
+    twin: Twin,
+    recording: Recording,
+    *,
+    storage: str = 'mcap',
     provenance: Mapping[str, Any] | None = None,
-) -> float | None:  # fmt: skip
+) -> float | None:
     """
     Write the recording with the twin's pose at every joint state, and deviations.
 
@@ -101,7 +109,12 @@ def write_prediction(
         deviation = gap @ twin.robot.T_world_base[:3, :3]
     made = {'twin_effects': [effect.to_mapping() for effect in twin.effects]}
     write_recording(
-        path, recording, twin.robot, twin=(poses.position, poses.rotation),
-        deviation=deviation, storage=storage, provenance={**made, **(provenance or {})},
-    )  # fmt: skip
+        path,
+        recording,
+        twin.robot,
+        twin=(poses.position, poses.rotation),
+        deviation=deviation,
+        storage=storage,
+        provenance={**made, **(provenance or {})},
+    )
     return None if deviation is None else float(np.sqrt((deviation**2).sum(axis=1).mean()))

@@ -18,9 +18,12 @@ from .simulation import Simulation
 
 
 def write_simulation(
-    path: Path | str, simulation: Simulation, *, storage: str = 'mcap',
+    path: Path | str,
+    simulation: Simulation,
+    *,
+    storage: str = 'mcap',
     provenance: Mapping[str, Any] | None = None,
-) -> Mapping[str, float]:  # fmt: skip
+) -> Mapping[str, float]:
     """
     Write a bag with what the live nodes would publish; return the last metrics.
 

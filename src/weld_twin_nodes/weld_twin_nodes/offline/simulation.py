@@ -100,8 +100,10 @@ class Simulation:
         measured = zip(_late(self.stamps, self.real), self.measured.position, strict=True)
         expected = zip(_late(self.stamps, self.twin), self.expected.position, strict=True)
         takers = (analyzer.add_measured, analyzer.add_twin)
-        tagged = [[(s, take, p) for s, p in rows] for take, rows in
-                  zip(takers, (measured, expected), strict=True)]  # fmt: skip
+        tagged = [
+            [(s, take, p) for s, p in rows]
+            for take, rows in zip(takers, (measured, expected), strict=True)
+        ]
         for stamp, take, position in heapq.merge(*tagged, key=lambda row: row[0]):
             for deviation in take(stamp, position):
                 yield deviation, analyzer.metrics()

@@ -27,9 +27,13 @@ _ABOVE = 1.5
 def causes_section(diagnosis: Diagnosis) -> Html:
     """Return parameters, candidates and equivalence sets."""
     return section(
-        'Which effect', _found(diagnosis), _candidates(diagnosis), _sets(diagnosis),
-        _absent(diagnosis), id_='causes',
-    )  # fmt: skip
+        'Which effect',
+        _found(diagnosis),
+        _candidates(diagnosis),
+        _sets(diagnosis),
+        _absent(diagnosis),
+        id_='causes',
+    )
 
 
 def _found(diagnosis: Diagnosis) -> Html | None:
@@ -105,16 +109,23 @@ def _sets(diagnosis: Diagnosis) -> Html | None:
     if not sets:
         return joined([title, tag('p', 'Nothing: every effect named stands alone.')])
     items = [
-        tag('li', f'{listed([site_name(site) for site in group], "or")}: '
-            'naming one of them would be a guess.')
+        tag(
+            'li',
+            f'{listed([site_name(site) for site in group], "or")}: '
+            'naming one of them would be a guess.',
+        )
         for group in sets
-    ]  # fmt: skip
+    ]
     every = {site for group in sets for site in group}
     reasons = [tag('li', in_words(reason, every)) for reason in diagnosis.reasons]
-    return joined([
-        title, tag('ul', *items, class_='sentences'),
-        tag('p', 'Why:') if reasons else None, tag('ul', *reasons, class_='sentences'),
-    ])  # fmt: skip
+    return joined(
+        [
+            title,
+            tag('ul', *items, class_='sentences'),
+            tag('p', 'Why:') if reasons else None,
+            tag('ul', *reasons, class_='sentences'),
+        ]
+    )
 
 
 def _absent(diagnosis: Diagnosis) -> Html | None:
@@ -122,9 +133,10 @@ def _absent(diagnosis: Diagnosis) -> Html | None:
         return None
     rows = sorted(diagnosis.absent.items())
     return tag(
-        'details', tag('summary', f'Not considered, and why ({len(rows)})'),
+        'details',
+        tag('summary', f'Not considered, and why ({len(rows)})'),
         table(('Effect', 'Why'), rows),
-    )  # fmt: skip
+    )
 
 
 def leftover(diagnosis: Diagnosis) -> Html:
@@ -132,13 +144,21 @@ def leftover(diagnosis: Diagnosis) -> Html:
     rest = diagnosis.unexplained
     floor = diagnosis.gap.noise_floor_m
     if not rest.above_noise and rest.rms_m > _ABOVE * floor:
-        return tag('p', f'What remains, {millimetres(rest.rms_m)}, depends on nothing that was '
-                   f'looked at, but the instrument is better than that: {millimetres(floor)}.')
+        return tag(
+            'p',
+            f'What remains, {millimetres(rest.rms_m)}, depends on nothing that was '
+            f'looked at, but the instrument is better than that: {millimetres(floor)}.',
+        )
     if not rest.above_noise:
         text = f'What remains, {millimetres(rest.rms_m)}, is at the level of the noise.'
         return tag('p', text)
     items = [tag('li', line) for line in rest.structure] or [tag('li', MISSING)]
-    return joined([
-        tag('p', f'{millimetres(rest.rms_m)} above the noise remain unexplained. It depends on:'),
-        tag('ul', *items, class_='sentences'),
-    ])  # fmt: skip
+    return joined(
+        [
+            tag(
+                'p',
+                f'{millimetres(rest.rms_m)} above the noise remain unexplained. It depends on:',
+            ),
+            tag('ul', *items, class_='sentences'),
+        ]
+    )

@@ -36,21 +36,33 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
 
     """
     body = tag(
-        'main', header(diagnosis), opening(diagnosis), seam_section(diagnosis),
-        where_section(diagnosis), causes_section(diagnosis), shrink_section(diagnosis),
-        next_section(diagnosis), checks_section(diagnosis), inputs_section(inputs),
-    )  # fmt: skip
+        'main',
+        header(diagnosis),
+        opening(diagnosis),
+        seam_section(diagnosis),
+        where_section(diagnosis),
+        causes_section(diagnosis),
+        shrink_section(diagnosis),
+        next_section(diagnosis),
+        checks_section(diagnosis),
+        inputs_section(inputs),
+    )
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
-    head = joined([
-        tag('meta', charset='utf-8'),
-        tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
-        tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
-        tag('meta', name_='color-scheme', content='light dark'),
-        tag('title', title), tag('style', _file('page.css')),
-    ])  # fmt: skip
+    head = joined(
+        [
+            tag('meta', charset='utf-8'),
+            tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
+            tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
+            tag('meta', name_='color-scheme', content='light dark'),
+            tag('title', title),
+            tag('style', _file('page.css')),
+        ]
+    )
     data = tag('script', _embedded(seam_data(diagnosis)), type='application/json', id_='data')
     whole = tag(
-        'html', tag('head', head), tag('body', body, data, tag('script', _file('page.js'))),
+        'html',
+        tag('head', head),
+        tag('body', body, data, tag('script', _file('page.js'))),
         lang='en',
     )
     return f'<!doctype html>\n{whole}\n'

@@ -33,10 +33,13 @@ def worth_doing(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.families or len(diagnosis.actions) <= _LARGEST:
         return list(diagnosis.actions)
     more = len(diagnosis.actions) - _LARGEST
-    return [*diagnosis.actions[:_LARGEST], (
-        f'{more} smaller ones are in diagnosis.json. Together they are best taken in by the '
-        'corrected robot.yaml or robot.urdf, and by compensated commands (weld-twin compensate).'
-    )]  # fmt: skip
+    return [
+        *diagnosis.actions[:_LARGEST],
+        (
+            f'{more} smaller ones are in diagnosis.json. Together they are best taken in by the '
+            'corrected robot.yaml or robot.urdf, and by compensated commands (weld-twin compensate).'
+        ),
+    ]
 
 
 def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
@@ -69,10 +72,14 @@ def ripples(diagnosis: Diagnosis) -> list[Ripple]:
 def ripple_rows(diagnosis: Diagnosis) -> list[list[str]]:
     """Return joint, RMS of its ripple, strongest lines."""
     return [
-        [r.joint, f'{1e6 * r.rms:.0f} µrad',
-         ', '.join(f'{order:g} ({1e6 * size:.0f} µrad)' for order, size in r.lines)]
-        for r in ripples(diagnosis) if r.rms > 0.0
-    ]  # fmt: skip
+        [
+            r.joint,
+            f'{1e6 * r.rms:.0f} µrad',
+            ', '.join(f'{order:g} ({1e6 * size:.0f} µrad)' for order, size in r.lines),
+        ]
+        for r in ripples(diagnosis)
+        if r.rms > 0.0
+    ]
 
 
 FAMILY_HEADS = ('Kind', 'Members', 'Accounts for', 'Largest members')
@@ -82,13 +89,19 @@ RIPPLE_HEADS = ('Joint', 'Ripple, RMS', 'Strongest orders per turn')
 def families_table(diagnosis: Diagnosis) -> Html:
     """Return the kinds found, and the ripple of every joint."""
     rows = ripple_rows(diagnosis)
-    return joined([
-        tag('h3', 'Errors found, by kind'),
-        table(FAMILY_HEADS, family_rows(diagnosis.families), 'effects'),
-        tag('p', 'What a kind accounts for is how much the error on unseen data grows without it, '
-            'as RMS at the tool, while the others stay as they are. Exchangeable: the data hardly '
-            'get worse without it, for the other kinds take its place. Every member and order is '
-            'in effects.yaml.', class_='note'),
-        tag('h3', 'Transmission ripple by joint') if rows else None,
-        table(RIPPLE_HEADS, rows) if rows else None,
-    ])  # fmt: skip
+    return joined(
+        [
+            tag('h3', 'Errors found, by kind'),
+            table(FAMILY_HEADS, family_rows(diagnosis.families), 'effects'),
+            tag(
+                'p',
+                'What a kind accounts for is how much the error on unseen data grows without it, '
+                'as RMS at the tool, while the others stay as they are. Exchangeable: the data hardly '
+                'get worse without it, for the other kinds take its place. Every member and order is '
+                'in effects.yaml.',
+                class_='note',
+            ),
+            tag('h3', 'Transmission ripple by joint') if rows else None,
+            table(RIPPLE_HEADS, rows) if rows else None,
+        ]
+    )

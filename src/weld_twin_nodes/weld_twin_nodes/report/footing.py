@@ -48,8 +48,9 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
         rest['parts them by'] = f'{sigma:.0f} standard deviations, as far as can be foreseen'
     lines = [
         tag('p', in_words(wanted[key], sites), class_=class_)
-        for key, class_ in (('sentence', None), ('reason', 'note')) if wanted.get(key)
-    ]  # fmt: skip
+        for key, class_ in (('sentence', None), ('reason', 'note'))
+        if wanted.get(key)
+    ]
     entries = _entries(rest)
     return joined([*lines, tag('dl', *entries, class_='pairs') if entries else None])
 
@@ -82,18 +83,26 @@ def checks_section(diagnosis: Diagnosis) -> Html:
     """Return the checks of the data, those that need attention first."""
     ordered = sorted(diagnosis.checks, key=lambda check: _ORDER.get(check.level, 0))
     items = [
-        tag('li', tag('span', check.level, class_=f'level {check.level}'),
-            tag('span', tag('b', check.name.replace('_', ' ')), ' ', check.sentence))
+        tag(
+            'li',
+            tag('span', check.level, class_=f'level {check.level}'),
+            tag('span', tag('b', check.name.replace('_', ' ')), ' ', check.sentence),
+        )
         for check in ordered
-    ]  # fmt: skip
+    ]
     notes = [
-        tag('li', tag('span', 'note', class_='level note'),
-            tag('span', tag('b', recording.name), ' ', note))
-        for recording in diagnosis.recordings for note in recording.notes
-    ]  # fmt: skip
+        tag(
+            'li',
+            tag('span', 'note', class_='level note'),
+            tag('span', tag('b', recording.name), ' ', note),
+        )
+        for recording in diagnosis.recordings
+        for note in recording.notes
+    ]
     found = tag('ul', *items, *notes, class_='checks')
     return section(
-        'Are the data sound', found if items or notes else tag('p', 'Nothing stood out.'),
+        'Are the data sound',
+        found if items or notes else tag('p', 'Nothing stood out.'),
         id_='checks',
         lead='Looked at before any cause was.',
     )
@@ -106,6 +115,8 @@ def inputs_section(inputs: Sequence[InputFile]) -> Html:
         for item in inputs
     ]
     return section(
-        'Made from', table(('Use', 'Path', 'SHA-256'), rows, 'inputs'),
-        tag('p', f'weld_twin {__version__}', class_='note'), id_='inputs',
+        'Made from',
+        table(('Use', 'Path', 'SHA-256'), rows, 'inputs'),
+        tag('p', f'weld_twin {__version__}', class_='note'),
+        id_='inputs',
     )

@@ -19,19 +19,27 @@ def where_section(diagnosis: Diagnosis) -> Html:
     where = diagnosis.where
     parts = [
         _part('By joint', _joints(diagnosis)),
-        _part('By regime', bars([
-            (REGIMES.get(name, name), share, percent(share))
-            for name, share in sorted(where.regimes.items(), key=lambda item: -item[1])
-        ])),
+        _part(
+            'By regime',
+            bars(
+                [
+                    (REGIMES.get(name, name), share, percent(share))
+                    for name, share in sorted(where.regimes.items(), key=lambda item: -item[1])
+                ]
+            ),
+        ),
         _part('By direction', _directions(diagnosis)),
-    ]  # fmt: skip
+    ]
     return section(
-        'Where it lies', _map(diagnosis), tag('div', *parts, class_='columns'),
-        _stretches(diagnosis), id_='where',
+        'Where it lies',
+        _map(diagnosis),
+        tag('div', *parts, class_='columns'),
+        _stretches(diagnosis),
+        id_='where',
         lead='How much of the squared gap each joint explains by itself, as a function of what; '
         'on stretches of the data not used for fitting. Rows and columns overlap, so they need '
         'not add up.',
-    )  # fmt: skip
+    )
 
 
 def _part(title: str, content: Html) -> Html:
@@ -49,9 +57,13 @@ def _map(diagnosis: Diagnosis) -> Html | None:
         rows.append(tag('tr', tag('th', name, scope='row'), *cells))
     head = tag('thead', tag('tr', tag('th', 'Joint', scope='col'), *heads))
     return tag(
-        'div', tag('table', head, tag('tbody', *rows), class_='map'), class_='scroll',
-        tabindex='0', role='region', aria_label='Share by joint and regressor',
-    )  # fmt: skip
+        'div',
+        tag('table', head, tag('tbody', *rows), class_='map'),
+        class_='scroll',
+        tabindex='0',
+        role='region',
+        aria_label='Share by joint and regressor',
+    )
 
 
 def _cell(share: float) -> Html:
@@ -75,10 +87,12 @@ def _directions(diagnosis: Diagnosis) -> Html:
         direction = {key: value for key, value in direction.items() if key != 'along_m'}
         names['across_m'] = 'across the tool'
     largest = max([*direction.values(), 1e-12])
-    return bars([
-        (names.get(key, key), value / largest, millimetres(value))
-        for key, value in direction.items()
-    ])  # fmt: skip
+    return bars(
+        [
+            (names.get(key, key), value / largest, millimetres(value))
+            for key, value in direction.items()
+        ]
+    )
 
 
 def _stretches(diagnosis: Diagnosis) -> Html | None:
@@ -88,13 +102,20 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
     largest = max(*(rms for *_, rms in path), 1e-12)
     cells = [
         tag(
-            'li', tag('span', f'{1e3 * rms:.2f}', class_='figure'),
+            'li',
+            tag('span', f'{1e3 * rms:.2f}', class_='figure'),
             style=f'--share:{rms / largest:.3f};flex-grow:{max(end - start, 1e-3):.3f}',
             class_='strong' if rms > 0.55 * largest else None,
             title=f'{seconds(start)} to {seconds(end)}: {millimetres(rms)}, '
             f'{percent(share)} of the squared gap',
         )
         for start, end, share, rms in path
-    ]  # fmt: skip
-    return _part('Along the recording', tag('div', tag('ol', *cells, class_='strip'), tag(
-        'p', 'RMS gap in mm of each stretch, in the order of time.', class_='note')))  # fmt: skip
+    ]
+    return _part(
+        'Along the recording',
+        tag(
+            'div',
+            tag('ol', *cells, class_='strip'),
+            tag('p', 'RMS gap in mm of each stretch, in the order of time.', class_='note'),
+        ),
+    )

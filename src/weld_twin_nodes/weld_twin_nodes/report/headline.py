@@ -29,9 +29,10 @@ def header(diagnosis: Diagnosis) -> Html:
     names = ', '.join(recording.name for recording in diagnosis.recordings)
     parts = [robot.name, names, _date(diagnosis)]
     return tag(
-        'header', tag('p', 'Positional accuracy ', tag('b', 'diagnosis'), class_='kind'),
+        'header',
+        tag('p', 'Positional accuracy ', tag('b', 'diagnosis'), class_='kind'),
         tag('p', ' · '.join(part for part in parts if part), class_='subject'),
-    )  # fmt: skip
+    )
 
 
 def _date(diagnosis: Diagnosis) -> str:
@@ -48,20 +49,25 @@ def opening(diagnosis: Diagnosis) -> Html:
     return tag(
         'section',
         tag('p', STATUS[diagnosis.status], class_=f'status {diagnosis.status}'),
-        tag('h1', first), tag('p', second, class_='second'),
-        _figures(diagnosis), _actions(diagnosis),
+        tag('h1', first),
+        tag('p', second, class_='second'),
+        _figures(diagnosis),
+        _actions(diagnosis),
         id_='verdict',
-    )  # fmt: skip
+    )
 
 
 def _figures(diagnosis: Diagnosis) -> Html:
     gap, shrink = diagnosis.gap, diagnosis.shrink
     rows = [
-        ('Gap', millimetres(gap.rms_m), f'RMS of {gap.samples} samples; '
-         f'{millimetres(gap.max_m)} at most'),
+        (
+            'Gap',
+            millimetres(gap.rms_m),
+            f'RMS of {gap.samples} samples; {millimetres(gap.max_m)} at most',
+        ),
         ('Left over', millimetres(shrink.rms_after_m), _left(diagnosis)),
         ('Noise floor', millimetres(gap.noise_floor_m), 'what the data cannot resolve'),
-    ]  # fmt: skip
+    ]
     if diagnosis.status in _SURE_OF:
         rows.append(('Confidence', odds(diagnosis.confidence), _SURE_OF[diagnosis.status]))
     if gap.orientation_rms_rad is not None:

@@ -38,10 +38,13 @@ def tag(name: str, *children: Child, **attributes: str | float | None) -> Html:
 
 def joined(children: Iterable[Child]) -> Html:
     """Return children side by side."""
-    return Html(''.join(
-        child if isinstance(child, Html) else escape(str(child))
-        for child in children if child is not None
-    ))  # fmt: skip
+    return Html(
+        ''.join(
+            child if isinstance(child, Html) else escape(str(child))
+            for child in children
+            if child is not None
+        )
+    )
 
 
 def section(title: str, *children: Child, id_: str, lead: str | None = None) -> Html:
@@ -55,9 +58,7 @@ def table(heads: Iterable[str], rows: Iterable[Iterable[Child]], class_: str = '
     body = []
     for row in rows:
         first, *rest = row
-        body.append(
-            tag('tr', tag('th', first, scope='row'), *(tag('td', cell) for cell in rest))
-        )
+        body.append(tag('tr', tag('th', first, scope='row'), *(tag('td', cell) for cell in rest)))
     top = tag('tr', *(tag('th', head, scope='col') for head in heads))
     whole = tag('table', tag('thead', top), tag('tbody', *body), class_=class_ or None)
     return tag('div', whole, class_='scroll')
@@ -68,9 +69,12 @@ def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:
     out = []
     for label, share, text in rows:
         width = f'width:{100.0 * min(max(share, 0.0), 1.0):.2f}%'
-        out.append(tag(
-            'li', tag('span', label, class_='label'),
-            tag('span', tag('i', style=width), class_='track'),
-            tag('span', text, class_='figure'),
-        ))  # fmt: skip
+        out.append(
+            tag(
+                'li',
+                tag('span', label, class_='label'),
+                tag('span', tag('i', style=width), class_='track'),
+                tag('span', text, class_='figure'),
+            )
+        )
     return tag('ul', *out, class_=f'bars {class_}'.strip())

@@ -14,10 +14,15 @@ from weld_twin_core.effects import Effect, Parameter
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 
 _BY_UNIT = {
-    'm': (1e3, 'mm'), 'rad': (1e3, 'mrad'), 's': (1e3, 'ms'), 'm/s': (1e6, 'µm/s'),
-    '1/K': (1e6, 'ppm/K'), 'rad/(N m)': (1e6, 'µrad/(N m)'), 'm/N': (1e6, 'µm/N'),
+    'm': (1e3, 'mm'),
+    'rad': (1e3, 'mrad'),
+    's': (1e3, 'ms'),
+    'm/s': (1e6, 'µm/s'),
+    '1/K': (1e6, 'ppm/K'),
+    'rad/(N m)': (1e6, 'µrad/(N m)'),
+    'm/N': (1e6, 'µm/N'),
     '-': (1.0, ''),
-}  # fmt: skip
+}
 _BY_NAME = {'phase': (1.0, 'rad'), 'scale': (1e6, 'ppm'), 'ratio': (1e6, 'ppm')}
 UNCHANGED = 0.005
 """Share of a gap below which it counts as the same."""
@@ -129,10 +134,12 @@ def _orders(ripple: TransmissionRipple, std: dict[str, Any]) -> list[tuple[str, 
     ]
     rows = sorted(zip(*columns, *errors, strict=True), key=lambda row: -row[0])
     return [
-        (f'order {order:g}', f'{uncertain(size, error, 1e3, "mrad")} at '
-         f'{uncertain(phase, turn, 1.0, "rad")}')
+        (
+            f'order {order:g}',
+            f'{uncertain(size, error, 1e3, "mrad")} at {uncertain(phase, turn, 1.0, "rad")}',
+        )
         for size, order, phase, error, turn in rows
-    ]  # fmt: skip
+    ]
 
 
 def display_unit(name: str, unit: str) -> tuple[float, str]:

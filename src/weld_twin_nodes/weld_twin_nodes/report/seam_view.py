@@ -38,10 +38,14 @@ def seam_data(diagnosis: Diagnosis) -> dict[str, Any]:
         measured = measured[good]
         kept = thinned(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1), each)
         static = k < len(diagnosis.recordings) and diagnosis.recordings[k].joints.static
-        runs.append({
-            'dots': bool(static), 'path': _micrometres((measured - before)[kept]),
-            'before': _micrometres(before[kept]), 'after': _micrometres(after[kept]),
-        })  # fmt: skip
+        runs.append(
+            {
+                'dots': bool(static),
+                'path': _micrometres((measured - before)[kept]),
+                'before': _micrometres(before[kept]),
+                'after': _micrometres(after[kept]),
+            }
+        )
     top = _large(tuple(part[trusted(traces, k)] for k, part in enumerate(traces.before)))
     return {'runs': runs, 'top': round(1e6 * top, 1), 'stretch': _stretch(traces.measured, top)}
 
@@ -93,27 +97,37 @@ def seam_section(diagnosis: Diagnosis) -> Html:
     stations = at_rest(diagnosis)
     panels = [
         tag(
-            'figure', tag('figcaption', title),
+            'figure',
+            tag('figcaption', title),
             tag('canvas', data_side=side, tabindex='0', role='img', aria_label=label),
         )
         for side, title, label in (
             ('before', 'Before: the twin as given', 'Seam coloured by deviation before'),
             ('after', f'After: {after}', 'Seam coloured by deviation after'),
         )
-    ]  # fmt: skip
+    ]
     views = [
         tag('button', name.capitalize(), type='button', data_view=name)
         for name in ('angled', 'top', 'front', 'side')
     ]
     slider = tag(
-        'label', 'Deviation drawn ', tag('output', id_='times'), ' larger ',
+        'label',
+        'Deviation drawn ',
+        tag('output', id_='times'),
+        ' larger ',
         tag('input', type='range', id_='stretch', min='0', max='1', step='0.01'),
-    )  # fmt: skip
+    )
     return section(
-        'The stations' if stations else 'The seam', tag('div', *panels, class_='panels'),
-        tag('div', tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
-            tag('div', *views, class_='views'), slider, class_='controls'),
+        'The stations' if stations else 'The seam',
+        tag('div', *panels, class_='panels'),
+        tag(
+            'div',
+            tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
+            tag('div', *views, class_='views'),
+            slider,
+            class_='controls',
+        ),
         tag('noscript', tag('p', 'The picture needs scripts switched on.')),
         id_='seam',
         lead=f'{_STATIONS if stations else _LINE} Drag to turn, scroll or pinch to zoom.',
-    )  # fmt: skip
+    )

@@ -28,16 +28,25 @@ def shrink_section(diagnosis: Diagnosis) -> Html:
     note = tag('p', f'{more} more recordings are not drawn.', class_='note') if more > 0 else None
     title = 'Deviation by station' if at_rest(diagnosis) else 'Deviation over time'
     return section(
-        'How far it shrinks', _waterfall(diagnosis), tag('p', _judged(diagnosis)),
-        tag('h3', title), _key(), *charts, note, leftover(diagnosis), id_='shrink',
+        'How far it shrinks',
+        _waterfall(diagnosis),
+        tag('p', _judged(diagnosis)),
+        tag('h3', title),
+        _key(),
+        *charts,
+        note,
+        leftover(diagnosis),
+        id_='shrink',
         lead='RMS gap as each effect is put into the twin in turn, each stretch of the recordings '
         'predicted from the others.',
-    )  # fmt: skip
+    )
 
 
 def _waterfall(diagnosis: Diagnosis) -> Html:
-    steps = [('as given', _given(diagnosis)), *(
-        (_readable(name), rms) for name, rms in diagnosis.shrink.steps)]
+    steps = [
+        ('as given', _given(diagnosis)),
+        *((_readable(name), rms) for name, rms in diagnosis.shrink.steps),
+    ]
     if len(steps) > _STEPS + 1:
         skipped = len(steps) - _STEPS
         steps = [*steps[:_STEPS], (f'{skipped} more', steps[-1][1])]
@@ -85,18 +94,27 @@ def _readable(name: str) -> str:
 def _step(label: str, share: float, before: float, rms: float, class_: str = '') -> Html:
     fallen = max(before - share, 0.0)
     return tag(
-        'li', tag('span', label, class_='label'),
-        tag('span', tag('i', style=f'width:{100 * share:.2f}%'),
-            tag('i', style=f'width:{100 * fallen:.2f}%', class_='fallen'), class_='track'),
-        tag('span', millimetres(rms), class_='figure'), class_=class_ or None,
-    )  # fmt: skip
+        'li',
+        tag('span', label, class_='label'),
+        tag(
+            'span',
+            tag('i', style=f'width:{100 * share:.2f}%'),
+            tag('i', style=f'width:{100 * fallen:.2f}%', class_='fallen'),
+            class_='track',
+        ),
+        tag('span', millimetres(rms), class_='figure'),
+        class_=class_ or None,
+    )
 
 
 def _key() -> Html:
     return tag(
-        'p', tag('span', 'before', class_='key before'), tag('span', 'after', class_='key after'),
-        tag('span', 'noise floor', class_='key floor'), class_='keys',
-    )  # fmt: skip
+        'p',
+        tag('span', 'before', class_='key before'),
+        tag('span', 'after', class_='key after'),
+        tag('span', 'noise floor', class_='key floor'),
+        class_='keys',
+    )
 
 
 def _chart(diagnosis: Diagnosis, k: int) -> Html:
@@ -111,24 +129,33 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     x = (np.arange(good.size, dtype=float) if static else traces.t[k])[good]
     # a single outlier must not flatten the rest
     top = 1.15 * max(float(np.percentile(np.concatenate(sizes), 99.5)), 1e-7)
-    lines = [_line(x, size, top, name) for size, name in zip(sizes, ('before', 'after'),
-                                                             strict=True)]  # fmt: skip
+    lines = [
+        _line(x, size, top, name) for size, name in zip(sizes, ('before', 'after'), strict=True)
+    ]
     level = f'{_HEIGHT * (1.0 - min(diagnosis.gap.noise_floor_m / top, 1.0)):.2f}'
     floor = tag('line', x1='0', x2=f'{_WIDTH:.0f}', y1=level, y2=level, class_='floor')
     picture = tag(
-        'svg', *lines, floor, viewBox=f'0 0 {_WIDTH:.0f} {_HEIGHT:.0f}',
-        preserveAspectRatio='none', role='img', aria_label='Deviation before and after',
-    )  # fmt: skip
+        'svg',
+        *lines,
+        floor,
+        viewBox=f'0 0 {_WIDTH:.0f} {_HEIGHT:.0f}',
+        preserveAspectRatio='none',
+        role='img',
+        aria_label='Deviation before and after',
+    )
     unit = ('station 1', f'station {good.size}') if static else (f'{x[0]:.1f} s', f'{x[-1]:.1f} s')
     title = recording.name if recording is not None else f'recording {k + 1}'
     outliers = int((~good).sum())
     if outliers:
         title += f' ({outliers} outlier{"s"[: outliers > 1]} not drawn)'
     return tag(
-        'figure', tag('figcaption', title),
-        tag('div', tag('span', millimetres(top)), tag('span', '0'), class_='y'), picture,
-        tag('div', tag('span', unit[0]), tag('span', unit[1]), class_='x'), class_='time',
-    )  # fmt: skip
+        'figure',
+        tag('figcaption', title),
+        tag('div', tag('span', millimetres(top)), tag('span', '0'), class_='y'),
+        picture,
+        tag('div', tag('span', unit[0]), tag('span', unit[1]), class_='x'),
+        class_='time',
+    )
 
 
 def _line(x: Array, y: Array, top: float, name: str) -> Html:

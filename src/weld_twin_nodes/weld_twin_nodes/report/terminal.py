@@ -43,8 +43,10 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
 
 
 def _print_families(diagnosis: Diagnosis, console: Console) -> None:
-    parts = [('errors found, by kind', FAMILY_HEADS, family_rows(diagnosis.families)),
-             ('transmission ripple by joint', RIPPLE_HEADS, ripple_rows(diagnosis))]  # fmt: skip
+    parts = [
+        ('errors found, by kind', FAMILY_HEADS, family_rows(diagnosis.families)),
+        ('transmission ripple by joint', RIPPLE_HEADS, ripple_rows(diagnosis)),
+    ]
     for title, heads, rows in parts:
         if rows:
             table = Table(box=None, title=title, title_justify='left', pad_edge=False)
@@ -74,9 +76,11 @@ def _candidates(diagnosis: Diagnosis) -> Table:
         table.add_column(head, header_style='dim', overflow='fold')
     for item in diagnosis.candidates[:_MOST]:
         table.add_row(
-            escape(site_name(item.site)), odds(item.probability), millimetres(item.rms_after_m),
+            escape(site_name(item.site)),
+            odds(item.probability),
+            millimetres(item.rms_after_m),
             change(item.shrink),
-        )  # fmt: skip
+        )
     return table
 
 

@@ -12,27 +12,45 @@ from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 from .quantities import millimetres, milliradians, odds, turns_only
 
 CAUSES = {
-    'joint_offset': 'zero offset', 'link_length': 'link length error',
-    'link_offset': 'link offset error', 'link_twist': 'link twist error',
-    'axis_parallelism': 'axis parallelism error', 'base_pose': 'base pose error',
-    'tool_pose': 'tool pose error', 'gear_ratio': 'gear ratio error',
-    'transmission_ripple': 'transmission ripple', 'joint_coupling': 'coupling',
-    'backlash': 'backlash', 'joint_compliance': 'compliance',
-    'cartesian_compliance': 'compliance at the tool', 'payload': 'wrong payload',
-    'servo_lag': 'servo lag', 'time_delay': 'clock delay', 'thermal_growth': 'thermal growth',
-    'drift': 'drift of the frame', 'vibration': 'vibration', 'quantization': 'encoder resolution',
-    'measurement_scale': 'scale error of the instrument', 'setup_step': 'moved set-up',
+    'joint_offset': 'zero offset',
+    'link_length': 'link length error',
+    'link_offset': 'link offset error',
+    'link_twist': 'link twist error',
+    'axis_parallelism': 'axis parallelism error',
+    'base_pose': 'base pose error',
+    'tool_pose': 'tool pose error',
+    'gear_ratio': 'gear ratio error',
+    'transmission_ripple': 'transmission ripple',
+    'joint_coupling': 'coupling',
+    'backlash': 'backlash',
+    'joint_compliance': 'compliance',
+    'cartesian_compliance': 'compliance at the tool',
+    'payload': 'wrong payload',
+    'servo_lag': 'servo lag',
+    'time_delay': 'clock delay',
+    'thermal_growth': 'thermal growth',
+    'drift': 'drift of the frame',
+    'vibration': 'vibration',
+    'quantization': 'encoder resolution',
+    'measurement_scale': 'scale error of the instrument',
+    'setup_step': 'moved set-up',
     'setup_settling': 'settling set-up',
-}  # fmt: skip
+}
 STATUS = {
-    'identified': 'Identified', 'ambiguous': 'Ambiguous', 'unknown': 'Unknown cause',
+    'identified': 'Identified',
+    'ambiguous': 'Ambiguous',
+    'unknown': 'Unknown cause',
     'none': 'No gap',
-}  # fmt: skip
+}
 REGIMES = {
-    'static': 'at rest', 'reversal': 'at reversals', 'speed': 'with speed',
-    'acceleration': 'with acceleration', 'load': 'with load', 'temperature': 'with temperature',
+    'static': 'at rest',
+    'reversal': 'at reversals',
+    'speed': 'with speed',
+    'acceleration': 'with acceleration',
+    'load': 'with load',
+    'temperature': 'with temperature',
     'time': 'with time',
-}  # fmt: skip
+}
 _NAMED = 3
 
 
@@ -69,8 +87,11 @@ def listed(names: Sequence[str], word: str = 'and') -> str:
 def verdict(diagnosis: Diagnosis) -> tuple[str, str]:
     """Return the verdict in two sentences: the cause, and what knowing it brings."""
     return {
-        'identified': _identified, 'ambiguous': _ambiguous, 'unknown': _unknown, 'none': _none,
-    }[diagnosis.status](diagnosis)  # fmt: skip
+        'identified': _identified,
+        'ambiguous': _ambiguous,
+        'unknown': _unknown,
+        'none': _none,
+    }[diagnosis.status](diagnosis)
 
 
 def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
@@ -80,8 +101,9 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
     if diagnosis.families:
         kinds = [
             f'{cause(f.effect, None)} ({millimetres(f.rms_m)})'
-            for f in diagnosis.families if f.named
-        ]  # fmt: skip
+            for f in diagnosis.families
+            if f.named
+        ]
         first = (
             f'The {size} comes from many small errors together ({sure} sure), mostly '
             f'{listed(kinds[:_NAMED])}.'
@@ -123,8 +145,10 @@ def _settled(diagnosis: Diagnosis) -> list[str]:
     """Return the effects that stand in no set with others."""
     unsure = {
         (site.effect, site.joint)
-        for group in diagnosis.indistinguishable if len(group) > 1 for site in group
-    }  # fmt: skip
+        for group in diagnosis.indistinguishable
+        if len(group) > 1
+        for site in group
+    }
     return [
         found_name(f) for f in diagnosis.effects if (f.effect.name, f.effect.site) not in unsure
     ]

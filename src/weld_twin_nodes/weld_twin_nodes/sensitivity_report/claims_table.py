@@ -28,15 +28,18 @@ def run_claims(
     names = [CaseName(robot.name, seam) for robot in robots for seam in seams]
     tasks = [
         Task(claim_case, (robot, seam, seed), f'claims: {robot.name}, {seam}')
-        for robot in robots for seam in seams
-    ]  # fmt: skip
+        for robot in robots
+        for seam in seams
+    ]
     found = dict(zip(names, runner.run(tasks), strict=True))
     return {
-        'schema': 'weld_twin/claims/1', 'seed': seed,
-        'robots': [robot.name for robot in robots], 'seams': list(seams),
+        'schema': 'weld_twin/claims/1',
+        'seed': seed,
+        'robots': [robot.name for robot in robots],
+        'seams': list(seams),
         'claims': [claim.as_dict() for claim in judgement(found)],
         'cases': [{**name._asdict(), **measured} for name, measured in found.items()],
-    }  # fmt: skip
+    }
 
 
 def claims_csv(result: dict[str, Any]) -> str:

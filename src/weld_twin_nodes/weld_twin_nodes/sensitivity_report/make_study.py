@@ -20,9 +20,15 @@ from .whole import run_study
 
 
 def make_study(
-    out: Path | str, pool: Pool, setting: Setting | None, *, claims_on: Sequence[Robot] = (),
-    seams: Sequence[str] = SEAMS, tell: Tell | None = None, seed: int = 0,
-) -> Path:  # fmt: skip
+    out: Path | str,
+    pool: Pool,
+    setting: Setting | None,
+    *,
+    claims_on: Sequence[Robot] = (),
+    seams: Sequence[str] = SEAMS,
+    tell: Tell | None = None,
+    seed: int = 0,
+) -> Path:
     """
     Run a study, the claims, or both, write the results and return the page.
 

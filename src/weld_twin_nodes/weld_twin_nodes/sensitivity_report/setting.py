@@ -80,9 +80,12 @@ class Setting:
         """Return the motions studied by name: the profiles, or the one recorded."""
         if self.recording is not None:
             study = recorded_study(
-                self.robot, self.recording, points=self.points, normal=self.normal,
+                self.robot,
+                self.recording,
+                points=self.points,
+                normal=self.normal,
                 known=self.known,
-            )  # fmt: skip
+            )
             return {RECORDED: study}
         return {profile: self.planned(profile) for profile in PROFILES}
 
@@ -90,24 +93,34 @@ class Setting:
         """Return the study of the seam travelled by a time law."""
         assert self.path is not None
         return planned_study(
-            self.robot, self.path, profile, points=points or self.points, torch=self.torch,
+            self.robot,
+            self.path,
+            profile,
+            points=points or self.points,
+            torch=self.torch,
             known=self.known,
-        )  # fmt: skip
+        )
 
     def describe(self) -> dict[str, Any]:
         """Return what the study was asked, as plain data."""
         first = next(iter(self.studies.values()))
         return {
-            'robot': self.robot.name, 'tool': self.robot.to_mapping()['tool'],
-            'seam': self.seam, 'length_m': first.length,
-            'path_points': first.samples, 'profiles': list(self.studies),
-            'samples': self.effort.samples, 'runs': self.effort.runs,
+            'robot': self.robot.name,
+            'tool': self.robot.to_mapping()['tool'],
+            'seam': self.seam,
+            'length_m': first.length,
+            'path_points': first.samples,
+            'profiles': list(self.studies),
+            'samples': self.effort.samples,
+            'runs': self.effort.runs,
             'trajectories': self.effort.trajectories,
-            'placements': self.effort.placements, 'seed': self.effort.seed,
-            'across_m': self.weld.across_m, 'stickout_m': self.weld.stickout_m,
+            'placements': self.effort.placements,
+            'seed': self.effort.seed,
+            'across_m': self.weld.across_m,
+            'stickout_m': self.weld.stickout_m,
             'known': [effect.to_mapping() for effect in self.known],
             'tolerances': [tolerance.to_mapping() for tolerance in self.tolerances],
-        }  # fmt: skip
+        }
 
 
 def recorded_deviations(study: Study) -> Array | None:

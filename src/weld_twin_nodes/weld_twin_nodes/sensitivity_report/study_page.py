@@ -34,16 +34,21 @@ def study_page(
         parts.append(_claims(claims))
     if study is not None:
         parts.append(_setting(study['setting']))
-    title = 'The claims of the paper' if study is None else (
-        f'Sensitivity of {study["setting"]["robot"]} on {study["setting"]["seam"]}'
-    )  # fmt: skip
+    title = (
+        'The claims of the paper'
+        if study is None
+        else (f'Sensitivity of {study["setting"]["robot"]} on {study["setting"]["seam"]}')
+    )
     css = (files('weld_twin_nodes.report') / 'page.css').read_text(encoding='utf-8')
-    head = joined([
-        tag('meta', charset='utf-8'),
-        tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
-        tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
-        tag('title', title), tag('style', Html(css + _STYLE)),
-    ])  # fmt: skip
+    head = joined(
+        [
+            tag('meta', charset='utf-8'),
+            tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
+            tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
+            tag('title', title),
+            tag('style', Html(css + _STYLE)),
+        ]
+    )
     foot = tag('p', f'weld_twin {__version__}', class_='note')
     body = tag('body', tag('main', tag('h1', title), *parts, foot))
     return f'<!doctype html>\n{tag("html", tag("head", head), body, lang="en")}\n'
@@ -68,18 +73,25 @@ def _answer(motion: str, found: dict[str, Any]) -> Html:
     settled = 'converged' if indices['converged'] else 'not converged yet'
     return section(
         'Which tolerance to tighten',
-        tag('p', f'{best["name"]} first: its total index is {_index(best)} on the {motion} '
-            'motion.', class_='second'),
+        tag(
+            'p',
+            f'{best["name"]} first: its total index is {_index(best)} on the {motion} motion.',
+            class_='second',
+        ),
         _bars(rows[:_SHOWN]),
-        tag('p', f'Total Sobol indices of the largest deviation with 95 % intervals; '
+        tag(
+            'p',
+            f'Total Sobol indices of the largest deviation with 95 % intervals; '
             f'N = {indices["base_samples"]}, {indices["runs"]} runs, seed {indices["seed"]}, '
             f'{settled} (widest half-width '
             f'{indices["largest_ST_half"]:.3f}, change from half of N '
             f'{indices["largest_ST_change"]:.3f}); sum of first-order indices '
             f'{indices["sum_S1"]:.2f}. The fast model is within {found["model_error"]:.0e} of the '
-            'exact twin.', class_='note'),
+            'exact twin.',
+            class_='note',
+        ),
         id_='answer',
-    )  # fmt: skip
+    )
 
 
 def _index(row: dict[str, Any]) -> str:
@@ -96,10 +108,14 @@ def _tighten(motions: dict[str, Any]) -> Html:
     for motion, found in motions.items():
         sobol = found['global']['sobol']
         columns = [
-            tag('div', tag('h3', f'By {by}, {motion}'),
-                _bars(sorted(outputs['d_norm']['indices'], key=lambda row: -row['ST'])))
-            for by, outputs in sobol.items() if by != 'parameter'
-        ]  # fmt: skip
+            tag(
+                'div',
+                tag('h3', f'By {by}, {motion}'),
+                _bars(sorted(outputs['d_norm']['indices'], key=lambda row: -row['ST'])),
+            )
+            for by, outputs in sobol.items()
+            if by != 'parameter'
+        ]
         parts.append(tag('div', *columns, class_='columns'))
     return section('Groups', *parts, id_='groups')
 
@@ -109,8 +125,11 @@ def _stack(motions: dict[str, Any]) -> Html:
     for motion, found in motions.items():
         stack = found['global']['stack']
         heads = ('', *(f'{row["percent"]:.0f} %' for row in stack['percentiles']['max_m']))
-        names = {'max_m': 'largest deviation', 'across_m': 'across the seam',
-                 'stickout_m': 'stick-out'}  # fmt: skip
+        names = {
+            'max_m': 'largest deviation',
+            'across_m': 'across the seam',
+            'stickout_m': 'stick-out',
+        }
         rows = [
             [name, *(f'{1e3 * row["value"]:.3f} mm' for row in stack['percentiles'][key])]
             for key, name in names.items()
@@ -122,10 +141,16 @@ def _stack(motions: dict[str, Any]) -> Html:
         parts += [
             tag('h3', f'{motion}, {stack["runs"]} runs'),
             table(heads, [*rows, ['D_norm', *d_norm]]),
-            table(('probability that the whole seam is inside',
-                   f'across ± {1e3 * limits["across_m"]:.2f} mm',
-                   f'stick-out ± {1e3 * limits["stickout_m"]:.2f} mm', 'both'), inside),
-        ]  # fmt: skip
+            table(
+                (
+                    'probability that the whole seam is inside',
+                    f'across ± {1e3 * limits["across_m"]:.2f} mm',
+                    f'stick-out ± {1e3 * limits["stickout_m"]:.2f} mm',
+                    'both',
+                ),
+                inside,
+            ),
+        ]
     return section('The tolerance stack', *parts, id_='stack')
 
 
@@ -137,15 +162,27 @@ def _inside(stack: dict[str, Any]) -> list[str]:
 
 
 def _local(motion: dict[str, Any]) -> Html:
-    heads = ('parameter', 'S analytic', 'S by difference', 'differ by', 'at one tolerance',
-             'S of D_norm', 'one tolerance makes')  # fmt: skip
+    heads = (
+        'parameter',
+        'S analytic',
+        'S by difference',
+        'differ by',
+        'at one tolerance',
+        'S of D_norm',
+        'one tolerance makes',
+    )
     rows = [
-        [r['name'], f'{r["S_analytic_peak_m"]:.4f} m/{r["unit"]}',
-         f'{r["S_difference_peak_m"]:.4f}', f'{r["disagreement"]:.0e}',
-         f'{r["disagreement_at_tolerance"]:.0e}', f'{r["S_norm"]:.3f} /{r["unit"]}',
-         f'{1e3 * r["contribution_m"]:.3f} mm rms']
+        [
+            r['name'],
+            f'{r["S_analytic_peak_m"]:.4f} m/{r["unit"]}',
+            f'{r["S_difference_peak_m"]:.4f}',
+            f'{r["disagreement"]:.0e}',
+            f'{r["disagreement_at_tolerance"]:.0e}',
+            f'{r["S_norm"]:.3f} /{r["unit"]}',
+            f'{1e3 * r["contribution_m"]:.3f} mm rms',
+        ]
         for r in motion['local']['parameters']
-    ]  # fmt: skip
+    ]
     lead = (
         'Slope of the largest deviation at no error, where D is the tip of a cone and only the '
         'slope to one side exists, and agreement of dD/dp at an error of one tolerance.'
@@ -155,39 +192,74 @@ def _local(motion: dict[str, Any]) -> Html:
 
 def _advice(advice: dict[str, Any]) -> Html:
     laws = [
-        [r['profile'], f'{r["duration_s"]:.1f} s', f'{1e3 * r["expected_without_lag_m"]:.3f} mm',
-         f'{1e3 * r["expected_m"]:.3f} mm', f'{1e3 * r["same_time_m"]:.3f} mm']
+        [
+            r['profile'],
+            f'{r["duration_s"]:.1f} s',
+            f'{1e3 * r["expected_without_lag_m"]:.3f} mm',
+            f'{1e3 * r["expected_m"]:.3f} mm',
+            f'{1e3 * r["same_time_m"]:.3f} mm',
+        ]
         for r in advice['profiles']
-    ]  # fmt: skip
+    ]
     given = advice['placement'][0]['expected_m']
     places = [
-        [r['free'], f'{57.29578 * r["rotation_rad"]:+.1f} deg', f'{1e3 * r["x_m"]:+.0f} mm',
-         f'{1e3 * r["y_m"]:+.0f} mm', f'{57.29578 * r["yaw_rad"]:+.1f} deg',
-         f'{1e3 * r["expected_m"]:.3f} mm', f'{100 * (1 - r["expected_m"] / given):.1f} %']
+        [
+            r['free'],
+            f'{57.29578 * r["rotation_rad"]:+.1f} deg',
+            f'{1e3 * r["x_m"]:+.0f} mm',
+            f'{1e3 * r["y_m"]:+.0f} mm',
+            f'{57.29578 * r["yaw_rad"]:+.1f} deg',
+            f'{1e3 * r["expected_m"]:.3f} mm',
+            f'{100 * (1 - r["expected_m"] / given):.1f} %',
+        ]
         for r in advice['placement']
-    ]  # fmt: skip
+    ]
     return section(
-        'Trajectory advice', tag('h3', 'Time laws on the same seam, over equal arc length'),
-        table(('time law', 'takes', 'expected, geometry and play', 'and a lag of every joint',
-               'the same, all as slow as the slowest'), laws),
+        'Trajectory advice',
+        tag('h3', 'Time laws on the same seam, over equal arc length'),
+        table(
+            (
+                'time law',
+                'takes',
+                'expected, geometry and play',
+                'and a lag of every joint',
+                'the same, all as slow as the slowest',
+            ),
+            laws,
+        ),
         tag('h3', 'Free torch rotation and base placement'),
-        table(('free', 'torch about the wire', 'base x', 'base y', 'base yaw', 'expected',
-               'gain'), places), id_='advice',
-    )  # fmt: skip
+        table(
+            ('free', 'torch about the wire', 'base x', 'base y', 'base yaw', 'expected', 'gain'),
+            places,
+        ),
+        id_='advice',
+    )
 
 
 def _recorded(recorded: dict[str, Any]) -> Html:
     below = recorded['share_of_runs_below']
     rows = [
-        ['largest deviation', f'{1e3 * recorded["max_m"]:.3f} mm',
-         f'{100 * below["max"]:.1f} % of the runs stay below'],
-        ['rms', f'{1e3 * recorded["rms_m"]:.3f} mm',
-         f'{100 * below["rms"]:.1f} % of the runs stay below'],
-        ['across the seam', f'{1e3 * recorded["across_m"]:.3f} mm',
-         'inside' if recorded['inside']['across'] else 'outside the tolerance'],
-        ['stick-out', f'{1e3 * recorded["stickout_m"]:.3f} mm',
-         'inside' if recorded['inside']['stickout'] else 'outside the tolerance'],
-    ]  # fmt: skip
+        [
+            'largest deviation',
+            f'{1e3 * recorded["max_m"]:.3f} mm',
+            f'{100 * below["max"]:.1f} % of the runs stay below',
+        ],
+        [
+            'rms',
+            f'{1e3 * recorded["rms_m"]:.3f} mm',
+            f'{100 * below["rms"]:.1f} % of the runs stay below',
+        ],
+        [
+            'across the seam',
+            f'{1e3 * recorded["across_m"]:.3f} mm',
+            'inside' if recorded['inside']['across'] else 'outside the tolerance',
+        ],
+        [
+            'stick-out',
+            f'{1e3 * recorded["stickout_m"]:.3f} mm',
+            'inside' if recorded['inside']['stickout'] else 'outside the tolerance',
+        ],
+    ]
     return section(
         'What was recorded', table(('', 'recorded', 'beside the tolerances'), rows), id_='recorded'
     )
@@ -213,18 +285,25 @@ def _claims(claims: dict[str, Any]) -> Html:
 
 def _setting(setting: dict[str, Any]) -> Html:
     tolerances = [
-        [' '.join(filter(None, (t['effect'], t.get('joint')))),
-         t['parameter'] + (f'[{t["index"]}]' if 'index' in t else ''), t['distribution'],
-         ', '.join(f'{k} {v:g}' for k, v in t.items() if isinstance(v, float))]
+        [
+            ' '.join(filter(None, (t['effect'], t.get('joint')))),
+            t['parameter'] + (f'[{t["index"]}]' if 'index' in t else ''),
+            t['distribution'],
+            ', '.join(f'{k} {v:g}' for k, v in t.items() if isinstance(v, float)),
+        ]
         for t in setting['tolerances']
-    ]  # fmt: skip
+    ]
     plain = [[k.replace('_', ' '), _plain(v)] for k, v in setting.items() if k != 'tolerances']
     return section(
-        'What was asked', table(('', ''), plain),
-        tag('details', tag('summary', f'{len(tolerances)} tolerances'),
-            table(('effect', 'parameter', 'distribution', 'numbers [SI]'), tolerances)),
+        'What was asked',
+        table(('', ''), plain),
+        tag(
+            'details',
+            tag('summary', f'{len(tolerances)} tolerances'),
+            table(('effect', 'parameter', 'distribution', 'numbers [SI]'), tolerances),
+        ),
         id_='setting',
-    )  # fmt: skip
+    )
 
 
 def _plain(value: Any) -> str:

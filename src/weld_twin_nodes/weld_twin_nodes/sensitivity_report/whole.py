@@ -38,13 +38,15 @@ def run_study(setting: Setting, runner: Runner) -> dict[str, Any]:
     found = work.run_all(runner, jobs)
     for name, design in designs.items():
         out['motions'][name] = {
-            'local': pieces[name, 'local'], 'sweeps': pieces[name, 'sweeps'],
+            'local': pieces[name, 'local'],
+            'sweeps': pieces[name, 'sweeps'],
             'global': design.results(found),
-        }  # fmt: skip
+        }
     if setting.path is not None:
         out['advice'] = {
-            'profiles': pieces['', 'profiles'], 'placement': pieces['', 'placement'],
-        }  # fmt: skip
+            'profiles': pieces['', 'profiles'],
+            'placement': pieces['', 'placement'],
+        }
     if RECORDED in setting.studies:
         stacked = found[designs[RECORDED].stack_label][0]
         out['recorded'] = _recorded(setting, stacked)
@@ -62,7 +64,8 @@ def _pieces(setting: Setting, runner: Runner) -> dict[tuple[str, str], Any]:
         seam = setting.robot, setting.path, tolerances
         tasks['', 'placement'] = Task(
             work.placement,
-            (*seam, setting.torch, setting.effort.placements, setting.effort.seed), 'placement',
+            (*seam, setting.torch, setting.effort.placements, setting.effort.seed),
+            'placement',
         )
         tasks['', 'profiles'] = Task(work.profiles, seam, 'profiles')
     return dict(zip(tasks, runner.run(list(tasks.values())), strict=True))
@@ -76,9 +79,10 @@ class _Designs:
         effort, tolerances = setting.effort, setting.tolerances
         names = tuple(t.name for t in tolerances)
         groupings = {
-            'parameter': None, 'effect': tuple(t.effect for t in tolerances),
+            'parameter': None,
+            'effect': tuple(t.effect for t in tolerances),
             'joint': tuple(t.site for t in tolerances),
-        }  # fmt: skip
+        }
         self._sobol = {
             by: SobolDesign(names, effort.samples, groups, effort.seed)
             for by, groups in groupings.items()
@@ -122,9 +126,12 @@ class _Designs:
             for effect in self._effects
         }
         return {
-            'model_error': error, 'sobol': sobol, 'morris': screened.as_dict(),
-            'stack': stack.as_dict(), 'halved': halved,
-        }  # fmt: skip
+            'model_error': error,
+            'sobol': sobol,
+            'morris': screened.as_dict(),
+            'stack': stack.as_dict(),
+            'halved': halved,
+        }
 
     def _stack(self, runs: Outcomes) -> ToleranceStack:
         setting = self._setting
@@ -150,9 +157,14 @@ def _recorded(setting: Setting, stacked: Outcomes) -> dict[str, Any] | None:
     size = np.linalg.norm(off, axis=1)
     across, stickout = np.abs(off[:, 1]).max(), np.abs(off[:, 2]).max()
     return {
-        't_s': study.t, 's_m': study.s, 'deviation_m': off,
-        'max_m': size.max(), 'rms_m': root_mean_square(size), 'd_norm': size.max() / study.length,
-        'across_m': across, 'stickout_m': stickout,
+        't_s': study.t,
+        's_m': study.s,
+        'deviation_m': off,
+        'max_m': size.max(),
+        'rms_m': root_mean_square(size),
+        'd_norm': size.max() / study.length,
+        'across_m': across,
+        'stickout_m': stickout,
         'inside': {
             'across': bool(across <= setting.weld.across_m),
             'stickout': bool(stickout <= setting.weld.stickout_m),
@@ -161,4 +173,4 @@ def _recorded(setting: Setting, stacked: Outcomes) -> dict[str, Any] | None:
             'max': float((stacked.max_m < size.max()).mean()),
             'rms': float((stacked.rms_m < root_mean_square(size)).mean()),
         },
-    }  # fmt: skip
+    }

@@ -78,7 +78,11 @@ def profiles(robot: Robot, path: Path, tolerances: tuple[Tolerance, ...]) -> lis
 
 
 def placement(
-    robot: Robot, path: Path, tolerances: tuple[Tolerance, ...], torch: Torch, tries: int,
+    robot: Robot,
+    path: Path,
+    tolerances: tuple[Tolerance, ...],
+    torch: Torch,
+    tries: int,
     seed: int,
 ) -> list[dict[str, Any]]:
     """Return the best torch rotation and base placement."""

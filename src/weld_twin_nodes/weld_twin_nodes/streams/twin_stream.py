@@ -102,9 +102,13 @@ class JointStream:
         if qd is None:
             qd = self._difference(stamp, q)
         joints, poses = self._live.step(
-            (stamp - self._epoch) * 1e-9, q, qd,
-            self._wrench, self._temperature, self._wrench_frame,
-        )  # fmt: skip
+            (stamp - self._epoch) * 1e-9,
+            q,
+            qd,
+            self._wrench,
+            self._temperature,
+            self._wrench_frame,
+        )
         self._before = (stamp, q)
         return Sample(stamp, stamp + self._delay, joints, poses)
 

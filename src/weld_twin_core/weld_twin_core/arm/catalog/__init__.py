@@ -10,8 +10,14 @@ from ...errors import ModelError
 from ..robot import Robot
 
 _NAMES = (
-    'ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb120', 'abb_irb1600', 'fanuc_m10ia', 'franka_panda',
-)  # fmt: skip
+    'ur5',
+    'ur10',
+    'kuka_kr6_r900',
+    'abb_irb120',
+    'abb_irb1600',
+    'fanuc_m10ia',
+    'franka_panda',
+)
 
 
 def names() -> tuple[str, ...]:

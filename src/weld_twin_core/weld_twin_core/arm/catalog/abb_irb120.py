@@ -22,8 +22,14 @@ DATA = {
     'solid models; acceleration is an estimate (full speed in 0.25 s)',
     'joints': [
         {
-            'name': f'joint_{k}', 'a': a, 'alpha': alpha, 'd': d, 'theta_offset': theta,
-            'lower': lower * DEGREE, 'upper': upper * DEGREE, 'max_velocity': speed * DEGREE,
+            'name': f'joint_{k}',
+            'a': a,
+            'alpha': alpha,
+            'd': d,
+            'theta_offset': theta,
+            'lower': lower * DEGREE,
+            'upper': upper * DEGREE,
+            'max_velocity': speed * DEGREE,
             'max_acceleration': 4.0 * speed * DEGREE,
         }
         for k, (a, alpha, d, theta, lower, upper, speed) in enumerate(_ROWS, 1)
@@ -36,4 +42,4 @@ DATA = {
         {'mass': 0.546, 'com': [6.2e-05, -3.7e-05, -0.00109]},
         {'mass': 0.137, 'com': [0.0, -0.00017, -0.00706]},
     ],
-}  # fmt: skip
+}

@@ -28,8 +28,14 @@ DATA = {
     '(full speed in 0.25 s)',
     'joints': [
         {
-            'name': f'joint_{k}', 'a': a, 'alpha': alpha, 'd': d, 'theta_offset': theta,
-            'lower': lower * DEGREE, 'upper': upper * DEGREE, 'max_velocity': speed * DEGREE,
+            'name': f'joint_{k}',
+            'a': a,
+            'alpha': alpha,
+            'd': d,
+            'theta_offset': theta,
+            'lower': lower * DEGREE,
+            'upper': upper * DEGREE,
+            'max_velocity': speed * DEGREE,
             'max_acceleration': 4.0 * speed * DEGREE,
         }
         for k, (a, alpha, d, theta, lower, upper, speed) in enumerate(_ROWS, 1)
@@ -42,4 +48,4 @@ DATA = {
         {'mass': 3.0, 'com': [0.0, 0.0, 0.0]},
         {'mass': 1.0, 'com': [0.0, 0.0, -0.02]},
     ],
-}  # fmt: skip
+}

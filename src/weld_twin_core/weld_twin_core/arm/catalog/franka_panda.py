@@ -23,8 +23,14 @@ DATA = {
     'URDF, without the hand',
     'joints': [
         {
-            'name': f'panda_joint{k}', 'a': a, 'alpha': alpha, 'd': d, 'lower': lower,
-            'upper': upper, 'max_velocity': speed, 'max_acceleration': acceleration,
+            'name': f'panda_joint{k}',
+            'a': a,
+            'alpha': alpha,
+            'd': d,
+            'lower': lower,
+            'upper': upper,
+            'max_velocity': speed,
+            'max_acceleration': acceleration,
         }
         for k, (a, alpha, d, lower, upper, speed, acceleration) in enumerate(_ROWS, 1)
     ],
@@ -38,4 +44,4 @@ DATA = {
         # The last row ends at the flange, 0.107 m beyond the frame of the published centre.
         {'mass': 0.735522, 'com': [0.010517, -0.004252, 0.061597 - 0.107]},
     ],
-}  # fmt: skip
+}

@@ -30,8 +30,14 @@ DATA = {
     'tool': {'quat_xyzw': [1.0, 0.0, 0.0, 0.0]},
     'joints': [
         {
-            'name': f'joint_a{k}', 'a': a, 'alpha': alpha, 'd': d, 'theta_offset': theta,
-            'lower': lower * DEGREE, 'upper': upper * DEGREE, 'max_velocity': speed * DEGREE,
+            'name': f'joint_a{k}',
+            'a': a,
+            'alpha': alpha,
+            'd': d,
+            'theta_offset': theta,
+            'lower': lower * DEGREE,
+            'upper': upper * DEGREE,
+            'max_velocity': speed * DEGREE,
             'max_acceleration': 4.0 * speed * DEGREE,
         }
         for k, (a, alpha, d, theta, lower, upper, speed) in enumerate(_ROWS, 1)
@@ -44,4 +50,4 @@ DATA = {
         {'mass': 1.5, 'com': [0.0, 0.0, 0.0]},
         {'mass': 0.4, 'com': [0.0, 0.0, 0.01]},
     ],
-}  # fmt: skip
+}

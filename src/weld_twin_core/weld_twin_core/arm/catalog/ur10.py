@@ -20,8 +20,14 @@ DATA = {
     'speed; acceleration is an estimate (full speed in about 0.2 s)',
     'joints': [
         {
-            'name': name, 'a': a, 'alpha': alpha, 'd': d, 'lower': -2 * pi, 'upper': 2 * pi,
-            'max_velocity': speed, 'max_acceleration': 5.0 * speed,
+            'name': name,
+            'a': a,
+            'alpha': alpha,
+            'd': d,
+            'lower': -2 * pi,
+            'upper': 2 * pi,
+            'max_velocity': speed,
+            'max_acceleration': 5.0 * speed,
         }
         for name, a, alpha, d, speed in _ROWS
     ],
@@ -33,4 +39,4 @@ DATA = {
         {'mass': 2.0, 'com': [0.0, 0.007, 0.018]},
         {'mass': 0.365, 'com': [0.0, 0.0, -0.026]},
     ],
-}  # fmt: skip
+}

@@ -5,9 +5,13 @@
 from math import pi
 
 _NAMES = (
-    'shoulder_pan_joint', 'shoulder_lift_joint', 'elbow_joint',
-    'wrist_1_joint', 'wrist_2_joint', 'wrist_3_joint',
-)  # fmt: skip
+    'shoulder_pan_joint',
+    'shoulder_lift_joint',
+    'elbow_joint',
+    'wrist_1_joint',
+    'wrist_2_joint',
+    'wrist_3_joint',
+)
 _ROWS = (  # a, alpha, d
     (0.0, pi / 2, 0.089159),
     (-0.425, 0.0, 0.0),
@@ -24,8 +28,14 @@ DATA = {
     'speed; acceleration is an estimate (full speed in about 0.2 s)',
     'joints': [
         {
-            'name': name, 'a': a, 'alpha': alpha, 'd': d, 'lower': -2 * pi, 'upper': 2 * pi,
-            'max_velocity': pi, 'max_acceleration': 15.0,
+            'name': name,
+            'a': a,
+            'alpha': alpha,
+            'd': d,
+            'lower': -2 * pi,
+            'upper': 2 * pi,
+            'max_velocity': pi,
+            'max_acceleration': 15.0,
         }
         for name, (a, alpha, d) in zip(_NAMES, _ROWS, strict=True)
     ],
@@ -37,4 +47,4 @@ DATA = {
         {'mass': 1.219, 'com': [0.0, 0.0018, 0.01634]},
         {'mass': 0.1879, 'com': [0.0, 0.0, -0.001159]},
     ],
-}  # fmt: skip
+}

@@ -105,8 +105,7 @@ def _joint_coupling(effect: Effect, robot: Robot) -> str:
     source = effect.source  # type: ignore[attr-defined]
     ratio = _value(effect, 'ratio')
     return (
-        f'Enter a coupling of {number(ratio * 1e3)} mrad per rad from {source} into '
-        f'{effect.site}.'
+        f'Enter a coupling of {number(ratio * 1e3)} mrad per rad from {source} into {effect.site}.'
     )
 
 
@@ -224,11 +223,22 @@ _SENTENCES: dict[str, Sentence] = {
     'link_offset': _row('dd', 'd', 'it is off by'),
     'link_twist': _row('dalpha', 'alpha', 'the axes are twisted by'),
     'axis_parallelism': _row('dbeta', 'beta', 'the axes are out of parallel by'),
-    'base_pose': _base_pose, 'tool_pose': _tool_pose, 'gear_ratio': _gear_ratio,
-    'transmission_ripple': _ripple, 'joint_coupling': _joint_coupling, 'backlash': _backlash,
-    'joint_compliance': _joint_compliance, 'cartesian_compliance': _cartesian_compliance,
-    'payload': _payload, 'servo_lag': _servo_lag, 'time_delay': _time_delay,
-    'thermal_growth': _thermal_growth, 'drift': _drift, 'vibration': _vibration,
-    'quantization': _quantization, 'measurement_scale': _measurement_scale,
-    'setup_step': _setup_step, 'setup_settling': _setup_settling,
-}  # fmt: skip
+    'base_pose': _base_pose,
+    'tool_pose': _tool_pose,
+    'gear_ratio': _gear_ratio,
+    'transmission_ripple': _ripple,
+    'joint_coupling': _joint_coupling,
+    'backlash': _backlash,
+    'joint_compliance': _joint_compliance,
+    'cartesian_compliance': _cartesian_compliance,
+    'payload': _payload,
+    'servo_lag': _servo_lag,
+    'time_delay': _time_delay,
+    'thermal_growth': _thermal_growth,
+    'drift': _drift,
+    'vibration': _vibration,
+    'quantization': _quantization,
+    'measurement_scale': _measurement_scale,
+    'setup_step': _setup_step,
+    'setup_settling': _setup_settling,
+}

@@ -77,24 +77,35 @@ def _as_it_is(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate
     """Yield measurements that leave the cell as it is."""
     still = all(r.joints.static for r in problem.recordings)
     yield Candidate(
-        'speed_sweep', 'Run one path forth and back at three speeds and record joints and tool '
-        'all the way.', EXTRA if still else 5.0, _with_sides(problem, sweep(problem, now.robot)),
+        'speed_sweep',
+        'Run one path forth and back at three speeds and record joints and tool all the way.',
+        EXTRA if still else 5.0,
+        _with_sides(problem, sweep(problem, now.robot)),
         now,
-    )  # fmt: skip
+    )
     yield Candidate(
-        'stations', f'Measure {len(spread)} stations at rest, spread over a wider part of the '
-        'workspace.', 15.0, _stations(problem, spread), now,
-    )  # fmt: skip
+        'stations',
+        f'Measure {len(spread)} stations at rest, spread over a wider part of the workspace.',
+        15.0,
+        _stations(problem, spread),
+        now,
+    )
     both = spread[: len(spread) // 4]
     yield Candidate(
-        'bidirectional', f'Measure {len(both)} stations at rest, each approached from both '
-        'sides of every joint.', 20.0, _stations(problem, _both_sides(both)), now,
-    )  # fmt: skip
+        'bidirectional',
+        f'Measure {len(both)} stations at rest, each approached from both sides of every joint.',
+        20.0,
+        _stations(problem, _both_sides(both)),
+        now,
+    )
     again = np.concatenate([spread[:5]] * (len(spread) // 5))
     yield Candidate(
-        'warm_up', 'Measure five stations again and again for an hour while the arm warms up.',
-        60.0, _stations(problem, again, 60.0, rise=15.0), now,
-    )  # fmt: skip
+        'warm_up',
+        'Measure five stations again and again for an hour while the arm warms up.',
+        60.0,
+        _stations(problem, again, 60.0, rise=15.0),
+        now,
+    )
 
 
 def _changed(problem: Problem, now: Model, few: Array) -> Iterator[Candidate]:
@@ -103,24 +114,38 @@ def _changed(problem: Problem, now: Model, few: Array) -> Iterator[Candidate]:
     words = f'Measure {len(few)} stations'
     if any(r.wrench is not None for r in problem.recordings):
         yield Candidate(
-            'press', f'{words} while the tool is pressed with {PRESS:g} N along x, y and z in '
-            'turn.', 25.0, _pressed(recording), now,
-        )  # fmt: skip
+            'press',
+            f'{words} while the tool is pressed with {PRESS:g} N along x, y and z in turn.',
+            25.0,
+            _pressed(recording),
+            now,
+        )
     heavy = replace(robot, payload_mass=robot.payload_mass + MASS)
     yield Candidate(
-        'payload_swap', f'{words} with {MASS:g} kg more on the flange, entered as payload.', 30.0,
-        recording, replace(now, robot=heavy),
-    )  # fmt: skip
+        'payload_swap',
+        f'{words} with {MASS:g} kg more on the flange, entered as payload.',
+        30.0,
+        recording,
+        replace(now, robot=heavy),
+    )
     longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
     yield Candidate(
-        'longer_tool', f'{words} with a tool {LONGER * 1e3:g} mm longer.', 40.0,
-        recording, replace(now, robot=robot.with_frames(tool=longer)), new_tool=True,
-    )  # fmt: skip
+        'longer_tool',
+        f'{words} with a tool {LONGER * 1e3:g} mm longer.',
+        40.0,
+        recording,
+        replace(now, robot=robot.with_frames(tool=longer)),
+        new_tool=True,
+    )
     base = transform(np.eye(3), np.array([1.5, 0.5, 0.0])) @ now.bases[0]
     yield Candidate(
-        'moved_instrument', f'Move the instrument by 1.5 m. {words}.', 45.0, recording,
-        replace(now, bases=(base,)), new_base=True,
-    )  # fmt: skip
+        'moved_instrument',
+        f'Move the instrument by 1.5 m. {words}.',
+        45.0,
+        recording,
+        replace(now, bases=(base,)),
+        new_base=True,
+    )
 
 
 def _stations(problem: Problem, q: Array, seconds: float = 15.0, rise: float = 0.0) -> Recording:
@@ -137,8 +162,11 @@ def _with_sides(problem: Problem, joints: JointMotion) -> Recording:
     """Return a recording of a motion, as warm and as loaded as those at hand were on average."""
     ends = joints.t[[0, -1]]
     warm = [r.temperature.value.mean() for r in problem.recordings if r.temperature is not None]
-    load = [(r.wrench.value.mean(axis=0), r.wrench_frame) for r in problem.recordings
-            if r.wrench is not None]  # fmt: skip
+    load = [
+        (r.wrench.value.mean(axis=0), r.wrench_frame)
+        for r in problem.recordings
+        if r.wrench is not None
+    ]
     heat = Signal(ends, np.full(2, np.mean(warm))) if warm else None
     if not load:
         return Recording(NAME, joints, temperature=heat)

@@ -88,9 +88,11 @@ def _chosen(
     best = min(enough.tolist(), key=lambda k: float(options[k].cost))
     pair = max(pairs, key=lambda p: tables[best][p])
     return _entry(
-        options[best], _reason(alternatives, pair, before, tables[best]),
-        float(tables[best][pair]), model,
-    )  # fmt: skip
+        options[best],
+        _reason(alternatives, pair, before, tables[best]),
+        float(tables[best][pair]),
+        model,
+    )
 
 
 _UNKNOWN = (
@@ -121,10 +123,13 @@ def _outside(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> dict[str,
     one, other = _differing(first, second)
     families = {effect.name for effect in _only(first, second) + _only(second, first)}
     return {
-        'kind': 'outside', 'motion': None, 'cost': None, 'expected_separation_sigma': 0.0,
+        'kind': 'outside',
+        'motion': None,
+        'cost': None,
+        'expected_separation_sigma': 0.0,
         'sentence': f'No motion tells {one} from {other}: {way(sorted(families))}.',
         'reason': 'Both move the tool alike wherever the joints go.',
-    }  # fmt: skip
+    }
 
 
 def _differing(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> tuple[str, str]:
@@ -161,6 +166,8 @@ def _motion(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
     if index.size > SAMPLES:
         index = np.linspace(0, index.size - 1, SAMPLES).round().astype(int)
     return {
-        'static': joints.static, 'joint_names': list(names),
-        't': joints.t[index].round(6).tolist(), 'q': joints.q[index].round(7).tolist(),
-    }  # fmt: skip
+        'static': joints.static,
+        'joint_names': list(names),
+        't': joints.t[index].round(6).tolist(),
+        'q': joints.q[index].round(7).tolist(),
+    }

@@ -48,16 +48,22 @@ class Gram:
         """Return the normal equations of columns, shape (P, rows), and residual, shape (rows,)."""
         normal = columns @ columns.T
         return cls(
-            normal, columns @ residual, float(residual @ residual), residual.size,
+            normal,
+            columns @ residual,
+            float(residual @ residual),
+            residual.size,
             np.maximum(np.diag(normal).copy(), 1e-300),
-        )  # fmt: skip
+        )
 
     def __sub__(self, other: Gram) -> Gram:
         """Return the normal equations without another's rows."""
         return Gram(
-            self.normal - other.normal, self.right - other.right, self.rss - other.rss,
-            self.rows - other.rows, np.maximum(self.size - other.size, 1e-300),
-        )  # fmt: skip
+            self.normal - other.normal,
+            self.right - other.right,
+            self.rss - other.rss,
+            self.rows - other.rows,
+            np.maximum(self.size - other.size, 1e-300),
+        )
 
     def live(self, index: Index) -> Index:
         """Return those of an index whose columns still carry something."""
@@ -124,7 +130,10 @@ def by_block(columns: Array, residual: Array, labels: Array) -> tuple[Gram, list
     total = blocks[0]
     for block in blocks[1:]:
         total = Gram(
-            total.normal + block.normal, total.right + block.right, total.rss + block.rss,
-            total.rows + block.rows, total.size + block.size,
-        )  # fmt: skip
+            total.normal + block.normal,
+            total.right + block.right,
+            total.rss + block.rss,
+            total.rows + block.rows,
+            total.size + block.size,
+        )
     return total, blocks

@@ -126,9 +126,7 @@ class Problem:
 
     def features(self, model: Model) -> list[Features]:
         """Return the feature makers of all recordings, taken at the model."""
-        return [
-            Features(model.twin(k), r, _measured(r).t) for k, r in enumerate(self.recordings)
-        ]
+        return [Features(model.twin(k), r, _measured(r).t) for k, r in enumerate(self.recordings)]
 
     def whitened(self, parts: list[Array], scale: Scale) -> Array:
         """

@@ -99,8 +99,9 @@ def _free(model: Model) -> NDArray[np.bool_]:
             out += [True] * effect.coordinates().size
             continue
         specs = [p for p, _ in effect.components() if p.differentiable]
-        out += [p.lower < value < p.upper
-                for p, value in zip(specs, effect.coordinates(), strict=True)]  # fmt: skip
+        out += [
+            p.lower < value < p.upper for p, value in zip(specs, effect.coordinates(), strict=True)
+        ]
     return np.array(out, dtype=bool)
 
 
@@ -143,9 +144,10 @@ def _shaped(effect: Effect, std: Array) -> dict[str, Any]:
         else:
             out.setdefault(parameter.name, []).append(next(values))
     return {
-        name: value for name, value in out.items()
+        name: value
+        for name, value in out.items()
         if value is not None and value != [None] * len(np.atleast_1d(value))
-    }  # fmt: skip
+    }
 
 
 def _ripple(effect: TransmissionRipple, std: Array) -> dict[str, Any]:

@@ -90,9 +90,7 @@ def families(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]
     return sorted(kinds, key=lambda kind: (kind.stage, kind.name))
 
 
-def build(
-    problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] = ()
-) -> Library:
+def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] = ()) -> Library:
     """Return the library at a model: one set of columns that all hypotheses share."""
     features = problem.features(model)
     residual = problem.residuals(model)[0]

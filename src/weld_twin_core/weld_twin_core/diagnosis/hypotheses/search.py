@@ -88,9 +88,7 @@ class Search:
         return effective_rows(self.work.problem, found, self.bare_rss)
 
 
-def effective_rows(
-    problem: Problem, found: Fit, bare_rss: float, trust: float = 1.0
-) -> float:
+def effective_rows(problem: Problem, found: Fit, bare_rss: float, trust: float = 1.0) -> float:
     """
     Return the number of independent rows that a fit's evidence may count.
 
@@ -107,9 +105,7 @@ def effective_rows(
     return float(count / (1.0 + MISFIT**2 * explained / MISFIT_DIRECTIONS))
 
 
-def search(
-    problem: Problem, start: Model, exclude: Sequence[str], progress: Progress
-) -> Search:
+def search(problem: Problem, start: Model, exclude: Sequence[str], progress: Progress) -> Search:
     """Return the effects that earn their place, fitted on all measurements."""
     full = problem.thinned(FIT_ROWS)
     # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.

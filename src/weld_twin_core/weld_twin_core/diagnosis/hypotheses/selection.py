@@ -57,9 +57,12 @@ class Workspace:
         normal = np.block([[self.shared, cross.T], [cross, own @ own.T]])
         right = np.concatenate([self.library.columns @ residual, own @ residual])
         gram = Gram(
-            normal, right, float(residual @ residual), residual.size,
+            normal,
+            right,
+            float(residual @ residual),
+            residual.size,
             np.maximum(np.diag(normal).copy(), 1e-300),
-        )  # fmt: skip
+        )
         count = self.library.columns.shape[0]
         return gram.without(np.arange(count, count + own.shape[0]))
 

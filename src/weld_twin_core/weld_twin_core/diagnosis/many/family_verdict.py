@@ -52,8 +52,9 @@ def weighed(found: Search, unseen: Unseen) -> tuple[Family, ...]:
         error = falls.std(ddof=1) / np.sqrt(falls.size) if falls.size > 1 else np.inf
         named = bool(falls.mean() > max(WORTH * full.mean(), CERTAIN * error))
         size = float(np.sqrt(max(falls.mean(), 0.0)))
-        sites = [(Site(name, model.found[k].site), unseen.rms(unseen.targets[1 + k]))
-                 for k in index]  # fmt: skip
+        sites = [
+            (Site(name, model.found[k].site), unseen.rms(unseen.targets[1 + k])) for k in index
+        ]
         sites = [item for item in sites if item[1] > LEAST]
         sites.sort(key=lambda item: -item[1])
         if sites:

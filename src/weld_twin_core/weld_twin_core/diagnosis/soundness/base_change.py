@@ -173,9 +173,10 @@ def _scale(parts: list[Array]) -> Scale:
     """
     size = [
         float(np.quantile(np.abs(np.concatenate([p[rows].ravel() for p in parts])), WIDE)) / 1.645
-        if any(p[rows].size for p in parts) else 1.0
+        if any(p[rows].size for p in parts)
+        else 1.0
         for rows in (slice(0, 3), slice(3, 6))
-    ]  # fmt: skip
+    ]
     position, turn = (max(s, 1e-9) for s in size)
     off = [np.linalg.norm(p[:3], axis=0) / (np.sqrt(3.0) * position) for p in parts]
     weights = tuple(np.minimum(1.0, (HUBER / np.maximum(o, 1e-12)) ** 2) for o in off)
@@ -200,8 +201,10 @@ def _arm(maker: Features, rows: int) -> Array:
     out = []
     for i in range(robot.n):
         joint = maker.column(('q', i))[:rows] * LOOSE[0 if robot.prismatic[i] else 1]
-        out += [maker.column((key, i))[:rows] * LOOSE[0 if key in ('d', 'a') else 1]
-                for key in GEOMETRY]  # fmt: skip
+        out += [
+            maker.column((key, i))[:rows] * LOOSE[0 if key in ('d', 'a') else 1]
+            for key in GEOMETRY
+        ]
         signals = [np.sin(view.q[:, i]), np.cos(view.q[:, i]), view.q[:, i]]
         signals += [view.shift[('tau', i)], view.qd[:, i], np.sign(view.qd[:, i])]
         if view.static:

@@ -71,10 +71,11 @@ class Case:
         shot = snapshot(self.problem, self.model, self._motions(late))
         again = self._lags(refined(replace(shot.problem, align=self.problem.align), shot.model))
         return [
-            new if old is not None and new is not None and new.after < EXPLAINED * old.before
+            new
+            if old is not None and new is not None and new.after < EXPLAINED * old.before
             else None
             for old, new in zip(late, again, strict=True)
-        ]  # fmt: skip
+        ]
 
     def _lags(self, model: Model) -> list[Lag | None]:
         out: list[Lag | None] = []

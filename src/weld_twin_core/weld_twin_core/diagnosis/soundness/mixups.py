@@ -99,9 +99,7 @@ def _unravelled(shot: Snapshot, start: float) -> tuple[list[Suspicion], float]:
     return [], start
 
 
-def _best(
-    shot: Snapshot, tries: Iterable[Suspicion]
-) -> tuple[Suspicion | None, Snapshot, float]:
+def _best(shot: Snapshot, tries: Iterable[Suspicion]) -> tuple[Suspicion | None, Snapshot, float]:
     """Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best."""
     tried, rough = [], []
     for suspicion in tries:

@@ -46,11 +46,12 @@ def orientation(case: Case) -> Sequence[Finding]:
 
 def _ways() -> dict[str, Undo]:
     return {
-        'Measured orientations are those of the instrument seen from the tool (inverted)':
-            lambda turn: np.swapaxes(turn, -1, -2),
+        'Measured orientations are those of the instrument seen from the tool (inverted)': lambda turn: (
+            np.swapaxes(turn, -1, -2)
+        ),
         'Quaternions were written w first and read x first': _rolled(-1),
         'Quaternions were written x first and read w first': _rolled(1),
-    }  # fmt: skip
+    }
 
 
 def _rolled(places: int) -> Undo:

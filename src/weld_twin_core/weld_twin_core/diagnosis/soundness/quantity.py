@@ -40,9 +40,12 @@ def quantity(case: Case) -> Sequence[Finding]:
     if spread < STILL:
         raise DataError(
             'the joints do not move in any recording; '
-            + ('there is nothing to compare' if seen < STILL else
-               'the tool does, so these are not its joint states')
-        )  # fmt: skip
+            + (
+                'there is nothing to compare'
+                if seen < STILL
+                else 'the tool does, so these are not its joint states'
+            )
+        )
     if seen < STILL:
         raise DataError('the joints move, but the measured tool never does; is the topic right?')
     total = sum(problem.samples)

@@ -52,11 +52,15 @@ def _one_way(case: Case) -> Iterator[Finding]:
         one_way = np.abs(moved.sum(axis=0))
         turned |= one_way < 0.999 * travel
         turned |= travel < LITTLE
-    names = [repr(name) for name, t in zip(case.model.robot.joint_names, turned, strict=True)
-             if not t]  # fmt: skip
+    names = [
+        repr(name) for name, t in zip(case.model.robot.joint_names, turned, strict=True) if not t
+    ]
     if names:
-        yield Finding('note', f'{listed(names)} never reverse{"s" if len(names) == 1 else ""}; '
-                      'play there looks like an offset.')  # fmt: skip
+        yield Finding(
+            'note',
+            f'{listed(names)} never reverse{"s" if len(names) == 1 else ""}; '
+            'play there looks like an offset.',
+        )
 
 
 def _frames(case: Case) -> Iterator[Finding]:

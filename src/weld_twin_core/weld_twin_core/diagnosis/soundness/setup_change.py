@@ -62,10 +62,12 @@ def setup(case: Case) -> Sequence[Finding]:
     found = changes(case.residuals, case.problem, case.model)
     most = SEEN * max(float(np.quantile(distance(part), LARGEST)) for part in case.residuals)
     return [
-        Finding('warning', _moved(case, each)) if isinstance(each, Step)
+        Finding('warning', _moved(case, each))
+        if isinstance(each, Step)
         else Finding('note', _settled(case, each))
-        for each in found if each.size < most
-    ]  # fmt: skip
+        for each in found
+        if each.size < most
+    ]
 
 
 def moved_setup(parts: list[Array], problem: Problem, model: Model) -> list[Step]:
@@ -152,9 +154,7 @@ def _trials(
         )
 
 
-def _step(
-    change: BaseChange, k: int, before: Sequence[int | None], *, whole: bool
-) -> int | None:
+def _step(change: BaseChange, k: int, before: Sequence[int | None], *, whole: bool) -> int | None:
     """Return the sample before which a step of recording k's base explains most."""
     gains = change.step_gains(k)
     edge = max(3, int(EDGE * gains.size))
@@ -167,9 +167,7 @@ def _step(
     return int(np.where(allowed, gains, -np.inf).argmax()) if allowed.any() else None
 
 
-def _smooth(
-    change: BaseChange, mine: NDArray[np.bool_], age: Array
-) -> tuple[float, list[Array]]:
+def _smooth(change: BaseChange, mine: NDArray[np.bool_], age: Array) -> tuple[float, list[Array]]:
     """Return the best time constant of a settling, and other smooth shapes of a recording."""
 
     def gain(constant: float) -> float:

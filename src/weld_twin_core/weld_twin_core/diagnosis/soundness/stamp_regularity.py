@@ -28,8 +28,9 @@ def stamps(case: Case) -> Sequence[Finding]:
         if recording.joints.static:
             continue
         for t, what in (
-            (recording.joints.t, 'joint states'), (measured(recording).t, 'measurements')
-        ):  # fmt: skip
+            (recording.joints.t, 'joint states'),
+            (measured(recording).t, 'measurements'),
+        ):
             if t.size >= ENOUGH:
                 out += _stream(t, f'The {what} of {recording.name}')
     return out
@@ -50,13 +51,19 @@ def _stream(t: Array, name: str) -> Iterator[Finding]:
         )
     grid = _grid(t)
     if grid is not None:
-        yield Finding('note', f'{name} are stamped in whole {grid * 1e3:g} ms; positions are '
-                      f'uncertain by the way made in {grid * 5e2:g} ms.')  # fmt: skip
+        yield Finding(
+            'note',
+            f'{name} are stamped in whole {grid * 1e3:g} ms; positions are '
+            f'uncertain by the way made in {grid * 5e2:g} ms.',
+        )
         return
     spread = 1.4826 * float(np.median(np.abs(steps[~gaps] - usual)))
     if spread > JITTER * usual:
-        yield Finding('note', f'{name} come irregularly: every {usual * 1e3:.3g} ms, give or take '
-                      f'{spread * 1e3:.2g} ms.')  # fmt: skip
+        yield Finding(
+            'note',
+            f'{name} come irregularly: every {usual * 1e3:.3g} ms, give or take '
+            f'{spread * 1e3:.2g} ms.',
+        )
 
 
 def _grid(t: Array) -> float | None:

@@ -38,9 +38,15 @@ def held_out_shrink(found: Search, unseen: Unseen, holdout: Sequence[Recording])
         source = ', '.join(r.name for r in holdout)
     ratio, interval = ratio_interval(before, after, labels, elsewhere)
     return Shrink(
-        float(np.sqrt(before.mean())), float(np.sqrt(after.mean())), ratio, interval, source,
-        steps, alone, None if turned[0] is None or turned[1] is None else (turned[0], turned[1]),
-    )  # fmt: skip
+        float(np.sqrt(before.mean())),
+        float(np.sqrt(after.mean())),
+        ratio,
+        interval,
+        source,
+        steps,
+        alone,
+        None if turned[0] is None or turned[1] is None else (turned[0], turned[1]),
+    )
 
 
 def _waterfall(
@@ -94,10 +100,14 @@ def _for_bag(problem: Problem, model: Model, recordings: Sequence[Recording]) ->
     """Return the model with the base whose set-up the bag matches, or the bag's own."""
     recording = problem.recordings[0]
     choices = [
-        Model(model.robot, (base,), model.known,
-              seen_from(model.found, own.epoch_ns, own.span_ns, recording))
+        Model(
+            model.robot,
+            (base,),
+            model.known,
+            seen_from(model.found, own.epoch_ns, own.span_ns, recording),
+        )
         for base, own in zip(model.bases, recordings, strict=True)
-    ]  # fmt: skip
+    ]
     sizes = [_size(problem, choice) for choice in choices]
     best = choices[int(np.argmin(sizes))]
     if 'base' in problem.align:

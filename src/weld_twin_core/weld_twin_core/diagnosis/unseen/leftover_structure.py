@@ -63,9 +63,7 @@ def structure(unseen: Unseen, model: Model, kept: list[int]) -> Structure:
     return Structure(float(np.sqrt(squares.mean())), gain, sure, names)
 
 
-def _best(
-    base: Base, columns: Array, before: Array, labels: Array
-) -> tuple[float, float, Array]:
+def _best(base: Base, columns: Array, before: Array, labels: Array) -> tuple[float, float, Array]:
     """Return gain, its certainty and the squared errors at the best of a few ridges."""
     best: tuple[float, float, Array] | None = None
     for residual in base.extended(columns, RIDGES):
@@ -80,9 +78,7 @@ def _best(
     return best
 
 
-def _generic(
-    problem: Problem, model: Model, scale: Scale
-) -> Iterator[tuple[str, Array]]:
+def _generic(problem: Problem, model: Model, scale: Scale) -> Iterator[tuple[str, Array]]:
     """Yield named groups of whitened generic columns, (E, rows) of unit mean square."""
     features = problem.features(model)
     for i, joint in enumerate(model.robot.joint_names):
@@ -96,8 +92,9 @@ def _generic(
     yield 'a step in time', _pose_group(problem, features, scale, _steps)
     yield 'the place in the workspace', _pose_group(problem, features, scale, _place)
     yield 'time, seen from the tool', _pose_group(problem, features, scale, _time, of_tool=True)
-    yield 'a step in time, seen from the tool', _pose_group(
-        problem, features, scale, _steps, of_tool=True
+    yield (
+        'a step in time, seen from the tool',
+        _pose_group(problem, features, scale, _steps, of_tool=True),
     )
 
 
@@ -118,9 +115,13 @@ def _column_group(
 
 
 def _pose_group(
-    problem: Problem, features: list[Features], scale: Scale, regressors: object, *,
+    problem: Problem,
+    features: list[Features],
+    scale: Scale,
+    regressors: object,
+    *,
     of_tool: bool = False,
-) -> Array:  # fmt: skip
+) -> Array:
     parts = []
     for k, maker in enumerate(features):
         values = regressors(maker)  # type: ignore[operator]

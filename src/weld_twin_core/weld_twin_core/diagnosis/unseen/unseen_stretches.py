@@ -95,9 +95,17 @@ class Unseen:
         normals = np.array([columns[:, a:b] @ columns[:, a:b].T for a, b in spans])
         rights = np.array([columns[:, a:b] @ stacked[:, a:b].T for a, b in spans])
         return cls(
-            problem, scale, labels, columns, tuple(parts), stacked, prior + tether, prior * x,
-            normals, rights,
-        )  # fmt: skip
+            problem,
+            scale,
+            labels,
+            columns,
+            tuple(parts),
+            stacked,
+            prior + tether,
+            prior * x,
+            normals,
+            rights,
+        )
 
     @property
     def frames(self) -> int:

@@ -13,9 +13,16 @@ from ..result import Where
 from .unseen_stretches import TRUSTED, Unseen
 
 REGRESSORS = (
-    'constant', 'angle, low order', 'angle, high order', 'reversal', 'speed', 'acceleration',
-    'load', 'temperature', 'time',
-)  # fmt: skip
+    'constant',
+    'angle, low order',
+    'angle, high order',
+    'reversal',
+    'speed',
+    'acceleration',
+    'load',
+    'temperature',
+    'time',
+)
 REGIMES = ('static', 'reversal', 'speed', 'acceleration', 'load', 'temperature', 'time')
 STRETCHES = 12
 
@@ -38,15 +45,21 @@ def locate(problem: Problem, baseline: Unseen, start: Model, final: Unseen, foun
     shares = _map(problem, baseline, start)
     joints, regimes = _explained(final, found)
     if not found.found:
-        joints = {name: float(row.max()) for name, row in zip(start.robot.joint_names, shares,
-                                                             strict=True)}  # fmt: skip
+        joints = {
+            name: float(row.max())
+            for name, row in zip(start.robot.joint_names, shares, strict=True)
+        }
         regimes = _map_regimes(shares)
     ordered = sorted(joints.items(), key=lambda item: -item[1])
     good = [weight >= TRUSTED for weight in final.scale.weights]
     return Where(
-        tuple(ordered), regimes, _path(problem, start, good), _direction(problem, start, good),
-        REGRESSORS, tuple(tuple(float(v) for v in row) for row in shares),
-    )  # fmt: skip
+        tuple(ordered),
+        regimes,
+        _path(problem, start, good),
+        _direction(problem, start, good),
+        REGRESSORS,
+        tuple(tuple(float(v) for v in row) for row in shares),
+    )
 
 
 def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str, float]]:
@@ -61,8 +74,10 @@ def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str,
         less = final.predict([k for k in everything if k not in members])
         return max(float(final.squares(less).mean() - after), 0.0)
 
-    at = {name: [k for k in everything if found.found[k].site == name]
-          for name in found.robot.joint_names}  # fmt: skip
+    at = {
+        name: [k for k in everything if found.found[k].site == name]
+        for name in found.robot.joint_names
+    }
     under = {name: [k for k in everything if found.found[k].regime == name] for name in REGIMES}
     free = [k for k in everything if found.found[k].site is None]
     return (
@@ -71,9 +86,7 @@ def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str,
     )
 
 
-def _shares(
-    falls: dict[str, float], rest: float, total: float, after: float
-) -> dict[str, float]:
+def _shares(falls: dict[str, float], rest: float, total: float, after: float) -> dict[str, float]:
     """Return each fall's part of the share of the squared gap that the model explains."""
     explained = max(total - after, 0.0) / max(total, 1e-300)
     scale = explained / max(sum(falls.values()) + rest, 1e-300)

@@ -146,10 +146,13 @@ def decide(evidence: Evidence) -> Verdict:
     doubt = _doubt(evidence)
     if left > STRUCTURE or doubt is not None:
         solid = tuple(
-            chosen for chosen, part in zip(sets, evidence.parts, strict=True)
-            if len(chosen) == 1 and doubt is None and part > left
+            chosen
+            for chosen, part in zip(sets, evidence.parts, strict=True)
+            if len(chosen) == 1
+            and doubt is None
+            and part > left
             and not _touched(chosen[0], evidence)
-        )  # fmt: skip
+        )
         reason = _depends(evidence) if doubt is None else doubt
         sure = _unknown_confidence(left) if doubt is None else DOUBTED
         return Verdict('unknown', sure, solid, (reason,))
@@ -164,8 +167,11 @@ def decide(evidence: Evidence) -> Verdict:
     if evidence.glimpsed:
         confidence *= GLIMPSED
     confidence /= 1.0 + min(evidence.rise / RISE, evidence.share / SHARE) ** 2
-    reasons = tuple(_alike(slot, chosen) for slot, chosen in zip(evidence.slots, sets, strict=True)
-                    if len(chosen) > 1)  # fmt: skip
+    reasons = tuple(
+        _alike(slot, chosen)
+        for slot, chosen in zip(evidence.slots, sets, strict=True)
+        if len(chosen) > 1
+    )
     status = 'ambiguous' if reasons else 'identified'
     return Verdict(status, confidence, sets, reasons)
 
@@ -173,10 +179,15 @@ def decide(evidence: Evidence) -> Verdict:
 def _none(evidence: Evidence) -> Verdict:
     """Return that there is no gap, with less belief where only the rest shows the noise."""
     if not evidence.independent and evidence.after > ABOVE * evidence.floor:
-        return Verdict('none', 0.6, (), (
-            'nothing is found, but what remains is not spread as noise is, and nothing on these '
-            'recordings shows the noise by itself: repeat some poses',
-        ))  # fmt: skip
+        return Verdict(
+            'none',
+            0.6,
+            (),
+            (
+                'nothing is found, but what remains is not spread as noise is, and nothing on these '
+                'recordings shows the noise by itself: repeat some poses',
+            ),
+        )
     return Verdict('none', CALIBRATION, (), ('the gap does not rise above the noise',))
 
 
@@ -221,7 +232,8 @@ def _joints_at_rest(evidence: Evidence) -> list[str]:
 def _at_rest(sites: Iterable[Site]) -> list[str]:
     """Return the joints of the effects that show at rest."""
     return [
-        site.joint for site in sites
+        site.joint
+        for site in sites
         if site.joint and REGISTRY[site.effect].regime in ('static', 'load')
     ]
 

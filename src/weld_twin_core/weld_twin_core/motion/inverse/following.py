@@ -44,7 +44,6 @@ _ROUGH = 1e-4
 _ROUNDS = 8
 
 
-
 def follow(robot: Robot, poses: Array, seed: Array) -> Array | None:
     """
     Return joint positions, shape (N, 6), that start near the seed and go on without a jump.

@@ -13,6 +13,16 @@ from .torch import Torch
 from .weave import Weave
 
 __all__ = [
-    'KINDS', 'Arc', 'Circle', 'Line', 'Path', 'Polyline', 'SeamFrames', 'Spline', 'Torch',
-    'Weave', 'default_seam', 'from_mapping',
-]  # fmt: skip
+    'KINDS',
+    'Arc',
+    'Circle',
+    'Line',
+    'Path',
+    'Polyline',
+    'SeamFrames',
+    'Spline',
+    'Torch',
+    'Weave',
+    'default_seam',
+    'from_mapping',
+]

@@ -70,9 +70,13 @@ def _weave(place: Place) -> Path:
 
 
 _SHAPES: dict[str, Callable[[Place], Path]] = {
-    'line': _line, 'arc': _arc, 'circle': _circle, 'polyline': _polyline, 'spline': _spline,
+    'line': _line,
+    'arc': _arc,
+    'circle': _circle,
+    'polyline': _polyline,
+    'spline': _spline,
     'weave': _weave,
-}  # fmt: skip
+}
 KINDS = tuple(_SHAPES)
 
 

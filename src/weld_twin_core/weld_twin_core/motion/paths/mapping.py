@@ -22,9 +22,13 @@ from .spline import Spline
 from .weave import Weave
 
 _KINDS: dict[str, type[Any]] = {
-    'line': Line, 'arc': Arc, 'circle': Circle, 'polyline': Polyline, 'spline': Spline,
+    'line': Line,
+    'arc': Arc,
+    'circle': Circle,
+    'polyline': Polyline,
+    'spline': Spline,
     'points': Spline,
-}  # fmt: skip
+}
 
 
 def from_mapping(data: Mapping[str, Any]) -> Path:

@@ -79,6 +79,10 @@ def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
 
     case = Case(robot, path, seed)
     out: dict[str, float] = {}
-    for measure in (*geometric_measures.MEASURES, *motion_measures.MEASURES, *combined_measures.MEASURES):
+    for measure in (
+        *geometric_measures.MEASURES,
+        *motion_measures.MEASURES,
+        *combined_measures.MEASURES,
+    ):
         out |= {key: float(value) for key, value in measure(case).items()}
     return out

@@ -17,9 +17,12 @@ from ..tolerance import with_draws
 from .claim_case import Case, Measure
 
 GROUPS = {
-    'joint_offset': 'angular', 'link_twist': 'angular', 'backlash': 'backlash',
-    'link_length': 'length', 'base_pose': 'initial',
-}  # fmt: skip
+    'joint_offset': 'angular',
+    'link_twist': 'angular',
+    'backlash': 'backlash',
+    'link_length': 'length',
+    'base_pose': 'initial',
+}
 ORDER = ('angular', 'backlash', 'length', 'initial')
 """The paper's final ranking (V.vii), the strongest first."""
 _DRAWS = 200
@@ -43,8 +46,10 @@ def sums(case: Case) -> dict[str, float]:
     ratio = combined / parts
     peaks = combined.max(axis=1) / parts.max(axis=1)
     return {
-        'combined_ratio_median': np.median(peaks), 'combined_ratio_max': ratio.max(),
-        'combined_exceeds': (ratio > 1.0).mean(), **_coupling(case, draws, combined),
+        'combined_ratio_median': np.median(peaks),
+        'combined_ratio_max': ratio.max(),
+        'combined_exceeds': (ratio > 1.0).mean(),
+        **_coupling(case, draws, combined),
     }
 
 
@@ -72,7 +77,8 @@ def drift(case: Case) -> dict[str, float]:
     off = scenario_deviations(study)['angular']
     speed = np.linalg.norm(off, axis=-1)
     return {
-        'drift_exponent_angular': out['angular'], 'drift_exponent_combined': out['combined'],
+        'drift_exponent_angular': out['angular'],
+        'drift_exponent_combined': out['combined'],
         'drift_exponent_init': out['initialization'],
         'drift_spread_angular': np.ptp(speed) / speed.mean(),
     }

@@ -43,10 +43,12 @@ def initialization(case: Case) -> dict[str, float]:
     worst = max(turned, key=lambda d: float(np.ptp(d)))
     growth = np.polyfit(study.s / study.length, shifted / size, 1)[0]
     return {
-        'init_S': shifted.max() / size, 'init_spread': np.ptp(shifted) / shifted.mean(),
-        'init_growth': growth, 'init_turn_S_m': max(d.max() for d in turned) / 1e-3,
+        'init_S': shifted.max() / size,
+        'init_spread': np.ptp(shifted) / shifted.mean(),
+        'init_growth': growth,
+        'init_turn_S_m': max(d.max() for d in turned) / 1e-3,
         'init_turn_spread': np.ptp(worst) / worst.mean(),
-    }  # fmt: skip
+    }
 
 
 def _distance(case: Case, *effects: Effect) -> Array:
@@ -84,8 +86,10 @@ def leverage(case: Case) -> dict[str, float]:
         'distal_rank_torch': spearmanr(order, torch.peak).statistic,
         'distal_ratio': bare.peak[-half:].mean() / bare.peak[:half].mean(),
         'distal_ratio_torch': torch.peak[-half:].mean() / torch.peak[:half].mean(),
-        'turn_spread': np.ptp(bare.turns), 'S_theta_max_m': bare.peak.max(),
-        'S_theta_mean_m': bare.peak.mean(), 'S_theta_least_m': bare.peak.min(),
+        'turn_spread': np.ptp(bare.turns),
+        'S_theta_max_m': bare.peak.max(),
+        'S_theta_mean_m': bare.peak.mean(),
+        'S_theta_least_m': bare.peak.min(),
     }
 
 
@@ -95,7 +99,9 @@ def lengths(case: Case) -> dict[str, float]:
     found = local_sensitivity(case.smooth, links)
     bends = [abs(sweep(case.smooth, t, default_values(t)).departure[-1]) for t in links]
     return {
-        'S_a_max': found.peak.max(), 'S_a_min': found.peak.min(), 'S_a_departure': max(bends),
+        'S_a_max': found.peak.max(),
+        'S_a_min': found.peak.min(),
+        'S_a_departure': max(bends),
         'S_a_spread': np.ptp(found.analytic, axis=1).max(),
     }
 
@@ -107,8 +113,10 @@ def conditioning(case: Case) -> dict[str, float]:
     return {
         'condition_rank': spearmanr(stand.condition, stand.amplification).statistic,
         'condition_rank_anywhere': spearmanr(condition, gain).statistic,
-        'condition_max': stand.condition.max(), 'gain_max': stand.amplification.max(),
-        'gain_min': stand.amplification.min(), 'manipulability_min': stand.manipulability.min(),
+        'condition_max': stand.condition.max(),
+        'gain_max': stand.amplification.max(),
+        'gain_min': stand.amplification.min(),
+        'manipulability_min': stand.manipulability.min(),
     }
 
 
@@ -131,13 +139,19 @@ def bound(case: Case) -> dict[str, float]:
     for _ in range(20):
         offset = rng.normal(size=case.robot.n) * 1e-4
         effects = [
-            JointOffset(name, float(v)) for name, v in zip(case.robot.joint_names, offset,
-                                                           strict=True)
-        ]  # fmt: skip
+            JointOffset(name, float(v))
+            for name, v in zip(case.robot.joint_names, offset, strict=True)
+        ]
         parts.append((_distance(case, *effects) / (gain * np.linalg.norm(offset))).mean())
     return {'bound_low': min(parts), 'bound_high': max(parts)}
 
 
 MEASURES: tuple[Measure, ...] = (
-    baseline, initialization, linearity, leverage, lengths, conditioning, bound
-)  # fmt: skip
+    baseline,
+    initialization,
+    linearity,
+    leverage,
+    lengths,
+    conditioning,
+    bound,
+)

@@ -102,10 +102,15 @@ class Claim:
         """Return plain numbers and strings."""
         measured = {key: {'least': a, 'largest': b} for key, (a, b) in self.measured.items()}
         return {
-            'claim': self.key, 'statement': self.statement, 'where': self.where,
-            'verdict': self.verdict, 'reason': self.reason, 'held': self.held,
-            'cases': self.cases, 'measured': measured,
-        }  # fmt: skip
+            'claim': self.key,
+            'statement': self.statement,
+            'where': self.where,
+            'verdict': self.verdict,
+            'reason': self.reason,
+            'held': self.held,
+            'cases': self.cases,
+            'measured': measured,
+        }
 
 
 def judge(cases: Mapping[CaseName, Measured]) -> tuple[Claim, ...]:
@@ -135,6 +140,12 @@ def _decide(rule: Rule, cases: Sequence[Measured]) -> Claim:
         verdict = f'{HOLDS_WHEN} {rule.condition}'
     measured = {key: (ranges[key].low, ranges[key].high) for key in rule.shows}
     return Claim(
-        rule.key, rule.statement, rule.where, verdict, rule.reason(ranges), held, len(cases),
+        rule.key,
+        rule.statement,
+        rule.where,
+        verdict,
+        rule.reason(ranges),
+        held,
+        len(cases),
         measured,
-    )  # fmt: skip
+    )

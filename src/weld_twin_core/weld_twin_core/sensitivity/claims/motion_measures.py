@@ -62,10 +62,12 @@ def play(case: Case) -> dict[str, float]:
     smooth, aggressive = (np.linalg.norm(each, axis=-1) for each in off)
     spread = [float(spread_of_passes(s, each)) for s, each in zip(studies, off, strict=True)]
     return {
-        'play_spread_smooth_m': spread[0], 'play_spread_aggressive_m': spread[1],
+        'play_spread_smooth_m': spread[0],
+        'play_spread_aggressive_m': spread[1],
         'play_peak_ratio': aggressive.max() / smooth.max(),
         'play_rms_ratio': _rms(case.aggressive, aggressive) / _rms(case.smooth, smooth),
-        'play_smooth_m': smooth.max(), 'play_aggressive_m': aggressive.max(),
+        'play_smooth_m': smooth.max(),
+        'play_aggressive_m': aggressive.max(),
         'play_mean_ratio': aggressive.mean() / smooth.mean(),
     }
 
@@ -85,8 +87,10 @@ def locality(case: Case) -> dict[str, float]:
         square = study.deviations((Backlash(name, _WIDTH, form),)) ** 2
         share[form] = square[near].sum() / square.sum()
     return {
-        'local_share_play': share['play'], 'local_share_written': share['reversal'],
-        'local_share_of_points': near.mean(), 'reversals': flips.size,
+        'local_share_play': share['play'],
+        'local_share_written': share['reversal'],
+        'local_share_of_points': near.mean(),
+        'reversals': flips.size,
     }
 
 
@@ -118,9 +122,10 @@ def planning(case: Case) -> dict[str, float]:
         tolerances = default_tolerances(case.robot, families)
         found = {
             r.profile: r
-            for r in compare_profiles(case.robot, case.path, tolerances, profiles=profiles,
-                                      points=POINTS)
-        }  # fmt: skip
+            for r in compare_profiles(
+                case.robot, case.path, tolerances, profiles=profiles, points=POINTS
+            )
+        }
         rough, fine = found['aggressive'], found['smooth']
         out |= {
             f'plan_{label}_ratio': rough.expected_m / fine.expected_m,

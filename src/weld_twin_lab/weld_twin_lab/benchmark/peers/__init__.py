@@ -16,14 +16,22 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 
 MODULES = {
-    'pinocchio': 'pinocchio_peer', 'mujoco': 'mujoco_peer',
-    'roboticstoolbox': 'toolbox_peer', 'pybotics': 'pybotics_peer', 'kinpy': 'kinpy_peer',
+    'pinocchio': 'pinocchio_peer',
+    'mujoco': 'mujoco_peer',
+    'roboticstoolbox': 'toolbox_peer',
+    'pybotics': 'pybotics_peer',
+    'kinpy': 'kinpy_peer',
     'jax': 'jax_peer',
-}  # fmt: skip
+}
 PACKAGES = {
-    'pinocchio': 'pin', 'mujoco': 'mujoco', 'roboticstoolbox': 'roboticstoolbox-python',
-    'pybotics': 'pybotics', 'kinpy': 'kinpy', 'jax': 'jax', 'salib': 'SALib',
-}  # fmt: skip
+    'pinocchio': 'pin',
+    'mujoco': 'mujoco',
+    'roboticstoolbox': 'roboticstoolbox-python',
+    'pybotics': 'pybotics',
+    'kinpy': 'kinpy',
+    'jax': 'jax',
+    'salib': 'SALib',
+}
 """What they are called on PyPI."""
 
 

@@ -42,10 +42,14 @@ def _chain(base: jax.Array, tool: jax.Array, n: int) -> Callable[..., jax.Array]
         for i in range(n):
             theta, d, a, alpha = rows[0, i] + q[i], rows[1, i], rows[2, i], rows[3, i]
             c, s, ca, sa = jnp.cos(theta), jnp.sin(theta), jnp.cos(alpha), jnp.sin(alpha)
-            out = out @ jnp.array([
-                [c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s],
-                [0.0, sa, ca, d], [0.0, 0.0, 0.0, 1.0],
-            ])  # fmt: skip
+            out = out @ jnp.array(
+                [
+                    [c, -s * ca, s * sa, a * c],
+                    [s, c * ca, -c * sa, a * s],
+                    [0.0, sa, ca, d],
+                    [0.0, 0.0, 0.0, 1.0],
+                ]
+            )
         return out @ tool
 
     return pose

@@ -22,9 +22,14 @@ def make(robot: Robot) -> Peer:
     *placements, tool = links(robot)
     for i, placement in enumerate(placements):
         body = body.add_body(
-            name=f'link{i}', pos=placement[:3, 3], quat=_quaternion(placement), mass=1.0,
-            inertia=[1.0, 1.0, 1.0], ipos=[0.0, 0.0, 0.0], explicitinertial=True,
-        )  # fmt: skip
+            name=f'link{i}',
+            pos=placement[:3, 3],
+            quat=_quaternion(placement),
+            mass=1.0,
+            inertia=[1.0, 1.0, 1.0],
+            ipos=[0.0, 0.0, 0.0],
+            explicitinertial=True,
+        )
         body.add_joint(name=f'q{i}', axis=[0.0, 0.0, 1.0])
     body.add_site(name='tool', pos=tool[:3, 3], quat=_quaternion(tool))
     model = spec.compile()

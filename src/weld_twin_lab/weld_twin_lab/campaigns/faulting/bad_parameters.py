@@ -40,10 +40,14 @@ def abuse(bench: Bench) -> list[dict[str, Any]]:
     for node, name, value in ABUSES:
         answer = bench.cell.set_parameter(node, name, value)
         text = repr(value)
-        rows.append({
-            'node': node, 'parameter': name,
-            'value': text if len(text) < 60 else f'{text[:40]}... ({len(text)} characters)',
-            'refused': not answer.successful, 'reason': answer.reason[:200],
-        })  # fmt: skip
+        rows.append(
+            {
+                'node': node,
+                'parameter': name,
+                'value': text if len(text) < 60 else f'{text[:40]}... ({len(text)} characters)',
+                'refused': not answer.successful,
+                'reason': answer.reason[:200],
+            }
+        )
         bench.run(0.2)
     return rows

@@ -52,6 +52,7 @@ class Fault:
 
 def _third(spoil: Callable[[Any], None]) -> Callable[[Bench], None]:
     """Return a fault that spoils every third joint state."""
+
     def run(bench: Bench) -> None:
         def each(k: int) -> None:
             message = bench.joint_state()
@@ -66,6 +67,7 @@ def _third(spoil: Callable[[Any], None]) -> Callable[[Bench], None]:
 
 def _bytes(make: Callable[[bytes, int], bytes]) -> Callable[[Bench], None]:
     """Return a fault that follows every third joint state with bytes that are none."""
+
     def run(bench: Bench) -> None:
         def each(k: int) -> None:
             message = bench.joint_state()
@@ -127,6 +129,7 @@ def _foreign(bench: Bench) -> None:
 
 def _future(bench: Bench) -> None:
     """One stamp an hour ahead; those behind it are out of order until time has begun anew."""
+
     def each(k: int) -> None:
         message = bench.joint_state()
         if k % 50 == 10:
@@ -146,6 +149,7 @@ def _silence(bench: Bench) -> None:
 
 def _twice(change: float) -> Callable[[Bench], None]:
     """Return a fault: another publisher repeats every joint state, or contradicts it between."""
+
     def run(bench: Bench) -> None:
         second = bench.publisher(JOINT_STATES)
         bench.cell.wait(lambda: second.get_subscription_count() >= 4, 'listeners')
@@ -167,6 +171,7 @@ def _twice(change: float) -> Callable[[Bench], None]:
 
 def _restart(number: int, order: Sequence[str]) -> Callable[[Bench], None]:
     """Return a fault: nodes end by a signal and come back in the order given."""
+
     def run(bench: Bench) -> None:
         for name in order:
             process = bench.processes[name]
@@ -210,6 +215,7 @@ def _frozen(bench: Bench) -> None:
 
 def _beside(topic: Topic, make: Callable[[Bench, int], Any]) -> Callable[[Bench], None]:
     """Return a fault on another topic than the joint states, which go on."""
+
     def run(bench: Bench) -> None:
         publisher = bench.publisher(topic)
         bench.cell.wait(lambda: publisher.get_subscription_count() > 0, 'listeners')
@@ -257,27 +263,48 @@ JOINT_FAULTS = (
     Fault('a second publisher that differs', _twice(0.05)),
 )
 OTHER_FAULTS = (
-    Fault('NaN in a measured pose', _beside(MEASURED_POSE, _nan_pose),
-          ('deviation_analyzer', 'deviation_markers', 'live_diagnosis')),
-    Fault('a measured pose without orientation', _beside(MEASURED_POSE, _zero_pose),
-          ('deviation_analyzer', 'deviation_markers', 'live_diagnosis')),
-    Fault('random bytes as measured pose',
-          _beside(MEASURED_POSE, lambda b, k: np.random.default_rng(k).bytes(99)),
-          ('deviation_analyzer', 'deviation_markers', 'live_diagnosis', 'recorder')),
+    Fault(
+        'NaN in a measured pose',
+        _beside(MEASURED_POSE, _nan_pose),
+        ('deviation_analyzer', 'deviation_markers', 'live_diagnosis'),
+    ),
+    Fault(
+        'a measured pose without orientation',
+        _beside(MEASURED_POSE, _zero_pose),
+        ('deviation_analyzer', 'deviation_markers', 'live_diagnosis'),
+    ),
+    Fault(
+        'random bytes as measured pose',
+        _beside(MEASURED_POSE, lambda b, k: np.random.default_rng(k).bytes(99)),
+        ('deviation_analyzer', 'deviation_markers', 'live_diagnosis', 'recorder'),
+    ),
     Fault('the clock goes back by a minute', _clock(-60 * S)),
     Fault('the clock goes on by an hour', _clock(HOUR), ()),
     Fault('the clock stands still', _frozen, ()),
-    Fault('twin killed and started again',
-          _restart(signal.SIGKILL, ['forward_kinematics_twin']), ('deviation_analyzer',)),
-    Fault('injector and analyzer killed, started in the other order',
-          _restart(signal.SIGKILL, ['error_injector', 'deviation_analyzer']),
-          ('deviation_markers',)),
-    Fault('twin, analyzer, markers ended, started in turn',
-          _restart(signal.SIGTERM, ['deviation_markers', 'forward_kinematics_twin',
-                                    'deviation_analyzer']), ()),
+    Fault(
+        'twin killed and started again',
+        _restart(signal.SIGKILL, ['forward_kinematics_twin']),
+        ('deviation_analyzer',),
+    ),
+    Fault(
+        'injector and analyzer killed, started in the other order',
+        _restart(signal.SIGKILL, ['error_injector', 'deviation_analyzer']),
+        ('deviation_markers',),
+    ),
+    Fault(
+        'twin, analyzer, markers ended, started in turn',
+        _restart(
+            signal.SIGTERM, ['deviation_markers', 'forward_kinematics_twin', 'deviation_analyzer']
+        ),
+        (),
+    ),
     Fault('discovery lost and found (twin hangs for 25 s)', _stopped, TAKE_JOINTS[1:]),
-    Fault('an infinite wrench', _beside(
-        TOOL_WRENCH, lambda b, k: b.make.wrench(b.stamp, np.full(6, np.inf)))),
-    Fault('temperature in kelvin', _beside(
-        TEMPERATURE, lambda b, k: b.make.temperature(b.stamp, 294.0))),
-)  # fmt: skip
+    Fault(
+        'an infinite wrench',
+        _beside(TOOL_WRENCH, lambda b, k: b.make.wrench(b.stamp, np.full(6, np.inf))),
+    ),
+    Fault(
+        'temperature in kelvin',
+        _beside(TEMPERATURE, lambda b, k: b.make.temperature(b.stamp, 294.0)),
+    ),
+)

@@ -18,9 +18,10 @@ from .bench import NODES, Bench
 from .fault_list import Fault
 
 PUBLISHED = {
-    'forward_kinematics_twin': TWIN_POSE.name, 'error_injector': MEASURED_POSE.name,
+    'forward_kinematics_twin': TWIN_POSE.name,
+    'error_injector': MEASURED_POSE.name,
     'deviation_analyzer': DEVIATION.name,
-}  # fmt: skip
+}
 EXACT = 1e-9
 """Largest difference [m] of a published number from the right one."""
 BEFORE, AFTER = 3.5, 1.0
@@ -47,22 +48,31 @@ def trial(bench: Bench, fault: Fault) -> dict[str, Any]:
     rows = {}
     for name in NODES:
         process = bench.processes[name]
-        log = process.log[marks[name]:] if len(process.log) >= marks[name] else process.log
+        log = process.log[marks[name] :] if len(process.log) >= marks[name] else process.log
         row = {
-            'alive': process.code is None, 'traceback': 'Traceback' in log,
-            'outputs': _outputs(bench, name), 'wrong': _wrong(bench, name),
-            **_summary(told[name]), 'must_tell': name in fault.tell, 'ok_again': well[name],
-        }  # fmt: skip
+            'alive': process.code is None,
+            'traceback': 'Traceback' in log,
+            'outputs': _outputs(bench, name),
+            'wrong': _wrong(bench, name),
+            **_summary(told[name]),
+            'must_tell': name in fault.tell,
+            'ok_again': well[name],
+        }
         row['passed'] = bool(
-            row['alive'] and not row['traceback'] and row['wrong'] == 0 and row['ok_again']
+            row['alive']
+            and not row['traceback']
+            and row['wrong'] == 0
+            and row['ok_again']
             and (row['told'] not in ('ok', 'silent') or not row['must_tell'])
         )
         rows[name] = row
     resumed = _outputs(bench, 'deviation_analyzer') > 0
     return {
-        'fault': fault.name, 'resumed': resumed, 'nodes': rows,
+        'fault': fault.name,
+        'resumed': resumed,
+        'nodes': rows,
         'passed': resumed and all(row['passed'] for row in rows.values()),
-    }  # fmt: skip
+    }
 
 
 def _settle(bench: Bench) -> None:
@@ -84,8 +94,9 @@ def _well_again(bench: Bench) -> dict[str, bool]:
         _settle(bench)
         seen = {
             name: bool(entries) and all(entries)
-            for name in NODES for entries in [_inputs(bench, name)]
-        }  # fmt: skip
+            for name in NODES
+            for entries in [_inputs(bench, name)]
+        }
         if all(seen.values()):
             break
     return seen

@@ -181,9 +181,10 @@ def read(target: Target, path: Path) -> str:
 def _place(error: BaseException) -> str:
     """Return the last line of this project's own code in a traceback."""
     own = [
-        frame for frame in traceback.extract_tb(error.__traceback__)
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
         if 'weld_twin' in frame.filename and 'fuzzing' not in frame.filename
-    ]  # fmt: skip
+    ]
     if not own:
         return 'an unknown place'
     return f'{Path(own[-1].filename).name}:{own[-1].lineno} {own[-1].name}'

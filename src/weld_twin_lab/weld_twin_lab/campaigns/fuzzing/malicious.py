@@ -56,7 +56,7 @@ def harms() -> dict[str, tuple[Make, Callable[[Path], Any]]]:
         'metadata.yaml nested deeply': (_nested_listing, _bag),
         'sqlite3 bag whose table is an endless query': (_endless, _bag),
         'the same bag, recovered': (_endless, _recovered),
-    }  # fmt: skip
+    }
 
 
 def try_all() -> dict[str, str]:

@@ -16,14 +16,55 @@ import yaml
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 
 NUMBERS = (
-    b'nan', b'.nan', b'inf', b'-.inf', b'1e308', b'-1e308', b'1e-320', b'0', b'-0.0', b'-1', b'',
-    b'1e999', b'9223372036854775808', b'1' * 400, b'0x10', b'1_000', b'12:30:45', b'1,5', b'~',
-)  # fmt: skip
+    b'nan',
+    b'.nan',
+    b'inf',
+    b'-.inf',
+    b'1e308',
+    b'-1e308',
+    b'1e-320',
+    b'0',
+    b'-0.0',
+    b'-1',
+    b'',
+    b'1e999',
+    b'9223372036854775808',
+    b'1' * 400,
+    b'0x10',
+    b'1_000',
+    b'12:30:45',
+    b'1,5',
+    b'~',
+)
 VALUES: tuple[Any, ...] = (
-    None, True, False, 0, -1, 1.5, 1e308, -1e308, 1e-320, float('nan'), float('inf'), 10**30,
-    '', 'x', 'nan', 'x' * 3000, '\x00', '\U0001f600', [], {}, [[]], [1, 2], [None] * 3,
-    {'x': 1}, {'': {}}, [[1.0] * 4] * 4, ['a', 1, None],
-)  # fmt: skip
+    None,
+    True,
+    False,
+    0,
+    -1,
+    1.5,
+    1e308,
+    -1e308,
+    1e-320,
+    float('nan'),
+    float('inf'),
+    10**30,
+    '',
+    'x',
+    'nan',
+    'x' * 3000,
+    '\x00',
+    '\U0001f600',
+    [],
+    {},
+    [[]],
+    [1, 2],
+    [None] * 3,
+    {'x': 1},
+    {'': {}},
+    [[1.0] * 4] * 4,
+    ['a', 1, None],
+)
 SIZES = (0, 1, 0x7F, 0xFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 2**40, 2**62, 2**63 - 1, 2**64 - 1)
 _NUMBER = re.compile(rb'-?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?')
 _WORD = re.compile(rb'[A-Za-z_]{3,}')
@@ -110,7 +151,7 @@ def _size(rng: Random, data: bytes) -> bytes:
     start = rng.randrange(max(1, len(data) - width))
     value = rng.choice(SIZES) % (1 << 8 * width)
     field = value.to_bytes(width, rng.choice(('little', 'big')))
-    return data[:start] + field + data[start + width:]
+    return data[:start] + field + data[start + width :]
 
 
 def _zero(rng: Random, data: bytes) -> bytes:
@@ -124,7 +165,7 @@ def _replace(rng: Random, data: bytes, pattern: re.Pattern[bytes], by: bytes | N
         return data
     place = rng.choice(found)
     new = rng.choice(found).group() if by is None else by
-    return data[:place.start()] + new + data[place.end():]
+    return data[: place.start()] + new + data[place.end() :]
 
 
 def _number(rng: Random, data: bytes) -> bytes:

@@ -87,21 +87,24 @@ def targets() -> dict[str, Target]:
     robots = [catalog.load(name) for name in ('ur5', 'franka_panda')]
     bags = {storage: _bag(storage) for storage in ('mcap', 'sqlite3')}
     return {
-        'robot': Target('.yaml', 'yaml', _encoded(yaml_text(r.to_mapping()) for r in robots),
-                        load_robot),
+        'robot': Target(
+            '.yaml', 'yaml', _encoded(yaml_text(r.to_mapping()) for r in robots), load_robot
+        ),
         'urdf': Target('.urdf', 'text', _encoded([URDF, _urdf()]), load_robot),
         'effects': Target('.yaml', 'yaml', _encoded([EFFECTS]), _effects),
         'tolerances': Target('.yaml', 'yaml', _encoded([TOLERANCES]), _tolerances),
         'table': Target('.csv', 'text', _tables(), lambda path: read_table(path, ROBOT)),
         'diagnosis': Target('.json', 'json', _encoded([_diagnosis()]), _model),
         'path': Target('.yaml', 'yaml', _encoded(PATHS), read_path),
-        'points': Target('.csv', 'text', (b'x,y,z\n0.4,0,0.2\n0.5,0.1,0.2\n0.4,0.2,0.2\n',),
-                         read_path),
+        'points': Target(
+            '.csv', 'text', (b'x,y,z\n0.4,0,0.2\n0.5,0.1,0.2\n0.4,0.2,0.2\n',), read_path
+        ),
         'mcap': Target('.mcap', 'binary', (bags['mcap'][0],), _read_bag),
         'sqlite3': Target('.db3', 'binary', (bags['sqlite3'][0],), _read_bag),
-        'metadata': Target('.yaml', 'yaml', (bags['mcap'][1],),
-                           lambda path: _read_listed(path, bags['mcap'][0])),
-    }  # fmt: skip
+        'metadata': Target(
+            '.yaml', 'yaml', (bags['mcap'][1],), lambda path: _read_listed(path, bags['mcap'][0])
+        ),
+    }
 
 
 def _encoded(texts: Any) -> tuple[bytes, ...]:
@@ -149,13 +152,19 @@ def _tables() -> tuple[bytes, ...]:
 def _diagnosis() -> str:
     frame = np.eye(4).tolist()
     found = effects_from_list(parse_yaml(EFFECTS, 'effects'), ROBOT)
-    return json.dumps({
-        'schema': 'weld_twin/diagnosis/1',
-        'model': {
-            'tool': frame, 'bases': [frame], 'known': [], 'epochs_ns': [0], 'spans_ns': [[0, 1]],
-            'found': [effect.to_mapping() for effect in found],
-        },
-    })  # fmt: skip
+    return json.dumps(
+        {
+            'schema': 'weld_twin/diagnosis/1',
+            'model': {
+                'tool': frame,
+                'bases': [frame],
+                'known': [],
+                'epochs_ns': [0],
+                'spans_ns': [[0, 1]],
+                'found': [effect.to_mapping() for effect in found],
+            },
+        }
+    )
 
 
 def _bag(storage: str) -> tuple[bytes, bytes]:

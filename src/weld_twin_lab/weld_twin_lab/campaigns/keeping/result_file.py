@@ -32,13 +32,17 @@ def write_result(
     """
     refuse_foreign(path, campaign)
     head = {
-        'schema': SCHEMA, 'campaign': campaign, 'version': __version__,
+        'schema': SCHEMA,
+        'campaign': campaign,
+        'version': __version__,
         'machine': {
-            'python': platform.python_version(), 'system': platform.system(),
-            'architecture': platform.machine(), 'cores': os.cpu_count(),
+            'python': platform.python_version(),
+            'system': platform.system(),
+            'architecture': platform.machine(),
+            'cores': os.cpu_count(),
         },
         'seconds': round(seconds, 1),
-    }  # fmt: skip
+    }
     write_text(path, json.dumps({**head, **result}, indent=1) + '\n', overwrite=True)
 
 

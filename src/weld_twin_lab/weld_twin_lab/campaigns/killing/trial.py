@@ -89,9 +89,12 @@ def try_once(trial: Trial) -> dict[str, Any]:
             sent, moment = _feed_and_kill(cell, trial, recorder)
         row = {
             **{key: _rounded(value) for key, value in asdict(trial).items()},
-            'sent': sent.before(moment), 'recovered': 0, 'missing_s': 0.0, 'opened': '',
+            'sent': sent.before(moment),
+            'recovered': 0,
+            'missing_s': 0.0,
+            'opened': '',
             'fault': '',
-        }  # fmt: skip
+        }
         try:
             row['opened'], held = _left(out)
         except TwinError as error:
@@ -118,9 +121,11 @@ def _recorder(cell: Cell, trial: Trial, out: Path) -> Iterator[BaseProcess]:
     context = get_context('forkserver')
     context.set_forkserver_preload(['weld_twin_nodes.live.recorder'])
     parameters = {
-        'out': str(out), 'storage': trial.storage, 'split_size': trial.split_mb,
+        'out': str(out),
+        'storage': trial.storage,
+        'split_size': trial.split_mb,
         'reliable_inputs': 'true',
-    }  # fmt: skip
+    }
     process = context.Process(target=_record, args=(cell.domain, parameters))
     process.start()
     try:

@@ -38,10 +38,18 @@ class Contender:
         self.name, self.kind = name, kind
         self.given, self.answer = f'/race/{name}/in', f'/race/{name}/out'
         self._command = [
-            sys.executable, '-m', module, '--ros-args', *parameters,
-            '-r', f'{JOINT_STATES.name}:={self.given}', '-r', f'{TWIN_POSE.name}:={self.answer}',
-            '-r', f'__node:={name}',
-        ]  # fmt: skip
+            sys.executable,
+            '-m',
+            module,
+            '--ros-args',
+            *parameters,
+            '-r',
+            f'{JOINT_STATES.name}:={self.given}',
+            '-r',
+            f'{TWIN_POSE.name}:={self.answer}',
+            '-r',
+            f'__node:={name}',
+        ]
         self.turns: list[list[int]] = []
         self.cpu = self.sent = 0
 
@@ -67,11 +75,13 @@ class Contender:
         p50, p99 = np.median(turns, axis=0)
         pooled = np.concatenate(self.turns)
         return {
-            'p50_us': round(float(p50), 1), 'p99_us': round(float(p99), 1),
+            'p50_us': round(float(p50), 1),
+            'p99_us': round(float(p99), 1),
             'p99_all_us': round(float(np.percentile(pooled, 99)) / 1e3, 1),
             'cpu_us': round(self.cpu / self.sent / 1e3, 1),
-            'sent': self.sent, 'lost': self.sent - pooled.size,
-        }  # fmt: skip
+            'sent': self.sent,
+            'lost': self.sent - pooled.size,
+        }
 
     def add(self, other: Contender) -> None:
         """Take over the samples of another."""
@@ -109,9 +119,12 @@ class Race:
                 contender.kind, contender.answer, contender.hear, deep, raw=True
             )
         self._pulse = subprocess.Popen(
-            [sys.executable, '-m', f'{__package__}.pulse'], text=True,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=1,
-        )  # fmt: skip
+            [sys.executable, '-m', f'{__package__}.pulse'],
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=1,
+        )
         self._stack.callback(self._pulse.wait)
         self._stack.callback(self._pulse.stdin.close)  # type: ignore[union-attr]
         return self

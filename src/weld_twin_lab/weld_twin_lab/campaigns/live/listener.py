@@ -32,9 +32,11 @@ class HealthListener:
         self.told: dict[str, list[tuple[str, str]]] = defaultdict(list)
         self.values: dict[str, dict[str, str]] = {}
         node.create_subscription(
-            DIAGNOSTICS.message_class(), DIAGNOSTICS.name, self._take,
+            DIAGNOSTICS.message_class(),
+            DIAGNOSTICS.name,
+            self._take,
             DIAGNOSTICS.requested.to_rclpy(),
-        )  # fmt: skip
+        )
 
     def clear(self) -> None:
         """Forget what was told, not the values."""
@@ -43,9 +45,11 @@ class HealthListener:
     def of(self, node: str) -> list[tuple[str, str]]:
         """Return level and message of all statuses of a node."""
         return [
-            entry for name, entries in self.told.items()
-            if name == node or name.startswith(node + ': ') for entry in entries
-        ]  # fmt: skip
+            entry
+            for name, entries in self.told.items()
+            if name == node or name.startswith(node + ': ')
+            for entry in entries
+        ]
 
     def _take(self, message: Any) -> None:
         for status in message.status:

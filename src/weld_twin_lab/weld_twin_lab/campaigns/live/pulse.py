@@ -33,9 +33,11 @@ def main() -> int:
     node = Node('pulse')
     robot = catalog.load(ROBOT)
     q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
-    data = bytearray(serialize_message(
-        ros_messages().joint_state(1, robot.joint_names, q, np.zeros(robot.n), 'base_link')
-    ))  # fmt: skip
+    data = bytearray(
+        serialize_message(
+            ros_messages().joint_state(1, robot.joint_names, q, np.zeros(robot.n), 'base_link')
+        )
+    )
     publishers: dict[str, Any] = {}
     for line in sys.stdin:
         topic, rate, count = line.split()

@@ -45,9 +45,7 @@ class Usage(NamedTuple):
 class Soak:
     """A context manager with all nodes of a cell in processes of their own."""
 
-    def __init__(
-        self, folder: Path, bag: Path, rate: float, seconds: float, effects: str
-    ) -> None:
+    def __init__(self, folder: Path, bag: Path, rate: float, seconds: float, effects: str) -> None:
         self._cell = Cell(folder)
         self._bag, self._rate, self._effects = bag, rate, effects
         samples = plan_motion(catalog.load(ROBOT), PATH, rate=rate).motion.t.size
@@ -86,9 +84,14 @@ class Soak:
         cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
         cell.start('error_injector', effects=self._effects, seed=1, wait_for_subscribers=2, **sure)
         cell.start(
-            'trajectory_generator', rate=self._rate, repeat=self._rounds, path=PATH, robot=ROBOT,
-            wait_for_subscribers=4, **sure,
-        )  # fmt: skip
+            'trajectory_generator',
+            rate=self._rate,
+            repeat=self._rounds,
+            path=PATH,
+            robot=ROBOT,
+            wait_for_subscribers=4,
+            **sure,
+        )
         node = cell.node
         cell.wait(lambda: node.count_publishers('/diagnostics') == len(cell.processes), 'all')
 
@@ -111,18 +114,20 @@ class Soak:
         self._told = {name: list(entries) for name, entries in self._listener.told.items()}
         end = time.monotonic() + COMPLETE
         self._cell.wait(
-            lambda: self._least() >= self.sent or time.monotonic() > end, 'the rest',
+            lambda: self._least() >= self.sent or time.monotonic() > end,
+            'the rest',
             2.0 * COMPLETE,
-        )  # fmt: skip
+        )
         quiet = time.monotonic() + 3.0
         self._cell.wait(lambda: time.monotonic() > quiet, 'the last word on health')
 
     def _least(self) -> int:
         """Return how many messages came through where fewest did."""
         return min(
-            int(values['received']) for name, values in self._listener.values.items()
+            int(values['received'])
+            for name, values in self._listener.values.items()
             if name.partition(': ')[2] in COUNTED
-        )  # fmt: skip
+        )
 
     def _look(self, t: float) -> None:
         for process in self._cell.processes:
@@ -148,14 +153,15 @@ class Soak:
                 'rss_mib': round(float(rss[-1]) / MIB, 1),
                 'rss_first_mib': round(float(rss[late][0]) / MIB, 1),
                 'rss_slope_mib_per_h': round(float(slope) * 3600.0 / MIB, 2),
-            }  # fmt: skip
+            }
         spent = sum(usage.cpu for usage in self._work.values())
         span = next(iter(self.samples.values()))[-1].t
         out['live_diagnosis workers'] = {
-            'cpu_share': round(spent * 1e-9 / span, 4), 'runs': len(self._work),
+            'cpu_share': round(spent * 1e-9 / span, 4),
+            'runs': len(self._work),
             'rss_mib': round(max((u.rss for u in self._work.values()), default=0) / MIB, 1),
             'rss_slope_mib_per_h': 0.0,
-        }  # fmt: skip
+        }
         return out
 
     def health(self) -> dict[str, Any]:
@@ -167,8 +173,10 @@ class Soak:
             if name.partition(': ')[2] in COUNTED:
                 row['missing'] = self.sent - row['received']
             out[name] = {
-                **row, 'not_ok': len(told), 'worst': sorted({text for _, text in told})[:5],
-            }  # fmt: skip
+                **row,
+                'not_ok': len(told),
+                'worst': sorted({text for _, text in told})[:5],
+            }
         return out
 
 

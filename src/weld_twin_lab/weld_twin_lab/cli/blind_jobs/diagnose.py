@@ -18,13 +18,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('cases', metavar='DIR', help='cases made by blind make')
     parser.add_argument('--out', required=True, metavar='DIR', help='where the verdicts go')
     parser.add_argument(
-        '--allow-readable', action='store_true',
+        '--allow-readable',
+        action='store_true',
         help='go on although truths lie within reach; the score tells',
-    )  # fmt: skip
+    )
     parser.add_argument(
-        '--without-holdout', action='store_true',
+        '--without-holdout',
+        action='store_true',
         help='judge the shrink on stretches of the training recording',
-    )  # fmt: skip
+    )
     add_pool(parser)
 
 
@@ -36,9 +38,12 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     with runner_of(args, out / layout.DONE, 'diagnosing') as runner:
         verdicts = diagnose_cases(
-            Path(args.cases), out, runner, allow_readable=args.allow_readable,
+            Path(args.cases),
+            out,
+            runner,
+            allow_readable=args.allow_readable,
             with_holdout=not args.without_holdout,
-        )  # fmt: skip
+        )
     failed = sum(verdict['error'] is not None for verdict in verdicts)
     print(f'{len(verdicts) - failed} verdicts, {failed} cases could not be diagnosed')
     return 0

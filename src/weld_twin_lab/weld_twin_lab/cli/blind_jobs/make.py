@@ -18,9 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_draw(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='where the recordings go')
     parser.add_argument(
-        '--truths', required=True, metavar='DIR',
+        '--truths',
+        required=True,
+        metavar='DIR',
         help='where the truths go; keep it where a diagnosis cannot read',
-    )  # fmt: skip
+    )
     add_pool(parser)
 
 
@@ -34,8 +36,6 @@ def run(args: argparse.Namespace) -> int:
 
     cases, truths = Path(args.out), Path(args.truths)
     with runner_of(args, truths / layout.DONE, 'making cases') as runner:
-        sealed = make(
-            cases, truths, args.seed, args.count, runner, kinds_of(args), spans_of(args)
-        )
+        sealed = make(cases, truths, args.seed, args.count, runner, kinds_of(args), spans_of(args))
     print(f'seal {sealed}')
     return 0

@@ -20,9 +20,11 @@ def add_pool(parser: argparse.ArgumentParser) -> None:
         '--workers', type=int, default=0, metavar='N', help='processes (default: all cores)'
     )
     parser.add_argument(
-        '--scheduler', default='', metavar='ADDRESS',
+        '--scheduler',
+        default='',
+        metavar='ADDRESS',
         help='Dask cluster to run on instead; it must see the same directories',
-    )  # fmt: skip
+    )
 
 
 @contextmanager
@@ -46,16 +48,20 @@ def runner_of(args: argparse.Namespace, store: Path, what: str) -> Iterator[Runn
 
 def add_draw(parser: argparse.ArgumentParser) -> None:
     """Add the options that say which cases to draw."""
-    parser.add_argument('--cases', type=int, default=400, metavar='N', dest='count',
-                        help='how many (default: 400)')  # fmt: skip
+    parser.add_argument(
+        '--cases', type=int, default=400, metavar='N', dest='count', help='how many (default: 400)'
+    )
     parser.add_argument('--seed', type=int, required=True, metavar='S')
     parser.add_argument(
-        '--kinds', default='', metavar='LIST',
+        '--kinds',
+        default='',
+        metavar='LIST',
         help='only these, comma-separated: single, double, triple, none, outside, withheld, '
-             'ambiguous',
-    )  # fmt: skip
+        'ambiguous',
+    )
     parser.add_argument(
-        '--leave-one-out', action='store_true',
+        '--leave-one-out',
+        action='store_true',
         help='each family of effects in turn at work and taken out of the library',
     )
     parser.add_argument(

@@ -20,18 +20,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('--seed', type=int, required=True, metavar='S')
     parser.add_argument('--out', required=True, metavar='DIR', help='where the table goes')
-    parser.add_argument('--robots', default='', metavar='LIST',
-                        help='comma-separated (default: one of each kind of arm)')  # fmt: skip
-    parser.add_argument('--families', default='', metavar='LIST',
-                        help='only these, comma-separated (default: all)')  # fmt: skip
     parser.add_argument(
-        '--sizes', default='0.5,1,3,10', metavar='LIST',
+        '--robots',
+        default='',
+        metavar='LIST',
+        help='comma-separated (default: one of each kind of arm)',
+    )
+    parser.add_argument(
+        '--families', default='', metavar='LIST', help='only these, comma-separated (default: all)'
+    )
+    parser.add_argument(
+        '--sizes',
+        default='0.5,1,3,10',
+        metavar='LIST',
         help='effect RMS over noise, comma-separated (default: 0.5,1,3,10)',
-    )  # fmt: skip
-    parser.add_argument('--motion', default='free', metavar='NAME',
-                        help='free, seams or stations (default: free)')  # fmt: skip
-    parser.add_argument('--store', default='', metavar='DIR',
-                        help='where single results are kept (default: inside --out)')  # fmt: skip
+    )
+    parser.add_argument(
+        '--motion', default='free', metavar='NAME', help='free, seams or stations (default: free)'
+    )
+    parser.add_argument(
+        '--store',
+        default='',
+        metavar='DIR',
+        help='where single results are kept (default: inside --out)',
+    )
     add_pool(parser)
 
 
@@ -52,10 +64,18 @@ def run(args: argparse.Namespace) -> int:
     arms, families = _listed(args.robots) or ARMS, _listed(args.families) or FAMILIES
     with runner_of(args, Path(args.store) if args.store else out / STORE, 'recovering') as runner:
         rows = recover(runner, args.seed, arms, families, _numbers(args.sizes), args.motion)
-    made = {'seed': args.seed, 'motion': args.motion, 'engine': engine_digest(),
-            'version': __version__}  # fmt: skip
-    content = {'schema': 'weld_twin/blind/recovery/1', 'made': made, 'sums': summary(rows),
-               'cases': rows}  # fmt: skip
+    made = {
+        'seed': args.seed,
+        'motion': args.motion,
+        'engine': engine_digest(),
+        'version': __version__,
+    }
+    content = {
+        'schema': 'weld_twin/blind/recovery/1',
+        'made': made,
+        'sums': summary(rows),
+        'cases': rows,
+    }
     write_text(out / RESULT, json.dumps(content, indent=1) + '\n', overwrite=True)
     text = table(rows, made)
     write_text(out / TABLE, text, overwrite=True)

@@ -18,8 +18,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     add_draw(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='where everything goes')
-    parser.add_argument('--reasons', default='', metavar='FILE',
-                        help='YAML file of case names and why they went wrong')  # fmt: skip
+    parser.add_argument(
+        '--reasons',
+        default='',
+        metavar='FILE',
+        help='YAML file of case names and why they went wrong',
+    )
     add_pool(parser)
 
 
@@ -37,9 +41,7 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     cases, truths, results = out / 'cases', out / 'truths', out / 'verdicts'
     with runner_of(args, truths / layout.DONE, 'making cases') as runner:
-        sealed = make(
-            cases, truths, args.seed, args.count, runner, kinds_of(args), spans_of(args)
-        )
+        sealed = make(cases, truths, args.seed, args.count, runner, kinds_of(args), spans_of(args))
     print(f'seal {sealed}', flush=True)
     with runner_of(args, results / layout.DONE, 'diagnosing') as runner:
         diagnose_cases(cases, results, runner, allow_readable=True)

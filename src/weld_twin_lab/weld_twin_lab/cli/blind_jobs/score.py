@@ -20,14 +20,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('cases', metavar='DIR', help='cases made by blind make')
     parser.add_argument('--truths', required=True, metavar='DIR')
-    parser.add_argument('--results', required=True, metavar='DIR',
-                        help='verdicts of blind diagnose')  # fmt: skip
-    parser.add_argument('--seal', default='', metavar='HASH',
-                        help='the seal as it was printed before the diagnosis')  # fmt: skip
-    parser.add_argument('--reasons', default='', metavar='FILE',
-                        help='YAML file of case names and why they went wrong')  # fmt: skip
-    parser.add_argument('--out', required=True, metavar='DIR',
-                        help='where score.json and score.html go')  # fmt: skip
+    parser.add_argument(
+        '--results', required=True, metavar='DIR', help='verdicts of blind diagnose'
+    )
+    parser.add_argument(
+        '--seal',
+        default='',
+        metavar='HASH',
+        help='the seal as it was printed before the diagnosis',
+    )
+    parser.add_argument(
+        '--reasons',
+        default='',
+        metavar='FILE',
+        help='YAML file of case names and why they went wrong',
+    )
+    parser.add_argument(
+        '--out', required=True, metavar='DIR', help='where score.json and score.html go'
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -36,9 +46,12 @@ def run(args: argparse.Namespace) -> int:
     from ...blind.scoring import score
 
     result = score(
-        Path(args.cases), Path(args.truths), Path(args.results), seal_given=args.seal,
+        Path(args.cases),
+        Path(args.truths),
+        Path(args.results),
+        seal_given=args.seal,
         reasons=read_reasons(args.reasons),
-    )  # fmt: skip
+    )
     write_score(Path(args.out), result)
     print_score(result)
     return 0
@@ -55,8 +68,13 @@ def print_score(result: Score) -> None:
     for measure in result.measures:
         value, low, high, count = measure.estimate
         interval = '-' if value is None else f'{low:.3f} to {high:.3f}'
-        table.add_row(measure.title, '-' if value is None else f'{value:.3f}', interval,
-                      str(count), _goal(measure))  # fmt: skip
+        table.add_row(
+            measure.title,
+            '-' if value is None else f'{value:.3f}',
+            interval,
+            str(count),
+            _goal(measure),
+        )
     Console(highlight=False).print(table)
 
 

@@ -19,10 +19,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('bags', nargs='+', metavar='BAG', help='real recordings of one robot')
     parser.add_argument('--robot', required=True, metavar='R', help='bundled robot or robot file')
-    parser.add_argument('--align', default='', metavar='FRAMES',
-                        help='frames that are not known: base, tool, or base,tool')  # fmt: skip
-    parser.add_argument('--cases', type=int, default=40, metavar='N', dest='count',
-                        help='how many (default: 40)')  # fmt: skip
+    parser.add_argument(
+        '--align',
+        default='',
+        metavar='FRAMES',
+        help='frames that are not known: base, tool, or base,tool',
+    )
+    parser.add_argument(
+        '--cases', type=int, default=40, metavar='N', dest='count', help='how many (default: 40)'
+    )
     parser.add_argument('--seed', type=int, required=True, metavar='S')
     parser.add_argument('--out', required=True, metavar='DIR', help='where everything goes')
     add_pool(parser)

@@ -35,21 +35,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_robot(parser)
     parser.add_argument(
-        '--holdout', action='append', default=[], metavar='BAG',
+        '--holdout',
+        action='append',
+        default=[],
+        metavar='BAG',
         help='a recording that is not fitted, to judge the shrink on; may be given again',
-    )  # fmt: skip
+    )
     parser.add_argument(
-        '--align', default='', metavar='FRAMES',
+        '--align',
+        default='',
+        metavar='FRAMES',
         help='frames that are not known and fitted along: base, tool, or base,tool',
-    )  # fmt: skip
+    )
     parser.add_argument(
-        '--effects-known', default='', metavar='FILE',
+        '--effects-known',
+        default='',
+        metavar='FILE',
         help='effects file or diagnosis.json put into the twin first',
-    )  # fmt: skip
+    )
     parser.add_argument(
-        '--exclude-effect', action='extend', nargs='+', default=[], metavar='NAME',
+        '--exclude-effect',
+        action='extend',
+        nargs='+',
+        default=[],
+        metavar='NAME',
         help='families left out of the library',
-    )  # fmt: skip
+    )
     parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
     add_topics(parser)
 
@@ -87,9 +98,14 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             recordings.append(read_recording(path, twin.robot, topics))
         count = len(args.bags)
         return diagnose(
-            _bounded(recordings[:count]), twin.robot, align=align, known=twin.effects,
-            exclude=excluded, holdout=_bounded(recordings[count:]), progress=tell,
-        )  # fmt: skip
+            _bounded(recordings[:count]),
+            twin.robot,
+            align=align,
+            known=twin.effects,
+            exclude=excluded,
+            holdout=_bounded(recordings[count:]),
+            progress=tell,
+        )
 
 
 def _bounded(recordings: Sequence[Recording]) -> list[Recording]:
@@ -103,7 +119,7 @@ def _bounded(recordings: Sequence[Recording]) -> list[Recording]:
             _share(r.joints.t.size, states, JOINT_STATES),
         )
         for r in recordings
-    ]  # fmt: skip
+    ]
 
 
 def _share(own: int, total: int, most: int) -> int:

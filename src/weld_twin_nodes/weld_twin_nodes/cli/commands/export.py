@@ -18,10 +18,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', metavar='MODEL', help='diagnosis.json')
     add_robot(parser)
     parser.add_argument(
-        '--format', choices=_FORMATS, default='yaml',
+        '--format',
+        choices=_FORMATS,
+        default='yaml',
         help='yaml, urdf: the corrected robot; offsets: per joint, as CSV; effects: all, for the '
         'nominal robot; left-over: what the corrected robot cannot hold (default: yaml)',
-    )  # fmt: skip
+    )
     parser.add_argument('--out', metavar='FILE', help='file to write; left out, the terminal')
 
 

@@ -31,16 +31,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument('--length-unit', choices=('m', 'mm'))
     group.add_argument('--angle-unit', choices=('rad', 'deg'), help='of the joints')
     group.add_argument('--rotation-unit', choices=('rad', 'deg'), help='of measured angles')
+    group.add_argument('--rotation', metavar='ORDER', help='XYZ, ZYX, ... (intrinsic) or rotvec')
     group.add_argument(
-        '--rotation', metavar='ORDER', help='XYZ, ZYX, ... (intrinsic) or rotvec'
-    )
-    group.add_argument(
-        '--difference', choices=('add', 'subtract'), default='add',
+        '--difference',
+        choices=('add', 'subtract'),
+        default='add',
         help='measured is target plus or minus difference',
-    )  # fmt: skip
+    )
     group.add_argument('--positions-only', action='store_true', help='leave orientation out')
-    group.add_argument('--skip-rows', metavar='N,N', type=_numbers, default=(),
-                       help='rows to leave out, the first under the header being 1')  # fmt: skip
+    group.add_argument(
+        '--skip-rows',
+        metavar='N,N',
+        type=_numbers,
+        default=(),
+        help='rows to leave out, the first under the header being 1',
+    )
     group.add_argument('--delimiter', help='comma, semicolon or tab')
     group.add_argument('--decimal', choices=('.', ','))
 
@@ -62,9 +67,14 @@ def run(args: argparse.Namespace) -> int:
     expected = Twin(robot).poses(recording, measured.t)
     off = measured.position - expected.position
     write_recording(
-        args.out, recording, robot, twin=expected, deviation=off, storage=args.storage,
+        args.out,
+        recording,
+        robot,
+        twin=expected,
+        deviation=off,
+        storage=args.storage,
         provenance={'source': args.file, 'assumptions': list(said)},
-    )  # fmt: skip
+    )
     for sentence in said:
         print(sentence)
     if args.table or args.picture:

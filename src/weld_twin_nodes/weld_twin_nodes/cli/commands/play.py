@@ -17,18 +17,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bag', metavar='BAG', help='rosbag2 directory, .mcap or .db3')
     parser.add_argument('--rate', type=float, default=1.0, help='speed against the recording')
     parser.add_argument(
-        '--clock', type=float, nargs='?', const=100.0, default=0.0, metavar='HZ',
+        '--clock',
+        type=float,
+        nargs='?',
+        const=100.0,
+        default=0.0,
+        metavar='HZ',
         help='tell the time of the recording on /clock, 100 times a second unless said',
-    )  # fmt: skip
+    )
     parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='only these')
     parser.add_argument(
-        '--loop', type=int, nargs='?', const=0, default=1, metavar='N',
+        '--loop',
+        type=int,
+        nargs='?',
+        const=0,
+        default=1,
+        metavar='N',
         help='play N times, without a number until stopped',
-    )  # fmt: skip
+    )
     parser.add_argument(
-        '--subscribers', type=int, default=1, metavar='N',
+        '--subscribers',
+        type=int,
+        default=1,
+        metavar='N',
         help='how many each topic is to have before the start',
-    )  # fmt: skip
+    )
     parser.add_argument(
         '--wait', type=float, default=5.0, metavar='S', help='longest time to wait for them [s]'
     )

@@ -20,9 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--model', required=True, metavar='FILE', help='diagnosis.json, or an effects file'
     )
     parser.add_argument(
-        '--setup', type=int, metavar='N',
+        '--setup',
+        type=int,
+        metavar='N',
         help='where the set-up moved between the recordings of the diagnosis: which of them',
-    )  # fmt: skip
+    )
     add_bag_output(parser)
     add_topics(parser)
 

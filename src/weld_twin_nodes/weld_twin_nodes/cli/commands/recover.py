@@ -15,10 +15,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('bag', metavar='BAG', help='bag, its .unfinished directory, or a file')
     parser.add_argument(
-        '--out', metavar='BAG2',
+        '--out',
+        metavar='BAG2',
         help='bag to write; must not exist (default: the name the recording was to have, or '
-             'BAG_recovered)',
-    )  # fmt: skip
+        'BAG_recovered)',
+    )
 
 
 def run(args: argparse.Namespace) -> int:

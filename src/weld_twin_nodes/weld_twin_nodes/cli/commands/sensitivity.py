@@ -37,31 +37,73 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_question(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
-    add('--path', metavar='P', default='line',
-        help='path file, or a bundled seam: line, arc, circle, polyline, spline, weave')
-    add('--tolerances', metavar='FILE', help='tolerance file; left out, typical magnitudes of '
-        'joint_offset, link_length, link_twist, backlash and base_pose')
-    add('--effects-known', metavar='FILE', default='', help='effects file or diagnosis.json put '
-        'into the twin first')
-    add('--tool', type=float, nargs=6, metavar=('X', 'Y', 'Z', 'RX', 'RY', 'RZ'),
-        help='tool frame in the flange [m, rotation vector rad], instead of the model\'s')
-    add('--across', type=float, default=5e-4, metavar='M', help='weld tolerance across the seam '
-        '(default: 0.0005)')
-    add('--stickout', type=float, default=1e-3, metavar='M', help='weld tolerance of the '
-        'stick-out (default: 0.001)')
-    add('--normal', type=float, nargs=3, metavar=('X', 'Y', 'Z'), help='direction out of the work '
-        'of a recorded motion; left out, against the wire')
+    add(
+        '--path',
+        metavar='P',
+        default='line',
+        help='path file, or a bundled seam: line, arc, circle, polyline, spline, weave',
+    )
+    add(
+        '--tolerances',
+        metavar='FILE',
+        help='tolerance file; left out, typical magnitudes of '
+        'joint_offset, link_length, link_twist, backlash and base_pose',
+    )
+    add(
+        '--effects-known',
+        metavar='FILE',
+        default='',
+        help='effects file or diagnosis.json put into the twin first',
+    )
+    add(
+        '--tool',
+        type=float,
+        nargs=6,
+        metavar=('X', 'Y', 'Z', 'RX', 'RY', 'RZ'),
+        help="tool frame in the flange [m, rotation vector rad], instead of the model's",
+    )
+    add(
+        '--across',
+        type=float,
+        default=5e-4,
+        metavar='M',
+        help='weld tolerance across the seam (default: 0.0005)',
+    )
+    add(
+        '--stickout',
+        type=float,
+        default=1e-3,
+        metavar='M',
+        help='weld tolerance of the stick-out (default: 0.001)',
+    )
+    add(
+        '--normal',
+        type=float,
+        nargs=3,
+        metavar=('X', 'Y', 'Z'),
+        help='direction out of the work of a recorded motion; left out, against the wire',
+    )
     add('--points', type=int, default=200, metavar='N', help='path points (default: 200)')
-    add('--figure', action='append', default=[], metavar='K', help='draw figure 6 to 14, posture '
-        'or recorded, and nothing else; may be given again')
+    add(
+        '--figure',
+        action='append',
+        default=[],
+        metavar='K',
+        help='draw figure 6 to 14, posture or recorded, and nothing else; may be given again',
+    )
     add('--claims', action='store_true', help='measure the claims of the paper')
     add('--claims-robots', nargs='+', metavar='R', help='robots of the claims (default: all)')
 
 
 def _add_effort(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
-    add('--samples', type=int, default=1024, metavar='N', help='Sobol base samples, a power of '
-        'two (default: 1024)')
+    add(
+        '--samples',
+        type=int,
+        default=1024,
+        metavar='N',
+        help='Sobol base samples, a power of two (default: 1024)',
+    )
     add('--runs', type=int, default=20_000, metavar='N', help='of the tolerance stack')
     add('--trajectories', type=int, default=50, metavar='N', help='of the Morris screening')
     add('--placements', type=int, default=32, metavar='N', help='tried for the advice')
@@ -86,9 +128,13 @@ def run(args: argparse.Namespace) -> int:
     robots = _claims_robots(args)
     with _progress() as tell:
         page = make_study(
-            args.out, pool_of(args.scheduler, args.workers), setting, claims_on=robots,
-            tell=tell, seed=args.seed,
-        )  # fmt: skip
+            args.out,
+            pool_of(args.scheduler, args.workers),
+            setting,
+            claims_on=robots,
+            tell=tell,
+            seed=args.seed,
+        )
     _print_summary(Path(args.out))
     print(f'page: {page}')
     return 0
@@ -109,17 +155,20 @@ def _setting(args: argparse.Namespace) -> Setting | None:
         raise DataError('give --robot R or a BAG to study, or --claims')
     twin = build_twin(_robot(args), args.effects_known)
     common = {
-        'robot': twin.robot, 'tolerances': _tolerances(args, twin.robot), 'known': twin.effects,
-        'points': args.points, 'weld': WeldTolerance(args.across, args.stickout),
-        'effort': Effort(
-            args.samples, args.runs, args.trajectories, args.placements, args.seed
-        ),
-    }  # fmt: skip
+        'robot': twin.robot,
+        'tolerances': _tolerances(args, twin.robot),
+        'known': twin.effects,
+        'points': args.points,
+        'weld': WeldTolerance(args.across, args.stickout),
+        'effort': Effort(args.samples, args.runs, args.trajectories, args.placements, args.seed),
+    }
     if args.bag:
         return Setting(
-            seam=Path(args.bag).name, recording=_recording(args, twin.robot), normal=args.normal,
+            seam=Path(args.bag).name,
+            recording=_recording(args, twin.robot),
+            normal=args.normal,
             **common,
-        )  # fmt: skip
+        )
     if args.path in KINDS:
         return Setting(seam=args.path, path=default_seam(twin.robot, args.path), **common)
     path, torch = read_path(args.path)
@@ -184,9 +233,10 @@ def _print_summary(place: Path) -> None:
             inside = found['global']['stack']['inside']['both']
             rows = found['global']['sobol']['parameter']['d_norm']['indices']
             best = sorted(rows, key=lambda row: -row['ST'])[:3]
-            print(f'{motion}: tighten first ' + ', '.join(
-                f'{row["name"]} (ST {row["ST"]:.2f})' for row in best
-            ))  # fmt: skip
+            print(
+                f'{motion}: tighten first '
+                + ', '.join(f'{row["name"]} (ST {row["ST"]:.2f})' for row in best)
+            )
             print(
                 f'{motion}: inside the weld tolerance with probability {inside["value"]:.3f} '
                 f'({inside["low"]:.3f} to {inside["high"]:.3f})'

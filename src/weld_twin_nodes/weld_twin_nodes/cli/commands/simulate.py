@@ -14,25 +14,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_robot(parser)
     parser.add_argument('--effects', metavar='E.yaml', default='', help='effects to inject')
     parser.add_argument(
-        '--model', metavar='FILE', default='',
+        '--model',
+        metavar='FILE',
+        default='',
         help='what the twin knows: an effects file or diagnosis.json',
-    )  # fmt: skip
+    )
     parser.add_argument(
-        '--path', metavar='P', default='line',
+        '--path',
+        metavar='P',
+        default='line',
         help='path file, or a bundled seam: line, arc, circle, polyline, spline, weave',
-    )  # fmt: skip
+    )
     parser.add_argument(
-        '--profile', default='smooth',
+        '--profile',
+        default='smooth',
         help='time law: constant, trapezoid, s-curve, smooth, aggressive (default: smooth)',
-    )  # fmt: skip
-    parser.add_argument('--speed', type=float, default=0.0, metavar='M/S',
-                        help='travel speed; left out, as fast as the profile and the joints go')
+    )
+    parser.add_argument(
+        '--speed',
+        type=float,
+        default=0.0,
+        metavar='M/S',
+        help='travel speed; left out, as fast as the profile and the joints go',
+    )
     parser.add_argument('--rate', type=float, default=125.0, metavar='HZ', help='samples a second')
     parser.add_argument('--seed', type=int, default=0, help='of the measurement noise')
     parser.add_argument(
-        '--start-stamp', type=int, default=1_000_000_000, metavar='NS',
+        '--start-stamp',
+        type=int,
+        default=1_000_000_000,
+        metavar='NS',
         help='stamp of the first sample; stamp 0 means unset (default: 1 s)',
-    )  # fmt: skip
+    )
     add_bag_output(parser)
 
 
@@ -50,9 +63,13 @@ def run(args: argparse.Namespace) -> int:
     robot = robot_of(args)
     plan = plan_motion(robot, args.path, args.profile, args.rate, args.speed)
     simulation = Simulation(
-        build_twin(robot, args.effects), build_twin(robot, args.model), plan.motion,
-        stamps(plan.motion.t, args.start_stamp), args.seed, plan.length,
-    )  # fmt: skip
+        build_twin(robot, args.effects),
+        build_twin(robot, args.model),
+        plan.motion,
+        stamps(plan.motion.t, args.start_stamp),
+        args.seed,
+        plan.length,
+    )
     made = {'path': args.path, 'profile': args.profile, 'rate_hz': args.rate}
     metrics = write_simulation(args.out, simulation, storage=args.storage, provenance=made)
     if plan.report.slowed > 1.0:

@@ -15,10 +15,18 @@ from .canvas import Drawing
 __all__ = ['FIGURES', 'Drawing', 'draw', 'drawable']
 
 FIGURES: dict[str, Callable[[Setting], Drawing | None]] = {
-    '6': paths.baseline, '7': paths.initialization, '8': paths.profiles, '9': paths.play,
-    '10': sizes.angles, '11': together.combined, '12': sizes.joints, '13': sizes.widths,
-    '14': together.drift, 'posture': posture.standing, 'recorded': posture.recorded,
-}  # fmt: skip
+    '6': paths.baseline,
+    '7': paths.initialization,
+    '8': paths.profiles,
+    '9': paths.play,
+    '10': sizes.angles,
+    '11': together.combined,
+    '12': sizes.joints,
+    '13': sizes.widths,
+    '14': together.drift,
+    'posture': posture.standing,
+    'recorded': posture.recorded,
+}
 """By the number the paper gives them, or a name."""
 _PLANNED_ONLY = ('6', '8')
 

@@ -21,17 +21,32 @@ if TYPE_CHECKING:
 Table = Mapping[str, Array]
 """Columns of one length; their names carry the unit."""
 COLOURS = (
-    '#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#666666', '#000000',
-)  # fmt: skip
+    '#0072b2',
+    '#d55e00',
+    '#009e73',
+    '#cc79a7',
+    '#e69f00',
+    '#56b4e9',
+    '#666666',
+    '#000000',
+)
 """Okabe and Ito's, which people with any colour vision tell apart."""
 WIDTH = 9.0
 _STYLE = {
     'font.size': 9.0,
-    'axes.spines.top': False, 'axes.spines.right': False, 'axes.grid': True,
-    'grid.color': '#e3e6ea', 'grid.linewidth': 0.6, 'axes.axisbelow': True,
-    'legend.frameon': False, 'legend.fontsize': 8.0, 'lines.linewidth': 1.6,
-    'svg.fonttype': 'path', 'svg.hashsalt': 'weld_twin', 'axes.formatter.useoffset': False,
-}  # fmt: skip
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.grid': True,
+    'grid.color': '#e3e6ea',
+    'grid.linewidth': 0.6,
+    'axes.axisbelow': True,
+    'legend.frameon': False,
+    'legend.fontsize': 8.0,
+    'lines.linewidth': 1.6,
+    'svg.fonttype': 'path',
+    'svg.hashsalt': 'weld_twin',
+    'axes.formatter.useoffset': False,
+}
 
 
 @dataclass(frozen=True)

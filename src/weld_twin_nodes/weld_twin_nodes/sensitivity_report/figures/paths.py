@@ -48,10 +48,14 @@ def baseline(setting: Setting) -> Drawing:
     off = _size(study.nominal.position - planned.poses[:, :3, 3])
     plane, wanted = _plane(study, study.nominal.position), _plane(study, planned.poses[:, :3, 3])
     table = {
-        's_m': planned.s, 'planned_along_m': wanted[:, 0], 'planned_across_m': wanted[:, 1],
-        'twin_along_m': plane[:, 0], 'twin_across_m': plane[:, 1], 'deviation_m': off,
+        's_m': planned.s,
+        'planned_along_m': wanted[:, 0],
+        'planned_across_m': wanted[:, 1],
+        'twin_along_m': plane[:, 0],
+        'twin_across_m': plane[:, 1],
+        'deviation_m': off,
         'd_norm': off / planned.length,
-    }  # fmt: skip
+    }
     figure, (left, right) = panels(2)
     left.plot(1e3 * wanted[:, 0], 1e3 * wanted[:, 1], color='#c9ced6', lw=5, label='planned')
     left.plot(1e3 * plane[:, 0], 1e3 * plane[:, 1], color=COLOURS[0], lw=1.3, label='twin')
@@ -61,8 +65,14 @@ def baseline(setting: Setting) -> Drawing:
     floor = np.maximum(off / planned.length, 1e-17)
     right.semilogy(1e3 * planned.s, floor, color=COLOURS[0])
     right.axhline(np.finfo(float).eps, color='#999999', lw=1, ls=':')
-    right.annotate('double precision', (0, np.finfo(float).eps), xytext=(2, 3),
-                   textcoords='offset points', color='#666666', fontsize=8)
+    right.annotate(
+        'double precision',
+        (0, np.finfo(float).eps),
+        xytext=(2, 3),
+        textcoords='offset points',
+        color='#666666',
+        fontsize=8,
+    )
     right.set_ylim(1e-17, 1e-9)
     label(right, 'D(t) over path length', 'arc length [mm]', 'D(t) / L')
     caption = (
@@ -81,8 +91,10 @@ def initialization(setting: Setting) -> Drawing:
     moved = {name: study.deviations((*known, e)) for name, e in (('shift', shift), ('turn', turn))}
     nominal = _plane(study, study.nominal.position)
     table: dict[str, Array] = {
-        's_m': study.s, 'nominal_along_m': nominal[:, 0], 'nominal_across_m': nominal[:, 1],
-    }  # fmt: skip
+        's_m': study.s,
+        'nominal_along_m': nominal[:, 0],
+        'nominal_across_m': nominal[:, 1],
+    }
     figure, (left, right) = panels(2)
     left.plot(1e3 * nominal[:, 0], 1e3 * nominal[:, 1], color='#444444', label='nominal')
     names = {
@@ -125,9 +137,11 @@ def profiles(setting: Setting) -> Drawing:
             style = {'lw': 4.0, 'alpha': 0.35} if name == 'aggressive' and key == 'offset' else {}
             axis.plot(1e3 * study.s, 1e3 * off[key], color=colour, label=name, **style)
         columns = {
-            'motion': np.full(study.samples, name), 't_s': study.t, 's_m': study.s,
+            'motion': np.full(study.samples, name),
+            't_s': study.t,
+            's_m': study.s,
             **{f'{key}_deviation_m': value for key, value in off.items()},
-        }  # fmt: skip
+        }
         for key, value in columns.items():
             rows.setdefault(key, []).append(value)
     titles = (
@@ -162,10 +176,13 @@ def play(setting: Setting) -> Drawing:
     off = {form: vector[:, axis] for form, vector in vectors.items()}
     turned = np.concatenate([[False], np.diff(np.sign(np.diff(q))) != 0.0, [False]])
     table = {
-        't_s': study.t, 's_m': study.s, f'{stem}_rad': q, 'reversal': turned.astype(float),
+        't_s': study.t,
+        's_m': study.s,
+        f'{stem}_rad': q,
+        'reversal': turned.astype(float),
         **{f'{_FORMS[form]}_{_AXES[axis].split()[0]}_m': value for form, value in off.items()},
         **{f'{_FORMS[form]}_deviation_m': _size(value) for form, value in vectors.items()},
-    }  # fmt: skip
+    }
     picture = _play_picture(study, stem, q, off, turned, _AXES[axis])
     caption = (
         'Backlash of one joint: a gap shifts the tool by half of it, to the side the joint came '

@@ -29,9 +29,12 @@ def standing(setting: Setting) -> Drawing:
         axis.set_ylim(0.0, 1.15 * float(value.max()))
         label(axis, title, 'arc length [mm]', unit)
     table = {
-        's_m': study.s, 'condition': stand.condition, 'manipulability': stand.manipulability,
-        'gain_m_per_rad': stand.amplification, 'expected_m': expected,
-    }  # fmt: skip
+        's_m': study.s,
+        'condition': stand.condition,
+        'manipulability': stand.manipulability,
+        'gain_m_per_rad': stand.amplification,
+        'expected_m': expected,
+    }
     caption = 'How the arm stands along the seam, and the deviation its tolerances lead to expect.'
     return Drawing('figure-posture', caption, table, svg(figure))
 
@@ -59,9 +62,14 @@ def recorded(setting: Setting) -> Drawing | None:
     legend(right)
     mean = np.sqrt((size**2 * arc_weights(study.s)).sum())
     table = {
-        't_s': study.t, 's_m': study.s, 'along_m': off[:, 0], 'across_m': off[:, 1],
-        'normal_m': off[:, 2], 'recorded_m': size, 'expected_m': expected,
-    }  # fmt: skip
+        't_s': study.t,
+        's_m': study.s,
+        'along_m': off[:, 0],
+        'across_m': off[:, 1],
+        'normal_m': off[:, 2],
+        'recorded_m': size,
+        'expected_m': expected,
+    }
     caption = (
         f'Recorded deviation, {1e3 * mean:.3f} mm rms over the path, beside what the tolerances '
         'lead to expect.'

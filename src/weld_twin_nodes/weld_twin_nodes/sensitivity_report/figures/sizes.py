@@ -29,8 +29,10 @@ def angles(setting: Setting) -> Drawing:
     values = default_values(offsets[0], 50)
     single = [sweep(study, tolerance, values) for tolerance in offsets]
     best = max(single, key=lambda found: float(found.max_m[-1]))
-    found = {best.name.split('.')[1]: best,
-             'all joints together': together(study, offsets, values, 'all')}  # fmt: skip
+    found = {
+        best.name.split('.')[1]: best,
+        'all joints together': together(study, offsets, values, 'all'),
+    }
     table: dict[str, Array] = {'angle_deg': values / DEGREE}
     figure, (left, right) = panels(2)
     for colour, (name, item) in zip(COLOURS, found.items(), strict=False):
@@ -41,8 +43,12 @@ def angles(setting: Setting) -> Drawing:
         left.plot(values / DEGREE, 1e3 * item.max_m / study.length, color=colour, label=name)
         left.plot(values / DEGREE, 1e3 * item.linear_m / study.length, color=colour, ls=':', lw=3)
         right.plot(values / DEGREE, 1e6 * item.departure, color=colour, label=name)
-    label(left, 'D_norm (dotted: proportional to the angle)', 'angle of the error [deg]',
-          'D_norm [1/1000]')
+    label(
+        left,
+        'D_norm (dotted: proportional to the angle)',
+        'angle of the error [deg]',
+        'D_norm [1/1000]',
+    )
     label(right, 'Departure from proportional', 'angle of the error [deg]', 'parts per million')
     right.set_yscale('symlog', linthresh=1.0)
     legend(left)
@@ -109,4 +115,3 @@ def widths(setting: Setting) -> Drawing:
         'with reversals adds is that the same place of the seam is met from both sides.'
     )
     return Drawing('figure-13', caption, table, svg(figure))
-

@@ -19,7 +19,7 @@ from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.process import MODULES
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes']
+PACKAGES = ['weld_twin_core', 'weld_twin_lab', 'weld_twin_msgs_py', 'weld_twin_nodes']
 NODES = list(MODULES)
 
 pytestmark = pytest.mark.slow
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope='module')
 def workspace(tmp_path_factory) -> Path:
-    """Build the three packages away from the tree; return the folder with ``install``."""
+    """Build the four packages away from the tree; return the folder with ``install``."""
     folder = tmp_path_factory.mktemp('ws')
     subprocess.run(
         [
@@ -65,7 +65,7 @@ def sourced(workspace) -> dict[str, str]:
     return dict(item.split('=', 1) for item in out.split('\0') if '=' in item)
 
 
-def test_colcon_finds_exactly_the_three_packages():
+def test_colcon_finds_exactly_the_four_packages():
     found = subprocess.run(
         [sys.executable, '-m', 'colcon', 'list', '--names-only'],
         cwd=ROOT,

@@ -20,7 +20,7 @@ else:
     tomllib = pytest.importorskip('tomli')
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes']
+PACKAGES = ['weld_twin_core', 'weld_twin_lab', 'weld_twin_msgs_py', 'weld_twin_nodes']
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
 MODULES = {
     'PyYAML': 'yaml',
@@ -73,7 +73,7 @@ def test_both_ways_of_installing_have_the_same_programs():
 
 def imported(package, *, at_once=False):
     """Yield the modules a package imports, or only those importing it brings in at once."""
-    for file in (ROOT / 'src' / package).rglob('*.py'):
+    for file in (ROOT / 'src' / package / package).rglob('*.py'):
         tree = ast.parse(file.read_text())
         for node in tree.body if at_once else ast.walk(tree):
             if isinstance(node, ast.Import):

@@ -20,7 +20,7 @@ from weld_twin_core.sensitivity import (
     scenario_deviations,
     sweep,
 )
-from weld_twin_core.sensitivity.claims import CaseName, judgement, measure_case
+from weld_twin_core.sensitivity.claims import CaseName, judge, measure_case
 from weld_twin_core.sensitivity.claims.combined_measures import _exponent
 
 
@@ -119,13 +119,13 @@ def test_claims_of_identities_are_measured_as_such(case):
 
 
 def test_verdicts_follow_the_measurements(case):
-    found = {claim.key: claim for claim in judgement({CaseName('ur5', 'line'): case})}
+    found = {claim.key: claim for claim in judge({CaseName('ur5', 'line'): case})}
     assert found['baseline'].verdict == 'holds'
     assert found['combined'].verdict == 'does not hold'
     assert found['smooth_below_aggressive'].verdict.startswith('holds when')
-    turned = judgement({CaseName('a', 'b'): {**case, 'distal_ratio': 1.5}})
+    turned = judge({CaseName('a', 'b'): {**case, 'distal_ratio': 1.5}})
     assert {c.key: c.verdict for c in turned}['distal'] == 'holds'
-    split = judgement(
+    split = judge(
         {
             CaseName('a', 'b'): case,
             CaseName('c', 'd'): {**case, 'distal_ratio': 1.5},

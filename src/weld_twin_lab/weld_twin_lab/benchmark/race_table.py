@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_nodes.report import markdown
+from weld_twin_msgs_py.files import markdown
 
 from .kinematics import OWN
 from .race import Outcome

@@ -12,7 +12,7 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
-from weld_twin_nodes.report import markdown
+from weld_twin_msgs_py.files import markdown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

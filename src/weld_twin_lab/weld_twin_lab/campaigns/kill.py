@@ -14,7 +14,7 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
-from weld_twin_nodes.report import markdown
+from weld_twin_msgs_py.files import markdown
 
 ALLOWED = 1.0
 """Seconds of messages that a kill may cost."""

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from copy import copy
 from typing import Any
 
-from weld_twin_nodes.report import markdown
+from weld_twin_msgs_py.files import markdown
 
 RATES = (125.0, 500.0, 1000.0)
 LIMIT = 1.25

@@ -18,7 +18,7 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_lab.campaigns.killing.trial import Trial, try_once
-from weld_twin_msgs_py.bags import rebuild
+from weld_twin_msgs_py.bags import recover
 from weld_twin_nodes.harness import Cell
 
 ROBOT = catalog.load('ur5')
@@ -39,7 +39,7 @@ def flushed(folder, numbers):
         shutil.rmtree(folder / name, ignore_errors=True)
     shutil.copytree(folder / 'bag.unfinished', folder / 'copy.unfinished')
     try:
-        rebuild(folder / 'copy')
+        recover(folder / 'copy')
     except DataError:  # nothing whole yet
         return 0
     return len(numbers(folder / 'copy'))
@@ -75,7 +75,7 @@ def test_a_recorder_on_a_full_disk_ends_with_a_sentence_and_loses_nothing_flushe
     assert 'cannot be written' in recorder.log
     assert f"'weld-twin recover {tmp_path}/bag'" in recorder.log
     assert 'Traceback' not in recorder.log
-    rebuild(tmp_path / 'bag')
+    recover(tmp_path / 'bag')
     found = numbers(tmp_path / 'bag')
     assert found == list(range(len(found)))
     assert len(found) > 100

@@ -19,7 +19,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.bags import BagReader, GrowingBag, bag_info, provenance, rebuild
+from weld_twin_msgs_py.bags import BagReader, GrowingBag, bag_info, provenance, recover
 from weld_twin_nodes.cli import main
 
 FLUSHED, WRITTEN = 700, 950
@@ -72,7 +72,7 @@ def test_a_killed_process_has_kept_what_it_had_flushed(tmp_path, storage, number
     assert here.recv() == 'written'
     os.kill(process.pid, signal.SIGKILL)
     process.join()
-    rebuild(tmp_path / 'bag')
+    recover(tmp_path / 'bag')
     found = numbers(tmp_path / 'bag')
     assert len(found) >= FLUSHED
     assert found == list(range(len(found)))
@@ -81,7 +81,7 @@ def test_a_killed_process_has_kept_what_it_had_flushed(tmp_path, storage, number
 def test_what_was_flushed_is_recovered_and_the_original_stays(cut_short, numbers):
     growing = cut_short.with_name('bag.unfinished')
     before = {file: file.read_bytes() for file in growing.rglob('*') if file.is_file()}
-    done = rebuild(cut_short)
+    done = recover(cut_short)
     found = numbers(cut_short)
     assert FLUSHED <= len(found) <= WRITTEN
     assert found == list(range(len(found)))
@@ -103,7 +103,7 @@ def test_a_tail_the_disk_never_got_costs_only_itself(tmp_path, storage, numbered
     file = last_file(bag.folder)
     with file.open('ab') as stream:
         stream.write(tail)
-    rebuild(tmp_path / 'bag')
+    recover(tmp_path / 'bag')
     assert numbers(tmp_path / 'bag') == list(range(FLUSHED))
 
 
@@ -118,7 +118,7 @@ def test_a_chunk_with_a_flipped_bit_is_left_out_and_told(tmp_path, numbered, num
     whole = bytearray(file.read_bytes())
     whole[len(whole) // 2] ^= 0x10
     file.write_bytes(whole)
-    done = rebuild(tmp_path / 'bag')
+    done = recover(tmp_path / 'bag')
     assert numbers(tmp_path / 'bag') == [*range(100), *range(200, 300)]
     assert any('damaged chunk' in sentence for sentence in done.damage)
 
@@ -135,7 +135,7 @@ def test_a_bag_cut_anywhere_gives_what_lies_before_the_cut(
     bag.close()
     file = next(item for item in (tmp_path / 'bag').iterdir() if item.suffix != '.yaml')
     file.write_bytes(file.read_bytes()[: int(share * file.stat().st_size)])
-    done = rebuild(tmp_path / 'bag')
+    done = recover(tmp_path / 'bag')
     assert done.path == tmp_path / 'bag_recovered'
     found = numbers(done.path)
     assert 0.3 * FLUSHED < len(found) < FLUSHED
@@ -164,7 +164,7 @@ def test_a_step_a_database_was_in_is_undone(tmp_path, numbered, numbers):
     assert half_done != committed
     file.write_bytes(half_done)
     file.with_name(file.name + '-journal').write_bytes(journal)
-    rebuild(tmp_path / 'bag')
+    recover(tmp_path / 'bag')
     assert numbers(tmp_path / 'bag') == list(range(FLUSHED))
 
 
@@ -197,7 +197,7 @@ def test_a_recording_that_still_runs_is_left_alone(tmp_path, numbered):
     bag.write_cdr(*numbered(0))
     bag.flush()
     with pytest.raises(DataError, match='is still being recorded'):
-        rebuild(tmp_path / 'bag')
+        recover(tmp_path / 'bag')
     bag.close()
 
 
@@ -205,10 +205,10 @@ def test_nothing_stays_of_a_recovery_that_finds_nothing(tmp_path):
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'bag_0.mcap').write_bytes(b'\x89MCAP0\r\n')
     with pytest.raises(DataError, match='holds no whole message'):
-        rebuild(tmp_path / 'bag')
+        recover(tmp_path / 'bag')
     assert [item.name for item in tmp_path.iterdir()] == ['bag']
     with pytest.raises(DataError, match='there is no bag at'):
-        rebuild(tmp_path / 'nowhere')
+        recover(tmp_path / 'nowhere')
 
 
 def test_types_nobody_here_knows_are_recovered_too(tmp_path, storage):
@@ -219,7 +219,7 @@ def test_types_nobody_here_knows_are_recovered_too(tmp_path, storage):
         arc = bag.add_connection('/arc', 'their_msgs/msg/Arc', typestore=store)
         bag.write(arc, 5, b'\0\1\0\0' + b'\0' * 8)
     (tmp_path / 'bag' / 'metadata.yaml').unlink()
-    assert rebuild(tmp_path / 'bag').messages == {'/arc': 1}
+    assert recover(tmp_path / 'bag').messages == {'/arc': 1}
     with BagReader(tmp_path / 'bag_recovered') as reader:
         assert list(reader.raw(['/arc'])) == [
             ('/arc', 'their_msgs/msg/Arc', 5, b'\0\1\0\0' + b'\0' * 8)
@@ -260,7 +260,7 @@ def test_a_full_disk_is_told_in_a_sentence_and_keeps_what_was_on_it(
     assert process.exitcode == 0
     assert f"bag '{tmp_path}/bag' cannot be written: " in said
     assert f"'weld-twin recover {tmp_path}/bag'" in said
-    rebuild(tmp_path / 'bag')
+    recover(tmp_path / 'bag')
     found = numbers(tmp_path / 'bag')
     assert len(found) >= flushed > 0
     assert found == list(range(len(found)))
@@ -269,7 +269,7 @@ def test_a_full_disk_is_told_in_a_sentence_and_keeps_what_was_on_it(
 def test_another_tool_reads_the_recovered_bag(cut_short, storage):
     if storage != 'mcap':
         pytest.skip('the other tool reads mcap')
-    rebuild(cut_short)
+    recover(cut_short)
     count = 0
     for file in sorted(cut_short.glob('*.mcap')):
         with file.open('rb') as stream:

@@ -11,10 +11,10 @@ from typing import Any
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.sensitivity.claims import CaseName, judgement
+from weld_twin_core.sensitivity.claims import CaseName, judge
+from weld_twin_msgs_py.files import markdown
 
 from ..offline.task_pool import Runner, Task
-from ..report import markdown
 from .work import claim_case
 
 ROBOTS = catalog.names()
@@ -37,7 +37,7 @@ def run_claims(
         'seed': seed,
         'robots': [robot.name for robot in robots],
         'seams': list(seams),
-        'claims': [claim.as_dict() for claim in judgement(found)],
+        'claims': [claim.as_dict() for claim in judge(found)],
         'cases': [{**name._asdict(), **measured} for name, measured in found.items()],
     }
 

@@ -17,7 +17,7 @@ from typing import Any
 from lz4.frame import compress as lz4_compress
 
 from weld_twin_core.errors import TwinError
-from weld_twin_msgs_py.bags import bag_info, read_recording, rebuild
+from weld_twin_msgs_py.bags import bag_info, read_recording, recover
 from weld_twin_msgs_py.bags.unpack import zstd
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.files.path_file import read_path
@@ -96,7 +96,7 @@ def _bag(path: Path) -> Any:
 
 
 def _recovered(path: Path) -> Any:
-    return rebuild(path, path.with_name('recovered'))
+    return recover(path, path.with_name('recovered'))
 
 
 def _file(folder: Path, name: str, content: str | bytes) -> Path:

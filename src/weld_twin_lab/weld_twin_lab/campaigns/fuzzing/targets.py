@@ -21,7 +21,7 @@ from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.sensitivity import tolerances_from_list
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.bags import bag_info, read_recording, rebuild, write_recording
+from weld_twin_msgs_py.bags import bag_info, read_recording, recover, write_recording
 from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
 from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.files.path_file import read_path
@@ -179,7 +179,7 @@ def _bag(storage: str) -> tuple[bytes, bytes]:
 def _read_bag(path: Path) -> Any:
     """Read a bag, and recover it whether it reads or not."""
     try:
-        rebuild(path, path.with_name('recovered'))
+        recover(path, path.with_name('recovered'))
         read_recording(path.with_name('recovered'), ROBOT)
     except (DataError, ModelError):
         pass

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.errors import TwinError
-from weld_twin_msgs_py.bags import BagReader, rebuild
+from weld_twin_msgs_py.bags import BagReader, recover
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POSE
 from weld_twin_nodes.harness import Cell
@@ -186,7 +186,7 @@ def _left(out: Path) -> tuple[str, dict[str, list[int]]]:
     """Return how the bag was opened, and the numbers of the messages by topic."""
     how = 'by itself'
     if not out.exists():
-        rebuild(out)
+        recover(out)
         how = 'recover'
     numbers: dict[str, list[int]] = {JOINT_STATES.name: [], MEASURED_POSE.name: []}
     with BagReader(out) as bag:

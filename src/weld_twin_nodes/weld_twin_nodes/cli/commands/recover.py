@@ -24,9 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Recover, and say what was lost and what was not."""
-    from weld_twin_msgs_py.bags import rebuild
+    from weld_twin_msgs_py.bags import recover
 
-    done = rebuild(args.bag, args.out)
+    done = recover(args.bag, args.out)
     for sentence in done.damage:
         print(f'note: {sentence}')
     for topic, count in sorted(done.messages.items()):

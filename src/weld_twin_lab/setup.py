@@ -25,6 +25,7 @@ setup(
             'benchmark = weld_twin_lab.cli.benchmark',
             'blind = weld_twin_lab.cli.blind',
             'campaign = weld_twin_lab.cli.campaign',
+            'lab = weld_twin_lab.cli.lab',
             'real-robots = weld_twin_lab.cli.real_robots',
         ]
     },

@@ -8,8 +8,9 @@ from diagnosis_cells import effect
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from weld_twin_core.diagnosis.algebra.evidence_score import best_choice, effective_share, evidence
 from weld_twin_core.diagnosis.algebra.gram import Gram
+from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
+from weld_twin_core.diagnosis.hypotheses.evidence_score import best_choice, evidence
 from weld_twin_core.diagnosis.hypotheses.library import Unit
 
 

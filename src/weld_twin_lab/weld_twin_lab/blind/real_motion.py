@@ -170,7 +170,7 @@ def _mixed(
     problem = Problem((real,), frozenset(align))
     aligned = initial_frames(problem, Model(robot, (robot.T_world_base,)))
     arm = aligned.robot.with_frames(base=aligned.bases[0])
-    noise = noise_floor(problem, problem.residuals(aligned))[0] * float(np.sqrt(3.0))
+    noise = noise_floor(problem, problem.residuals(aligned)).rms_m
     cell = Cell(arm, Tracker(), richness=float(rng.uniform(0.0, 1.0)))
     taken = Take(_command(real), int(rng.integers(2**31)))
     wanted = float(np.exp(rng.uniform(*np.log(STRATA[wish.stratum]))))

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...arrays import Array
@@ -14,11 +16,31 @@ SAME_STATION = 2e-3
 ENOUGH = 12
 
 
-def noise_floor(problem: Problem, residuals: list[Array]) -> tuple[float, bool]:
+class NoiseFloor(NamedTuple):
     """
-    Return the standard deviation of one measured coordinate, [m], and whether it is independent.
+    What the instrument's noise alone would leave.
 
-    Independent means that repeats or differences in time showed it, not what a model left.
+    Attributes
+    ----------
+    sigma : float
+        Standard deviation of one measured coordinate, [m].
+    independent : bool
+        Whether repeats or differences in time showed it, not what a model left.
+
+    """
+
+    sigma: float
+    independent: bool
+
+    @property
+    def rms_m(self) -> float:
+        """Return the RMS distance that it makes in three coordinates, [m]."""
+        return self.sigma * float(np.sqrt(3.0))
+
+
+def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
+    """
+    Return the noise of one measured coordinate, and whether it is independent of any model.
 
     Parameters
     ----------
@@ -41,7 +63,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> tuple[float, bool]:
             independent = False
         estimates.append((left if direct is None else min(direct, left), part.shape[1]))
     values, counts = zip(*estimates, strict=True)
-    return float(np.average(values, weights=counts)), independent
+    return NoiseFloor(float(np.average(values, weights=counts)), independent)
 
 
 def _differences(position: Array) -> float | None:

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..algebra.evidence_score import Choice, evidence
 from ..algebra.fit import Fit, fit
 from ..algebra.gram import Gram
 from ..result import Site
+from .evidence_score import Choice, evidence
 from .selection import Workspace, fitted_with, ranking, without
 
 TEMPERATURE = 2.0

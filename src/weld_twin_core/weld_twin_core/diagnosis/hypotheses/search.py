@@ -5,17 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...arrays import Array
-from ..algebra.evidence_score import effective_share
 from ..algebra.fit import Fit, fit, robust_fit, robust_scale
+from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
-from ..many.small_errors import many_small
 from ..result import Site
-from ..unseen.unseen_stretches import Unseen
 from .library import Library, build
 from .rivals import Rival, rivals
 from .selection import Workspace, backward, consolidated, forward, without_negligible
@@ -26,12 +24,6 @@ FIT_ROWS = 30000
 ROUNDS = 3
 MANY = 8
 """So many units found one by one on stations mean many small errors acting together."""
-SEVERAL = 4
-"""From this many on, the many are tried, and taken if they predict unseen stations better."""
-BETTER = 0.95
-MEMBER = 0.3
-"""Share of what all of them leave from which an effect counts as one of the many; a few large ones
-that tiny ones mend are one cause that the library lacks."""
 SWAPS = 3
 HOPE = 0.3
 MISFIT = 0.012
@@ -62,6 +54,8 @@ class Search:
         Sum of squares on the workspace's measurements without any found effect.
     slots : tuple of tuple of Rival
         For every found effect itself and its rivals; empty when many were fitted together.
+    crowded : bool
+        Whether so many units came one by one that the selection among them was not finished.
     dense : bool
         Whether many small errors were fitted together.
 
@@ -76,7 +70,8 @@ class Search:
     small: Fit
     bare_rss: float
     slots: tuple[tuple[Rival, ...], ...]
-    dense: bool
+    crowded: bool = False
+    dense: bool = False
 
     @property
     def library(self) -> Library:
@@ -112,7 +107,7 @@ def search(problem: Problem, start: Model, exclude: Sequence[str], progress: Pro
     baseline, scale = robust_fit(full, start, robust_scale(full, full.residuals(start)))
     progress('baseline fitted')
     small = problem.thinned(SEARCH_ROWS)
-    model, dense = baseline.model, False
+    model, crowded = baseline.model, False
     work, now, bare = _workspace(small, model, exclude)
     for _ in range(ROUNDS):
         before = names(model)
@@ -124,33 +119,33 @@ def search(problem: Problem, start: Model, exclude: Sequence[str], progress: Pro
             return effective_rows(small, found, bare, HOPE)
 
         steps = forward(work, now, hopeful, MANY, progress)
-        dense = small.recordings[0].joints.static and len(steps) >= MANY
+        crowded = small.recordings[0].joints.static and len(steps) >= MANY
         if steps:
             now = steps[-1].fit
-        if steps and not dense:
+        if steps and not crowded:
             now = backward(work, now, effective)
             now = without_negligible(work, consolidated(work, now, effective))
         model = now.model
-        if dense or names(model) == before:
+        if crowded or names(model) == before:
             break
         work, now, bare = _workspace(small, model, exclude)
     slots: tuple[tuple[Rival, ...], ...] = ()
-    if not dense:
+    if not crowded:
         now, slots = settled(work, now, lambda f: effective_rows(small, f, bare), progress)
         model = now.model
     final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
-    sparse = Search(full, scale, baseline, final, np.zeros(0), work, now, bare, slots, False)
-    if not (small.recordings[0].joints.static and len(model.found) >= SEVERAL):
-        return sparse
-    progress('many small errors at once: fitting them together')
-    final, scale, precision = many_small(full, model, exclude, progress)
-    together = replace(sparse, scale=scale, final=final, precision=precision, slots=(), dense=True)
-    if dense:
-        return together
-    unseen = _unseen(together)
-    left = _unseen_rms(unseen)
-    many = _members(unseen, left) >= MANY
-    return together if many and left < BETTER * _unseen_rms(_unseen(sparse)) else sparse
+    return Search(
+        problem=full,
+        scale=scale,
+        baseline=baseline,
+        final=final,
+        precision=np.zeros(0),
+        work=work,
+        small=now,
+        bare_rss=bare,
+        slots=slots,
+        crowded=crowded,
+    )
 
 
 def settled(
@@ -169,20 +164,6 @@ def settled(
         else:
             break
     return now, tuple(slots)
-
-
-def _unseen(found: Search) -> Unseen:
-    return Unseen.of(found.problem, found.scale, found.final, found.precision)
-
-
-def _unseen_rms(unseen: Unseen) -> float:
-    return unseen.rms(unseen.predict(range(len(unseen.parts))))
-
-
-def _members(unseen: Unseen, left: float) -> int:
-    """Return how many effects move the tool by more than a share of what is left [m]."""
-    sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
-    return int((sizes > MEMBER * left).sum())
 
 
 def names(model: Model) -> list[tuple[str, str | None, int]]:

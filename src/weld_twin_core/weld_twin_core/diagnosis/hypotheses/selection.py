@@ -12,10 +12,10 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.evidence_score import Choice, best_choice, evidence
 from ..algebra.fit import Fit, design, fit
 from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
+from .evidence_score import Choice, best_choice, evidence
 from .library import Library, Unit
 from .starts import searched, started
 

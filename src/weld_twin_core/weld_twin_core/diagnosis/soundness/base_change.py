@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...twin.features import Features
-from ..algebra.evidence_score import effective_share
 from ..algebra.fit import HUBER
+from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')

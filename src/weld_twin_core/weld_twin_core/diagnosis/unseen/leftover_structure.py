@@ -48,9 +48,9 @@ class Structure:
     depends_on: tuple[str, ...]
 
 
-def structure(unseen: Unseen, model: Model, kept: list[int]) -> Structure:
+def structure(unseen: Unseen, model: Model) -> Structure:
     """Return what generic columns add to a model on stretches not used for fitting."""
-    base = unseen.base(kept)
+    base = unseen.base(range(len(model.found)))
     before = unseen.squares(base.residual)
     labels = unseen.trusted_labels()
     found: list[tuple[float, float, str, Array]] = []

@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Array
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem
+from ..hypotheses.search import Search
 from ..result import Where
 from .unseen_stretches import TRUSTED, Unseen
 
@@ -27,24 +28,23 @@ REGIMES = ('static', 'reversal', 'speed', 'acceleration', 'load', 'temperature',
 STRETCHES = 12
 
 
-def locate(problem: Problem, baseline: Unseen, start: Model, final: Unseen, found: Model) -> Where:
+def locate(found: Search, final: Unseen) -> Where:
     """
     Return where the gap lies.
 
     Parameters
     ----------
-    problem : Problem
-    baseline : Unseen
-        Of the model before any effect was found.
-    start : Model
+    found : Search
+        Its baseline is the model before any effect was found.
     final : Unseen
         Of the final model.
-    found : Model
 
     """
+    problem, start = found.problem, found.baseline.model
+    baseline = Unseen.of(problem, found.scale, found.baseline, np.zeros(0))
     shares = _map(problem, baseline, start)
-    joints, regimes = _explained(final, found)
-    if not found.found:
+    joints, regimes = _explained(final, found.final.model)
+    if not found.final.model.found:
         joints = {
             name: float(row.max())
             for name, row in zip(start.robot.joint_names, shares, strict=True)

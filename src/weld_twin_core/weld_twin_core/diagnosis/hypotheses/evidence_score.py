@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Array
 from ...effects.effect import Effect
-from ..hypotheses.library import Unit
-from .gram import Gram, Index
+from ..algebra.gram import Gram, Index
+from .library import Unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,48 +94,3 @@ def _grow(gram: Gram, columns: Index, effective: float) -> tuple[Index, float]:
         nats = trials[k]
         chosen = np.append(chosen, rest.pop(k))
     return (best_all[0], best_all[1]) if best_all[1] > nats else (chosen, nats)
-
-
-def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, ...]) -> float:
-    """
-    Return the share of rows that count as independent, from the residual's autocorrelation.
-
-    Initial positive sequence estimate [1]_ on every component of every recording.
-
-    Parameters
-    ----------
-    residual : array, shape (rows,)
-        Whitened, as `Problem.whitened` lays it out.
-    rows, samples : tuple of int
-        Components and samples of every recording.
-
-    References
-    ----------
-    .. [1] C. J. Geyer, "Practical Markov chain Monte Carlo", Statist. Sci. 7, 1992.
-
-    """
-    at, shares, counts = 0, [], []
-    for c, m in zip(rows, samples, strict=True):
-        part = residual[at : at + c * m].reshape(m, c)
-        at += c * m
-        times = _correlation_time(part - part.mean(axis=0))
-        shares.append(1.0 / times)
-        counts.append(c * m)
-    return float(np.average(shares, weights=counts))
-
-
-def _correlation_time(part: Array) -> float:
-    """Return 1 + 2 sum of autocorrelations until a pair of them is not positive."""
-    m = part.shape[0]
-    if m < 8:
-        return 1.0
-    size = 1 << (2 * m - 1).bit_length()
-    spectrum = np.abs(np.fft.rfft(part, size, axis=0)) ** 2
-    covariance = np.fft.irfft(spectrum.sum(axis=1), size)[: m // 2]
-    if covariance[0] <= 0.0:
-        return 1.0
-    rho = covariance / covariance[0]
-    even = len(rho) // 2 * 2
-    pairs = rho[0:even:2] + rho[1:even:2]
-    stop = int(np.argmax(pairs <= 0.0)) if (pairs <= 0.0).any() else len(pairs)
-    return float(max(1.0, 2.0 * pairs[:stop].sum() - 1.0))

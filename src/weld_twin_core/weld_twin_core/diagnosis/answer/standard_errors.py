@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.transmission_ripple import TransmissionRipple
+from ..algebra.fit import coordinates, design
+from ..algebra.problem import Model, Problem, Scale
 from ..hypotheses.starts import profile
-from .fit import coordinates, design
-from .problem import Model, Problem, Scale
 
 BLOCKS = 24
 UNSEEN = 1e-2

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole answer of a diagnosis, from what each step found."""
+
+from __future__ import annotations
+
+from ..advice import actions
+from ..advice.next_step import next_step
+from ..algebra.noise_floor import NoiseFloor
+from ..hypotheses.search import Search
+from ..result import Check, Diagnosis, Shrink
+from ..unseen.unseen_stretches import Unseen
+from ..unseen.where import locate
+from ..verdict.decision import Evidence, Verdict
+from .gap import gap, traces
+from .named_effects import named_effects
+from .weighed_candidates import unexplained, weighed_candidates
+
+
+def answer(
+    *,
+    found: Search,
+    unseen: Unseen,
+    evidence: Evidence,
+    verdict: Verdict,
+    noise: NoiseFloor,
+    shrink: Shrink,
+    checks: tuple[Check, ...],
+) -> Diagnosis:
+    """
+    Return the diagnosis.
+
+    Parameters
+    ----------
+    found : Search
+    unseen : Unseen
+        Of the final model.
+    evidence : Evidence
+    verdict : Verdict
+    noise : NoiseFloor
+    shrink : Shrink
+    checks : tuple of Check
+        Whether the data are sound.
+
+    """
+    effects = named_effects(found, unseen, verdict)
+    return Diagnosis(
+        gap=gap(found, noise.rms_m),
+        where=locate(found, unseen),
+        status=verdict.status,
+        effects=effects,
+        confidence=verdict.confidence,
+        indistinguishable=verdict.sets,
+        reasons=verdict.reasons,
+        candidates=weighed_candidates(found, evidence),
+        shrink=shrink,
+        unexplained=unexplained(evidence),
+        next_experiment=next_step(found, verdict),
+        actions=actions([named.effect for named in effects], found.baseline.model.robot),
+        checks=checks,
+        model=found.final.model,
+        traces=traces(found),
+        absent=found.library.absent,
+        recordings=found.problem.recordings,
+        families=verdict.families,
+    )

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The hypotheses weighed for every effect found, what each would bring, and what remains."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..hypotheses.rivals import Rival
+from ..hypotheses.search import Search
+from ..result import Candidate, Unexplained
+from ..verdict.decision import Evidence
+
+
+def weighed_candidates(found: Search, evidence: Evidence) -> tuple[Candidate, ...]:
+    """Return the hypotheses for every slot, those of the strongest effect first."""
+    out = []
+    for slot in evidence.slots:
+        least = _position_rms(found, slot[0])
+        for rival in slot:
+            rms = evidence.after * _position_rms(found, rival) / max(least, 1e-300)
+            shrink = 1.0 - rms / max(evidence.gap, 1e-300)
+            out.append(Candidate(rival.site, rival.probability, rms, shrink))
+    return tuple(out)
+
+
+def _position_rms(found: Search, rival: Rival) -> float:
+    """Return the RMS position residual of a rival's fit, weighted, [m]."""
+    at, total, count = 0, 0.0, 0
+    for c, m in zip(found.work.problem.rows, found.work.problem.samples, strict=True):
+        part = rival.fit.residual[at : at + c * m].reshape(m, c)[:, :3]
+        at += c * m
+        total += float((part**2).sum())
+        count += m
+    return found.work.scale.position * float(np.sqrt(total / max(count, 1)))
+
+
+def unexplained(evidence: Evidence) -> Unexplained:
+    """Return what remains after the verdict, and what it depends on."""
+    names = evidence.structure.depends_on if evidence.structured else ()
+    return Unexplained(evidence.after, evidence.above_noise, names)

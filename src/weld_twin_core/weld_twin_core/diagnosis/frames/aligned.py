@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The problem that recordings pose, and the nominal model with frames to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...arm.robot import Robot
+from ...effects.effect import Effect
+from ...recording import Recording
+from ..algebra.problem import Model, Problem, usable
+from .alignment import initial_frames
+
+
+def aligned(
+    recordings: Sequence[Recording], robot: Robot, align: frozenset[str], known: Sequence[Effect]
+) -> tuple[Problem, Model]:
+    """
+    Return the recordings as a problem, and the model that a search starts from.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    robot : Robot
+        The nominal model.
+    align : frozenset of str
+        Frames fitted as nuisance in every hypothesis: 'base', 'tool'.
+    known : sequence of Effect
+        Put into the twin first.
+
+    Raises
+    ------
+    DataError
+        Nothing was measured, or no measurement falls inside a joint stream.
+
+    """
+    problem = Problem(tuple(usable(r) for r in recordings), frozenset(align))
+    model = Model(robot, tuple(robot.T_world_base for _ in recordings), tuple(known))
+    return problem, initial_frames(problem, model)

@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the verdict is drawn from, gathered from the fits and the unseen stretches."""
+
+from __future__ import annotations
+
+from ..algebra.noise_floor import NoiseFloor
+from ..hypotheses.search import Search
+from ..result import Shrink
+from ..unseen.leftover_structure import Structure
+from ..unseen.unseen_stretches import Unseen
+from .decision import Evidence
+from .partial_ripple import glimpsed
+
+
+def gathered(
+    found: Search, unseen: Unseen, leftover: Structure, shrink: Shrink, noise: NoiseFloor
+) -> Evidence:
+    """
+    Return the evidence for a verdict.
+
+    Parameters
+    ----------
+    found : Search
+    unseen : Unseen
+        Of the final model.
+    leftover : Structure
+        What generic columns still find beside it.
+    shrink : Shrink
+        On held-out recordings or on stretches taking their turn.
+    noise : NoiseFloor
+
+    """
+    everything = range(len(found.final.model.found))
+    return Evidence(
+        slots=found.slots,
+        structure=leftover,
+        gap=shrink.rms_before_m,
+        after=shrink.rms_after_m,
+        floor=noise.rms_m,
+        fitted=unseen.rms(unseen.predict(everything)),
+        independent=noise.independent,
+        parts=_parts(unseen),
+        glimpsed=glimpsed(found.problem, found.final.model),
+    )
+
+
+def _parts(unseen: Unseen) -> tuple[float, ...]:
+    """Return the squared contribution of every effect over the square of their sum."""
+    parts = unseen.targets[1:]
+    total = parts.sum(axis=0)
+    return tuple(float(p @ p) / max(float(total @ total), 1e-300) for p in parts)

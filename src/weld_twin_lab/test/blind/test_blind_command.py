@@ -91,7 +91,7 @@ def test_another_seed_does_not_go_where_cases_are(checked, weld_twin):
 def test_a_cause_put_into_a_real_bag_moves_it_as_the_twin_says():
     from weld_twin_lab.blind.blind_cell import Cell, Take
     from weld_twin_lab.blind.real_motion import _command, _with
-    from weld_twin_lab.plant import Tracker
+    from weld_twin_lab.plant.tracker import Tracker
 
     robot = catalog.load('ur5')
     rng = np.random.default_rng(5)

@@ -22,7 +22,9 @@ pytest.importorskip('mujoco')
 
 from weld_twin_lab.blind.blind_cell import Cell, Take, deviation, floor, record
 from weld_twin_lab.blind.making import draw_case
-from weld_twin_lab.plant import KNOWN, Command, Tracker
+from weld_twin_lab.plant.plant import KNOWN
+from weld_twin_lab.plant.plant_recording import Command
+from weld_twin_lab.plant.tracker import Tracker
 
 SIGMA = 2e-5
 

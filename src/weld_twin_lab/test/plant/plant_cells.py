@@ -5,7 +5,9 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from weld_twin_lab.plant import Command, Tracker, run
+from weld_twin_lab.plant.plant import run
+from weld_twin_lab.plant.plant_recording import Command
+from weld_twin_lab.plant.tracker import Tracker
 
 HALF = np.pi / 2.0
 

@@ -7,7 +7,7 @@ import pytest
 from plant_cells import EXACT, ROBOTS, UR5, dh_pose, dh_positions, record, stations, weave
 from scipy.spatial.transform import Rotation
 
-from weld_twin_lab.plant import Tracker
+from weld_twin_lab.plant.tracker import Tracker
 
 
 @pytest.mark.parametrize('name', ROBOTS)

@@ -14,7 +14,7 @@ from plant_cells import (
     weave,
 )
 
-from weld_twin_lab.plant import KNOWN
+from weld_twin_lab.plant.plant import KNOWN
 
 CASES = {
     'bearing_tilt': {'joint': 'j1', 'tilt': 1e-3},

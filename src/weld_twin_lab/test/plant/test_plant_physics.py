@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
-from weld_twin_lab.plant import Command
+from weld_twin_lab.plant.plant_recording import Command
 
 
 def _ramp(joint, speed, duration=3.0):

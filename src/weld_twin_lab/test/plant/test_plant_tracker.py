@@ -7,7 +7,8 @@ import pytest
 from plant_cells import UR5, dh_positions, record, stations, weave
 from scipy.spatial.transform import Rotation
 
-from weld_twin_lab.plant import Command, Tracker
+from weld_twin_lab.plant.plant_recording import Command
+from weld_twin_lab.plant.tracker import Tracker
 
 
 def test_noise_of_position_and_orientation():

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,9 @@ def calibrated_arm() -> Robot:
     """Return a UR5 whose DH values are all off nominal by about a millimetre or milliradian."""
     rng = np.random.default_rng(5)
     arm = load('ur5')
-    rows = {key: getattr(arm, key) + SIZE * rng.normal(size=arm.n) for key in DH_KEYS}
+    rows: dict[str, Any] = {
+        key: getattr(arm, key) + SIZE * rng.normal(size=arm.n) for key in DH_KEYS
+    }
     tool = transform(np.eye(3), np.array([0.03, -0.02, 0.25]))
     return replace(arm, **rows, T_flange_tool=tool)
 
@@ -30,10 +33,11 @@ def arm_of(joints: int) -> Robot:
     """Return an arm of any number of revolute joints in general position."""
     rng = np.random.default_rng(joints)
     wide = np.full(joints, 7.0)
+    rows: dict[str, Any] = {key: rng.normal(size=joints) for key in DH_KEYS}
     return Robot(
         name=f'arm of {joints}',
         joint_names=tuple(f'joint{i}' for i in range(joints)),
-        **{key: rng.normal(size=joints) for key in DH_KEYS},
+        **rows,
         beta=np.zeros(joints),
         prismatic=np.zeros(joints, dtype=bool),
         lower=-wide,

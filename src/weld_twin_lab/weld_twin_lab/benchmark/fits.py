@@ -74,7 +74,7 @@ def _by_trf(robot: Robot, q: Array, poses: Array) -> Robot:
 
     def jacobian(values: Array) -> Array:
         columns = linearised(moved(robot, channels, values), q, poses, channels)[0]
-        return -(_from_start(channels, values) @ columns).T
+        return np.asarray(-(_from_start(channels, values) @ columns).T)
 
     found = least_squares(
         residual,

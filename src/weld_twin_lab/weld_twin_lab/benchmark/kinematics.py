@@ -46,7 +46,10 @@ def single(robot: Robot, peers: dict[str, Peer]) -> Workload:
         position, rotation = live.step(0.0, one)[1]
         return np.column_stack([rotation, position])
 
-    ways = {OWN: SinglePose(robot), 'weld_twin, LiveTwin.step': step}
+    ways: dict[str, Callable[[Array], Array]] = {
+        OWN: SinglePose(robot),
+        'weld_twin, LiveTwin.step': step,
+    }
     ways |= {name: peer.single for name, peer in peers.items() if peer.single}
     contenders = []
     for name, way in ways.items():
@@ -87,14 +90,13 @@ def _jacobians(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
     kernel = BulkKernel(robot, [('theta', i) for i in range(robot.n)])
     poses, out = kernel.screws(q)
     found = out.transpose(2, 0, 1)
-    ways = {name: peer for name, peer in peers.items() if peer.screws}
-    wanted = ways['pinocchio'].screws(q[:LOOPED])[1] if 'pinocchio' in ways else found
+    ways = {name: peer.screws for name, peer in peers.items() if peer.screws}
+    wanted = ways['pinocchio'](q[:LOOPED])[1] if 'pinocchio' in ways else found
     own = Contender(OWN, lambda: kernel.screws(q, poses, out), count, _gap(found, wanted))
     contenders = [own]
-    for name, peer in ways.items():
+    for name, way in ways.items():
         part = q[:LOOPED]
-        gap = _gap(peer.screws(part)[1], wanted)
-        contenders.append(Contender(name, _call(peer.screws, part), len(part), gap))
+        contenders.append(Contender(name, _call(way, part), len(part), _gap(way(part)[1], wanted)))
     return Workload(
         f'poses and Jacobians, N = {count:,}',
         'pose',
@@ -109,15 +111,15 @@ def _derivatives(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
     kernel = BulkKernel(robot, [(key, i) for i in range(robot.n) for key in ('theta', 'alpha')])
     poses, out = kernel.screws(q)
     found = written_out(out[..., :LOOPED])
-    ways = {name: peer for name, peer in peers.items() if peer.dh}
-    wanted = ways['pinocchio'].dh(q[:LOOPED])[1] if 'pinocchio' in ways else found
+    ways = {name: peer.dh for name, peer in peers.items() if peer.dh}
+    wanted = ways['pinocchio'](q[:LOOPED])[1] if 'pinocchio' in ways else found
     own = Contender(OWN, lambda: kernel.screws(q, poses, out), count, _gap(found, wanted))
     contenders = [own]
-    for name, peer in ways.items():
-        part = q[:LOOPED] if peer.loops else q[:BATCH]
-        derivative = peer.dh(part)[1]
+    for name, way in ways.items():
+        part = q[:LOOPED] if peers[name].loops else q[:BATCH]
+        derivative = way(part)[1]
         gap = _gap(derivative, wanted[:, : derivative.shape[1]])
-        contenders.append(Contender(name, _call(peer.dh, part), len(part), gap))
+        contenders.append(Contender(name, _call(way, part), len(part), gap))
     return Workload(
         f'poses and derivatives by {4 * robot.n} DH values, N = {count:,}',
         'pose',
@@ -132,7 +134,7 @@ def written_out(screws: Array) -> Array:
     theta, alpha = screws[:, ::2], screws[:, 1::2]
     slides = [np.concatenate([screw[3:], np.zeros_like(screw[3:])]) for screw in (theta, alpha)]
     out: Array = np.stack([theta, *slides, alpha], axis=2).reshape(6, -1, screws.shape[-1])
-    return out.transpose(2, 0, 1)
+    return np.transpose(out, (2, 0, 1))
 
 
 def _gap(found: Array, wanted: Array) -> float:

@@ -98,8 +98,12 @@ def _sobol(robot: Robot, base: int, with_pinocchio: bool) -> Workload:
     q = smooth_motion(robot, POINTS)
 
     def own() -> tuple[Array, ...]:
-        pair = (np.hstack(drawn(robot, ndtri(part))) for part in base_pair(inputs, base, seed=1))
-        draws = DhDraws(*np.split(mixed(*pair).reshape(runs, inputs), len(DH_KEYS), axis=1))
+        first, second = (
+            np.hstack(drawn(robot, ndtri(part))) for part in base_pair(inputs, base, seed=1)
+        )
+        draws = DhDraws(
+            *np.split(mixed(first, second).reshape(runs, inputs), len(DH_KEYS), axis=1)
+        )
         results = SeamDraws(robot, q).largest(draws).reshape(base, inputs + 2)
         rng = np.random.default_rng(1)
         return *sobol_estimates(results), *sobol_half_widths(results, CONFIDENCE, rng)
@@ -134,7 +138,10 @@ def _salib(robot: Robot, q: Array, base: int, wanted: tuple[Array, ...]) -> Cont
         return np.asarray(sample.sample(problem, base, calc_second_order=False, seed=1))
 
     def estimates(results: Array) -> dict[str, Array]:
-        return analyze.analyze(problem, results, calc_second_order=False, seed=1)
+        found: dict[str, Array] = analyze.analyze(
+            problem, results, calc_second_order=False, seed=1
+        )
+        return found
 
     results = SeamDraws(robot, q).largest(drawn(robot, ndtri(design())))
     found = estimates(results)

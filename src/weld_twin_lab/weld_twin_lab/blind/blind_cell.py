@@ -18,7 +18,9 @@ from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 
-from ..plant import Command, PlantRecording, Tracker, run
+from ..plant.plant import run
+from ..plant.plant_recording import Command, PlantRecording
+from ..plant.tracker import Tracker
 from .cause_sizes import Cause
 from .displacement import rigid, rms
 from .recorded_motion import Motion, motion

@@ -31,7 +31,8 @@ from weld_twin_msgs_py.robots import load_robot, write_robot_yaml
 from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
-from ..plant import Command, PlantRecording, Tracker
+from ..plant.plant_recording import Command, PlantRecording
+from ..plant.tracker import Tracker
 from . import layout, seal
 from .blind_cell import Cell, Take, at_stamps, record
 from .cause_sizes import FAMILIES, MOVING, Cause, draw, scaled, site

@@ -8,12 +8,12 @@ down, so a positive compliance sags. A gap follows the textbook play. The same a
 in `tree`.
 """
 
-from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
 
 from . import mujoco_model
+from .entries import Entry
 from .exponentials import Arm
 from .textbook_effects import Causes
 
@@ -35,7 +35,7 @@ class Compliant:
 
     """
 
-    def __init__(self, robot: Mapping, arm: Arm, causes: Causes, richness: float) -> None:
+    def __init__(self, robot: Entry, arm: Arm, causes: Causes, richness: float) -> None:
         extra = [
             (float(item['mass']), np.array(item.get('com', [0.0] * 3), dtype=float))
             for item in causes.of('payload')
@@ -54,14 +54,13 @@ class Compliant:
     def rated(self) -> np.ndarray:
         """Return the largest load torque over poses of the whole range, shape (n,) [N m]."""
         poses = np.random.default_rng(0).uniform(-np.pi, np.pi, (RATING_POSES, len(self.width)))
-        return np.abs(self.torque(np.where(self.arm.sliding, 0.0, poses), None)).max(axis=0)
+        torque = self.torque(np.where(self.arm.sliding, 0.0, poses), None)
+        return np.asarray(np.abs(torque).max(axis=0))
 
-    def stiffening(
-        self, deflection: np.ndarray | float, peak: np.ndarray | float
-    ) -> np.ndarray | float:
+    def stiffening(self, deflection: np.ndarray, peak: np.ndarray) -> np.ndarray:
         """Return stiffness over the stated one: softer at no load, harder at the peak."""
         gain = HARDENING * self.richness
-        return 1.0 - 0.5 * gain + gain * (deflection / peak) ** 2
+        return np.asarray(1.0 - 0.5 * gain + gain * (deflection / peak) ** 2)
 
     @property
     def rigid(self) -> bool:
@@ -97,4 +96,4 @@ class Compliant:
     def at_rest(self, q: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:
         """Return gaps and springs over a sequence of poses at rest, shape (N, n)."""
         gap = self.play(q)
-        return gap + self.sag(q + gap, wrench)
+        return np.asarray(gap + self.sag(q + gap, wrench))

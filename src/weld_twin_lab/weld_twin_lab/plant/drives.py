@@ -20,6 +20,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from . import rollout
+from .entries import Entry
 from .plant_recording import Course
 from .textbook_effects import Causes
 
@@ -64,11 +65,13 @@ def displacement(causes: Causes, course: Course, richness: float) -> CubicSpline
     return CubicSpline(t, gap)
 
 
-def _omega(item) -> float:
+def _omega(item: Entry) -> float:
     return 2.0 * np.pi * float(item['frequency'])
 
 
-def _rotor(lag: float, shaking: list, swing: list[float], richness: float) -> mujoco.MjModel:
+def _rotor(
+    lag: float, shaking: list[Entry], swing: list[float], richness: float
+) -> mujoco.MjModel:
     """Return the rotor of one drive, carrying one flywheel for each vibration."""
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
@@ -93,7 +96,7 @@ def _rotor(lag: float, shaking: list, swing: list[float], richness: float) -> mu
     return spec.compile()
 
 
-def _wheel(parent):
+def _wheel(parent: mujoco.MjsBody) -> mujoco.MjsBody:
     """Return a body with 1 kg m^2 about its axis."""
     body = parent.add_body(mass=1.0, inertia=[1.0, 1.0, 1.0])
     body.explicitinertial = True

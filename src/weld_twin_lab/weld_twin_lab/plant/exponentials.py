@@ -8,13 +8,13 @@ joints at zero). From there on the arm is its screws and its home pose:
 T(q) = exp(S_1 q_1) ... exp(S_n q_n) M. Brockett 1984; Lynch and Park, chapter 4.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from . import screws
+from .entries import Entry
 from .screws import Motion
 
 
@@ -87,7 +87,7 @@ class Home:
     links: tuple[Motion, ...]
 
 
-def arm_from(robot: Mapping) -> Arm:
+def arm_from(robot: Entry) -> Arm:
     """Read the geometry of a robot file (interface section 2)."""
     convention = robot.get('convention', 'standard')
     if convention not in ('standard', 'modified'):
@@ -112,7 +112,7 @@ def arm_from(robot: Mapping) -> Arm:
     )
 
 
-def _frame(entry: Mapping | None) -> Motion:
+def _frame(entry: Entry | None) -> Motion:
     entry = entry or {}
     return screws.from_quaternion(
         entry.get('quat_xyzw', [0.0, 0.0, 0.0, 1.0]), entry.get('xyz', [0.0, 0.0, 0.0])

@@ -8,14 +8,15 @@ gap if the gear has play, a spring if it gives. Gap and spring are thus read as 
 their own, free of the motor's tracking error. World is the robot base.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from . import exponentials, screws
+from .entries import Entry
 from .exponentials import Arm
 from .screws import Motion
 
@@ -42,7 +43,7 @@ class Load:
     com: np.ndarray
 
 
-def load_from(robot: Mapping, extra: list[tuple[float, np.ndarray]]) -> Load:
+def load_from(robot: Entry, extra: list[tuple[float, np.ndarray]]) -> Load:
     """Return the declared payload and the undeclared ones (mass, com) as one."""
     entry = robot.get('payload') or {}
     parts = [(float(entry.get('mass', 0.0)), np.array(entry.get('com', [0.0] * 3), dtype=float))]
@@ -50,11 +51,11 @@ def load_from(robot: Mapping, extra: list[tuple[float, np.ndarray]]) -> Load:
     mass = sum(part[0] for part in parts)
     if mass < 0.0:
         raise ValueError(f'the payload must not weigh less than nothing, got {mass} kg')
-    moment = sum(part[0] * part[1] for part in parts)
+    moment = sum((part[0] * part[1] for part in parts), start=np.zeros(3))
     return Load(mass, moment / mass if mass > 0.0 else np.zeros(3))
 
 
-def add_links(spec: mujoco.MjSpec, robot: Mapping, arm: Arm, load: Load) -> list:
+def add_links(spec: mujoco.MjSpec, robot: Entry, arm: Arm, load: Load) -> list[mujoco.MjsBody]:
     """Add the links, the tool and the payload, without joints; return the link bodies."""
     spec.option.gravity = list(robot.get('gravity', STANDARD_GRAVITY))
     at = exponentials.home(arm)
@@ -81,12 +82,12 @@ def _reach(arm: Arm, i: int) -> float:
     return float(np.hypot(arm.rows.a[i], arm.rows.d[i]))
 
 
-def _add_body(parent, name: str, pose: Motion):
+def _add_body(parent: mujoco.MjsBody, name: str, pose: Motion) -> mujoco.MjsBody:
     x, y, z, w = Rotation.from_matrix(pose.rotation).as_quat()
     return parent.add_body(name=name, pos=pose.position, quat=[w, x, y, z])
 
 
-def _add_mass(body, robot: Mapping, i: int, reach: float) -> None:
+def _add_mass(body: mujoco.MjsBody, robot: Entry, i: int, reach: float) -> None:
     links = robot.get('links') or []
     link = links[i] if i < len(links) else {}
     mass = max(float(link.get('mass', 0.0)), MASSLESS)
@@ -94,12 +95,14 @@ def _add_mass(body, robot: Mapping, i: int, reach: float) -> None:
     _weigh(body, mass, np.array(link.get('com', [0.0, 0.0, 0.0]), dtype=float), inertia)
 
 
-def _weigh(body, mass: float, com: np.ndarray, inertia: float) -> None:
+def _weigh(body: mujoco.MjsBody, mass: float, com: np.ndarray, inertia: float) -> None:
     body.explicitinertial = True
     body.mass, body.ipos, body.inertia = mass, com, np.full(3, inertia)
 
 
-def add_hinge(body, arm: Arm, at: exponentials.Home, i: int, name: str, **options):
+def add_hinge(
+    body: mujoco.MjsBody, arm: Arm, at: exponentials.Home, i: int, name: str, **options: Any
+) -> mujoco.MjsJoint:
     """Add a hinge or slide of joint i to its link."""
     link = at.links[i]
     axis = at.v[i] if arm.sliding[i] else at.omega[i]
@@ -108,7 +111,7 @@ def add_hinge(body, arm: Arm, at: exponentials.Home, i: int, name: str, **option
     return body.add_joint(name=name, type=kind, axis=link.rotation.T @ axis, pos=anchor, **options)
 
 
-def rigid(robot: Mapping, arm: Arm, load: Load) -> mujoco.MjModel:
+def rigid(robot: Entry, arm: Arm, load: Load) -> mujoco.MjModel:
     """Return the arm with one hinge a joint and nothing that gives."""
     spec = mujoco.MjSpec()
     at = exponentials.home(arm)

@@ -8,7 +8,7 @@ under load (`tree`, `compliance`) -> geometry as built (`geometry`) -> tool unde
 instrument and clocks (`tracker`). Nothing here is shared with the twin that is to diagnose it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from . import drives, exponentials, outside_causes, rollout, screws, tree
 from . import textbook_effects as library
 from . import tracker as sensors
 from .compliance import Compliant
+from .entries import Entry
 from .exponentials import Arm
 from .plant_recording import Command, Course, PlantRecording
 from .screws import Motion
@@ -31,7 +32,7 @@ KNOWN = library.LIBRARY | outside_causes.OUTSIDE
 class _Cell:
     """One robot with its flaws and one command."""
 
-    robot: Mapping
+    robot: Entry
     arm: Arm
     causes: Causes
     course: Course
@@ -44,8 +45,8 @@ class _Cell:
 
 
 def run(
-    robot: Mapping,
-    effects: Sequence[Mapping],
+    robot: Entry,
+    effects: Sequence[Entry],
     command: Command,
     tracker: Tracker,
     rng: np.random.Generator,
@@ -100,17 +101,21 @@ def _record(cell: _Cell, instrument: Tracker, rng: np.random.Generator) -> Plant
     floors = [float(item['sigma']) for item in cell.causes.of('measurement_noise')]
     sigma = float(np.linalg.norm([instrument.sigma, *floors]))
     position, quaternion = sensors.observe(instrument, pose, sigma, rng)
+    wrench_t, wrench = sensors.wrench_stream(instrument, cell.course, rng)
+    temperature_t, temperature = sensors.temperature_stream(instrument, cell.course, rng)
     late = float(cell.causes.total('time_delay', 'delay')) + instrument.clock_offset
     return PlantRecording(
-        joint_stamps,
-        cell.course.q(t_joint),
-        cell.course.q(t_joint, 1) if instrument.velocity else None,
-        stamps + late,
-        position,
-        quaternion,
-        *sensors.wrench_stream(instrument, cell.course, rng),
-        *sensors.temperature_stream(instrument, cell.course, rng),
-        static,
+        t_joint=joint_stamps,
+        q=cell.course.q(t_joint),
+        qd=cell.course.q(t_joint, 1) if instrument.velocity else None,
+        t_measured=stamps + late,
+        position=position,
+        quaternion=quaternion,
+        wrench_t=wrench_t,
+        wrench=wrench,
+        temperature_t=temperature_t,
+        temperature=temperature,
+        static=static,
     )
 
 
@@ -129,13 +134,16 @@ def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
     return library.measured(causes, outside_causes.on_instrument(causes, pose, since), since)
 
 
-def _link_side(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> tuple:
+def _link_side(
+    cell: _Cell, t: np.ndarray, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the links' and the motors' positions at times t, each (M, n)."""
     compliant = Compliant(cell.robot, cell.arm, cell.causes, cell.richness)
     lost = drives.displacement(cell.causes, cell.course, cell.richness)
     motor = cell.course.q(t) + (0.0 if lost is None else lost(t))
     geared = motor + library.gearing(cell.causes, motor)
     rounding = library.rounding(cell.causes, motor)
+    give: np.ndarray | float
     if cell.course.command.static:
         give = _at_rest(cell, compliant, rng)[np.searchsorted(cell.course.command.t, t)]
     else:
@@ -148,9 +156,10 @@ def _at_rest(cell: _Cell, compliant: Compliant, rng: np.random.Generator) -> np.
     command = cell.course.command
     q = command.q + library.gearing(cell.causes, command.q)
     give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, command.wrench)
-    return give + outside_causes.on_joints(
+    flaws = outside_causes.on_joints(
         cell.causes, command.t, q, lambda: compliant.torque(q, command.wrench), rng
     )
+    return np.asarray(give + flaws)
 
 
 def _in_motion(
@@ -170,4 +179,5 @@ def _in_motion(
     )
     if not compliant.rigid:
         give = give + tree.moving(compliant, grid, CubicSpline(grid, geared), wrench)
-    return CubicSpline(grid, give)
+    spline: Callable[[np.ndarray], np.ndarray] = CubicSpline(grid, give)
+    return spline

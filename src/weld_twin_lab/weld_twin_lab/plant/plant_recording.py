@@ -108,7 +108,7 @@ class Course:
         if self._spline is None:
             rows = np.searchsorted(self.command.t, t)
             return self.command.q[rows] if order == 0 else np.zeros_like(self.command.q[rows])
-        return self._spline(np.clip(t, self.command.t[0], self.command.t[-1]), order)
+        return np.asarray(self._spline(np.clip(t, self.command.t[0], self.command.t[-1]), order))
 
     def wrench(self, t: np.ndarray) -> np.ndarray | None:
         """Return the tool wrench, shape (len(t), 6), linear between samples."""
@@ -121,4 +121,4 @@ class Course:
         """Return the arm's temperature, shape (len(t),) [degC]."""
         if self.command.temperature is None:
             return None
-        return np.interp(t, self.command.t, self.command.temperature)
+        return np.asarray(np.interp(t, self.command.t, self.command.temperature))

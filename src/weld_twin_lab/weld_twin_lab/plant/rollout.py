@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run a MuJoCo model open loop under given forces, in C, in bounded memory."""
 
+from typing import Any
+
 import mujoco
 import mujoco.rollout
 import numpy as np
@@ -16,7 +18,7 @@ def grid(start: float, end: float, step: float) -> np.ndarray:
     return start + step * np.arange(int(np.ceil((end - start) / step - 1e-9)) + 1)
 
 
-def follower() -> dict:
+def follower() -> dict[str, Any]:
     """
     Return the hinge options of a motor side that follows a course given by `follow`.
 

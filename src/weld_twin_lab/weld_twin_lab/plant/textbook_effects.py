@@ -8,12 +8,13 @@ The names and parameters are those of the interface (section 3). Effects that ne
 payload); causes that no library knows are in `outside`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from . import screws
+from .entries import Entry
 from .exponentials import Arm, Rows
 from .screws import Motion
 
@@ -59,10 +60,10 @@ class Causes:
 
     """
 
-    items: tuple[Mapping, ...]
+    items: tuple[Entry, ...]
     joints: tuple[str, ...]
 
-    def of(self, effect: str) -> Iterator[Mapping]:
+    def of(self, effect: str) -> Iterator[Entry]:
         """Yield the entries of one effect."""
         return (item for item in self.items if item['effect'] == effect)
 
@@ -82,12 +83,11 @@ class Causes:
     def total(self, effect: str, key: str, width: int | None = None) -> np.ndarray:
         """Return the sum of one parameter of a robot effect, a number or a vector (width,)."""
         zero = np.zeros(() if width is None else width)
-        return sum(
-            (np.asarray(item.get(key, zero), dtype=float) for item in self.of(effect)), start=zero
-        )
+        values = (np.asarray(item.get(key, zero), dtype=float) for item in self.of(effect))
+        return np.asarray(sum(values, start=zero))
 
 
-def causes_from(effects: Sequence[Mapping], arm: Arm, known: frozenset[str]) -> Causes:
+def causes_from(effects: Sequence[Entry], arm: Arm, known: frozenset[str]) -> Causes:
     """Check the effects against the names known to the plant and the joints of the arm."""
     causes = Causes(tuple(effects), arm.names)
     for item in causes.items:
@@ -101,7 +101,7 @@ def causes_from(effects: Sequence[Mapping], arm: Arm, known: frozenset[str]) -> 
     return causes
 
 
-def warm_up(item: Mapping, t: np.ndarray, temperature: np.ndarray | None) -> np.ndarray:
+def warm_up(item: Entry, t: np.ndarray, temperature: np.ndarray | None) -> np.ndarray:
     """
     Return the warming against the reference, shape (len(t),) [K].
 
@@ -148,7 +148,7 @@ def gearing(causes: Causes, q: np.ndarray) -> np.ndarray:
         Motor side, in units of the joint.
 
     """
-    error = causes.per_joint('gear_ratio', 'scale') * q
+    error: np.ndarray = causes.per_joint('gear_ratio', 'scale') * q
     error += causes.per_joint('joint_offset', 'offset')
     for item in causes.of('transmission_ripple'):
         i = causes.joint(item['joint'])

@@ -10,6 +10,9 @@ from scipy.spatial.transform import Rotation
 from .plant_recording import Course
 from .screws import Motion
 
+Readings = tuple[np.ndarray, np.ndarray] | tuple[None, None]
+"""Stamps and values of a sensor, or that there is none."""
+
 STAMP_MARGIN = 0.45  # jittered stamps keep their order: at most this share of the spacing
 
 
@@ -76,20 +79,20 @@ def instants(
     if rate is not None:
         # the sensor's clock does not start with the command's
         t = np.arange(t[0] + rng.uniform(0.0, 1.0 / rate), t[-1], 1.0 / rate)
-    return t[kept(len(t), drop, rng)]
+    return np.asarray(t[kept(len(t), drop, rng)])
 
 
 def kept(count: int, drop: float, rng: np.random.Generator) -> np.ndarray:
     """Return which samples arrive, shape (count,), bool."""
-    return rng.random(count) >= drop if drop > 0.0 else np.ones(count, dtype=bool)
+    return np.ones(count, dtype=bool) if drop <= 0.0 else np.asarray(rng.random(count) >= drop)
 
 
 def stamped(t: np.ndarray, jitter: float, rng: np.random.Generator) -> np.ndarray:
     """Return stamps that scatter about the true instants but keep their order, (M,) [s]."""
     if jitter <= 0.0 or len(t) < 2:
-        return t.copy()
-    limit = STAMP_MARGIN * np.diff(t).min()
-    return t + np.clip(jitter * rng.standard_normal(len(t)), -limit, limit)
+        return np.array(t)
+    limit = STAMP_MARGIN * float(np.diff(t).min())
+    return np.asarray(t + np.clip(jitter * rng.standard_normal(len(t)), -limit, limit))
 
 
 def observe(
@@ -125,7 +128,7 @@ def observe(
     return position, turned.as_quat()
 
 
-def wrench_stream(tracker: Tracker, course: Course, rng: np.random.Generator) -> tuple:
+def wrench_stream(tracker: Tracker, course: Course, rng: np.random.Generator) -> Readings:
     """Return stamps and readings of the tool wrench at the command's stamps, or two Nones."""
     command = course.command
     if command.wrench is None:
@@ -134,13 +137,13 @@ def wrench_stream(tracker: Tracker, course: Course, rng: np.random.Generator) ->
     return command.t.copy(), command.wrench + scale * rng.standard_normal(command.wrench.shape)
 
 
-def temperature_stream(tracker: Tracker, course: Course, rng: np.random.Generator) -> tuple:
+def temperature_stream(tracker: Tracker, course: Course, rng: np.random.Generator) -> Readings:
     """Return stamps and readings of a slow, noisy temperature sensor, or two Nones."""
     command = course.command
     if command.temperature is None:
         return None, None
     t = instants(command.t, tracker.temperature_rate, 0.0, rng)
-    reading = course.temperature(t)
+    reading = np.interp(t, command.t, command.temperature)
     if tracker.temperature_lag > 0.0:
         follow = 1.0 - np.exp(-np.diff(t, prepend=t[0]) / tracker.temperature_lag)
         level = reading[0]

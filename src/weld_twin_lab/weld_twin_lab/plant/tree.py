@@ -14,6 +14,8 @@ nothing, because gap and spring are joints of their own and only these are read.
   definition leaves out: little in slow motion, a third of the deflection in violent motion.
 """
 
+from typing import Any
+
 import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -21,7 +23,10 @@ from scipy.interpolate import CubicSpline
 from . import exponentials, mujoco_model, rollout
 from .compliance import HARDENING, Compliant
 
-STEP = 1e-3
+Course = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Position, velocity and acceleration of the motor sides, each (N, n), `STEP` apart."""
+
+STEP = 1e-3  # s, of the simulation
 DAMPING = 0.1  # damping ratio of a spring with the links beyond it
 EDGE_SHARE = 0.02  # share of the width that the edges of a gap give
 UNBALANCED = 0.2  # share of the load a counterbalance leaves to the gap
@@ -48,7 +53,7 @@ def moving(
     wrench : array, shape (N, 6), optional
 
     """
-    q = motor(t)
+    q: np.ndarray = motor(t)
     if parts.richness <= 0.0:
         return parts.at_rest(q, wrench)
     tree = Tree(parts, (q, motor(t, 1), motor(t, 2)), wrench)
@@ -66,20 +71,20 @@ class Tree:
     Parameters
     ----------
     parts : Compliant
-    course : tuple of three arrays, each (N, n)
-        Position, velocity and acceleration of the motor sides, `STEP` apart.
+    course : Course
     wrench : array, shape (N, 6), optional
 
     """
 
-    def __init__(self, parts: Compliant, course: tuple, wrench: np.ndarray | None) -> None:
+    def __init__(self, parts: Compliant, course: Course, wrench: np.ndarray | None) -> None:
         self.parts, self.course = parts, course
         self.coarse = np.arange(0, len(course[0]), max(1, round(COARSE / STEP)))
-        few = [None if rows is None else rows[self.coarse] for rows in (*course, wrench)]
-        self.tau = parts.statics.torque(few[0], few[3])
-        self.inertial = parts.statics.drive_torque(*few[:3])
-        self.inertia = parts.statics.inertia(few[0][::10]).min(axis=0)
-        self.first_sag = parts.sag(few[0][:1], None if few[3] is None else few[3][:1])[0]
+        q, qd, qdd = (rows[self.coarse] for rows in course)
+        load = None if wrench is None else wrench[self.coarse]
+        self.tau = parts.statics.torque(q, load)
+        self.inertial = parts.statics.drive_torque(q, qd, qdd)
+        self.inertia = parts.statics.inertia(q[::10]).min(axis=0)
+        self.first_sag = parts.sag(q[:1], None if load is None else load[:1])[0]
         self._build()
 
     def _build(self) -> None:
@@ -109,13 +114,13 @@ class Tree:
 
         No mode of the arm can then swing faster than the step can follow, whatever the links.
         """
-        return STEP**2 / (FASTEST * self.parts.compliance[i])
+        return float(STEP**2 / (FASTEST * self.parts.compliance[i]))
 
-    def _spring(self, i: int) -> dict:
+    def _spring(self, i: int) -> dict[str, Any]:
         k = 1.0 / self.parts.compliance[i]
         moving = (np.abs(self.tau[:, i]) + np.abs(self.inertial[:, i])).max()
         peak = max(self.parts.rated[i], moving) / k + 1e-12
-        idle = self.parts.stiffening(0.0, 1.0)
+        idle = float(self.parts.stiffening(np.zeros(()), np.ones(())))
         light = self._light(i)
         damper = 2.0 * DAMPING * np.sqrt(k * (self.inertia[i] + light))
         cubic = HARDENING * self.parts.richness * k / peak**2
@@ -129,13 +134,15 @@ class Tree:
         """Return the dry friction [N m] that makes the link stay where it was left."""
         own = np.abs(self.inertial[:, i]) + UNBALANCED * np.abs(self.tau[:, i])
         gear = self._gear(i) * np.abs(self.course[2][:, i]).max()
-        return GRIP * (own.max() + gear) + 1e-3 * self.inertia[i]
+        return float(GRIP * (own.max() + gear) + 1e-3 * self.inertia[i])
 
     def _gear(self, i: int) -> float:
         """Return the inertia [kg m^2] of the wheel between gap and spring."""
-        return 0.05 * self.inertia[i]
+        return float(0.05 * self.inertia[i])
 
-    def _add_gap(self, spec: mujoco.MjSpec, body, at: exponentials.Home, i: int) -> None:
+    def _add_gap(
+        self, spec: mujoco.MjSpec, body: mujoco.MjsBody, at: exponentials.Home, i: int
+    ) -> None:
         half = 0.5 * self.parts.width[i] * (1.0 - 2.0 * self._edge())
         mujoco_model.add_hinge(
             body,
@@ -196,7 +203,7 @@ class Tree:
 
     def _fine(self, torque: np.ndarray) -> np.ndarray:
         """Return a torque known at the coarse samples at all of them, shape (N,)."""
-        return np.interp(np.arange(len(self.course[0])), self.coarse, torque)
+        return np.asarray(np.interp(np.arange(len(self.course[0])), self.coarse, torque))
 
     def pull(self, wrench: np.ndarray | None) -> np.ndarray | None:
         """Return the tool wrench as forces on the bodies in the base frame, (N, nbody, 6)."""

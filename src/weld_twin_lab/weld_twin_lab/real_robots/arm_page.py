@@ -7,7 +7,6 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Sequence
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 from weld_twin_core import __version__
 from weld_twin_nodes.report.cause_list import causes_section
@@ -20,10 +19,8 @@ from weld_twin_nodes.report.shrinking import shrink_section
 
 from .data import Source
 from .figures import ripple_over_range, ripple_spectrum, workspace
+from .judged_split import Judged
 from .owner_advice import blind_spots, owner_advice
-
-if TYPE_CHECKING:
-    from .arm_study import Judged
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 _STYLE = 'figure { margin: 0 0 1.5rem; } figure img { width: 100%; background: #fff; }'

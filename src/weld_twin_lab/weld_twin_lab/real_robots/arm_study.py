@@ -6,68 +6,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 from weld_twin_core import __version__
-from weld_twin_core.arm import catalog
-from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.report import hashed
 from weld_twin_nodes.report.diagnosis_files import diagnosis_text
 from weld_twin_nodes.report.family_table import ripples
 
-from .data import Source, Split, tables, ur5_splits, ur10_splits
-from .unseen_stations import ALIGN, Errors, errors, frames_only, inside, residual
+from .arm_page import robot_page
+from .data import Source, tables, ur5_splits, ur10_splits
+from .judged_split import Judged, judge
 
 RESULTS = 'results.json'
 SPLITS = {'ur5': ur5_splits, 'ur10': ur10_splits}
-
-
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """
-    A split with its diagnosis and what that predicts on the held-out poses.
-
-    Attributes
-    ----------
-    split : Split
-    diagnosis : Diagnosis
-        Of the training poses alone.
-    before, after : Errors
-        On the held-out poses: frames fitted only, and with everything found.
-    before_parts, after_parts : array, shape (3 or 6, M)
-        The residuals behind them [m, rad].
-    seconds : float
-
-    """
-
-    split: Split
-    diagnosis: Diagnosis
-    before: Errors
-    after: Errors
-    before_parts: Array
-    after_parts: Array
-    seconds: float
-
-    @property
-    def within(self) -> bool:
-        """Return whether the claimed interval contains what is got."""
-        return inside(self.diagnosis, self.before, self.after)
-
-    @property
-    def reached(self) -> bool:
-        """Return whether every goal of the split is reached."""
-        goal, got = self.split.goal, self.after
-        pairs = [
-            (goal.mean_m, got.mean_m),
-            (goal.max_m, got.max_m),
-            (goal.orientation_rad, got.orientation_rms_rad),
-        ]
-        return all(g is None or (v is not None and v <= g) for g, v in pairs)
 
 
 def study(
@@ -91,8 +44,6 @@ def study(
         A table is missing or cannot be read.
 
     """
-    from .arm_page import robot_page
-
     results: dict[str, Any] = {'version': __version__, 'robots': {}}
     for robot, directory in (('ur5', ur5), ('ur10', ur10)):
         sources = tables(robot, directory)
@@ -110,17 +61,6 @@ def _judged(
 ) -> Iterator[Judged]:
     for split in SPLITS[robot](sources):
         yield judge(split, lambda text, name=split.name: tell(f'{name}: {text}'))  # type: ignore[misc]
-
-
-def judge(split: Split, tell: Callable[[str], None] = lambda text: None) -> Judged:
-    """Return a split diagnosed on its training poses and judged on the others."""
-    nominal = catalog.load(split.robot)
-    start = perf_counter()
-    diagnosis = diagnose([split.train], nominal, align=ALIGN, progress=tell)
-    seconds = perf_counter() - start
-    before = residual(frames_only(split.train, nominal), split.train, split.test)
-    after = residual(diagnosis.model, split.train, split.test)
-    return Judged(split, diagnosis, errors(before), errors(after), before, after, seconds)
 
 
 def _entry(sources: tuple[Source, ...], judged: list[Judged]) -> dict[str, Any]:

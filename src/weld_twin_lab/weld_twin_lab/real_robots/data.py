@@ -9,15 +9,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_msgs_py.tables import read_table
 
 GRID, RANDOM = 'grid.csv', 'random.csv'
 POSES = 'series_c_random_poses.csv'
 SHARE = 0.8
+"""Of the poses of one series, what is fitted on; the rest judges."""
+
+Rows = NDArray[np.intp]
 
 
 class Goal(NamedTuple):
@@ -111,7 +114,7 @@ def ur10_splits(sources: tuple[Source, ...]) -> Iterator[Split]:
     )
 
 
-def part(recording: Recording, rows: Array) -> Recording:
+def part(recording: Recording, rows: Rows) -> Recording:
     """
     Return the measurements of some rows, each at the time of its row.
 
@@ -122,7 +125,7 @@ def part(recording: Recording, rows: Array) -> Recording:
     return recording.with_measured(measured.take(np.sort(rows)))
 
 
-def _shuffled(count: int) -> tuple[Array, Array]:
+def _shuffled(count: int) -> tuple[Rows, Rows]:
     order = np.random.default_rng(0).permutation(count)
     cut = int(SHARE * count)
     return order[:cut], order[cut:]

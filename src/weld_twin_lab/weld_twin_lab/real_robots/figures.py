@@ -33,7 +33,8 @@ def ripple_over_range(diagnosis: Diagnosis) -> str:
     joints = diagnosis.recordings[0].joints
     for axis, effect in zip(axes, found, strict=False):
         q = joints.q[:, diagnosis.model.robot.index(effect.joint)]
-        theta = np.linspace(*np.percentile(q, [1.0, 99.0]), 1500)
+        low, high = np.percentile(q, [1.0, 99.0])
+        theta = np.linspace(low, high, 1500)
         order, size, phase = (
             np.atleast_1d(np.asarray(v)) for v in (effect.order, effect.amplitude, effect.phase)
         )
@@ -61,15 +62,16 @@ def workspace(position: Array, before: Array, after: Array) -> str:
     names = ('frames fitted only', 'with everything found')
     for axis, size, name in zip(axes, sizes, names, strict=False):
         top = float(np.percentile(size, 98.0))
-        dots = axis.scatter(*position[:, :2].T, c=size, s=7, vmin=0.0, vmax=top, cmap='viridis')
+        dots = axis.scatter(
+            position[:, 0], position[:, 1], c=size, s=7, vmin=0.0, vmax=top, cmap='viridis'
+        )
         axis.set(aspect='equal', xlabel='x [m]', ylabel='y [m]')
         axis.set_title(f'{name} [mm]', loc='left', fontsize=9.0)
         figure.colorbar(dots, ax=axis, shrink=0.8)
     top = float(np.percentile(sizes[0], 99.0))
     for size, name, colour in zip(sizes, names, (COLOURS[1], COLOURS[0]), strict=True):
-        axes[2].hist(
-            size, bins=np.linspace(0.0, top, 60), histtype='step', color=colour, label=name
-        )
+        edges = list(np.linspace(0.0, top, 60))
+        axes[2].hist(size, bins=edges, histtype='step', color=colour, label=name)
     axes[2].set(xlabel='error [mm]', ylabel='held-out poses')
     axes[2].legend(frameon=False, fontsize=8.0)
     return svg(figure)

@@ -39,7 +39,7 @@ class Qos:
             ReliabilityPolicy,
         )
 
-        return QoSProfile(  # type: ignore[no-untyped-call]
+        return QoSProfile(
             history=HistoryPolicy.KEEP_LAST,
             depth=self.depth,
             reliability=ReliabilityPolicy[self.reliability.upper()],

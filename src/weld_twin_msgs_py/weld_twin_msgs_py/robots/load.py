@@ -19,13 +19,15 @@ YAML_SUFFIXES = ('.yaml', '.yml')
 URDF_SUFFIXES = ('.urdf', '.xml')
 
 
-def load_robot(spec: str, base_link: str | None = None, tip_link: str | None = None) -> Robot:
+def load_robot(
+    spec: str | Path, base_link: str | None = None, tip_link: str | None = None
+) -> Robot:
     """
     Return a robot.
 
     Parameters
     ----------
-    spec : str
+    spec : str or Path
         Name of a bundled model, or path of a YAML or URDF file.
     base_link, tip_link : str, optional
         Ends of the chain in a URDF; left out, its root and its only leaf (or ``tool0``).
@@ -36,6 +38,7 @@ def load_robot(spec: str, base_link: str | None = None, tip_link: str | None = N
         Neither a bundled name nor a file, or a file that cannot be used.
 
     """
+    spec = str(spec)
     path = Path(spec)
     suffix = path.suffix.lower()
     if suffix == '.xacro':

@@ -20,7 +20,7 @@ def make(robot: Robot) -> Peer:
     chain = kinpy.build_serial_chain_from_urdf(_urdf(robot), 'tool', 'base')
 
     def single(q: Array) -> Array:
-        return chain.forward_kinematics(q).matrix()
+        return np.asarray(chain.forward_kinematics(q).matrix())
 
     def poses(q: Array) -> Array:
         return np.stack([single(one) for one in q])

@@ -48,7 +48,7 @@ def make(robot: Robot) -> Peer:
 
     def single(q: Array) -> Array:
         pin.forwardKinematics(model, data, q)
-        return pin.updateFramePlacement(model, data, tool).homogeneous
+        return np.asarray(pin.updateFramePlacement(model, data, tool).homogeneous)
 
     def poses(q: Array) -> Array:
         out = np.empty((len(q), 4, 4))

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arm import catalog
+from weld_twin_core.arrays import Array
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -131,8 +132,10 @@ def _model(path: Path) -> Any:
 
 def _recording(count: int = 40) -> Recording:
     rng = np.random.default_rng(1)
-    t = np.arange(count) * 0.05
-    q = np.array([0.3, -1.2, 1.4, -1.0, -1.5, 0.2]) + 0.2 * rng.standard_normal((count, ROBOT.n))
+    t = 0.05 * np.arange(count, dtype=np.float64)
+    q: Array = np.array([0.3, -1.2, 1.4, -1.0, -1.5, 0.2]) + 0.2 * rng.standard_normal(
+        (count, ROBOT.n)
+    )
     motion = JointMotion(t, q)
     still = Recording('sample', motion)
     poses = Twin(ROBOT).poses(still, t)

@@ -126,7 +126,8 @@ class Race:
             bufsize=1,
         )
         self._stack.callback(self._pulse.wait)
-        self._stack.callback(self._pulse.stdin.close)  # type: ignore[union-attr]
+        assert self._pulse.stdin is not None
+        self._stack.callback(self._pulse.stdin.close)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -142,7 +143,8 @@ class Race:
         before = cpu_ns(contender.process.pid)
         self._pulse.stdin.write(f'{contender.given} {rate} {count}\n')
         future: Future = Future()
-        threading.Thread(target=lambda: future.set_result(self._pulse.stdout.readline())).start()
+        done = self._pulse.stdout.readline
+        threading.Thread(target=lambda: future.set_result(done())).start()
         while not future.done():
             self._runner.spin_until_future_complete(future, timeout_sec=0.05)
         end = time.monotonic() + SETTLE

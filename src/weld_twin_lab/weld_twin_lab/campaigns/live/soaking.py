@@ -169,7 +169,9 @@ class Soak:
         out: dict[str, Any] = {}
         for name, values in sorted(self._listener.values.items()):
             told = [entry for entry in self._told.get(name, []) if entry[0] != 'ok']
-            row = {key: int(values[key]) for key in ('received', 'refused') if key in values}
+            row: dict[str, int] = {
+                key: int(values[key]) for key in ('received', 'refused') if key in values
+            }
             if name.partition(': ')[2] in COUNTED:
                 row['missing'] = self.sent - row['received']
             out[name] = {

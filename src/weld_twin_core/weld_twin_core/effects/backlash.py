@@ -28,7 +28,7 @@ from ..arm.chain import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
-from . import associative_scan
+from .associative_scan import last_true, play
 from .effect import Effect, MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
@@ -66,9 +66,7 @@ class Backlash(MemoryEffect):
         if self.form == 'reversal':
             flips, state = _reversals(q, state)
             return {('q', i): -self.number('width') * flips}, state
-        output = associative_scan.play(
-            q, self.number('width'), q[..., 0] if state is None else state
-        )
+        output = play(q, self.number('width'), q[..., 0] if state is None else state)
         return {('q', i): self._side * (output - q)}, output[..., -1]
 
     @property
@@ -98,7 +96,7 @@ class Backlash(MemoryEffect):
     def _contact(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return output minus input where a side is touched (else 0), and when it last was."""
         width = self.number('width')
-        lag = associative_scan.play(q, width, q[..., 0]) - q
+        lag = play(q, width, q[..., 0]) - q
         # Whatever is within rounding of a side rests on it; a closed gap always rests on the
         # side opposite to the motion.
         rounding = 4.0 * np.spacing(np.abs(q).max(initial=1.0))
@@ -106,7 +104,7 @@ class Backlash(MemoryEffect):
         is_open = width > 4.0 * rounding
         side = np.where(is_open, lag, -step)
         resting = np.abs(side) >= np.where(is_open, 0.5 * width - rounding, 1e-300)
-        return np.where(resting, side, 0.0), associative_scan.last_true(resting)
+        return np.where(resting, side, 0.0), last_true(resting)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
@@ -130,7 +128,7 @@ def _reversals(q: Array, state: Any) -> tuple[Array, Any]:
     direction = np.sign(np.diff(path, axis=-1))
     # Prefix the direction carried over, so that index 0 always holds a motion or rest.
     direction = np.concatenate([np.asarray(moved)[..., None], direction], axis=-1)
-    last = np.maximum(associative_scan.last_true(direction != 0.0), 0)
+    last = np.maximum(last_true(direction != 0.0), 0)
     held = np.take_along_axis(direction, last, -1)
     flips = (held[..., 1:] * held[..., :-1] < 0.0).astype(np.float64)
     return flips, (q[..., -1], held[..., -1])

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arm.chain import Shift
 from ..arrays import Array
-from . import associative_scan
+from .associative_scan import linear
 from .effect import MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
@@ -49,7 +49,7 @@ class ServoLag(MemoryEffect):
         dt = np.diff(view.t, prepend=t0)
         change = np.diff(q, axis=-1, prepend=np.asarray(q0)[..., None])
         decay, weight = self._coefficients(dt)
-        x = associative_scan.linear(decay, -weight * change, x0)
+        x = linear(decay, -weight * change, x0)
         return {('q', i): x}, (view.t[-1], q[..., -1], x[..., -1])
 
     def gradient(self, view: View) -> list[Shift | None]:
@@ -62,13 +62,11 @@ class ServoLag(MemoryEffect):
         dt = np.diff(view.t, prepend=view.t[0])
         change = np.diff(q, axis=-1, prepend=q[..., :1])
         decay, weight = self._coefficients(dt)
-        x = associative_scan.linear(decay, -weight * change, np.zeros(q.shape[:-1]))
+        x = linear(decay, -weight * change, np.zeros(q.shape[:-1]))
         before = np.concatenate([np.zeros_like(x[..., :1]), x[..., :-1]], axis=-1)
         d_decay = decay * dt / tau**2
         d_weight = np.where(dt > 0.0, weight / tau - decay / tau, 0.0)
-        slope = associative_scan.linear(
-            decay, d_decay * before - d_weight * change, np.zeros(x.shape[:-1])
-        )
+        slope = linear(decay, d_decay * before - d_weight * change, np.zeros(x.shape[:-1]))
         return [{('q', i): slope}]
 
     def push(self, view: View, tangent: Array) -> Array:
@@ -78,7 +76,7 @@ class ServoLag(MemoryEffect):
         dt = np.diff(view.t, prepend=view.t[0])
         change = np.diff(tangent, axis=-1, prepend=tangent[..., :1])
         decay, weight = self._coefficients(dt)
-        x: Array = associative_scan.linear(decay, -weight * change, np.zeros(tangent.shape[:-1]))
+        x: Array = linear(decay, -weight * change, np.zeros(tangent.shape[:-1]))
         return tangent + x
 
     @classmethod

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arm.chain import Shift
 from ..arrays import Array
-from . import associative_scan
+from .associative_scan import linear
 from .effect import Effect, MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
@@ -78,7 +78,7 @@ class Vibration(MemoryEffect):
         dt, kick, (t, last, rate, z0) = self._kicks(view, q, state)
         pole, damped = self._mode()
         decay = np.exp(pole * dt)
-        z = associative_scan.linear(decay, -decay * kick / damped, z0)
+        z = linear(decay, -decay * kick / damped, z0)
         return z, decay, dt, kick, (t, last, rate, z[..., -1])
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
@@ -105,12 +105,7 @@ class Vibration(MemoryEffect):
             (w * (-1.0 - 1j * zeta / root), -zeta / root**2),
         ):
             drive = decay * kick / damped * d_log_damped + dt * d_pole * z
-            out.append(
-                {
-                    ('q', i): gain
-                    * associative_scan.linear(decay, drive, np.zeros(z.shape[:-1])).imag
-                }
-            )
+            out.append({('q', i): gain * linear(decay, drive, np.zeros(z.shape[:-1])).imag})
         return [*out, {('q', i): z.imag}]
 
     def push(self, view: View, tangent: Array) -> Array:
@@ -120,7 +115,7 @@ class Vibration(MemoryEffect):
         dt, kick, _ = self._kicks(view, tangent, None)
         pole, damped = self._mode()
         decay = np.exp(pole * dt)
-        z = associative_scan.linear(decay, -decay * kick / damped, np.zeros(tangent.shape[:-1]))
+        z = linear(decay, -decay * kick / damped, np.zeros(tangent.shape[:-1]))
         pushed: Array = tangent + self.number('gain') * z.imag
         return pushed
 

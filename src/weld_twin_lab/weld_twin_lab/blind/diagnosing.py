@@ -16,12 +16,12 @@ from weld_twin_core import __version__
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
 from weld_twin_nodes.offline.task_pool import Runner, Task
 from weld_twin_nodes.offline.told_twin import build_twin
 from weld_twin_nodes.report.diagnosis_files import diagnosis_text
-from weld_twin_nodes.report.provenance import hashed
 
 from . import layout, seal
 

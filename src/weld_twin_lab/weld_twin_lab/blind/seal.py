@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.report.provenance import hashed
+from weld_twin_msgs_py.files.input_files import hashed
 
 from . import layout
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core import __version__
+from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_text
-from weld_twin_nodes.report import hashed
 from weld_twin_nodes.report.diagnosis_files import diagnosis_text
 from weld_twin_nodes.report.family_table import ripples
 

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
-from weld_twin_msgs_py.bags.typestore import TYPES, decode
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_read import READERS, JointStateDecoder, decoder
 from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder, PoseEncoder, Vector3Encoder
 from weld_twin_msgs_py.messages.to_messages import bag_messages
+from weld_twin_msgs_py.messages.typestore import TYPES, decode
 
 MAKE = bag_messages()
 NS = 1_700_000_000_123_456_789

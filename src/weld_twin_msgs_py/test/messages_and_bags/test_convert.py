@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.bags.typestore import decode
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import bag_messages, ros_messages
+from weld_twin_msgs_py.messages.typestore import decode
 
 NS = 1_700_000_000_987_654_321
 

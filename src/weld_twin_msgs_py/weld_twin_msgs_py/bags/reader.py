@@ -24,8 +24,8 @@ from rosbags.rosbag2 import Reader
 from weld_twin_core.errors import DataError, TwinError
 
 from ..messages.from_messages import NANOSECONDS
+from ..messages.typestore import PROVENANCE_PREFIX, TYPES, decode
 from .storage import PACKED, look
-from .typestore import PROVENANCE_PREFIX, TYPES, decode
 from .unpack import unpack_file, unzstd
 
 CDR_HEADER = 4

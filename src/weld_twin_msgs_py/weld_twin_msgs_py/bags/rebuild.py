@@ -15,6 +15,7 @@ from pathlib import Path
 
 from weld_twin_core.errors import DataError
 
+from ..messages.typestore import TYPES, decode
 from .growing import NOTES, UNFINISHED, lock, unfinished
 from .salvage import Damage, Found
 from .salvage_mcap import salvage_mcap
@@ -22,7 +23,6 @@ from .salvage_sqlite import salvage_sqlite
 from .segment import SUFFIXES, clear_write_errors, sync
 from .segments import Segments
 from .storage import look, storage_files
-from .typestore import TYPES, decode
 from .writer import custom_data
 
 _STORAGE = {'.mcap': ('mcap', salvage_mcap), '.db3': ('sqlite3', salvage_sqlite)}

@@ -11,8 +11,8 @@ from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from ..messages.typestore import TYPES
 from .segment import Channel
-from .typestore import TYPES
 
 Found = tuple[Channel, int, bytes]
 """Channel, time of recording [ns] and serialised message."""

@@ -35,7 +35,7 @@ from weld_twin_core.errors import DataError
 
 from ..messages.topics import BY_NAME, RELIABLE
 from ..messages.topics import Qos as TopicQos
-from .typestore import TYPES
+from ..messages.typestore import TYPES
 
 STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
 SUFFIXES = ('.mcap', '.db3')

@@ -20,8 +20,8 @@ from typing import Any
 from weld_twin_core.errors import DataError
 
 from ..messages.from_messages import stamp_ns
+from ..messages.typestore import PROVENANCE_PREFIX, TYPES
 from .segment import Channel, Segment, check_storage, clear_write_errors
-from .typestore import PROVENANCE_PREFIX, TYPES
 
 
 class BagWriter:

@@ -291,6 +291,6 @@ def ros_messages() -> Messages:
 
 def bag_messages() -> Messages:
     """Return the factory of rosbags messages, the ones a `BagWriter` serialises."""
-    from ..bags.typestore import TYPES
+    from .typestore import TYPES
 
     return Messages(lambda kind: TYPES.types[kind], lambda values: values, lambda level: level)

@@ -22,7 +22,7 @@ def storage(request):
 @pytest.fixture
 def numbered():
     """Return a maker of `write_cdr` arguments: the message of a number, 1 ms after the last."""
-    from weld_twin_msgs_py.bags.typestore import TYPES
+    from weld_twin_msgs_py.messages.typestore import TYPES
 
     make = bag_messages()
 

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BackgroundBag, BagReader, GrowingBag, bag_info
-from weld_twin_msgs_py.bags.typestore import TYPES
+from weld_twin_msgs_py.messages.typestore import TYPES
 
 COUNT = 1200
 

@@ -16,7 +16,8 @@ import pytest
 from matplotlib.image import imread
 
 from weld_twin_core.diagnosis.result import Check, Traces
-from weld_twin_nodes.report import InputFile, report_page
+from weld_twin_msgs_py.files.input_files import InputFile
+from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.seam_view import seam_data
 
 FRAME = '<iframe width="{width}" height="3000" srcdoc="{page}"></iframe>'

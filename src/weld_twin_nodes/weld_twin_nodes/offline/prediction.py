@@ -22,8 +22,8 @@ from weld_twin_msgs_py.files.diagnosis_model import (
     read_model,
     timed,
 )
+from weld_twin_msgs_py.files.input_files import hashed
 
-from ..report.provenance import hashed
 from .told_twin import build_twin
 
 

@@ -3,7 +3,6 @@
 """A diagnosis as people read it: one self-contained page, and a summary for the terminal."""
 
 from .diagnosis_page import report_page
-from .provenance import InputFile, hashed
 from .terminal import print_summary
 
-__all__ = ['InputFile', 'hashed', 'print_summary', 'report_page']
+__all__ = ['print_summary', 'report_page']

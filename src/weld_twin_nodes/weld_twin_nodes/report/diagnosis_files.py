@@ -15,12 +15,12 @@ import numpy as np
 
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
 
 from ..offline.exports import write_all
 from .diagnosis_page import report_page
-from .provenance import InputFile
 
 RESULT = 'diagnosis.json'
 PAGE = 'report.html'

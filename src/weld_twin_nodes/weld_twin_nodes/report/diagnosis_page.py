@@ -10,13 +10,13 @@ from importlib.resources import files
 from typing import Any
 
 from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_msgs_py.files.input_files import InputFile
 
 from .cause_list import causes_section
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
 from .headline import header, opening
 from .html import Html, joined, tag
-from .provenance import InputFile
 from .seam_view import seam_data, seam_section
 from .shrinking import shrink_section
 from .words import STATUS

@@ -9,9 +9,9 @@ from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis.result import Diagnosis, Site
+from weld_twin_msgs_py.files.input_files import InputFile
 
 from .html import Child, Html, joined, section, table, tag
-from .provenance import InputFile
 from .words import in_words
 
 _APART = ('kind', 'motion', 'cost', 'expected_separation_sigma')

@@ -21,8 +21,8 @@ from weld_twin_core.sensitivity import (
 )
 
 from ..offline.task_pool import Runner, Task
-from . import work
 from .setting import RECORDED, Setting, recorded_deviations
+from .work import local, placement, profiles, run_all, sweeps
 
 SCHEMA = 'weld_twin/sensitivity/1'
 OUTPUTS = ('d_norm', 'across_m', 'stickout_m')
@@ -35,7 +35,7 @@ def run_study(setting: Setting, runner: Runner) -> dict[str, Any]:
     designs = {name: _Designs(setting, name) for name in setting.studies}
     pieces = _pieces(setting, runner)
     jobs = {k: v for name, d in designs.items() for k, v in d.jobs(setting.studies[name]).items()}
-    found = work.run_all(runner, jobs)
+    found = run_all(runner, jobs)
     for name, design in designs.items():
         out['motions'][name] = {
             'local': pieces[name, 'local'],
@@ -58,16 +58,16 @@ def _pieces(setting: Setting, runner: Runner) -> dict[tuple[str, str], Any]:
     tasks: dict[tuple[str, str], Task] = {}
     tolerances = setting.tolerances
     for name, study in setting.studies.items():
-        tasks[name, 'local'] = Task(work.local, (study, tolerances), f'{name}: local')
-        tasks[name, 'sweeps'] = Task(work.sweeps, (study, tolerances), f'{name}: sweeps')
+        tasks[name, 'local'] = Task(local, (study, tolerances), f'{name}: local')
+        tasks[name, 'sweeps'] = Task(sweeps, (study, tolerances), f'{name}: sweeps')
     if setting.path is not None:
         seam = setting.robot, setting.path, tolerances
         tasks['', 'placement'] = Task(
-            work.placement,
+            placement,
             (*seam, setting.torch, setting.effort.placements, setting.effort.seed),
             'placement',
         )
-        tasks['', 'profiles'] = Task(work.profiles, seam, 'profiles')
+        tasks['', 'profiles'] = Task(profiles, seam, 'profiles')
     return dict(zip(tasks, runner.run(list(tasks.values())), strict=True))
 
 

@@ -19,8 +19,7 @@ from ..options import add_robot, add_topics, robot_of, topics_of
 if TYPE_CHECKING:
     from weld_twin_core.diagnosis import Diagnosis
     from weld_twin_core.recording import Recording
-
-    from ...report import InputFile
+    from weld_twin_msgs_py.files.input_files import InputFile
 
 MEASUREMENTS = 40_000
 """Diagnosed together; eleven minutes at 60 Hz."""
@@ -150,7 +149,7 @@ def _families(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _inputs(args: argparse.Namespace) -> list[InputFile]:
-    from ...report import hashed
+    from weld_twin_msgs_py.files.input_files import hashed
 
     out = [hashed('recording', path) for path in args.bags]
     out += [hashed('held out', path) for path in args.holdout]

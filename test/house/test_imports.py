@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Imports point one way: between packages, between the rooms of a package, between files."""
+
+from pathlib import Path
+
+import pytest
+from import_graph import (
+    ROOT,
+    against_order,
+    circles,
+    grouped,
+    import_graph,
+    layer_table,
+    module_files,
+)
+
+LAYERS = layer_table((ROOT / 'docs/architecture.md').read_text(encoding='utf-8'))
+PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes', 'weld_twin_lab']
+FILES = module_files(ROOT / 'src')
+GRAPH = import_graph(FILES)
+
+UPWARD = {'weld_twin_core': {'weld_twin_core.arm -> weld_twin_core.kernels'}}
+CIRCLES = [
+    ['weld_twin_core.arm.chain', 'weld_twin_core.kernels.bulk', 'weld_twin_core.kernels.regions'],
+    [
+        'weld_twin_core.sensitivity.claims',
+        'weld_twin_core.sensitivity.claims.claim_case',
+        'weld_twin_core.sensitivity.claims.combined_measures',
+        'weld_twin_core.sensitivity.claims.geometric_measures',
+        'weld_twin_core.sensitivity.claims.motion_measures',
+    ],
+    ['weld_twin_core.sensitivity.claims.judgement', 'weld_twin_core.sensitivity.claims.rules'],
+    ['weld_twin_core.twin.stepping', 'weld_twin_core.twin.twin'],
+]
+"""What is still to be mended; nothing may join these, and what is mended leaves them."""
+
+
+def tree(folder: Path, sources: dict[str, str]) -> dict[str, Path]:
+    """Write sources by their paths in a folder of packages; return the files of the modules."""
+    for path, source in sources.items():
+        file = folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(source)
+    return module_files(folder)
+
+
+def test_the_graph_finds_imports_wherever_they_stand(tmp_path):
+    files = tree(
+        tmp_path,
+        {
+            'p/p/__init__.py': '',
+            'p/p/top.py': 'from . import low\nimport p.room.deep as deep\n',
+            'p/p/low.py': 'def f():\n    from .room.deep import thing\n',
+            'p/p/types.py': (
+                'from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from .top import T\n'
+            ),
+            'p/p/room/__init__.py': 'from .deep import thing\n',
+            'p/p/room/deep.py': 'from .. import low\nimport numpy\n',
+        },
+    )
+    graph = import_graph(files)
+    assert graph['p.top'] == {'p', 'p.low', 'p.room.deep'}
+    assert graph['p.low'] == {'p.room.deep'}
+    assert graph['p.types'] == {'p.top'}
+    assert graph['p.room'] == {'p.room.deep'}
+    assert circles(graph) == [{'p.low', 'p.room.deep'}]
+    assert circles(grouped(graph, 2)) == [{'p.low', 'p.room'}]
+    assert against_order(grouped(graph, 2), ['p.room', 'p.low', 'p.top']) == ['p.room -> p.low']
+
+
+def test_packages_point_one_way():
+    assert list(LAYERS) == PACKAGES
+    packages = grouped(GRAPH, 1)
+    assert sorted(packages) == sorted(PACKAGES)
+    assert against_order(packages, PACKAGES) == []
+
+
+def test_the_plant_knows_no_other_room():
+    outward = {
+        f'{module} -> {other}'
+        for module, others in GRAPH.items()
+        for other in others
+        if module.startswith('weld_twin_lab.plant') and not other.startswith('weld_twin_lab.plant')
+    }
+    assert outward == set()
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_every_room_has_its_layer_in_the_architecture_page(package):
+    rooms = {name.split('.')[1] for name in FILES if name.startswith(f'{package}.')}
+    assert rooms - {'__main__'} == set(LAYERS[package]), (
+        'docs/architecture.md tells the rooms of each package, the lowest first'
+    )
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_rooms_point_to_rooms_below_them(package):
+    order = [f'{package}.{room}' for room in LAYERS[package]]
+    assert set(against_order(grouped(GRAPH, 2), order)) == UPWARD.get(package, set())
+
+
+def test_no_files_import_each_other_in_a_circle():
+    assert [sorted(group) for group in circles(GRAPH)] == CIRCLES

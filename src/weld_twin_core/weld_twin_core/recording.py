@@ -27,10 +27,26 @@ class JointMotion:
     t : array, shape (N,) [s]
         Stamps on the joint clock, strictly increasing, counted from the recording's epoch.
     q : array, shape (N, n) [rad or m]
+        Joint positions, as commanded or as the controller read them.
     qd : array, shape (N, n) [rad/s or m/s], optional
         Velocity where the controller gives it.
     static : bool
         Each row is a station at rest, visited in order; nothing is known of the motion between.
+
+    Raises
+    ------
+    DataError
+        No samples, shapes that do not fit, values that are not finite, or stamps out of order.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> motion = wt.JointMotion(t, np.stack([np.sin(t), 0.0 * t], axis=1))
+    >>> q, qd = motion.at(np.array([0.55]))
+    >>> print(q.round(4), 'rad,', qd.round(3), 'rad/s')
+    [[0.5227 0.    ]] rad, [[0.853 0.   ]] rad/s
 
     """
 
@@ -65,7 +81,14 @@ class JointMotion:
         return readonly(rates, self.q.shape, 'joint velocities')
 
     def nearest(self, t: Array) -> np.ndarray:
-        """Return the sample nearest in time to each of other times, shape t.shape."""
+        """
+        Return the index of the sample nearest in time, an integer array of shape t.shape.
+
+        Parameters
+        ----------
+        t : array, any shape [s]
+
+        """
         after = np.clip(np.searchsorted(self.t, t), 0, self.t.size - 1)
         before = np.maximum(after - 1, 0)
         return np.where(np.abs(t - self.t[before]) <= np.abs(self.t[after] - t), before, after)
@@ -77,6 +100,11 @@ class JointMotion:
         Cubic Hermite between samples: a planned motion is smooth, and at 125 Hz a straight line
         between samples would be wrong by more than a laser tracker's noise. Times outside the
         stream take its first or last position at rest.
+
+        Parameters
+        ----------
+        t : array, any shape [s]
+
         """
         if self.static or self.t.size < 2:
             index = self.nearest(np.asarray(t))
@@ -97,8 +125,22 @@ class Measurements:
         Stamps on the measurement clock, same epoch as the joint stream.
     position : array, shape (M, 3) [m]
     rotation : array, shape (M, 3, 3), optional
+        ``R_world_tool``; left out, points were measured.
     sigma : array, shape (M,) [m], optional
         Standard deviation of each position, where the instrument gives it.
+
+    Raises
+    ------
+    DataError
+        Shapes that do not fit, values that are not finite, stamps out of order, or a negative
+        sigma.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> measured = wt.Measurements([0.0, 0.1], [[0.8, 0.0, 0.4], [0.8, 0.1, 0.4]])
+    >>> measured.position.shape, measured.rotation is None
+    ((2, 3), True)
 
     """
 
@@ -124,7 +166,14 @@ class Measurements:
             object.__setattr__(self, 'sigma', sigma)
 
     def take(self, index: Array) -> Measurements:
-        """Return the measurements of an index or mask."""
+        """
+        Return some of the measurements.
+
+        Parameters
+        ----------
+        index : array of int, or of bool with shape (M,)
+
+        """
         return Measurements(
             self.t[index],
             self.position[index],
@@ -135,7 +184,29 @@ class Measurements:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """A sampled side signal: stamps, shape (K,) [s], and values, shape (K,) or (K, 6)."""
+    """
+    A sampled side signal, such as a temperature or the wrench on the tool.
+
+    Attributes
+    ----------
+    t : array, shape (K,) [s]
+        Stamps on the joint clock, strictly increasing.
+    value : array, shape (K,) or (K, 6)
+        Temperatures [degC], or force and torque [N, N m].
+
+    Raises
+    ------
+    DataError
+        No samples, shapes that do not fit, values that are not finite, or stamps out of order.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> warming = wt.Signal([0.0, 600.0], [20.0, 26.0])
+    >>> print(warming.at(300.0), 'degC')
+    23.0 degC
+
+    """
 
     t: Array
     value: Array
@@ -149,7 +220,14 @@ class Signal:
         object.__setattr__(self, 'value', readonly(self.value, shape, 'signal values'))
 
     def at(self, t: Array) -> Array:
-        """Return the signal at other times by straight lines, held at the ends."""
+        """
+        Return the signal at other times by straight lines, held at the ends.
+
+        Parameters
+        ----------
+        t : array, any shape [s]
+
+        """
         if self.value.ndim == 1:
             return np.interp(t, self.t, self.value)
         columns = [np.interp(t, self.t, column) for column in self.value.T]
@@ -172,7 +250,24 @@ class Recording:
         'tool', or 'base' for a wrench given in the base frame.
     temperature : Signal, value shape (K,) [degC], optional
     epoch_ns : int
-        What the stamps count from.
+        What the stamps count from, [ns] since 1970.
+    notes : tuple of str
+        What a reader should know of it, in sentences.
+
+    Raises
+    ------
+    DataError
+        A signal of the wrong shape, or an unknown wrench frame.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> commanded = wt.Recording('day 1', wt.JointMotion(t, np.zeros((11, 6))))
+    >>> tracker = wt.Measurements(t, np.zeros((11, 3)))
+    >>> commanded.with_measured(tracker).measured.t.size
+    11
 
     """
 
@@ -207,7 +302,14 @@ class Recording:
         return first, last
 
     def with_measured(self, measured: Measurements | None) -> Recording:
-        """Return the recording with other measurements beside the same motion."""
+        """
+        Return the recording with other measurements beside the same motion.
+
+        Parameters
+        ----------
+        measured : Measurements, or None for no measurements
+
+        """
         return replace(self, measured=measured)
 
     def thinned(self, measurements: int, joints: int) -> Recording:
@@ -217,6 +319,12 @@ class Recording:
         Both are taken evenly over the whole recording, each with a note: play, warm-up and drift
         depend on all that went before, so no stretch is left out. Joint velocity is that of the
         full stream. Stations stay whole.
+
+        Parameters
+        ----------
+        measurements, joints : int
+            How many samples of each are kept at most.
+
         """
         if self.joints.static:
             return self

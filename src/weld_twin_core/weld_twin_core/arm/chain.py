@@ -17,8 +17,10 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Array
+from ..errors import DataError
 from .robot import Robot
 from .rotation import left_jacobian, rotation_matrix, transform
 from .vectors import components, cross, pad, samples_first
@@ -180,12 +182,46 @@ def displaced_robot(robot: Robot, shift: Mapping[Channel, float]) -> Robot:
     return replace(robot, **rows, T_world_base=transform(*base), T_flange_tool=transform(*tool))
 
 
-def forward(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
+def positions(robot: Robot, q: ArrayLike) -> Array:
+    """Return joint positions as an array whose last axis has one entry per joint."""
+    array: Array = np.asarray(q, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != robot.n:
+        raise DataError(
+            f'robot {robot.name!r} has {robot.n} joints; joint positions must have shape '
+            f'(..., {robot.n}), got {array.shape}'
+        )
+    return array
+
+
+def forward(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
     """
     Return tool poses ``T_world_tool``, shape (..., 4, 4) [m].
 
     The product of the paper's eq. for T_i^{i-1} over the rows, between base and tool frame.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : array_like, shape (..., n) [rad or m]
+        Joint positions; leading axes are draws and samples.
+    shift : mapping of channel to array, optional
+        Displaced channels; each value broadcasts with ``q[..., 0]``.
+
+    Raises
+    ------
+    DataError
+        The last axis of ``q`` does not have one position for every joint.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> pose = wt.forward(wt.load('ur5'), [0.0, -np.pi / 2, 0.0, 0.0, 0.0, 0.0])
+    >>> print(pose[:3, 3].round(4), 'm')
+    [-0.0947 -0.1914  0.9064] m
+
     """
+    q = positions(robot, q)
     if q.size >= MANY * robot.n and robot.n <= MOST_JOINTS and not shift:
         from ..kernels.bulk import kernel_of
 
@@ -200,6 +236,16 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
 
     Screw columns as in Everett, Driels and Mooring (1987); 'base' and 'tool' turns use the left
     Jacobian of the rotation vector, so the derivative is exact at any displacement.
+
+    Parameters
+    ----------
+    robot : Robot
+    chain : Frames
+        The chain at the samples; see `frames`.
+    channel : tuple of str and int
+        Name and index of one channel, such as ``('q', 2)`` or ``('tool', 5)``.
+    shift : mapping, optional
+        The displacement that ``chain`` was made with.
 
     Raises
     ------
@@ -266,9 +312,36 @@ def _frame_column(robot: Robot, chain: Frames, name: str, i: int, shift: Shift) 
     return out
 
 
-def jacobian(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
-    """Return the geometric Jacobian at the tool, shape (..., 6, n), linear part first."""
-    chain = frames(robot, q, shift)
+def jacobian(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
+    """
+    Return the geometric Jacobian at the tool, shape (..., 6, n), linear part first.
+
+    Its columns are in the world frame: m (or 1) and rad per unit of joint position.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : array_like, shape (..., n) [rad or m]
+    shift : mapping of channel to array, optional
+        Displaced channels; each value broadcasts with ``q[..., 0]``.
+
+    Raises
+    ------
+    DataError
+        The last axis of ``q`` does not have one position for every joint.
+
+    Examples
+    --------
+    A turn of the first joint moves the tool of a stretched arm sideways.
+
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> jacobian = wt.jacobian(wt.load('ur5'), np.zeros(6))
+    >>> print(jacobian[:3, 0].round(3), 'm/rad')
+    [ 0.191 -0.817  0.   ] m/rad
+
+    """
+    chain = frames(robot, positions(robot, q), shift)
     columns = [column(robot, chain, ('q', i), shift) for i in range(robot.n)]
     return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), (0, 1), (-2, -1))
 
@@ -285,6 +358,14 @@ def identification_jacobian(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> 
     Return d(pose) / d(every geometric channel), shape (..., 6, 12 + 5 n).
 
     Columns follow `identification_channels`.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : array, shape (..., n) [rad or m]
+    shift : mapping of channel to array, optional
+        Displaced channels; each value broadcasts with ``q[..., 0]``.
+
     """
     chain = frames(robot, q, shift)
     columns = [column(robot, chain, key, shift) for key in identification_channels(robot)]

@@ -8,9 +8,10 @@ joint, the negative of what the motor must hold.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Array
-from .chain import NO_SHIFT, Frames, Shift, frames
+from .chain import NO_SHIFT, Frames, Shift, frames, positions
 from .robot import Robot
 from .vectors import components, cross, dot, pad
 
@@ -41,7 +42,19 @@ def gravity_direction(robot: Robot, chain: Frames) -> Array:
 
 
 def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array) -> Array:
-    """Return load torques, shape (n, ...) [N m], of a mass at ``com`` (..., 3) of the tool."""
+    """
+    Return load torques, shape (n, ...) [N m], of a mass carried by the tool.
+
+    Parameters
+    ----------
+    robot : Robot
+    chain : Frames
+        The chain at the samples.
+    mass : float, or array broadcasting with the samples [kg]
+    com : array, shape (..., 3) [m]
+        Centre of the mass in the tool frame.
+
+    """
     centre = chain.position + (chain.rotation @ np.asarray(com)[..., None])[..., 0]
     weight = mass * pad(gravity_direction(robot, chain), np.ndim(mass))
     return point_force_torque(robot, chain, components(centre), weight)
@@ -49,10 +62,18 @@ def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array)
 
 def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool') -> Array:
     """
-    Return load torques, shape (n, ...) [N m], of a wrench (..., 6) on the tool: J^T w.
+    Return load torques, shape (n, ...) [N m], of a wrench on the tool: J^T w.
 
-    ``frame`` says where force and torque are expressed: 'tool' or 'base'; both act at the tool
-    centre point.
+    Parameters
+    ----------
+    robot : Robot
+    chain : Frames
+        The chain at the samples.
+    wrench : array, shape (..., 6) [N, N m]
+        Force and torque; both act at the tool centre point.
+    frame : str
+        Where they are expressed: 'tool' or 'base'.
+
     """
     rotation = chain.rotation if frame == 'tool' else chain.base_rotation
     force = components((rotation @ wrench[..., :3, None])[..., 0])
@@ -65,12 +86,35 @@ def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool
     return torque
 
 
-def gravity_torque(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
+def gravity_torque(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
     """
     Return load torques, shape (..., n) [N m], of the links and the robot's own payload.
 
     The negative of the generalised gravity of a rigid chain (Siciliano et al. 2009, eq. 7.39).
+
+    Parameters
+    ----------
+    robot : Robot
+        Links without masses weigh nothing.
+    q : array_like, shape (..., n) [rad or m]
+    shift : mapping of channel to array, optional
+        Displaced channels; each value broadcasts with ``q[..., 0]``.
+
+    Raises
+    ------
+    DataError
+        The last axis of ``q`` does not have one position for every joint.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> torque = wt.gravity_torque(wt.load('ur5'), np.zeros(6))
+    >>> print(torque[:3].round(1), 'N m')
+    [ 0.  53.8 15.6] N m
+
     """
+    q = positions(robot, q)
     return np.moveaxis(chain_gravity_torque(robot, frames(robot, q, shift)), 0, -1)
 
 
@@ -99,7 +143,20 @@ def chain_gravity_torque(robot: Robot, chain: Frames) -> Array:
 
 
 def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
-    """Return a point (3,) of link i's DH frame in the world, components first (3, ...)."""
+    """
+    Return a point of a link in the world frame, components first, shape (3, ...) [m].
+
+    Parameters
+    ----------
+    robot : Robot
+    chain : Frames
+        The chain at the samples.
+    i : int
+        Which link, counted from 0; its DH frame is at its far end.
+    point : array, shape (3,) [m]
+        In that DH frame.
+
+    """
     if i + 1 == robot.n:
         return components(chain.flange_point + chain.flange_rotation @ point)
     # The frame at the end of row i is where row i + 1 starts.

@@ -64,10 +64,27 @@ class Robot:
         Link masses and centres in the DH frame at the end of each link.
     payload_mass : float [kg]; payload_com : array, shape (3,) [m], in the tool frame
     gravity : array, shape (3,) [m/s^2], in the base frame
+    source : str
+        Where the numbers come from.
+
+    Raises
+    ------
+    ModelError
+        No joints, a name used twice, an unknown convention, limits the wrong way round.
+    DataError
+        An array has the wrong shape or a value that is not finite.
 
     References
     ----------
     .. [1] S. Hayati, "Robot arm geometric link parameter estimation", IEEE CDC 1983.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> rows = [{'name': 'j1', 'a': 0.4, 'd': 0.3}, {'name': 'j2', 'a': 0.3}]
+    >>> robot = wt.Robot.from_mapping({'name': 'scara', 'joints': rows})
+    >>> robot.n, robot.joint_names, robot.a.tolist()
+    (2, ('j1', 'j2'), [0.4, 0.3])
 
     """
 
@@ -138,7 +155,11 @@ class Robot:
 
     def index(self, joint: str) -> int:
         """
-        Return the position of a joint in the chain.
+        Return the position of a joint in the chain, counted from 0.
+
+        Parameters
+        ----------
+        joint : str
 
         Raises
         ------
@@ -155,7 +176,17 @@ class Robot:
             ) from None
 
     def with_frames(self, *, base: Array | None = None, tool: Array | None = None) -> Robot:
-        """Return the same arm with another base or tool frame, each shape (4, 4)."""
+        """
+        Return the same arm with another base or tool frame.
+
+        Parameters
+        ----------
+        base : array, shape (4, 4) [m], optional
+            ``T_world_base``; left out, it stays.
+        tool : array, shape (4, 4) [m], optional
+            ``T_flange_tool``; left out, it stays.
+
+        """
         return replace(
             self,
             T_world_base=self.T_world_base if base is None else base,
@@ -165,6 +196,10 @@ class Robot:
     def check_positions(self, q: Array) -> None:
         """
         Refuse joint positions that look like degrees or lie outside the limits.
+
+        Parameters
+        ----------
+        q : array, shape (..., n) [rad or m]
 
         Raises
         ------
@@ -191,6 +226,11 @@ class Robot:
     def from_mapping(cls, data: Mapping[str, Any]) -> Robot:
         """
         Build a robot from the mapping a robot file holds.
+
+        Parameters
+        ----------
+        data : mapping
+            The keys of a robot file; only ``joints`` is required, each with a ``name``.
 
         Raises
         ------
@@ -222,6 +262,7 @@ class Robot:
     @classmethod
     def _from_rows(cls, name: str, rows: Sequence[Any], data: Mapping[str, Any]) -> Robot:
         def column(key: str, default: Any = 0.0, rows: Sequence[Any] = rows) -> Any:
+            """Return one key of every row, or its default."""
             return [row.get(key, default) for row in rows]
 
         links = data.get('links')

@@ -3,6 +3,14 @@
 """
 Rotations: vectors, matrices and quaternions (x y z w), batched over leading axes.
 
+Examples
+--------
+>>> import numpy as np
+>>> import weld_twin_core as wt
+>>> quarter = wt.rotation.rotation_matrix([0.0, 0.0, np.pi / 2])
+>>> print(quarter.round(3) @ [1.0, 0.0, 0.0])
+[0. 1. 0.]
+
 References
 ----------
 .. [1] J. Sola, J. Deray, D. Atchuthan, "A micro Lie theory for state estimation in robotics",

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from ..arm.robot import Robot
 from ..effects.effect import Effect
@@ -27,27 +27,28 @@ Progress = Callable[[str], None]
 
 
 def diagnose(
-    recordings: Sequence[Recording],
+    recordings: Recording | Sequence[Recording],
     robot: Robot,
     *,
-    align: frozenset[str] = frozenset(),
+    align: str | Iterable[str] = (),
     known: Sequence[Effect] = (),
     exclude: Sequence[str] = (),
     holdout: Sequence[Recording] = (),
     progress: Progress = lambda text: None,
 ) -> Diagnosis:
     """
-    Diagnose the gap between a robot and recordings of the real cell.
+    Say where the gap between a robot's model and the real cell lies, and what causes it.
 
     Parameters
     ----------
-    recordings : sequence of Recording
+    recordings : Recording, or sequence of Recording
         Joint streams with measured poses or points; each has its own base frame when ``align``
         names 'base'.
     robot : Robot
         The nominal model.
-    align : frozenset of str
-        Frames fitted as nuisance in every hypothesis: 'base', 'tool'.
+    align : str or iterable of str
+        Frames that are not known, fitted along in every hypothesis: 'base', 'tool',
+        'base,tool', or the names in a list or a set.
     known : sequence of Effect
         Put into the twin first; what remains is diagnosed.
     exclude : sequence of str
@@ -55,12 +56,37 @@ def diagnose(
     holdout : sequence of Recording
         Never fitted; judge the shrink. Left out, stretches of the recordings take their turn.
     progress : callable
-        Told what has been done.
+        Told in a few words what has been done.
+
+    Returns
+    -------
+    Diagnosis
+        ``status`` is 'identified', 'ambiguous', 'unknown' or 'none'; ``effects`` holds what was
+        found, with standard errors; ``traces`` holds the residuals as arrays.
 
     Raises
     ------
     DataError
         The data cannot be diagnosed; the message says what to mend.
+    ModelError
+        ``align`` names something else than base and tool.
+
+    Examples
+    --------
+    A UR5 with 0.5 mrad of play in its elbow, measured with 20 um of noise, is diagnosed.
+
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('ur5')
+    >>> plan = wt.plan(robot, wt.default_seam(robot, 'spline'), 'aggressive', rate_hz=50.0)
+    >>> commanded = wt.Recording('seam', plan.motion)
+    >>> play = wt.effects.Backlash('elbow_joint', width=5e-4)
+    >>> real = wt.Twin(robot, [play]).poses(commanded)
+    >>> noise = np.random.default_rng(7).normal(scale=2e-5, size=real.position.shape)
+    >>> measured = wt.Measurements(plan.motion.t, real.position + noise)
+    >>> found = wt.diagnose(commanded.with_measured(measured), robot)
+    >>> print(found.status, found.effects[0].effect.name, found.effects[0].effect.joint)
+    identified backlash elbow_joint
 
     """
     problem, start = aligned(recordings, robot, align, known)

@@ -169,7 +169,51 @@ class Traces:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The whole answer."""
+    """
+    The whole answer of `diagnose`.
+
+    Attributes
+    ----------
+    gap : Gap
+        Measured against the twin, before any effect that was found [m, rad].
+    where : Where
+        On which joints, in which regimes, where on the path and in which direction it lies.
+    status : str
+        'identified', 'ambiguous', 'unknown' or 'none'.
+    effects : tuple of Found
+        The effects named, with standard errors, those that move the tool most first.
+    confidence : float
+        Probability that the set of effects named is right.
+    indistinguishable : tuple of tuple of Site
+        One group per effect: what these data cannot tell apart.
+    reasons : tuple of str
+        Why the status is what it is, in sentences.
+    candidates : tuple of Candidate
+        Hypotheses with their probabilities.
+    shrink : Shrink
+        The gap before and after on data not used for fitting.
+    unexplained : Unexplained
+        What remains, and what it depends on.
+    next_experiment : dict, optional
+        What to measure so that the remaining alternatives part.
+    actions : tuple of str
+        What to do about every effect found.
+    checks : tuple of Check
+        Whether the data are sound.
+    model : Model
+        The fitted frames and effects.
+    traces : Traces
+        Residuals before and after, as arrays.
+
+    Examples
+    --------
+    `diagnose` makes it; its example shows how.
+
+    >>> import weld_twin_core as wt
+    >>> 'status' in wt.Diagnosis.__dataclass_fields__
+    True
+
+    """
 
     gap: Gap
     where: Where

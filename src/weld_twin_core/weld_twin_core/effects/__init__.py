@@ -4,70 +4,78 @@
 The vocabulary of effects: one physical cause per file, one definition for every use.
 
 Importing this package registers the bundled effects; user code adds its own with `register`.
+Every effect is a frozen dataclass. Its fields are the parameters that the page of effects lists,
+in SI units; effects of a joint or a link take the name of the joint first.
+
+Examples
+--------
+>>> import weld_twin_core as wt
+>>> play = wt.effects.Backlash('elbow_joint', width=5e-4)
+>>> play.to_mapping()
+{'effect': 'backlash', 'joint': 'elbow_joint', 'width': 0.0005}
+
 """
 
-from . import (
-    axis_parallelism,
-    backlash,
-    base_pose,
-    cartesian_compliance,
-    drift,
-    gear_ratio,
-    joint_compliance,
-    joint_coupling,
-    joint_offset,
-    link_length,
-    link_offset,
-    link_twist,
-    measurement_noise,
-    measurement_scale,
-    payload,
-    quantization,
-    servo_lag,
-    setup_settling,
-    setup_step,
-    thermal_growth,
-    time_delay,
-    tool_pose,
-    transmission_ripple,
-    vibration,
-)
+from .axis_parallelism import AxisParallelism
+from .backlash import Backlash
+from .base_pose import BasePose
+from .cartesian_compliance import CartesianCompliance
+from .drift import Drift
 from .effect import Effect, MemoryEffect
+from .gear_ratio import GearRatio
+from .joint_compliance import JointCompliance
+from .joint_coupling import JointCoupling
+from .joint_offset import JointOffset
+from .link_length import LinkLength
+from .link_offset import LinkOffset
+from .link_twist import LinkTwist
+from .measurement_noise import MeasurementNoise
+from .measurement_scale import MeasurementScale
+from .payload import Payload
+from .quantization import Quantization
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
+from .servo_lag import ServoLag
+from .setup_settling import SetupSettling
+from .setup_step import SetupStep
+from .thermal_growth import ThermalGrowth
+from .time_delay import TimeDelay
+from .tool_pose import ToolPose
+from .transmission_ripple import TransmissionRipple
+from .vibration import Vibration
 from .view import Parameter, Stage, View
 
 __all__ = [
     'REGISTRY',
+    'AxisParallelism',
+    'Backlash',
+    'BasePose',
+    'CartesianCompliance',
+    'Drift',
     'Effect',
+    'GearRatio',
+    'JointCompliance',
+    'JointCoupling',
+    'JointOffset',
+    'LinkLength',
+    'LinkOffset',
+    'LinkTwist',
+    'MeasurementNoise',
+    'MeasurementScale',
     'MemoryEffect',
     'Parameter',
+    'Payload',
+    'Quantization',
+    'ServoLag',
+    'SetupSettling',
+    'SetupStep',
     'Stage',
+    'ThermalGrowth',
+    'TimeDelay',
+    'ToolPose',
+    'TransmissionRipple',
+    'Vibration',
     'View',
-    'axis_parallelism',
-    'backlash',
-    'base_pose',
-    'cartesian_compliance',
-    'drift',
     'effect_from_mapping',
     'effects_from_list',
-    'gear_ratio',
-    'joint_compliance',
-    'joint_coupling',
-    'joint_offset',
-    'link_length',
-    'link_offset',
-    'link_twist',
-    'measurement_noise',
-    'measurement_scale',
-    'payload',
-    'quantization',
     'register',
-    'servo_lag',
-    'setup_settling',
-    'setup_step',
-    'thermal_growth',
-    'time_delay',
-    'tool_pose',
-    'transmission_ripple',
-    'vibration',
 ]

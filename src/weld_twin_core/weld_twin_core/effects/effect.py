@@ -37,6 +37,30 @@ class Effect(Parametric, ABC):
 
     Parameters may carry a leading axis of draws, shape (D,) or (D, size); displacements then
     have shape (D, N).
+
+    Examples
+    --------
+    A column that leans with the square of the reach:
+
+    >>> from dataclasses import dataclass
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> @dataclass(frozen=True, eq=False)
+    ... class ColumnBend(wt.Effect):
+    ...     bend: object = 0.0
+    ...     name, of, stage = 'column_bend', 'robot', wt.Stage.LINK
+    ...     parameters = (wt.Parameter('bend', 'rad/m^2', typical=1e-3),)
+    ...
+    ...     def displace(self, view):
+    ...         reach = view.frames.position[..., :2]
+    ...         return {('base', 4): self.number('bend') * (reach**2).sum(axis=-1)}
+    >>> still = wt.Recording('still', wt.JointMotion([0.0], np.zeros((1, 6))))
+    >>> nominal, bent = (
+    ...     wt.Twin(wt.load('ur5'), effects).poses(still) for effects in ([], [ColumnBend(1e-3)])
+    ... )
+    >>> print(((bent.position - nominal.position)[0] * 1e3).round(3), 'mm')
+    [-0.004  0.     0.576] mm
+
     """
 
     of: ClassVar[str]
@@ -170,6 +194,15 @@ class MemoryEffect(Effect):
 
     `run` is the whole definition: the batch form runs it over all samples, the live form over
     one sample at a time with the state it returned. `displace` is `run` from rest.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> issubclass(wt.effects.Backlash, wt.MemoryEffect)
+    True
+    >>> issubclass(wt.effects.JointOffset, wt.MemoryEffect)
+    False
+
     """
 
     @abstractmethod

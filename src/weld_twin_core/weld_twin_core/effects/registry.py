@@ -23,10 +23,25 @@ def register(effect: type[E]) -> type[E]:
     """
     Make an effect known by its name, from this package or from user code.
 
+    Parameters
+    ----------
+    effect : subclass of Effect
+        A frozen dataclass; its ``name`` is how effects files call it.
+
+    Returns
+    -------
+    The same class, so that this may be used as a decorator.
+
     Raises
     ------
     ModelError
         Another effect has that name, or the class does not keep the contract of its stage.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> wt.register(wt.effects.Backlash) is wt.effects.Backlash
+    True
 
     """
     known = REGISTRY.get(effect.name)
@@ -53,10 +68,22 @@ def effect_from_mapping(entry: Mapping[str, Any]) -> Effect:
     """
     Build an effect from an entry of an effects file.
 
+    Parameters
+    ----------
+    entry : mapping
+        The key ``effect`` names it; the others are its fields, in SI units.
+
     Raises
     ------
     ModelError
         Unknown effect or parameter, or a value that is not a number.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> entry = {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4}
+    >>> wt.effect_from_mapping(entry).width
+    0.0005
 
     """
     if not isinstance(entry, Mapping) or 'effect' not in entry:
@@ -88,10 +115,22 @@ def effects_from_list(entries: Any, robot: Robot) -> tuple[Effect, ...]:
     """
     Build and check the effects of a file against a robot.
 
+    Parameters
+    ----------
+    entries : sequence of mapping, or None for none
+    robot : Robot
+
     Raises
     ------
     ModelError
         Not a list, or an entry that cannot be used; the message names the entry.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> entries = [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3}]
+    >>> len(wt.effects_from_list(entries, wt.load('ur5')))
+    1
 
     """
     if entries is None:

@@ -25,6 +25,13 @@ class Stage(IntEnum):
 
     SERVO and PLAY have memory and run one after the other on the joint stream's own stamps.
     CLOCK picks the instant a measurement belongs to. The others are functions of that instant.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> wt.Stage.PLAY < wt.Stage.JOINT
+    True
+
     """
 
     SERVO = 0
@@ -46,6 +53,7 @@ class Parameter:
     Attributes
     ----------
     name, unit : str
+        The unit in SI, as people read it.
     size : int
         Number of components; 0 means a number or a list of any length.
     typical : float
@@ -59,6 +67,14 @@ class Parameter:
     idealised : float
         Share by which an arm's own value differs from the one that fits best, because springs
         harden and modes couple where the formula is ideal.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> wt.effects.Backlash.parameters[0].unit
+    'rad'
+    >>> wt.Parameter('bend', 'rad/m^2', typical=1e-3).size
+    1
 
     """
 
@@ -93,6 +109,15 @@ class View:
     shift : mapping
         Channels displaced by the stages before.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> t, q = np.zeros(1), np.zeros((1, 6))
+    >>> view = wt.View(wt.load('ur5'), t, t, q, q)
+    >>> wt.effects.JointOffset('elbow_joint', offset=1e-3).displace(view)
+    {('q', 2): array([0.001])}
+
     """
 
     robot: Robot
@@ -116,7 +141,16 @@ class View:
         return self.q[..., index]
 
     def displaced(self, more: Shift, *, keep_frames: bool = False) -> View:
-        """Return the view with more displacement; ``keep_frames`` where it moves no frame."""
+        """
+        Return the view with more displacement.
+
+        Parameters
+        ----------
+        more : mapping of channel to array
+        keep_frames : bool
+            The displacement moves no frame, so frames already worked out stay as they are.
+
+        """
         total = dict(self.shift)
         for key, value in more.items():
             total[key] = total[key] + value if key in total else value
@@ -127,6 +161,16 @@ class View:
 
 
 def single(channel: Channel, value: Array | float, view: View) -> Shift:
-    """Return a shift of one channel, broadcast over the samples of a view."""
+    """
+    Return a shift of one channel, the same at every sample of a view.
+
+    Parameters
+    ----------
+    channel : tuple of str and int
+        Such as ``('q', 2)`` for the third joint.
+    value : float, or array broadcasting with the samples [rad or m]
+    view : View
+
+    """
     wanted = np.broadcast_shapes(np.shape(value), view.t.shape)
     return {channel: np.broadcast_to(value, wanted)}

@@ -110,8 +110,15 @@ class BulkKernel:
 
         Velocity of the tool point [m/rad] first, then the axis. A channel that slides moves the
         tool point along the axis of its screw: what `chain.column` gives for 'd' is rows 3 to 5
-        of the screw of 'theta', and 'a' goes with 'alpha' likewise in standard rows. ``poses``
-        and ``out`` are where both are written to; ``out`` may be a view.
+        of the screw of 'theta', and 'a' goes with 'alpha' likewise in standard rows.
+
+        Parameters
+        ----------
+        q : array, shape (N, n) [rad or m]
+        poses : array, shape (N, 4, 4), optional
+            Where the poses are written to.
+        out : array, shape (6, channels, N), optional
+            Where the turns are written to; may be a view.
 
         Raises
         ------

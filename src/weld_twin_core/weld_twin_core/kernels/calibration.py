@@ -121,6 +121,18 @@ def linearised(
     Return d pose / d channels, shape (P, 6 N), and measured minus found, shape (6 N,).
 
     Frames are displaced along and about their own axes, the base's those of the world.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : array, shape (N, n) [rad or m]
+    poses : array, shape (N, 4, 4) [m]
+        Measured ``T_world_tool``.
+    channels : sequence of channel, length P
+        Geometric channels; see `minimal_channels`.
+    length : float [m]
+        What a turn of 1 rad counts as, so that positions and turns share a unit.
+
     """
     turn_of = _turns(robot)
     named = dict.fromkeys((turn_of[key], i) for key, i in channels if key in turn_of)
@@ -179,7 +191,17 @@ def _solved(columns: Array, residual: Array) -> tuple[Array, bool]:
 
 
 def moved(robot: Robot, channels: Sequence[Channel], step: Array) -> Robot:
-    """Return the robot with its channels displaced; see `linearised`."""
+    """
+    Return the robot with its channels displaced.
+
+    Parameters
+    ----------
+    robot : Robot
+    channels : sequence of channel, length P
+        As for `linearised`.
+    step : array, shape (P,) [rad or m]
+
+    """
     values: dict[str, Any] = {key: np.array(getattr(robot, key)) for key in _DH}
     small = {'base': np.zeros(6), 'tool': np.zeros(6)}
     for (key, i), change in zip(channels, step, strict=True):

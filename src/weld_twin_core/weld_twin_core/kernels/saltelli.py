@@ -30,7 +30,18 @@ _CONSTANT = np.finfo(np.float64).eps
 
 
 def base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
-    """Return probabilities of every input, two independent sets of shape (base, inputs)."""
+    """
+    Return probabilities of every input, two independent sets of shape (base, inputs).
+
+    Parameters
+    ----------
+    inputs : int
+    base : int
+        Samples of each set, a power of two.
+    seed : int
+        Of the scrambling.
+
+    """
     pair = qmc.Sobol(2 * inputs, scramble=True, seed=seed).random(base)
     return pair[:, :inputs], pair[:, inputs:]
 
@@ -42,6 +53,13 @@ def mixed(first: Array, second: Array, groups: Sequence[str] | None = None) -> A
     Of the runs of one base sample the first is that of ``first``, the last that of ``second``, and
     run 1 + g is the first with the inputs of group g from the second. Every input is a group of
     its own unless ``groups`` names that of each; they count in order of appearance.
+
+    Parameters
+    ----------
+    first, second : array, shape (base, inputs)
+        Two independent sets of probabilities; see `base_pair`.
+    groups : sequence of str, length inputs, optional
+
     """
     base, inputs = first.shape
     names = list(range(inputs)) if groups is None else list(groups)
@@ -64,7 +82,20 @@ def sobol_estimates(results: Array) -> tuple[Array, Array]:
 def sobol_half_widths(
     results: Array, confidence: float, rng: np.random.Generator, resamples: int = 100
 ) -> tuple[Array, Array]:
-    """Return half-widths of the intervals of both indices, shape (G,), by the bootstrap [2]_."""
+    """
+    Return half-widths of the intervals of both indices, shape (G,), by the bootstrap [2]_.
+
+    Parameters
+    ----------
+    results : array, shape (base, G + 2)
+        Model results in the order of `mixed`.
+    confidence : float
+        Such as 0.95.
+    rng : numpy Generator
+        Chooses the resamples.
+    resamples : int
+
+    """
     base = len(results)
     picks = rng.integers(base, size=(base, resamples)) + base * np.arange(resamples)
     counts = np.bincount(picks.ravel(), minlength=base * resamples).reshape(resamples, base)

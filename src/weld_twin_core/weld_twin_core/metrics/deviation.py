@@ -46,6 +46,15 @@ class DeviationMetrics:
     along_rms_m, across_rms_m, normal_rms_m : float [m]
         Of the components on the seam axes.
 
+    Examples
+    --------
+    `deviation_metrics` makes it.
+
+    >>> import weld_twin_core as wt
+    >>> found = wt.deviation_metrics([[0.0, 0.0, 1e-3]], [[0.0, 0.0, 0.0]])
+    >>> found.as_dict()['max_m']
+    0.001
+
     """
 
     samples: int
@@ -69,7 +78,15 @@ class DeviationMetrics:
 
 
 def deviation(deviations: ArrayLike) -> Array:
-    """Return D, shape (...) [m]: the length of deviations actual minus nominal, shape (..., 3)."""
+    """
+    Return D, shape (...) [m]: how far the tool is off.
+
+    Parameters
+    ----------
+    deviations : array_like, shape (..., 3) [m]
+        Actual minus nominal position.
+
+    """
     size: Array = np.linalg.norm(np.asarray(deviations, dtype=np.float64), axis=-1)
     return size
 
@@ -77,6 +94,12 @@ def deviation(deviations: ArrayLike) -> Array:
 def normalized_deviation(deviations: ArrayLike, path_length_m: float) -> Array:
     """
     Return D(t) over the path length (paper, eq. II.vi), shape (...).
+
+    Parameters
+    ----------
+    deviations : array_like, shape (..., 3) [m]
+        Actual minus nominal position.
+    path_length_m : float [m]
 
     Raises
     ------
@@ -90,13 +113,28 @@ def normalized_deviation(deviations: ArrayLike, path_length_m: float) -> Array:
 
 
 def orientation_error(actual: Array, nominal: Array) -> Array:
-    """Return the angles, shape (...) [rad], between rotation matrices, shape (..., 3, 3)."""
+    """
+    Return the angles between orientations, shape (...) [rad].
+
+    Parameters
+    ----------
+    actual, nominal : array, shape (..., 3, 3)
+        Rotation matrices.
+
+    """
     angle: Array = np.linalg.norm(angle_between(actual, nominal), axis=-1)
     return angle
 
 
 def root_mean_square(values: ArrayLike) -> float:
-    """Return the root of the mean square of all values."""
+    """
+    Return the root of the mean square of all values, in their unit.
+
+    Parameters
+    ----------
+    values : array_like, any shape
+
+    """
     return float(np.sqrt(np.mean(np.square(values))))
 
 
@@ -126,6 +164,17 @@ def deviation_metrics(
     ------
     DataError
         No samples, samples that do not pair, or one seam direction without the other.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> nominal = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
+    >>> actual = [[0.0, 0.0003, 0.0], [0.1, 0.0, 0.0004]]
+    >>> found = wt.deviation_metrics(
+    ...     actual, nominal, tangent=[1.0, 0.0, 0.0], normal=[0.0, 0.0, 1.0]
+    ... )
+    >>> print(f'{found.rms_m * 1e6:.0f} um RMS, {found.across_rms_m * 1e6:.0f} um of it across')
+    354 um RMS, 212 um of it across
 
     """
     positions = [p.position if isinstance(p, Poses) else p for p in (actual, nominal)]

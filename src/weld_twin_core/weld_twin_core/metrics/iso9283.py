@@ -204,6 +204,16 @@ def normal_plane_crossings(
 
     Of several passes the one nearest to the command point counts.
 
+    Parameters
+    ----------
+    path : array_like, shape (K, 3) [m]
+    command : array_like, shape (m, 3) [m]
+        Points of the command path.
+    tangent : array_like, shape (m, 3)
+        Direction of the command path there; its length does not matter.
+    name : str
+        How the message names the path.
+
     Raises
     ------
     DataError

@@ -33,7 +33,17 @@ class RunningMetrics:
         self.samples = 0
 
     def add(self, deviation: Array, twin: Array) -> None:
-        """Take the deviation and the twin's position of one pair, shape (3,) each [m]."""
+        """
+        Take one pair of a measurement and the twin.
+
+        Parameters
+        ----------
+        deviation : array, shape (3,) [m]
+            Measured minus twin.
+        twin : array, shape (3,) [m]
+            Where the twin has the tool.
+
+        """
         if self._before is not None:
             self._gone += float(np.linalg.norm(twin - self._before))
         self._before = twin

@@ -72,7 +72,19 @@ class Plan:
     s : array, shape (N,) [m]
         Arc length of each sample.
     length : float [m]
+        Of the seam.
     report : PlanReport
+        What the plan asks of the robot.
+
+    Examples
+    --------
+    `plan` makes it.
+
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('ur5')
+    >>> made = wt.plan(robot, wt.default_seam(robot), rate_hz=10.0)
+    >>> isinstance(made, wt.Plan), made.poses.shape == (made.motion.t.size, 4, 4)
+    (True, True)
 
     """
 
@@ -101,9 +113,12 @@ def plan(
     ----------
     robot : Robot
     path : Path
+        A seam; see `paths`.
     profile : Profile or str
-        A time law, or the name of one with its default numbers.
+        A time law, or the name of one with its default numbers: 'constant', 'trapezoid',
+        's-curve', 'smooth' or 'aggressive'.
     rate_hz : float [1/s]
+        How many joint states a second.
     torch : Torch, optional
         Left out, upright on the seam.
     fit : bool
@@ -117,6 +132,14 @@ def plan(
         Part of the seam is out of reach.
     PathError
         A joint would have to be too fast; the message says which, when and by how much.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('ur5')
+    >>> made = wt.plan(robot, wt.default_seam(robot, 'line'), 'smooth', rate_hz=50.0)
+    >>> print(f'{made.length * 1e3:.0f} mm in {made.report.duration:.1f} s')
+    298 mm in 14.9 s
 
     """
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):

@@ -5,6 +5,13 @@ Time laws s(t): how a seam of any length is travelled.
 
 A law is a piecewise polynomial, so position, speed and acceleration are exact.
 
+Examples
+--------
+>>> import weld_twin_core as wt
+>>> timing = wt.profiles.Trapezoid(speed=0.02, acceleration=0.2).sample(length=0.1, dt=0.01)
+>>> print(f'{timing.t[-1]:.2f} s, {timing.sd.max():.3f} m/s at most')
+5.10 s, 0.020 m/s at most
+
 References
 ----------
 .. [1] L. Biagiotti, C. Melchiorri, "Trajectory Planning for Automatic Machines and Robots",
@@ -194,6 +201,11 @@ PROFILES: dict[str, type[Profile]] = {
 def named(name: str) -> Profile:
     """
     Return a profile with its default numbers.
+
+    Parameters
+    ----------
+    name : str
+        One of the keys of `PROFILES`.
 
     Raises
     ------

@@ -76,7 +76,22 @@ def seam_axes(tangent: ArrayLike, normal: ArrayLike) -> Array:
 
 
 def seam_components(deviation: ArrayLike, tangent: ArrayLike, normal: ArrayLike) -> Array:
-    """Return deviations (..., 3) as along, across and normal components, shape (..., 3)."""
+    """
+    Return deviations as components along, across and normal to a seam, shape (..., 3) [m].
+
+    Parameters
+    ----------
+    deviation : array_like, shape (..., 3) [m]
+        In the world frame.
+    tangent, normal : array_like, shape (3,) or (..., 3)
+        Directions of the travel and out of the work; their lengths do not matter.
+
+    Raises
+    ------
+    DataError
+        A tangent is zero, or a normal lies along its tangent.
+
+    """
     vector = np.asarray(deviation, dtype=np.float64)
     components: Array = (seam_axes(tangent, normal) @ vector[..., None])[..., 0]
     return components

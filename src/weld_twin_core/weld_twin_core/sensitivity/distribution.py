@@ -92,7 +92,15 @@ class Distribution:
         return self._below(self.lower), self._below(self.upper)
 
     def values(self, unit: ArrayLike) -> Array:
-        """Return the values, shape (...), at probabilities in [0, 1], shape (...)."""
+        """
+        Return the values at probabilities, shape (...), in the unit of the parameter.
+
+        Parameters
+        ----------
+        unit : array_like, shape (...)
+            Probabilities between 0 and 1.
+
+        """
         low, high = self._mass()
         p = low + (high - low) * np.asarray(unit, dtype=np.float64)
         # The ends of an unbounded distribution are at infinity; no sample may land there.
@@ -131,6 +139,13 @@ class Distribution:
     def from_mapping(cls, data: Mapping[str, Any], lower: float, upper: float) -> Distribution:
         """
         Build a distribution from the keys of a tolerance file.
+
+        Parameters
+        ----------
+        data : mapping
+            ``distribution`` names one of `KINDS`; the other keys are its numbers.
+        lower, upper : float
+            Bounds of the parameter, in its unit.
 
         Raises
         ------

@@ -94,13 +94,32 @@ def model(
 
 
 def draws_at(tolerances: Sequence[Tolerance], unit: Array) -> Array:
-    """Return draws at probabilities of every tolerance, both shape (D, P)."""
+    """
+    Return draws at probabilities of every tolerance, shape (D, P), each in its own unit.
+
+    Parameters
+    ----------
+    tolerances : sequence of Tolerance, length P
+    unit : array, shape (D, P)
+        Probabilities between 0 and 1.
+
+    """
     columns = [t.distribution.values(unit[:, k]) for k, t in enumerate(tolerances)]
     return np.stack(columns, axis=1)
 
 
 def exact_deviations(study: Study, tolerances: Sequence[Tolerance], draws: Array) -> Array:
-    """Return the exact twin's deviations in seam axes, shape (D, N, 3) [m]."""
+    """
+    Return the exact twin's deviations in seam axes, shape (D, N, 3) [m].
+
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance, length P
+    draws : array, shape (D, P)
+        In the units of the tolerances.
+
+    """
     return study.deviations(with_draws(study.known, tolerances, draws))
 
 

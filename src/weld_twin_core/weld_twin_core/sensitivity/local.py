@@ -149,7 +149,15 @@ def _relative(difference: Array, scale: Array) -> Array:
 
 
 def arc_weights(s: Array) -> Array:
-    """Return the part of the travelled arc length that belongs to each path point, shape (N,)."""
+    """
+    Return the part of the travelled arc length that belongs to each path point, shape (N,).
+
+    Parameters
+    ----------
+    s : array, shape (N,) [m]
+        Arc length at every path point.
+
+    """
     steps = np.abs(np.diff(s))
     if not steps.sum() > 0.0:
         return np.full(len(s), 1.0 / len(s))
@@ -160,7 +168,16 @@ def arc_weights(s: Array) -> Array:
 
 
 def local_sensitivity(study: Study, tolerances: Sequence[Tolerance]) -> LocalSensitivity:
-    """Return the local sensitivities of a study."""
+    """
+    Return how much the tool moves for each unit of every uncertain number.
+
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance
+        Slopes are taken at no error; the forward difference uses the typical size.
+
+    """
     tolerances = tuple(tolerances)
     size = np.array([abs(t.distribution.mean) + t.distribution.std for t in tolerances])
     vectors, turns = _linearised(study, tolerances, np.zeros(len(tolerances)))
@@ -234,7 +251,14 @@ class Posture:
 
 
 def posture(study: Study) -> Posture:
-    """Return condition number, manipulability and largest gain along a seam."""
+    """
+    Return condition number, manipulability and largest gain along a seam.
+
+    Parameters
+    ----------
+    study : Study
+
+    """
     motion = study.recording.joints
     q = motion.q if study.at is None else motion.at(study.at)[0]
     strength = np.linalg.svd(jacobian(study.robot, q)[..., :3, :], compute_uv=False)

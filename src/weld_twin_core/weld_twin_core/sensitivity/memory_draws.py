@@ -82,7 +82,17 @@ def _different(draws: Array) -> tuple[Array, NDArray[np.intp]]:
 def remembered(
     study: Study, tolerances: Sequence[Tolerance], scale: Array
 ) -> tuple[Remembered, ...]:
-    """Return the memory of every joint that has tolerances of it."""
+    """
+    Return the memory of every joint that has tolerances of it.
+
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance, length P
+    scale : array, shape (P,)
+        Typical size of each, in its unit; slopes are taken at it.
+
+    """
     columns: dict[int, list[int]] = {}
     for k, tolerance in enumerate(tolerances):
         if REGISTRY[tolerance.effect].stage in MEMORY:
@@ -97,7 +107,20 @@ def remembered(
 
 
 def displacement(study: Study, joint: int, tolerances: Sequence[Tolerance], draws: Array) -> Array:
-    """Return displacements of a joint, shape (D, N), beyond those of the known effects."""
+    """
+    Return displacements of a joint, shape (D, N) [rad or m], beyond those of the known effects.
+
+    Parameters
+    ----------
+    study : Study
+    joint : int
+        Counted from 0.
+    tolerances : sequence of Tolerance, length M
+        Of effects with memory on that joint.
+    draws : array, shape (D, M)
+        In the units of the tolerances.
+
+    """
     name = study.robot.joint_names[joint]
     known = tuple(e for e in study.known if e.stage in MEMORY and e.site == name)
     drawn = with_draws(known, tolerances, draws)

@@ -29,7 +29,17 @@ class Outcomes(NamedTuple):
 
 
 def outcomes(off: Array, length: float) -> Outcomes:
-    """Return the numbers of runs from deviations along, across and normal, shape (3, D, N) [m]."""
+    """
+    Return what runs come to.
+
+    Parameters
+    ----------
+    off : array, shape (3, D, N) [m]
+        Deviations along, across and normal to the seam.
+    length : float [m]
+        Of the seam.
+
+    """
     along, across, normal = off
     square = along * along
     square += across * across

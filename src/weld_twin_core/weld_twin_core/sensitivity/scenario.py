@@ -53,7 +53,21 @@ def sources(robot: Robot, sizes: Sizes | None = None) -> dict[str, tuple[Effect,
 
 
 def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, Array]:
-    """Return deviations (N, 3) [m] in seam axes of every source alone, and 'combined'."""
+    """
+    Return the deviations of every source alone and of all together, in seam axes.
+
+    Parameters
+    ----------
+    study : Study
+    sizes : Sizes, optional
+        Left out, those of the paper.
+
+    Returns
+    -------
+    dict of str to array, shape (N, 3) [m]
+        By source; 'combined' for all together.
+
+    """
     each = sources(study.robot, sizes)
     out = {name: study.deviations((*study.known, *effects)) for name, effects in each.items()}
     every = tuple(effect for effects in each.values() for effect in effects)
@@ -64,7 +78,13 @@ def spread_of_passes(study: Study, deviations: Array) -> Array:
     """
     Return how far apart the passes over one place of the seam are, shape (...) [m].
 
-    The median over twentieths of the seam, of deviations of shape (..., N, 3).
+    The median over twentieths of the seam.
+
+    Parameters
+    ----------
+    study : Study
+    deviations : array, shape (..., N, 3) [m]
+
     """
     part = np.floor(study.s / study.length * 20.0).astype(int)
     apart = [
@@ -75,5 +95,12 @@ def spread_of_passes(study: Study, deviations: Array) -> Array:
 
 
 def cumulative(deviations: Array) -> Array:
-    """Return D_cum up to every sample (paper, eq. III.iv), shape (N,) [m]."""
+    """
+    Return D_cum up to every sample (paper, eq. III.iv), shape (N,) [m].
+
+    Parameters
+    ----------
+    deviations : array, shape (N, 3) [m]
+
+    """
     return np.cumsum(np.linalg.norm(deviations, axis=-1))

@@ -89,6 +89,19 @@ def planned_study(
     """
     Return the study of a seam travelled by a time law, slowed to the joint limits.
 
+    Parameters
+    ----------
+    robot : Robot
+    path : Path
+    profile : Profile or str
+        A time law, or the name of one with its default numbers.
+    points : int
+        Path points that are looked at, evenly spread over time.
+    torch : Torch, optional
+        Left out, upright on the seam.
+    known : tuple of Effect
+        Effects believed to act; deviations are counted from the twin that has them.
+
     Raises
     ------
     ReachError, PathError
@@ -107,7 +120,17 @@ def planned_study(
 
 
 def study_of_plan(robot: Robot, planned: Plan, known: tuple[Effect, ...] = ()) -> Study:
-    """Return the study of a planned motion, at its own samples."""
+    """
+    Return the study of a planned motion, at its own samples.
+
+    Parameters
+    ----------
+    robot : Robot
+    planned : Plan
+    known : tuple of Effect
+        Effects believed to act.
+
+    """
     recording = Recording('planned', planned.motion)
     axes = seam_axes(planned.seam.tangent, planned.seam.normal)
     nominal = Twin(robot, known).poses(recording)
@@ -163,6 +186,14 @@ def _away(rotation: Array, tangent: Array) -> Array:
 
 
 def with_known(study: Study, known: tuple[Effect, ...]) -> Study:
-    """Return the study counted from a twin with other known effects."""
+    """
+    Return the study counted from a twin with other known effects.
+
+    Parameters
+    ----------
+    study : Study
+    known : tuple of Effect
+
+    """
     nominal = Twin(study.robot, known).poses(study.recording, study.at)
     return replace(study, known=known, nominal=nominal)

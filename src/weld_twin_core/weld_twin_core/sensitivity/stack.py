@@ -108,7 +108,23 @@ class ToleranceStack:
 
 
 def probabilities(runs: int, inputs: int, seed: int = 0) -> Array:
-    """Return independent probabilities, shape (runs, inputs)."""
+    """
+    Return independent probabilities, shape (runs, inputs).
+
+    Parameters
+    ----------
+    runs : int
+        At least 20.
+    inputs : int
+        Number of tolerances.
+    seed : int
+
+    Raises
+    ------
+    DataError
+        Fewer than 20 runs.
+
+    """
     if runs < 20:
         raise DataError(f'a tolerance stack needs at least 20 runs, got {runs}')
     return np.random.default_rng(seed).random((runs, inputs))
@@ -125,6 +141,7 @@ def tolerance_stack(
     found : Outcomes
         Of runs at `probabilities`.
     tolerance : WeldTolerance, optional
+        Left out, 0.5 mm across and 1 mm of stick-out.
     seed : int
         The runs' own, for the record.
 

@@ -72,12 +72,36 @@ class Sweep:
 
 
 def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
-    """Return the deviation over the size of one error."""
+    """
+    Return the deviation over the size of one error.
+
+    Parameters
+    ----------
+    study : Study
+    tolerance : Tolerance
+        Says which parameter of which effect.
+    values : array, shape (V,)
+        Sizes of the error, in the unit of the parameter.
+
+    """
     return together(study, (tolerance,), values, tolerance.name)
 
 
 def together(study: Study, tolerances: Sequence[Tolerance], values: Array, name: str) -> Sweep:
-    """Return the deviation over the size of several errors that are all equal."""
+    """
+    Return the deviation over the size of several errors that are all equal.
+
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance
+        All of one unit.
+    values : array, shape (V,)
+        Sizes of the errors, in that unit.
+    name : str
+        What the result is called.
+
+    """
     # The slope at no error, from an error too small to bend and large enough to compute.
     small = 1e-4 * float(np.abs(values).max())
     sizes = np.concatenate([[small], np.asarray(values, dtype=np.float64)])
@@ -96,7 +120,16 @@ def together(study: Study, tolerances: Sequence[Tolerance], values: Array, name:
 
 
 def default_values(tolerance: Tolerance, count: int = 25) -> Array:
-    """Return the sizes swept for an error: the paper's range, or up to three times typical."""
+    """
+    Return the sizes swept for an error: the paper's range, or up to three times typical.
+
+    Parameters
+    ----------
+    tolerance : Tolerance
+    count : int
+        How many sizes, evenly spread.
+
+    """
     last = 3.0 * (abs(tolerance.distribution.mean) + tolerance.distribution.std)
     ends = RANGES.get(tolerance.effect, (0.0, last))
     if tolerance.effect == 'base_pose' and tolerance.parameter == 'rotvec':
@@ -105,7 +138,21 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
 
 def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -> float | None:
-    """Return the smallest error at which D departs from proportion by `BENT`, None beyond."""
+    """
+    Return the smallest error at which D departs from proportion by `BENT`.
+
+    Parameters
+    ----------
+    study : Study
+    tolerance : Tolerance
+    largest : float
+        Where the search ends, in the unit of the parameter.
+
+    Returns
+    -------
+    float, or None where D stays in proportion up to ``largest``
+
+    """
     found = sweep(study, tolerance, np.geomspace(1e-3 * largest, largest, 121))
     bent = np.abs(found.departure) > BENT
     return float(found.values[np.argmax(bent)]) if bent.any() else None

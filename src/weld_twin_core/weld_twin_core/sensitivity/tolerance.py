@@ -82,6 +82,14 @@ def default_tolerances(
     A parameter that may have either sign is normal with its typical magnitude as std; one that
     may not be negative is uniform from zero to twice that.
 
+    Parameters
+    ----------
+    robot : Robot
+    families : iterable of str
+        Names of effects; every joint gets those of a joint.
+    scale : float
+        Multiplies the typical magnitudes.
+
     Raises
     ------
     ModelError
@@ -101,6 +109,11 @@ def tolerances_from_list(entries: Any, robot: Robot) -> tuple[Tolerance, ...]:
     An entry names an ``effect``, and may narrow it to a ``joint``, a ``parameter`` and an
     ``index``; the other keys are a distribution. A later entry replaces an earlier one of the
     same parameter.
+
+    Parameters
+    ----------
+    entries : sequence of mapping
+    robot : Robot
 
     Raises
     ------
@@ -203,7 +216,16 @@ def with_draws(
 
 
 def scaled(tolerances: Sequence[Tolerance], factors: Mapping[str, float]) -> tuple[Tolerance, ...]:
-    """Return tolerances whose distribution is stretched, by family; others stay as they are."""
+    """
+    Return tolerances whose distribution is stretched, by family; others stay as they are.
+
+    Parameters
+    ----------
+    tolerances : sequence of Tolerance
+    factors : mapping of str to float
+        Factor for the tolerances of an effect.
+
+    """
     out = []
     for item in tolerances:
         factor, law = factors.get(item.effect, 1.0), item.distribution

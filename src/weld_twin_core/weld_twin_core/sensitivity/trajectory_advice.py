@@ -40,6 +40,12 @@ def expected_deviation(study: Study, tolerances: Sequence[Tolerance]) -> Array:
     Return the root of the expected squared deviation at every path point, shape (N,) [m].
 
     To first order in the scatter, about the mean of every error.
+
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance
+
     """
     tolerances = tuple(tolerances)
     mean = np.array([t.distribution.mean for t in tolerances])
@@ -57,7 +63,15 @@ def expected_deviation(study: Study, tolerances: Sequence[Tolerance]) -> Array:
 
 
 def expected_rms(study: Study, tolerances: Sequence[Tolerance]) -> float:
-    """Return the root of the expected squared deviation over the arc length [m]."""
+    """
+    Return the root of the expected squared deviation over the arc length [m].
+
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance
+
+    """
     square = expected_deviation(study, tolerances) ** 2
     return float(np.sqrt((square * arc_weights(study.s)).sum()))
 
@@ -86,7 +100,25 @@ def compare_profiles(
     profiles: Sequence[str] = tuple(PROFILES),
     points: int = 400,
 ) -> tuple[ProfileResult, ...]:
-    """Return what time laws do to the same seam, compared over arc length."""
+    """
+    Return what time laws do to the same seam, compared over arc length.
+
+    Parameters
+    ----------
+    robot : Robot
+    path : Path
+    tolerances : sequence of Tolerance
+    profiles : sequence of str
+        Names of time laws.
+    points : int
+        Path points that are looked at.
+
+    Raises
+    ------
+    ReachError, PathError
+        The seam cannot be travelled.
+
+    """
     studies = {name: planned_study(robot, path, name, points=points) for name in profiles}
     slowest = max(float(study.t[-1]) for study in studies.values())
     out = []
@@ -197,6 +229,19 @@ def advise(
     A Sobol sample of the room, then a simplex search from its best; every candidate is solved
     along the whole seam and must keep its distance from limits and singularities.
 
+    Parameters
+    ----------
+    robot : Robot
+    path : Path
+    tolerances : sequence of Tolerance
+    torch : Torch, optional
+        As given; left out, upright on the seam.
+    room : Room, optional
+        How far the base may move, and how much room the arm must keep.
+    tries : int
+        Placements in the sample; the simplex search may take as many again for each free value.
+    seed : int
+
     Raises
     ------
     ReachError
@@ -264,7 +309,20 @@ class _Search:
     def best(
         self, label: str, free: list[int], tries: int, seed: int, start: PlacementResult
     ) -> PlacementResult:
-        """Return the best placement found with some of the values free."""
+        """
+        Return the best placement found with some of the values free.
+
+        Parameters
+        ----------
+        label : str
+            What the result is called.
+        free : list of int
+            Which of torch rotation, base x, base y and base yaw may change.
+        tries, seed : int
+        start : PlacementResult
+            What the values that are not free stay at.
+
+        """
         p = start.placement
         known = np.array([p.rotation, p.x, p.y, p.yaw])
 

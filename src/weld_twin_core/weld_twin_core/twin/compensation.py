@@ -57,6 +57,14 @@ class Compensation:
     left_out : tuple of Effect
         Effects of the model that no joint command can mend.
 
+    Examples
+    --------
+    `compensate` makes it.
+
+    >>> import weld_twin_core as wt
+    >>> sorted(wt.Compensation.__dataclass_fields__)
+    ['after', 'before', 'left_out', 'motion']
+
     """
 
     motion: JointMotion
@@ -86,6 +94,25 @@ def compensate(
         Its joints are the nominal commands; wrench and temperature are used where effects do.
     rounds : int
         Most Newton rounds.
+
+    Returns
+    -------
+    Compensation
+
+    Raises
+    ------
+    ModelError
+        An effect that this robot cannot have.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('ur5')
+    >>> plan = wt.plan(robot, wt.default_seam(robot), rate_hz=20.0)
+    >>> bent = [wt.effects.LinkTwist('elbow_joint', dalpha=5e-4)]
+    >>> found = wt.compensate(robot, bent, wt.Recording('seam', plan.motion))
+    >>> found.rms[0] > 1e-5, found.rms[1] < 1e-9
+    (True, True)
 
     """
     acting = tuple(e for e in effects if _commandable(e))

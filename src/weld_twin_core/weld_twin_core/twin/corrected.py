@@ -25,6 +25,26 @@ def corrected(robot: Robot, effects: Sequence[Effect]) -> tuple[Robot, tuple[Eff
     Joint offsets go into ``theta`` (``d`` of a prismatic joint), link errors into their rows,
     base and tool errors into the frames, a payload to the one declared. Everything else that
     depends on the motion, load or temperature stays an effect.
+
+    Parameters
+    ----------
+    robot : Robot
+    effects : sequence of Effect
+
+    Raises
+    ------
+    ModelError
+        The robot has no joint that an effect names.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> longer = wt.effects.LinkLength('elbow_joint', da=0.001)
+    >>> play = wt.effects.Backlash('elbow_joint', width=5e-4)
+    >>> robot, left = wt.corrected(wt.load('ur5'), [longer, play])
+    >>> print(round(robot.a[2] - wt.load('ur5').a[2], 6), 'm;', left[0].name, 'is left')
+    0.001 m; backlash is left
+
     """
     left = []
     for effect in effects:
@@ -45,6 +65,12 @@ def joint_offsets(robot: Robot, effects: Sequence[Effect]) -> np.ndarray:
 
     The joint really stands this much further than its reading; a controller that keeps its
     own offsets adds it to the reading.
+
+    Parameters
+    ----------
+    robot : Robot
+    effects : sequence of Effect
+
     """
     out = np.zeros(robot.n)
     for effect in effects:

@@ -16,7 +16,24 @@ if TYPE_CHECKING:
 
 
 class Poses(NamedTuple):
-    """Tool poses in the world frame: position (..., M, 3) [m], rotation (..., M, 3, 3)."""
+    """
+    Tool poses in the world frame.
+
+    Attributes
+    ----------
+    position : array, shape (..., M, 3) [m]
+    rotation : array, shape (..., M, 3, 3)
+        ``R_world_tool``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> poses = wt.Poses(np.zeros((1, 3)), np.eye(3)[None])
+    >>> poses.position.shape, poses.rotation.shape
+    ((1, 3), (1, 3, 3))
+
+    """
 
     position: Array
     rotation: Array

@@ -32,6 +32,22 @@ class LiveTwin:
 
     Changing `twin` while running keeps the memory of every effect that is still there. The
     poses belong to the joint stamps; a delay of the measurement clock is the caller's to add.
+
+    Parameters
+    ----------
+    twin : Twin
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('ur5')
+    >>> live = wt.Twin(robot, [wt.effects.Backlash('elbow_joint', width=5e-4)]).live()
+    >>> for k in range(3):
+    ...     q, pose = live.step(0.01 * k, np.array([0.0, 0.0, 0.01 * k, 0.0, 0.0, 0.0]))
+    >>> print(f'the elbow trails by {(0.02 - q[2]) * 1e3:.2f} mrad')
+    the elbow trails by 0.25 mrad
+
     """
 
     def __init__(self, twin: Twin) -> None:
@@ -74,9 +90,13 @@ class LiveTwin:
         ----------
         t : float [s]
             Stamp; not before the one of the last call.
-        q, qd : array, shape (n,)
-        wrench : array, shape (6,), optional
-        temperature : float, optional [degC]
+        q : array, shape (n,) [rad or m]
+        qd : array, shape (n,) [rad/s or m/s], optional
+        wrench : array, shape (6,) [N, N m], optional
+            Force and torque on the tool.
+        temperature : float [degC], optional
+        wrench_frame : str
+            'tool' or 'base'.
 
         Raises
         ------

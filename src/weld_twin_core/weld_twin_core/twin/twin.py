@@ -54,9 +54,28 @@ class Twin:
     Attributes
     ----------
     robot : Robot
-    effects : tuple of Effect
+    effects : sequence of Effect
         Stages decide the order; only effects with memory on one joint and of one stage run in
         the order given. Effects with parameter draws give every result a leading draw axis.
+
+    Raises
+    ------
+    ModelError
+        An effect that this robot cannot have, or different numbers of draws.
+
+    Examples
+    --------
+    A shoulder that is 1 mrad off moves the tool of a stretched UR5 by 0.8 mm.
+
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('ur5')
+    >>> recording = wt.Recording('still', wt.JointMotion([0.0], np.zeros((1, 6))))
+    >>> off = wt.effects.JointOffset('shoulder_pan_joint', offset=1e-3)
+    >>> real = wt.Twin(robot, [off]).poses(recording)
+    >>> nominal = wt.Twin(robot).poses(recording)
+    >>> print(((real.position - nominal.position)[0] * 1e3).round(3), 'mm')
+    [ 0.192 -0.817  0.   ] mm
 
     """
 
@@ -88,8 +107,15 @@ class Twin:
         Parameters
         ----------
         recording : Recording
+            Its joint stream, and wrench and temperature where effects need them.
         at : array, shape (M,) [s], optional
             Stamps of the measurement clock; left out, the instants of the joint stamps.
+
+        Returns
+        -------
+        Poses
+            Position (..., M, 3) [m] and rotation (..., M, 3, 3), with a leading axis of draws
+            where effects carry them.
 
         """
         if not self.effects:
@@ -99,7 +125,15 @@ class Twin:
         return self._full(self._evaluate(recording, at, False))
 
     def joints(self, recording: Recording, at: Array | None = None) -> Array:
-        """Return the joint positions behind the poses, shape (..., M, n)."""
+        """
+        Return the joint positions behind the poses, shape (..., M, n) [rad or m].
+
+        Parameters
+        ----------
+        recording, at
+            As for `poses`.
+
+        """
         view = self._evaluate(recording, at, False).view
         parts = [
             np.asarray(view.q[..., i] + view.shift.get(('q', i), 0.0)) for i in range(self.robot.n)
@@ -122,6 +156,18 @@ class Twin:
         Exact for each effect and for effects of different kinds together, but for products of
         two small displacements (a spring's torque at the displaced joint, the scale of a
         displaced point).
+
+        Parameters
+        ----------
+        recording, at
+            As for `poses`.
+
+        Returns
+        -------
+        poses : Poses
+        derivative : array, shape (..., M, 6, P) [m or rad per unit of the parameter]
+            Columns as in `components`.
+
         """
         run = self._evaluate(recording, at, True)
         poses = self._full(run)

@@ -7,8 +7,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from weld_twin_core.diagnosis.algebra.problem import FRAMES
-from weld_twin_core.errors import ModelError
+from weld_twin_core.diagnosis.algebra.problem import frames_named
 from weld_twin_msgs_py.messages.topics import (
     DIAGNOSIS,
     JOINT_STATES,
@@ -51,7 +50,7 @@ class LiveDiagnosis(CellNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('live_diagnosis', **kwargs)
         self._twin = build_twin(robot_of(self), self.setting('model'))
-        self._align = _frames(self.setting('align'))
+        self._align = frames_named(self.setting('align'))
         self._window = Window(self._twin.robot, self.setting('window'))
         self._worker = Worker()
         self._begun = -float('inf')
@@ -104,13 +103,6 @@ class LiveDiagnosis(CellNode):
                     self._twin.robot.name,
                 )
             )
-
-
-def _frames(text: str) -> frozenset[str]:
-    frames = frozenset(part.strip() for part in text.split(',') if part.strip())
-    if not frames <= set(FRAMES):
-        raise ModelError(f'align takes base, tool or base,tool, got {text!r}')
-    return frames
 
 
 def main(args: list[str] | None = None) -> int:

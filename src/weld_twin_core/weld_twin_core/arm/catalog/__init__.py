@@ -1,6 +1,17 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Bundled robots, each a module whose DATA is the mapping that a robot file holds."""
+"""
+Bundled robots, each a module whose DATA is the mapping that a robot file holds.
+
+Examples
+--------
+>>> import weld_twin_core as wt
+>>> wt.catalog.names()[:3]
+('ur5', 'ur10', 'kuka_kr6_r900')
+>>> wt.catalog.load('ur5').source[:16]
+'Universal Robots'
+
+"""
 
 from __future__ import annotations
 
@@ -29,10 +40,22 @@ def load(name: str) -> Robot:
     """
     Return a bundled robot.
 
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+
     Raises
     ------
     ModelError
         There is no such robot; the message lists those there are.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('kuka_kr6_r900')
+    >>> robot.n, robot.joint_names[0]
+    (6, 'joint_a1')
 
     """
     if name not in _NAMES:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,12 +13,36 @@ from ...arm.robot import Robot
 from ...arm.rotation import angle_between, rotation_matrix
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...errors import DataError
+from ...errors import DataError, ModelError
 from ...recording import Measurements, Recording
 from ...twin.features import Features
 from ...twin.twin import Twin
 
 FRAMES = ('base', 'tool')
+
+
+def frames_named(align: str | Iterable[str], what: str = 'align') -> frozenset[str]:
+    """
+    Return the frames to fit along, from one text or from several names.
+
+    Parameters
+    ----------
+    align : str or iterable of str
+        'base', 'tool', 'base,tool', or the names as a list or a set; nothing for neither.
+    what : str
+        How the message names the argument.
+
+    Raises
+    ------
+    ModelError
+        A name is neither 'base' nor 'tool'.
+
+    """
+    parts = align.split(',') if isinstance(align, str) else align
+    frames = frozenset(name for part in parts if (name := str(part).strip()))
+    for frame in sorted(frames - set(FRAMES)):
+        raise ModelError(f'{what} takes base, tool or base,tool; {frame!r} is neither')
+    return frames
 
 
 @dataclass(frozen=True, eq=False)

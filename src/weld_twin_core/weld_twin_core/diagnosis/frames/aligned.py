@@ -4,28 +4,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...recording import Recording
-from ..algebra.problem import Model, Problem, usable
+from ..algebra.problem import Model, Problem, frames_named, usable
 from .alignment import initial_frames
 
 
 def aligned(
-    recordings: Sequence[Recording], robot: Robot, align: frozenset[str], known: Sequence[Effect]
+    recordings: Recording | Sequence[Recording],
+    robot: Robot,
+    align: str | Iterable[str],
+    known: Sequence[Effect],
 ) -> tuple[Problem, Model]:
     """
     Return the recordings as a problem, and the model that a search starts from.
 
     Parameters
     ----------
-    recordings : sequence of Recording
+    recordings : Recording, or sequence of Recording
     robot : Robot
         The nominal model.
-    align : frozenset of str
-        Frames fitted as nuisance in every hypothesis: 'base', 'tool'.
+    align : str or iterable of str
+        Frames fitted as nuisance in every hypothesis: 'base', 'tool', 'base,tool'.
     known : sequence of Effect
         Put into the twin first.
 
@@ -33,8 +36,11 @@ def aligned(
     ------
     DataError
         Nothing was measured, or no measurement falls inside a joint stream.
+    ModelError
+        ``align`` names something else than base and tool.
 
     """
-    problem = Problem(tuple(usable(r) for r in recordings), frozenset(align))
+    recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    problem = Problem(tuple(usable(r) for r in recordings), frames_named(align))
     model = Model(robot, tuple(robot.T_world_base for _ in recordings), tuple(known))
     return problem, initial_frames(problem, model)

@@ -42,6 +42,16 @@ def solve(robot: Robot, pose: Array, seed: Array | None = None) -> Array:
     ReachError
         No joint positions within the limits reach the pose.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('ur5')
+    >>> pose = wt.forward(robot, [0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
+    >>> branches = wt.solve(robot, pose)
+    >>> len(branches), np.allclose(wt.forward(robot, branches), pose, atol=1e-9)
+    (8, True)
+
     """
     if family(robot) is None:
         found, _ = search(robot, pose, seed)

@@ -109,6 +109,17 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
     ReachError
         Names the first sample out of reach, where it is and why.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import weld_twin_core as wt
+    >>> robot = wt.load('ur5')
+    >>> seam = wt.default_seam(robot)
+    >>> poses = wt.paths.Torch().poses(seam.sample(np.linspace(0.0, seam.length, 20)))
+    >>> path = wt.solve_path(robot, poses)
+    >>> path.q.shape, bool(np.abs(np.diff(path.q, axis=0)).max() < 0.1)
+    ((20, 6), True)
+
     """
     poses = np.asarray(poses, dtype=np.float64)
     if seed is not None:

@@ -64,6 +64,14 @@ def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
 
     Half way between two joint positions of one motion the tool is near both; half way between
     two branches it is somewhere else, or the joints move much farther than the tool.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : array, shape (N, n) [rad or m]
+    poses : array, shape (N, 4, 4)
+        Where the tool should be.
+
     """
     if len(q) < 2:
         return np.zeros(0, dtype=bool)

@@ -28,7 +28,18 @@ def chain_jacobian(robot: Robot, chain: Frames) -> Array:
 
 
 def least_step(jacobian: Array, error: Array, damping: Array | float = _FLOOR) -> Array:
-    """Return the smallest joint step, shape (..., n), that takes the error away."""
+    """
+    Return the smallest joint step that takes a pose error away, shape (..., n) [rad or m].
+
+    Parameters
+    ----------
+    jacobian : array, shape (..., 6, n)
+    error : array, shape (..., 6) [m, rad]
+        What is missing to the pose wanted.
+    damping : float, or array of shape (...) [m^2]
+        Keeps the step finite near a singularity.
+
+    """
     transposed = np.swapaxes(jacobian, -1, -2)
     square = jacobian @ transposed + np.asarray(damping)[..., None, None] * np.eye(6)
     return (transposed @ np.linalg.solve(square, error[..., None]))[..., 0]
@@ -40,6 +51,7 @@ def polish(robot: Robot, q: Array, poses: Array, rounds: int = 12) -> tuple[Arra
 
     Parameters
     ----------
+    robot : Robot
     q : array, shape (N, n)
         A start near the solution.
     poses : array, shape (N, 4, 4)

@@ -18,7 +18,16 @@ from ...arrays import Array
 
 
 def turn(axis: Array, angle: Array, vector: Array) -> Array:
-    """Return vectors (..., 3) turned by angles (...) about a fixed unit axis (3,)."""
+    """
+    Return vectors turned about a fixed axis, shape (..., 3).
+
+    Parameters
+    ----------
+    axis : array, shape (3,), of length 1
+    angle : array, shape (...) [rad]
+    vector : array, shape (..., 3)
+
+    """
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     along = (vector @ axis)[..., None] * axis
     return along + cosine * (vector - along) + sine * np.cross(axis, vector)
@@ -30,14 +39,36 @@ def turn_matrix(axis: Array, angle: Array) -> Array:
 
 
 def angle_onto(axis: Array, start: Array, end: Array) -> Array:
-    """Return the angle about the axis that turns ``start`` onto ``end`` (..., 3)."""
+    """
+    Return the angle that turns one vector onto another, shape (...) [rad].
+
+    Parameters
+    ----------
+    axis : array, shape (3,), of length 1
+    start, end : array, shape (..., 3)
+        Of equal length and height along the axis; otherwise the nearest angle is returned.
+
+    """
     sine = np.cross(start, end) @ axis
     cosine = (start * end).sum(axis=-1) - (start @ axis) * (end @ axis)
     return np.asarray(np.arctan2(sine, cosine))
 
 
 def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> Array:
-    """Return both angles, shape (2, ...), at which the turned ``start`` has a height along."""
+    """
+    Return both angles at which a turned vector has a given component, shape (2, ...) [rad].
+
+    Parameters
+    ----------
+    along : array, shape (..., 3)
+        Direction of the component; the component counts in units of its length.
+    axis : array, shape (3,), of length 1
+    start : array, shape (..., 3)
+        The vector to turn.
+    height : array, shape (...)
+        The component wanted.
+
+    """
     level = (start @ axis)[..., None] * axis
     cosine = ((start - level) * along).sum(axis=-1)
     sine = (np.cross(axis, start) * along).sum(axis=-1)
@@ -49,6 +80,18 @@ def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> A
 
 
 def angle_to_distance(offset: Array, axis: Array, start: Array, distance: Array) -> Array:
-    """Return both angles, shape (2, ...), at which ``offset`` plus turned ``start`` is so long."""
+    """
+    Return both angles at which a sum has a given length, shape (2, ...) [rad].
+
+    Parameters
+    ----------
+    offset : array, shape (..., 3)
+    axis : array, shape (3,), of length 1
+    start : array, shape (..., 3)
+        The vector to turn; the sum is ``offset`` plus the turned vector.
+    distance : array, shape (...)
+        The length wanted.
+
+    """
     height = 0.5 * (distance**2 - (offset**2).sum(axis=-1) - (start**2).sum(axis=-1))
     return angle_to_height(offset, axis, start, height)

@@ -23,6 +23,20 @@ def centred(robot: Robot, q: Array) -> Array:
 
 
 def turns_to_middle(robot: Robot, low: Array, high: Array) -> Array:
-    """Return the turns, shape (..., n), that bring low..high to the middle of the range."""
+    """
+    Return how many whole turns bring a range of positions to the middle of the limits.
+
+    Parameters
+    ----------
+    robot : Robot
+    low, high : array, shape (..., n) [rad or m]
+        Ends of the range of every joint.
+
+    Returns
+    -------
+    array, shape (..., n)
+        Whole numbers; 0 for joints that slide.
+
+    """
     turns = np.round((middle(robot) - 0.5 * (low + high)) / TURN)
     return np.where(robot.prismatic, 0.0, turns)

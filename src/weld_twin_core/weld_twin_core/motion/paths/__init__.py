@@ -1,6 +1,16 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Weld seams in arc length, the torch on them, and seams from the mapping a path file holds."""
+"""
+Weld seams in arc length, the torch on them, and seams from the mapping a path file holds.
+
+Examples
+--------
+>>> import weld_twin_core as wt
+>>> seam = wt.paths.Line([0.5, -0.1, 0.2], [0.5, 0.1, 0.2])
+>>> print(round(seam.length, 6), 'm')
+0.2 m
+
+"""
 
 from .arc import Arc, Circle
 from .bundled import KINDS, default_seam

@@ -138,6 +138,7 @@ class _Circle:
 
     @classmethod
     def about(cls, centre: Array, axis: Array, start: Array) -> _Circle:
+        """Return the circle about a point and an axis of length 1, through a start (3,) [m]."""
         radius = float(np.linalg.norm(start - centre))
         out = (start - centre) / radius
         return cls(centre, radius, out, np.cross(axis, out))

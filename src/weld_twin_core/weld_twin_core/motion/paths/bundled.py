@@ -99,6 +99,13 @@ def default_seam(robot: Robot, kind: str = 'line', torch: Torch | None = None) -
     ReachError
         None of the places tried is within reach.
 
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> seam = wt.default_seam(wt.load('ur5'), 'circle')
+    >>> print(f'{seam.length:.3f} m')
+    0.375 m
+
     """
     if kind not in _SHAPES:
         raise PathError(f'no bundled seam is of kind {kind!r}; there are ' + ', '.join(KINDS))

@@ -35,6 +35,11 @@ def from_mapping(data: Mapping[str, Any]) -> Path:
     """
     Return the seam a mapping describes.
 
+    Parameters
+    ----------
+    data : mapping
+        ``kind`` and the arguments of that kind of seam, and ``weave`` where it weaves.
+
     Raises
     ------
     PathError

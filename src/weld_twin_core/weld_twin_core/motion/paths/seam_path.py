@@ -91,6 +91,12 @@ def frames_on(position: Array, tangent: Array, normal: Array) -> SeamFrames:
     """
     Return frames with the part of ``normal`` that is perpendicular to the travel.
 
+    Parameters
+    ----------
+    position : array, shape (N, 3) [m]
+    tangent : array, shape (N, 3), of length 1
+    normal : array, shape (3,) or (N, 3)
+
     Raises
     ------
     PathError

@@ -74,7 +74,22 @@ Measure = Callable[[Case], dict[str, float]]
 
 
 def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
-    """Return everything the claims need to know about a robot on a seam."""
+    """
+    Return everything the claims need to know about a robot on a seam.
+
+    Parameters
+    ----------
+    robot : Robot
+    path : Path
+    seed : int
+        Of the draws that some measures take.
+
+    Returns
+    -------
+    dict of str to float
+        Measures by name; units are in the names of `rules`.
+
+    """
     from . import combined_measures, geometric_measures, motion_measures
 
     case = Case(robot, path, seed)

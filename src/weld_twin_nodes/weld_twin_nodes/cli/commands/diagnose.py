@@ -83,11 +83,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.diagnosis import diagnose
+    from weld_twin_core.diagnosis.algebra.problem import frames_named
     from weld_twin_msgs_py.bags import read_recording
 
     from ...offline.told_twin import build_twin
 
-    align, excluded = _align(args.align), _families(args.exclude_effect)
+    align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
     twin = build_twin(robot_of(args), args.effects_known)
     topics = topics_of(args)
     with _progress() as tell:
@@ -123,16 +124,6 @@ def _bounded(recordings: Sequence[Recording]) -> list[Recording]:
 
 def _share(own: int, total: int, most: int) -> int:
     return max(ceil(own * min(most / max(total, 1), 1.0)), 2)
-
-
-def _align(text: str) -> frozenset[str]:
-    from weld_twin_core.diagnosis.algebra.problem import FRAMES
-    from weld_twin_core.errors import ModelError
-
-    frames = frozenset(part.strip() for part in text.split(',') if part.strip())
-    for frame in sorted(frames - set(FRAMES)):
-        raise ModelError(f'--align takes base, tool or base,tool; {frame!r} is neither')
-    return frames
 
 
 def _families(names: Sequence[str]) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ _TOP_KEYS = {
     'links',
     'payload',
     'source',
+    'plausible',
 }
 _JOINT_KEYS = {
     'name',
@@ -66,6 +67,9 @@ class Robot:
     gravity : array, shape (3,) [m/s^2], in the base frame
     source : str
         Where the numbers come from.
+    plausible : mapping
+        What this robot's errors can be where it is known better than of robots at large: effect,
+        parameter, and ``sd``, ``low``, ``high``; see `weld_twin_core.effects.plausible`.
 
     Raises
     ------
@@ -109,6 +113,7 @@ class Robot:
     payload_com: Array = field(default_factory=lambda: np.zeros(3))
     gravity: Array = field(default_factory=lambda: np.array(STANDARD_GRAVITY))
     source: str = ''
+    plausible: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
@@ -293,6 +298,7 @@ class Robot:
             payload_com=payload.get('com', np.zeros(3)),
             gravity=data.get('gravity', STANDARD_GRAVITY),
             source=str(data.get('source', '')),
+            plausible=_plausible(data.get('plausible')),
         )
 
     def to_mapping(self) -> dict[str, Any]:
@@ -327,6 +333,8 @@ class Robot:
         out['payload'] = {'mass': float(self.payload_mass), 'com': self.payload_com.tolist()}
         if self.source:
             out['source'] = self.source
+        if self.plausible:
+            out['plausible'] = _plausible(self.plausible)
         return out
 
 
@@ -337,6 +345,21 @@ def _known(mapping: Mapping[str, Any], keys: set[str], where: str) -> None:
             f'{where} has the unknown key {unknown[0]!r}; known keys are '
             + ', '.join(sorted(keys))
         )
+
+
+def _plausible(value: Any) -> dict[str, dict[str, dict[str, float]]]:
+    """Return what a robot file says about the size of errors, checked."""
+    out: dict[str, dict[str, dict[str, float]]] = {}
+    for effect, parameters in (value or {}).items():
+        for parameter, limits in parameters.items():
+            _known(limits, {'sd', 'low', 'high'}, f'plausible {effect}.{parameter}')
+            numbers = {key: float(number) for key, number in limits.items()}
+            if not numbers.get('sd', 1.0) > 0.0:
+                raise ModelError(f'plausible {effect}.{parameter}: sd must be above zero')
+            if not numbers.get('low', -np.inf) < numbers.get('high', np.inf):
+                raise ModelError(f'plausible {effect}.{parameter}: low must be below high')
+            out.setdefault(str(effect), {})[str(parameter)] = numbers
+    return out
 
 
 def _frame(value: Any, name: str) -> Array:

@@ -1,0 +1,281 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a machine can have: a spread and a range for every parameter of every effect.
+
+The spread (``sd``) is that of a Gaussian about zero, the prior of every fit; what lies outside
+the range is never named as a cause. ``source`` says where the figures come from: a publication
+that was read, or, where none was found, an argument that starts with 'derived'; those are wide.
+docs/plausible.md lists them. A robot may narrow them: key ``plausible`` of a robot file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arm.robot import Robot
+from ..arrays import Array
+from .effect import Effect
+from .transmission_ripple import TransmissionRipple
+
+URS = (
+    'controller calibrations of a UR3 (github.com/MyRobotLab/pyrobotlab issue 145) and of a UR5 '
+    '(github.com/UniversalRobots/Universal_Robots_ROS_Driver issue 457): rows between axes that '
+    'are not parallel'
+)
+RV = (
+    'backlash of 1 to 1.5 arcmin and angle errors of at most 1 arcmin allowed for reducers of '
+    'robots (zhygear.com, analysis-and-control-of-backlash-in-rv-reducers)'
+)
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """
+    Spread and range of one parameter, in its own unit.
+
+    Attributes
+    ----------
+    sd : float
+        Standard deviation among machines, and of what people do to them.
+    low, high : float
+        What lies outside is no property of a machine.
+    source : str
+
+    """
+
+    sd: float
+    low: float
+    high: float
+    source: str
+
+    @property
+    def derived(self) -> bool:
+        """Return whether no publication stands behind it."""
+        return self.source.startswith('derived')
+
+
+def _even(sd: float, most: float, source: str) -> Plausible:
+    return Plausible(sd, -most, most, source)
+
+
+TABLE: dict[tuple[str, str], Plausible] = {
+    ('joint_offset', 'offset'): _even(
+        5e-3,
+        0.13,
+        'a mastering 16 degrees of the motor off is 0.2 degrees (3.5 mrad) of the joint; arms '
+        'mastered on wrong marks were 5 to 7 degrees off (industrialmonitordirect.com, KR16 '
+        'mastering deviation and KR3 mastering error)',
+    ),
+    ('link_length', 'da'): _even(
+        5e-4, 1e-2, f'{URS}: 0.02 to 0.28 mm; range derived: beyond a centimetre it is another arm'
+    ),
+    ('link_offset', 'dd'): _even(
+        5e-4, 1e-2, f'{URS}: 0.09 to 0.32 mm; range derived: beyond a centimetre it is another arm'
+    ),
+    ('link_twist', 'dalpha'): _even(2e-3, 2e-2, f'{URS}: 0.4 to 3.9 mrad'),
+    ('axis_parallelism', 'dbeta'): _even(
+        2e-3, 2e-2, 'derived: a tilt of the same kind as link_twist, of the same size'
+    ),
+    ('gear_ratio', 'scale'): _even(
+        1e-3,
+        2e-2,
+        'derived: tooth numbers are exact, what is left is belts and scales of encoders; one tooth '
+        'in fifty is the coarsest wrong ratio',
+    ),
+    ('joint_coupling', 'ratio'): _even(
+        1e-3,
+        2e-2,
+        'motion that leaks through a wrist is divided by its reduction of 50:1 to 120:1 '
+        '(industrialmonitordirect.com, KR16 mastering deviation): at most 1/50',
+    ),
+    ('transmission_ripple', 'amplitude'): _even(
+        2e-4, 3e-3, f'{RV}; range derived: ten times that, a gear that is worn out'
+    ),
+    ('backlash', 'width'): Plausible(
+        5e-4, 0.0, 2e-2, f'{RV}; range derived: a degree is a gear that is broken'
+    ),
+    ('joint_compliance', 'compliance'): Plausible(
+        3e-5,
+        -1e-5,
+        3e-4,
+        'derived: 3,000 N m/rad is the softest gear of a small cobot; a little below zero is a '
+        'controller that mends too much',
+    ),
+    ('cartesian_compliance', 'compliance'): Plausible(
+        5e-6, -1e-6, 1e-4, 'derived: 10 mm under 100 N is the softest arm that still welds'
+    ),
+    ('payload', 'mass'): _even(
+        2.0, np.inf, 'derived: see `mass_range`; no arm carries half of what it weighs itself'
+    ),
+    ('payload', 'com'): _even(
+        0.1, 0.5, 'derived: centres of torches and grippers lie within half a metre'
+    ),
+    ('thermal_growth', 'coefficient'): Plausible(
+        2.4e-5,
+        -2.4e-5,
+        7.2e-5,
+        'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K, cast iron by 11e-6 (amesweb.info); '
+        'range derived: an arm may warm up three times as much as the place of the sensor',
+    ),
+    ('drift', 'xyz_rate'): _even(
+        5e-6,
+        1e-4,
+        'derived: 6 mm in a minute is a fixture that falls; trackers drift by tenths of a '
+        'millimetre in two hours (akjournals.com, 606/15/3 p. 60)',
+    ),
+    ('measurement_scale', 'scale'): _even(
+        1e-4,
+        2e-3,
+        'trackers are within 6 um/m across the beam (user manual of an AT9xx, section 2.8.2); '
+        'range derived: 2 mm/m is a wrong length, not an instrument',
+    ),
+    ('quantization', 'step'): Plausible(
+        1e-3, 0.0, 1e-2, 'derived: 12 bits a turn are 1.5 mrad; a centiradian is no encoder'
+    ),
+    ('servo_lag', 'time_constant'): Plausible(
+        2e-2, 0.0, 0.3, 'derived: the loop of a machine that follows a path closes within 0.3 s'
+    ),
+    ('time_delay', 'delay'): _even(
+        2e-2, 0.5, 'derived: buses and filters take milliseconds; half a second is another clock'
+    ),
+    ('vibration', 'frequency'): Plausible(
+        np.inf, 1.0, 100.0, 'derived: softer is a swing, stiffer does not reach the tool'
+    ),
+    ('vibration', 'damping'): Plausible(
+        np.inf, 1e-3, 0.7, 'derived: steel rings longest at 0.001; beyond 0.7 nothing swings'
+    ),
+    ('vibration', 'gain'): _even(1.0, 5.0, 'derived: one is the whole inertia on one spring'),
+    ('base_pose', 'xyz'): _even(5e-3, 0.5, 'derived: half a metre off is another place'),
+    ('base_pose', 'rotvec'): _even(1e-2, 0.2, 'derived: ten degrees are seen by the eye'),
+    ('tool_pose', 'xyz'): _even(
+        5e-3,
+        0.1,
+        'tool centres found by hand were 8 to 15 mm off (industrialmonitordirect.com, KR3 '
+        'mastering error)',
+    ),
+    ('tool_pose', 'rotvec'): _even(2e-2, 0.4, 'derived: twenty degrees are seen by the eye'),
+    ('setup_settling', 'xyz'): _even(1e-3, 2e-2, 'derived: what a stand creeps while it warms'),
+    ('setup_settling', 'rotvec'): _even(1e-3, 2e-2, 'derived: a millimetre on a metre'),
+    ('setup_step', 'xyz'): _even(5e-3, 0.1, 'derived: a knock'),
+    ('setup_step', 'rotvec'): _even(5e-3, 0.1, 'derived: a knock'),
+}
+"""By effect and parameter."""
+PRISMATIC: dict[tuple[str, str], Plausible] = {
+    ('joint_offset', 'offset'): _even(5e-3, 0.1, 'derived: a reference switch, by hand'),
+    ('transmission_ripple', 'amplitude'): _even(
+        2e-5, 1e-3, 'derived: a turn of a screw repeats within hundredths of a millimetre'
+    ),
+    ('backlash', 'width'): Plausible(
+        5e-5, 0.0, 5e-3, 'derived: nuts have hundredths of a millimetre of play'
+    ),
+    ('joint_compliance', 'compliance'): Plausible(
+        1e-6, -1e-7, 1e-4, 'derived: 10 mm under 100 N is the softest axis'
+    ),
+    ('quantization', 'step'): Plausible(1e-5, 0.0, 1e-3, 'derived: a millimetre is no scale'),
+}
+"""The same where a joint slides, in m instead of rad."""
+OWN_WEIGHT = 0.5
+"""Share of its own weight that no arm carries; those of welding carry a tenth to a third."""
+BELOW = 0.05
+"""Share of an arm's own weight by which published masses of its links are off."""
+UNSTATED_MASS = 20.0
+"""Load [kg] taken as most where an arm's own masses are not known."""
+
+
+def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = None) -> Plausible:
+    """
+    Return spread and range of one parameter on a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+    effect, parameter : str
+    joint : str, optional
+        Where the effect sits.
+
+    Returns
+    -------
+    Plausible
+        As wide as can be for what the table does not have.
+
+    """
+    key = (effect, parameter)
+    found = TABLE.get(key, Plausible(np.inf, -np.inf, np.inf, 'derived: nothing is known'))
+    if joint is not None and robot.prismatic[robot.index(joint)]:
+        found = PRISMATIC.get(key, found)
+    if key == ('payload', 'mass'):
+        low, high = mass_range(robot)
+        found = replace(found, low=low, high=high)
+    return _narrowed(found, robot.plausible.get(effect, {}).get(parameter))
+
+
+def mass_range(robot: Robot) -> tuple[float, float]:
+    """
+    Return how much less and more than declared a payload can weigh, [kg].
+
+    A load cannot weigh less than nothing, and no arm carries half of what it weighs itself.
+    """
+    own = UNSTATED_MASS / OWN_WEIGHT if robot.mass is None else float(robot.mass.sum())
+    return -robot.payload_mass - BELOW * own, OWN_WEIGHT * own - robot.payload_mass
+
+
+def spreads(robot: Robot, effect: Effect) -> Array:
+    """Return the prior standard deviation of every fit coordinate, shape (K,)."""
+    if isinstance(effect, TransmissionRipple):
+        each = plausible(robot, effect.name, 'amplitude', effect.site)
+        # Sine and cosine share the amplitude.
+        return np.full(effect.coordinates().size, each.sd / np.sqrt(2.0))
+    return np.array([each.sd for each in _each(robot, effect)])
+
+
+def ranges(robot: Robot, effect: Effect) -> tuple[Array, Array]:
+    """Return the least and the most of every fit coordinate, each shape (K,)."""
+    if isinstance(effect, TransmissionRipple):
+        most = plausible(robot, effect.name, 'amplitude', effect.site).high
+        full = np.full(effect.coordinates().size, most)
+        return -full, full
+    found = _each(robot, effect)
+    return np.array([each.low for each in found]), np.array([each.high for each in found])
+
+
+def beyond(robot: Robot, effect: Effect) -> list[tuple[str, float, float]]:
+    """
+    Return the parameters of an effect that no machine has, with value and nearest limit.
+
+    Parameters
+    ----------
+    robot : Robot
+    effect : Effect
+
+    """
+    out = []
+    for (parameter, _), value in zip(effect.components(), effect.vector(), strict=True):
+        each = plausible(robot, effect.name, parameter.name, effect.site)
+        if not each.low <= value <= each.high:
+            limit = each.low if value < each.low else each.high
+            out.append((parameter.name, float(value), float(limit)))
+    return out
+
+
+def _each(robot: Robot, effect: Effect) -> list[Plausible]:
+    return [
+        plausible(robot, effect.name, parameter.name, effect.site)
+        for parameter, _ in effect.components()
+        if parameter.differentiable
+    ]
+
+
+def _narrowed(found: Plausible, given: Mapping[str, float] | None) -> Plausible:
+    """Return what a robot file says instead, as far as it says anything."""
+    if not given:
+        return found
+    return Plausible(
+        float(given.get('sd', found.sd)),
+        float(given.get('low', found.low)),
+        float(given.get('high', found.high)),
+        'the robot file',
+    )

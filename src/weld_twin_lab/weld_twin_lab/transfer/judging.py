@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One split, diagnosed and fitted plainly, and what every model then does on other stations."""
+
+from __future__ import annotations
+
+import traceback
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import Diagnosis, diagnose
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.effects.plausible import beyond
+from weld_twin_core.recording import Recording
+
+from ..real_robots.unseen_stations import ALIGN, residual
+from .flags import flagged
+from .plain import PLAIN, plain_fit
+from .splits import Split, halves
+
+PRODUCT, FRAMES = 'product', 'frames'
+HALVES = 60
+"""Stations from which on the two halves of a split are diagnosed as well."""
+DRAWS = 2000
+
+
+def judge(split: Split) -> dict[str, Any]:
+    """Return what came of one split, as plain JSON values."""
+    robot = catalog.load(split.robot)
+    out: dict[str, Any] = {
+        'name': split.name,
+        'kind': split.kind,
+        'robot': split.robot,
+        'stations': _count(split.train),
+    }
+    models: dict[str, Model] = {
+        name: plain_fit(split.train, robot, families, ALIGN) for name, families in PLAIN.items()
+    }
+    start = perf_counter()
+    diagnosis, error = tried(split.train, split.robot)
+    out['seconds'] = round(perf_counter() - start, 2)
+    out['traceback'] = error
+    if diagnosis is None:
+        return out
+    out |= said(diagnosis)
+    if diagnosis.status != 'unsound':
+        models[PRODUCT] = diagnosis.model
+    for region, stations in (('inside', split.inside), ('outside', split.outside)):
+        out[region] = None
+        if stations is not None and _count(stations):
+            out[region] = _region(models, split.train, stations, diagnosis)
+    if _count(split.train) >= HALVES:
+        pair = [tried(half, split.robot) for half in halves(split.train)]
+        out['halves'] = [said(half) if half else {'traceback': text} for half, text in pair]
+    return out
+
+
+def tried(train: Recording, robot: str) -> tuple[Diagnosis | None, str | None]:
+    """Return the diagnosis, or the traceback that came instead."""
+    try:
+        return diagnose([train], catalog.load(robot), align=ALIGN), None
+    except Exception:  # what is counted here is exactly what nobody expected
+        return None, traceback.format_exc()
+
+
+def said(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return status, confidence, what is named, and whether a machine can have it."""
+    named = sorted({found.effect.name for found in diagnosis.effects})
+    families = sorted(family.effect for family in diagnosis.families if family.named)
+    return {
+        'status': diagnosis.status,
+        'confidence': diagnosis.confidence,
+        'named': named,
+        'families': families or named,
+        'reasons': list(diagnosis.reasons),
+        'beyond': [
+            [found.effect.name, found.effect.site, name, value, limit]
+            for found in diagnosis.effects
+            for name, value, limit in beyond(diagnosis.model.robot, found.effect)
+        ],
+        'claimed': diagnosis.shrink
+        and {'ratio': diagnosis.shrink.ratio, 'ci95': list(diagnosis.shrink.ci95)},
+    }
+
+
+def _region(
+    models: dict[str, Model], train: Recording, stations: Recording, diagnosis: Diagnosis
+) -> dict[str, Any]:
+    """Return the errors of every model on some stations, and how they compare."""
+    sizes = {name: _sizes(residual(model, train, stations)) for name, model in models.items()}
+    out: dict[str, Any] = {
+        'stations': _count(stations),
+        'mean_m': {name: float(size.mean()) for name, size in sizes.items()},
+        'rms_m': {name: float(np.sqrt((size**2).mean())) for name, size in sizes.items()},
+    }
+    if PRODUCT not in sizes:
+        return out
+    mine, frames = sizes[PRODUCT], sizes[FRAMES]
+    best = min(PLAIN, key=lambda name: out['mean_m'][name])
+    flags = flagged(diagnosis, train, stations)
+    out['best'] = best
+    out['over_best'] = paired(mine, sizes[best])
+    out['over_frames'] = paired(mine, frames)
+    out['flagged'] = float(flags.mean())
+    rest = ~flags
+    out['unflagged_over_frames'] = paired(mine[rest], frames[rest]) if rest.any() else None
+    return out
+
+
+def paired(mine: Array, other: Array) -> dict[str, float]:
+    """
+    Return the ratio of two mean errors on the same stations, with its 95 % interval.
+
+    Percentile bootstrap over stations, drawn for both at once; always the same draws.
+    """
+    ratio = float(mine.mean() / max(other.mean(), 1e-300))
+    pick = np.random.default_rng(0).integers(0, mine.size, (DRAWS, mine.size))
+    draws = mine[pick].mean(axis=1) / np.maximum(other[pick].mean(axis=1), 1e-300)
+    low, high = np.percentile(draws, [2.5, 97.5])
+    return {'ratio': ratio, 'low': float(low), 'high': float(high)}
+
+
+def _sizes(parts: Array) -> Array:
+    return np.asarray(np.linalg.norm(parts[:3], axis=0))
+
+
+def _count(recording: Recording) -> int:
+    return 0 if recording.measured is None else int(recording.measured.t.size)

@@ -19,6 +19,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 from ..real_robots.unseen_stations import residual
 from .judging import said
+from .splits import Rows
 
 FILE = 'DATA_EMPS.mat'
 JOINT = 'axis'
@@ -66,9 +67,9 @@ def judge_axis(directory: Path) -> dict[str, Any]:
     measured = recording.measured
     assert measured is not None
     cut = int(FITTED * measured.t.size)
-    index = np.arange(measured.t.size)
-    train = recording.with_measured(measured.take(index[:cut]))
-    test = recording.with_measured(measured.take(index[cut:]))
+    first: Rows = np.arange(measured.t.size) < cut
+    train = recording.with_measured(measured.take(first))
+    test = recording.with_measured(measured.take(~first))
     out: dict[str, Any] = {'name': 'servo_axis', 'kind': 'servo_axis', 'robot': robot.name}
     out['rms_m'] = plain_axis(recording, cut)
     start = perf_counter()

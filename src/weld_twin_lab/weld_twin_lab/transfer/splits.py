@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,8 @@ from numpy.typing import NDArray
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion, Recording
 
-Rows = NDArray[np.intp]
+Rows = NDArray[Any]
+"""Row numbers."""
 
 COUNTS = (15, 30, 60, 120, 240)
 LEAST = 15
@@ -105,7 +107,8 @@ def _narrow(table: Recording, rows: Rows) -> Iterator[tuple[str, Rows]]:
 def densest(q: Array, half: float) -> NDArray[np.bool_]:
     """Return which stations lie within ±half of the station that has most of them, (M,)."""
     near = [(np.abs(q - centre).max(axis=1) <= half) for centre in q]
-    return near[int(np.argmax([mask.sum() for mask in near]))]
+    best: NDArray[np.bool_] = near[int(np.argmax([mask.sum() for mask in near]))]
+    return best
 
 
 def kept_back(rows: Rows) -> tuple[Rows, Rows]:

@@ -39,8 +39,8 @@ def run(args: argparse.Namespace) -> int:
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    places = [Path(place) for place in (args.ur5, args.ur10, args.emps, args.out)]
-    result = study(*places, only=args.only, tell=tell)
+    ur5, ur10, emps, out = (Path(place) for place in (args.ur5, args.ur10, args.emps, args.out))
+    result = study(ur5, ur10, emps, out, args.only, tell)
     found = measures(result['splits'])
     print(goal_table(found))
     return 0 if all(m.reached is not False for m in found) else MISSED

@@ -9,6 +9,7 @@ from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
 from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.many.shrinkage import groups, learned_precision, shrunk_fit
 
 ROWS = 150
@@ -93,7 +94,7 @@ def test_ripple_is_grouped_by_joint_and_band_and_small_groups_are_free():
         effect('joint_offset', joint=j, offset=0.0)
         for j in ('elbow_joint', 'wrist_1_joint', 'wrist_2_joint')
     ]
-    numbers, scales = groups((ripple, *offsets))
+    numbers, scales = groups((ripple, *offsets), Beliefs())
     assert scales.shape == (13,)
     low, high, rest = numbers[[0, 1, 2, 3, 4, 5, 8, 9]], numbers[[6, 7]], numbers[10:]
     assert np.unique(low).size == 1 and low[0] >= 0
@@ -130,7 +131,7 @@ def test_sizes_learned_predict_nearly_as_well_as_sizes_known_and_better_than_non
         scale = known_scale(problem, position=1e-4)
         start = model.with_found(tuple(e.with_coordinates(np.zeros(1)) for e in true))
         fits = (
-            shrunk_fit(problem, start, scale)[0],
+            shrunk_fit(problem, start, scale, Beliefs())[0],
             fit(problem, start, scale, precision),
             fit(problem, start, scale),
             fit(problem, model, scale),

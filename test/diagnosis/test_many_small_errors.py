@@ -9,12 +9,13 @@ import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
 from weld_twin_core.diagnosis.algebra.fit import fit
-from weld_twin_core.diagnosis.hypotheses.ripple_lines import LINE, _Waves, with_lines
-from weld_twin_core.diagnosis.many.family_verdict import family_verdict, weighed
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.hypotheses.ripple_lines import _Waves, with_lines
 from weld_twin_core.diagnosis.many.shrinkage import groups
+from weld_twin_core.diagnosis.many.weighed_families import weighed_families
 from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
-from weld_twin_core.diagnosis.verdict.decision import Evidence
+from weld_twin_core.diagnosis.verdict.decision import Evidence, decide
 from weld_twin_core.twin.twin import Twin
 
 ELBOW = 2
@@ -40,13 +41,17 @@ def lines_of(model):
 def test_two_narrow_lines_are_found_where_they_are_and_nowhere_else():
     true = (ripple('elbow_joint', 256.0, 1.5e-4, 0.7), ripple('wrist_2_joint', 131.0, 3e-4, -2.0))
     problem, model = tiny(true, count=400)
-    found = with_lines(problem, model.with_found(dense(model.robot)), known_scale(problem))
+    found = with_lines(
+        problem, model.with_found(dense(model.robot)), known_scale(problem), Beliefs()
+    )
     assert lines_of(found) == {'elbow_joint': [256.0], 'wrist_2_joint': [131.0]}
 
 
 def test_noise_alone_has_no_lines():
     problem, model = tiny((), count=400, seed=3)
-    found = with_lines(problem, model.with_found(dense(model.robot)), known_scale(problem))
+    found = with_lines(
+        problem, model.with_found(dense(model.robot)), known_scale(problem), Beliefs()
+    )
     assert lines_of(found) == {}
 
 
@@ -55,14 +60,14 @@ def test_the_score_of_a_line_is_the_fall_of_least_squares(turned):
     problem, model = tiny((ripple('elbow_joint', 150.0, 1e-4, 0.3),), count=120, turned=turned)
     scale = known_scale(problem)
     features = problem.features(model)
-    waves = _Waves.of(problem, features, scale, ELBOW, np.array([150.0]))
+    waves = _Waves.of(problem, features, scale, ELBOW, np.array([150.0]), 1.0)
     chi, joint, _, step = waves.peak(problem.residuals(model), np.ones(1, bool))
     columns, target = by_differences(problem, model, 150.0), rows(problem.residuals(model)[0])
     solved, left, *_ = np.linalg.lstsq(columns, target, rcond=None)
     assert joint == ELBOW
     assert chi == pytest.approx(float(target @ target - left[0]), rel=1e-4)
     np.testing.assert_allclose(step, solved, rtol=1e-3)
-    assert chi > LINE
+    assert chi > Beliefs().line_chi2
 
 
 def rows(part):
@@ -86,7 +91,9 @@ def test_a_joint_that_hardly_moves_has_no_waves():
     features = problem.features(model)
     travel = np.ptp(features[0].view.q, axis=0)
     for joint in np.flatnonzero(travel < 1.0):
-        assert _Waves.of(problem, features, known_scale(problem), int(joint), np.ones(1)) is None
+        assert (
+            _Waves.of(problem, features, known_scale(problem), int(joint), np.ones(1), 1.0) is None
+        )
     assert (travel < 1.0).any()
 
 
@@ -103,7 +110,7 @@ def test_a_family_of_three_shares_a_size_and_a_pair_is_free():
             phase=[0.0] * 4,
         ),
     )
-    labels, scales = groups(found)
+    labels, scales = groups(found, Beliefs())
     assert labels.shape == scales.shape == (3 + 2 + 8,)
     assert len(set(labels[:3])) == 1
     assert labels[0] >= 0
@@ -131,9 +138,29 @@ def families():
     return problem, model, true, result, Unseen.of(problem, scale, result, np.zeros(0))
 
 
+def judged(families, gain=0.0, sure=0.0):
+    """Return the verdict on the two families, with a structure left beside them."""
+    result, unseen = families[3:]
+    loose = Structure(1e-4, gain, sure, ('the angle of elbow_joint',))
+    weighed = weighed_families(SimpleNamespace(final=result), unseen)
+    return decide(
+        Evidence(
+            slots=(),
+            structure=loose,
+            gap=4e-4,
+            after=1e-4,
+            floor=SIGMA * np.sqrt(3.0),
+            fitted=1e-4,
+            independent=False,
+            parts=(),
+            families=weighed,
+        )
+    )
+
+
 def test_the_family_at_work_is_named_and_accounts_for_what_it_moves(families):
-    problem, model, true, result, unseen = families
-    told = {f.effect: f for f in weighed(SimpleNamespace(final=result), unseen)}
+    problem, model, true = families[:3]
+    told = {f.effect: f for f in judged(families).families}
     recording = problem.recordings[0]
     t = recording.measured.t
     moved = (
@@ -154,10 +181,7 @@ def test_the_family_at_work_is_named_and_accounts_for_what_it_moves(families):
 
 @pytest.mark.parametrize(('gain', 'status'), [(0.0, 'identified'), (0.9, 'unknown')])
 def test_families_are_no_explanation_while_structure_remains(families, gain, status):
-    result, unseen = families[3:]
-    loose = Structure(1e-4, gain, 9.0 if gain else 0.0, ('the angle of elbow_joint',))
-    given = Evidence((), loose, 4e-4, 1e-4, SIGMA * np.sqrt(3.0), 1e-4, False, ())
-    verdict = family_verdict(SimpleNamespace(final=result), unseen, given)
+    verdict = judged(families, gain, 9.0 if gain else 0.0)
     assert verdict.status == status
     assert (verdict.confidence > 0.7) == (status == 'identified')
     assert {site.effect for group in verdict.sets for site in group} == {'link_length'}

@@ -11,12 +11,14 @@ from diagnosis_cells import effect, known_scale, tiny
 
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.library import build
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.diagnosis.unseen.leftover_structure import Structure, structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
-from weld_twin_core.diagnosis.verdict.decision import Evidence, decide
+from weld_twin_core.diagnosis.verdict.decision import decide
+from weld_twin_core.diagnosis.verdict.evidence import Evidence
 from weld_twin_core.diagnosis.verdict.partial_ripple import glimpsed
 from weld_twin_core.recording import Measurements
 
@@ -25,12 +27,8 @@ NOTHING_LEFT = Structure(3.5e-5, 0.0, 0.0, ())
 ELBOW_LEFT = Structure(2e-5, 0.5, 9.0, ('the angle of elbow_joint',))
 
 
-def fitted(*found):
-    return SimpleNamespace(model=SimpleNamespace(found=found))
-
-
-def slot(*pairs, found=()):
-    return tuple(Rival(site, 0.0, fitted(*found), probability) for site, probability in pairs)
+def slot(*pairs):
+    return tuple(Rival(site, 0.0, SimpleNamespace(), probability) for site, probability in pairs)
 
 
 def evidence(slots=(), loose=NOTHING_LEFT, after=3.5e-5, parts=None, fitted=None):
@@ -105,7 +103,7 @@ def test_periods_seen_are_counted_over_all_recordings(order, told):
     ripple = effect(
         'transmission_ripple', joint='elbow_joint', amplitude=1e-4, order=order, phase=0.0
     )
-    assert glimpsed(problem, model.with_found((ripple,))) == told
+    assert glimpsed(problem, model.with_found((ripple,)), Beliefs()) == told
 
 
 def test_belief_falls_as_what_remains_stands_above_the_floor():
@@ -131,19 +129,6 @@ def test_an_effect_smaller_than_what_remains_is_not_named():
     verdict = decide(evidence(slots, after=1e-4, parts=(0.9, 0.1)))
     assert verdict.status == 'unknown'
     assert verdict.sets == ((PLAY,),)
-
-
-def test_every_order_of_a_ripple_counts_as_a_cause_of_its_own():
-    site = Site('transmission_ripple', 'elbow_joint')
-    for count, status in ((1, 'identified'), (4, 'unknown')):
-        ripple = effect(
-            'transmission_ripple',
-            joint='elbow_joint',
-            amplitude=[1e-4] * count,
-            order=list(range(1, count + 1)),
-            phase=[0.0] * count,
-        )
-        assert decide(evidence((slot((site, 1.0), found=(ripple,)),))).status == status
 
 
 def test_effects_that_cancel_each_other_are_not_named():
@@ -177,7 +162,7 @@ def test_what_depends_on_the_angle_of_a_joint_is_said_to_and_noise_is_not(size, 
     problem, model = with_bend(size)
     scale = known_scale(problem)
     bare = fit(problem, model, scale)
-    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model)
+    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, Beliefs())
     assert (found.gain > 0.03 and found.sure > 3.0) is seen
     assert (found.depends_on[:1] == ('the angle of elbow_joint',)) is seen
 
@@ -244,5 +229,5 @@ def test_a_tool_that_slipped_is_told_from_a_base_that_moved():
     problem = Problem((recording.with_measured(slipped),))
     scale = known_scale(problem)
     bare = fit(problem, model, scale)
-    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model)
+    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, Beliefs())
     assert found.depends_on[0].endswith('seen from the tool')

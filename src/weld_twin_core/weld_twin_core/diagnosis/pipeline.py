@@ -11,9 +11,9 @@ from ..effects.effect import Effect
 from ..recording import Recording
 from .algebra.noise_floor import noise_floor
 from .answer.answer import answer
+from .beliefs import Beliefs
 from .frames.aligned import aligned
 from .hypotheses.search import search
-from .many.family_verdict import family_verdict
 from .many.fitted_together import fitted_together
 from .result import Diagnosis
 from .soundness import check
@@ -34,6 +34,7 @@ def diagnose(
     known: Sequence[Effect] = (),
     exclude: Sequence[str] = (),
     holdout: Sequence[Recording] = (),
+    beliefs: Beliefs | None = None,
     progress: Progress = lambda text: None,
 ) -> Diagnosis:
     """
@@ -55,6 +56,8 @@ def diagnose(
         Families taken out of the library.
     holdout : sequence of Recording
         Never fitted; judge the shrink. Left out, stretches of the recordings take their turn.
+    beliefs : Beliefs, optional
+        The numbers that decide the verdict; the usual ones when left out.
     progress : callable
         Told in a few words what has been done.
 
@@ -89,18 +92,19 @@ def diagnose(
     identified backlash elbow_joint
 
     """
+    beliefs = beliefs or Beliefs()
     problem, start = aligned(recordings, robot, align, known)
     checks = check(problem, start)
     progress('data checked')
-    found = search(problem, start, exclude, progress)
-    found = fitted_together(found, exclude, progress)
+    found = search(problem, start, exclude, beliefs, progress)
+    found = fitted_together(found, exclude, beliefs, progress)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    leftover = structure(unseen, found.final.model)
+    leftover = structure(unseen, found.final.model, beliefs)
     progress('looked for what is left')
     noise = noise_floor(found.problem, found.problem.residuals(found.final.model))
-    shrink = held_out_shrink(found, unseen, holdout)
-    evidence = gathered(found, unseen, leftover, shrink, noise)
-    verdict = family_verdict(found, unseen, evidence) if found.dense else decide(evidence)
+    shrink = held_out_shrink(found, unseen, holdout, beliefs)
+    evidence = gathered(found, unseen, leftover, shrink, noise, beliefs)
+    verdict = decide(evidence, beliefs)
     return answer(
         found=found,
         unseen=unseen,
@@ -109,4 +113,5 @@ def diagnose(
         noise=noise,
         shrink=shrink,
         checks=checks,
+        beliefs=beliefs,
     )

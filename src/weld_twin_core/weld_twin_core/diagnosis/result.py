@@ -234,6 +234,8 @@ class Diagnosis:
     recordings: tuple[Recording, ...] = ()
     families: tuple[Family, ...] = ()
     """Where many small errors act together: what each kind accounts for, largest first."""
+    evidence: object = None
+    """What the verdict was drawn from, `verdict.evidence.Evidence`, to draw it anew."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""

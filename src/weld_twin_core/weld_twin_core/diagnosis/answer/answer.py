@@ -7,11 +7,13 @@ from __future__ import annotations
 from ..advice import actions
 from ..advice.next_step import next_step
 from ..algebra.noise_floor import NoiseFloor
+from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Check, Diagnosis, Shrink
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
-from ..verdict.decision import Evidence, Verdict
+from ..verdict.decision import Verdict
+from ..verdict.evidence import Evidence
 from .gap import gap, traces
 from .named_effects import named_effects
 from .weighed_candidates import unexplained, weighed_candidates
@@ -26,6 +28,7 @@ def answer(
     noise: NoiseFloor,
     shrink: Shrink,
     checks: tuple[Check, ...],
+    beliefs: Beliefs,
 ) -> Diagnosis:
     """
     Return the diagnosis.
@@ -41,6 +44,7 @@ def answer(
     shrink : Shrink
     checks : tuple of Check
         Whether the data are sound.
+    beliefs : Beliefs
 
     """
     effects = named_effects(found, unseen, verdict)
@@ -54,7 +58,7 @@ def answer(
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,
-        unexplained=unexplained(evidence),
+        unexplained=unexplained(evidence, beliefs),
         next_experiment=next_step(found, verdict),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         checks=checks,
@@ -63,4 +67,5 @@ def answer(
         absent=found.library.absent,
         recordings=found.problem.recordings,
         families=verdict.families,
+        evidence=evidence,
     )

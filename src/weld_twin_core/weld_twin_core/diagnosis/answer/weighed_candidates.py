@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..result import Candidate, Unexplained
-from ..verdict.decision import Evidence
+from ..verdict.evidence import Evidence
+from ..verdict.weighing import Weighed
 
 
 def weighed_candidates(found: Search, evidence: Evidence) -> tuple[Candidate, ...]:
@@ -35,7 +37,8 @@ def _position_rms(found: Search, rival: Rival) -> float:
     return found.work.scale.position * float(np.sqrt(total / max(count, 1)))
 
 
-def unexplained(evidence: Evidence) -> Unexplained:
+def unexplained(evidence: Evidence, beliefs: Beliefs) -> Unexplained:
     """Return what remains after the verdict, and what it depends on."""
-    names = evidence.structure.depends_on if evidence.structured else ()
-    return Unexplained(evidence.after, evidence.above_noise, names)
+    case = Weighed(evidence, beliefs)
+    names = evidence.structure.depends_on if case.structured else ()
+    return Unexplained(evidence.after, case.above_noise, names)

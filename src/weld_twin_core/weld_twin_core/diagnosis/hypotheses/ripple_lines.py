@@ -13,15 +13,12 @@ from ...effects.effect import Effect
 from ...effects.transmission_ripple import TransmissionRipple
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem, Scale
+from ..beliefs import Beliefs
 
 DENSE_ORDERS = 100
 """One per tooth of a 100:1 gear, the highest order that a search takes one by one."""
 HIGHEST_ORDER = 420
-LINE = 25.0
-"""Chi-square of two degrees of freedom that a single line must reach: one false in 1e5 looks."""
 LINES = 40
-RANGE = 1.0
-"""A joint must travel this far [rad] for its ripple to be told from its neighbours' orders."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +50,18 @@ class _Waves:
 
     @classmethod
     def of(
-        cls, problem: Problem, features: list[Features], scale: Scale, joint: int, orders: Array
+        cls,
+        problem: Problem,
+        features: list[Features],
+        scale: Scale,
+        joint: int,
+        orders: Array,
+        least: float,
     ) -> _Waves | None:
-        """Return the waves of a joint, or None when it hardly moves."""
+        """Return the waves of a joint, or None when it travels less than ``least`` [rad]."""
         low = min(float(maker.view.q[:, joint].min()) for maker in features)
         high = max(float(maker.view.q[:, joint].max()) for maker in features)
-        if high - low < RANGE:
+        if high - low < least:
             return None
         columns, masses, waves = [], [], []
         normal = np.zeros((orders.size, 2, 2))
@@ -96,7 +99,7 @@ class _Waves:
         return float(chi[k]), self.joint, k, step[k]
 
 
-def with_lines(problem: Problem, model: Model, scale: Scale) -> Model:
+def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -> Model:
     """
     Return the model with narrow ripple lines above its dense orders.
 
@@ -106,7 +109,10 @@ def with_lines(problem: Problem, model: Model, scale: Scale) -> Model:
     residual = problem.residuals(model)
     features = problem.features(model)
     orders = np.arange(DENSE_ORDERS + 1.0, HIGHEST_ORDER + 1.0)
-    each = [_Waves.of(problem, features, scale, i, orders) for i in range(model.robot.n)]
+    each = [
+        _Waves.of(problem, features, scale, i, orders, beliefs.wave_range)
+        for i in range(model.robot.n)
+    ]
     waves = {w.joint: w for w in each if w is not None}
     free = {i: _free(model, w, orders) for i, w in waves.items()}
     found = list(model.found)
@@ -114,7 +120,7 @@ def with_lines(problem: Problem, model: Model, scale: Scale) -> Model:
         chi, i, k, step = max(
             (w.peak(residual, free[i]) for i, w in waves.items()), key=lambda item: item[0]
         )
-        if chi < LINE:
+        if chi < beliefs.line_chi2:
             break
         for r, maker in enumerate(features):
             angle = orders[k] * maker.view.q[:, i]

@@ -20,11 +20,8 @@ from ..result import Site
 from .evidence_score import Choice, evidence
 from .selection import Workspace, fitted_with, ranking, without
 
-TEMPERATURE = 2.0
-"""Evidence is softened by this: real physics is a little richer than any model compared."""
 SHORTLIST = 7
-LISTED = 0.03
-"""A rival this probable is named beside the leader."""
+"""Rivals fitted at the most; bounds the time that a slot takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,14 +50,14 @@ def rivals(
         Number of independent rows of a fit.
 
     """
-    effect = now.model.found[k]
+    effect, beliefs = now.model.found[k], work.beliefs
     rest = fit(work.problem, without(now.model, k), work.scale, None, 4)
     gram = work.conditioned(rest.model, rest.residual)
     ranked = ranking(gram, work.library.units, effective(now))
     own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
     taken = {(e.name, e.site) for e in now.model.found}
     choices = [c for c in ranked if c.unit.site not in taken and c.nats > 0.0]
-    reach = max(15.0, 0.35 * choices[0].nats) if choices else 0.0
+    reach = max(beliefs.rival_nats, beliefs.rival_share * choices[0].nats) if choices else 0.0
     close = [c for c in choices if c.nats > choices[0].nats - reach][:SHORTLIST]
     fits = [fitted_with(work, rest.model, c.effect(gram)) for c in close]
     # One count for all rivals: see `select`.
@@ -68,7 +65,9 @@ def rivals(
     out = [Rival(Site(effect.name, effect.site), _nats(rest, now, count, own), now)]
     for choice, other in zip(close, fits, strict=True):
         out.append(Rival(Site(*choice.unit.site), _nats(rest, other, count, choice), other))
-    weights = np.exp((np.array([r.nats for r in out]) - max(r.nats for r in out)) / TEMPERATURE)
+    weights = np.exp(
+        (np.array([r.nats for r in out]) - max(r.nats for r in out)) / beliefs.temperature
+    )
     weights /= weights.sum()
     weighed = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
     return tuple(sorted(weighed, key=lambda r: -r.probability))

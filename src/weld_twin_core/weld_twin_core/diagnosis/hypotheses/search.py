@@ -13,6 +13,7 @@ from ...arrays import Array
 from ..algebra.fit import Fit, fit, robust_fit, robust_scale
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
+from ..beliefs import Beliefs
 from ..result import Site
 from .library import Library, build
 from .rivals import Rival, rivals
@@ -21,14 +22,11 @@ from .selection import Workspace, backward, consolidated, forward, without_negli
 SEARCH_ROWS = 9000
 """Rows a search works on: what is found there is fitted again on all."""
 FIT_ROWS = 30000
+"""Rows that a final fit works on; more only take time, as neighbours err alike."""
 ROUNDS = 3
-MANY = 8
-"""So many units found one by one on stations mean many small errors acting together."""
+"""Times that a library is built anew at what was found; the second seldom changes anything."""
 SWAPS = 3
-HOPE = 0.3
-MISFIT = 0.012
-"""Real edges are soft, springs harden, lags have a second pole: the model errs by this share."""
-MISFIT_DIRECTIONS = 30.0
+"""Times that a rival may take an effect's place before the search stops asking."""
 Progress = Callable[[str], None]
 
 
@@ -80,16 +78,18 @@ class Search:
 
     def effective(self, found: Fit) -> float:
         """Return the number of independent rows of a fit on the workspace's measurements."""
-        return effective_rows(self.work.problem, found, self.bare_rss)
+        return effective_rows(self.work.problem, found, self.bare_rss, self.work.beliefs)
 
 
-def effective_rows(problem: Problem, found: Fit, bare_rss: float, trust: float = 1.0) -> float:
+def effective_rows(
+    problem: Problem, found: Fit, bare_rss: float, beliefs: Beliefs, trust: float = 1.0
+) -> float:
     """
     Return the number of independent rows that a fit's evidence may count.
 
     Two things make a residual less telling than its count: autocorrelation, and physics richer
-    than the model. An explained sum of squares E leaves about `MISFIT`^2 E of misfit in some
-    `MISFIT_DIRECTIONS` directions, and any further column may pick that up by chance.
+    than the model. An explained sum of squares E leaves about ``beliefs.misfit``^2 E of misfit in some
+    ``beliefs.misfit_directions`` directions, and any further column may pick that up by chance.
 
     ``trust`` is how far to believe the autocorrelation, as its exponent: while causes are still
     missing from the model, it is theirs.
@@ -97,10 +97,12 @@ def effective_rows(problem: Problem, found: Fit, bare_rss: float, trust: float =
     share = effective_share(found.residual, problem.rows, problem.samples) ** trust
     count = share * found.residual.size
     explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
-    return float(count / (1.0 + MISFIT**2 * explained / MISFIT_DIRECTIONS))
+    return float(count / (1.0 + beliefs.misfit**2 * explained / beliefs.misfit_directions))
 
 
-def search(problem: Problem, start: Model, exclude: Sequence[str], progress: Progress) -> Search:
+def search(
+    problem: Problem, start: Model, exclude: Sequence[str], beliefs: Beliefs, progress: Progress
+) -> Search:
     """Return the effects that earn their place, fitted on all measurements."""
     full = problem.thinned(FIT_ROWS)
     # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
@@ -108,18 +110,18 @@ def search(problem: Problem, start: Model, exclude: Sequence[str], progress: Pro
     progress('baseline fitted')
     small = problem.thinned(SEARCH_ROWS)
     model, crowded = baseline.model, False
-    work, now, bare = _workspace(small, model, exclude)
+    work, now, bare = _workspace(small, model, exclude, beliefs)
     for _ in range(ROUNDS):
         before = names(model)
 
         def effective(found: Fit, bare: float = bare) -> float:
-            return effective_rows(small, found, bare)
+            return effective_rows(small, found, bare, beliefs)
 
         def hopeful(found: Fit, bare: float = bare) -> float:
-            return effective_rows(small, found, bare, HOPE)
+            return effective_rows(small, found, bare, beliefs, beliefs.hope)
 
-        steps = forward(work, now, hopeful, MANY, progress)
-        crowded = small.recordings[0].joints.static and len(steps) >= MANY
+        steps = forward(work, now, hopeful, beliefs.many, progress)
+        crowded = small.recordings[0].joints.static and len(steps) >= beliefs.many
         if steps:
             now = steps[-1].fit
         if steps and not crowded:
@@ -128,10 +130,12 @@ def search(problem: Problem, start: Model, exclude: Sequence[str], progress: Pro
         model = now.model
         if crowded or names(model) == before:
             break
-        work, now, bare = _workspace(small, model, exclude)
+        work, now, bare = _workspace(small, model, exclude, beliefs)
     slots: tuple[tuple[Rival, ...], ...] = ()
     if not crowded:
-        now, slots = settled(work, now, lambda f: effective_rows(small, f, bare), progress)
+        now, slots = settled(
+            work, now, lambda f: effective_rows(small, f, bare, beliefs), progress
+        )
         model = now.model
     final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
     return Search(
@@ -175,10 +179,14 @@ def names(model: Model) -> list[tuple[str, str | None, int]]:
 
 
 def _workspace(
-    problem: Problem, model: Model, exclude: Sequence[str]
+    problem: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs
 ) -> tuple[Workspace, Fit, float]:
     """Return what selection works on, the fit it starts from, and the bare sum of squares."""
     scale = robust_scale(problem, problem.residuals(model))
     now = fit(problem, model, scale, None, 4)
     bare = fit(problem, now.model.with_found(()), scale, None, 4).rss
-    return Workspace.of(problem, scale, build(problem, now.model, scale, exclude)), now, bare
+    return (
+        Workspace.of(problem, scale, build(problem, now.model, scale, exclude), beliefs),
+        now,
+        bare,
+    )

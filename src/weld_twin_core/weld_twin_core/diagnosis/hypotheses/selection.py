@@ -15,27 +15,19 @@ from ...effects.effect import Effect
 from ..algebra.fit import Fit, design, fit
 from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
+from ..beliefs import Beliefs
 from .evidence_score import Choice, best_choice, evidence
 from .library import Library, Unit
 from .starts import searched, started
 
-ENTER = 6.0
-"""Nats a unit must be worth to enter: odds of about 400 to 1, for a hundred or so candidates."""
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
-INVISIBLE = 0.12
-"""RMS in units of noise below which nothing is worth a name, however many rows vouch for it."""
-CONSOLIDATE_SLACK = 0.3
-NEGLIGIBLE = 0.25
-"""RMS in units of noise below which an effect is not told from a larger one's misfit."""
-SLACK = 0.15
-"""Share of the best gain within which a linear ranking is not trusted."""
 
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
     """
-    What selection works on: the problem, its noise, the shared library and its Gram matrix.
+    What selection works on: the problem, its noise, the shared library, its Gram matrix, beliefs.
 
     ``shared`` is the library's normal matrix, computed once; residuals change, columns do not.
     """
@@ -43,12 +35,13 @@ class Workspace:
     problem: Problem
     scale: Scale
     library: Library
+    beliefs: Beliefs
     shared: Array
 
     @classmethod
-    def of(cls, problem: Problem, scale: Scale, library: Library) -> Workspace:
+    def of(cls, problem: Problem, scale: Scale, library: Library, beliefs: Beliefs) -> Workspace:
         """Multiply the library out once."""
-        return cls(problem, scale, library, library.columns @ library.columns.T)
+        return cls(problem, scale, library, beliefs, library.columns @ library.columns.T)
 
     def conditioned(self, model: Model, residual: Array) -> Gram:
         """Return the library's normal equations given a model: its frames and effects fitted."""
@@ -107,7 +100,7 @@ def forward(
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
         # only the fit with a choice tells how many rows were independent.
         ranked = ranking(gram, work.library.units, float(now.residual.size))
-        ranked = [c for c in ranked if c.nats > ENTER and not _repeats(c, taken)]
+        ranked = [c for c in ranked if c.nats > work.beliefs.enter_nats and not _repeats(c, taken)]
         if not ranked:
             break
         best = _refined(work, now, gram, ranked, effective)
@@ -139,7 +132,9 @@ def _refined(
     effective: Callable[[Fit], float],
 ) -> Step | None:
     """Return the best of the leading choices after a nonlinear fit of each."""
-    close = [c for c in ranked if c.nats > ranked[0].nats - max(8.0, SLACK * ranked[0].nats)]
+    best_nats = ranked[0].nats
+    slack = max(work.beliefs.close_nats, work.beliefs.close_share * best_nats)
+    close = [c for c in ranked if c.nats > best_nats - slack]
     tried = [(c, fitted_with(work, now.model, c.effect(gram))) for c in close[:SHORTLIST]]
     # One count for all, that of the fit which leaves least: a worse model explains less and would
     # otherwise be allowed more rows.
@@ -150,7 +145,7 @@ def _refined(
         freedom = result.coordinates.size - now.coordinates.size
         nats = evidence(before, now.rss - result.rss, freedom, count)
         nats -= float(np.log(choice.unit.trials))
-        if nats > ENTER and (best is None or nats > best.nats):
+        if nats > work.beliefs.enter_nats and (best is None or nats > best.nats):
             best = Step(choice.unit, nats, result)
     return best
 
@@ -208,7 +203,7 @@ def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fi
             freedom = now.coordinates.size - less.coordinates.size
             losses.append((evidence(gram, less.rss - now.rss, freedom, count), less))
         worst = min(losses, key=lambda item: item[0])
-        if worst[0] >= ENTER:
+        if worst[0] >= work.beliefs.enter_nats:
             break
         now = worst[1]
     return now
@@ -221,6 +216,7 @@ def without_negligible(work: Workspace, now: Fit) -> Fit:
     Thousands of rows make a micrometre significant; next to a larger cause it is more likely the
     difference between that cause and its model.
     """
+    beliefs = work.beliefs
     while now.model.found:
         sizes = []
         for k in range(len(now.model.found)):
@@ -228,7 +224,7 @@ def without_negligible(work: Workspace, now: Fit) -> Fit:
             change = work.problem.whitened(parts, work.scale) - now.residual
             sizes.append(float(np.sqrt((change**2).mean())))
         least = int(np.argmin(sizes))
-        if sizes[least] > (NEGLIGIBLE if len(sizes) > 1 else INVISIBLE):
+        if sizes[least] > (beliefs.negligible if len(sizes) > 1 else beliefs.invisible):
             break
         now = fit(work.problem, without(now.model, least), work.scale, None, 4)
     return now
@@ -264,7 +260,7 @@ def _one_for_two(
     freedom = now.coordinates.size - rest.coordinates.size
     wanted = evidence(pair, rest.rss - now.rss, freedom, count)
     for choice in [c for c in ranked if c.unit.site not in taken][:SHORTLIST]:
-        if choice.nats < wanted - CONSOLIDATE_SLACK * abs(wanted):
+        if choice.nats < wanted - work.beliefs.replacing_slack * abs(wanted):
             break
         one = fitted_with(work, rest.model, choice.effect(gram))
         free = one.coordinates.size - rest.coordinates.size

@@ -26,15 +26,14 @@ from ...effects.effect import Effect
 from ...effects.transmission_ripple import TransmissionRipple
 from ..algebra.fit import Fit, coordinates, design, fit, robust_scale, solve_scaled, stepped
 from ..algebra.problem import Model, Problem, Scale
+from ..beliefs import Beliefs
 
 BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
 """Ripple orders whose amplitudes are expected to be alike: up to a band's last order."""
 ROUNDS = 15
-FREE = 3
-"""A group of fewer coordinates than this is fitted freely: too few to learn a size from."""
 
 
-def groups(found: tuple[Effect, ...]) -> tuple[Array, Array]:
+def groups(found: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
     """
     Return the group number and the typical size of every fit coordinate, shapes (K,).
 
@@ -53,7 +52,7 @@ def groups(found: tuple[Effect, ...]) -> tuple[Array, Array]:
     names = {label: k for k, label in enumerate(dict.fromkeys(labels))}
     numbers = np.array([names[label] for label in labels], dtype=int)
     counts = np.bincount(numbers, minlength=len(names)) if numbers.size else np.zeros(0, int)
-    free = counts[numbers] < FREE if numbers.size else np.zeros(0, bool)
+    free = counts[numbers] < beliefs.tied_from if numbers.size else np.zeros(0, bool)
     return np.where(free, -1, numbers), np.concatenate([np.zeros(0), *scales])
 
 
@@ -99,24 +98,30 @@ def learned_precision(
     return precision * noise, float(determined.sum())
 
 
-def shrunk_step(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Scale]:
+def shrunk_step(
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
+) -> tuple[Model, Scale]:
     """Return the model after one linear step with learned priors, and the noise it leaves."""
-    model, _, freedom = _learned(problem, model, scale)
+    model, _, freedom = _learned(problem, model, scale, beliefs)
     return model, robust_scale(problem, problem.residuals(model), freedom=freedom)
 
 
-def shrunk_fit(problem: Problem, model: Model, scale: Scale) -> tuple[Fit, Array]:
+def shrunk_fit(
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
+) -> tuple[Fit, Array]:
     """Return the fit with learned priors, and their precision, shape (K,)."""
-    model, precision, _ = _learned(problem, model, scale)
+    model, precision, _ = _learned(problem, model, scale, beliefs)
     return fit(problem, model, scale, precision, iterations=1), precision
 
 
-def _learned(problem: Problem, model: Model, scale: Scale) -> tuple[Model, Array, float]:
+def _learned(
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
+) -> tuple[Model, Array, float]:
     """Return the model after one linear step, the prior precision learned, and its freedom."""
     residual = problem.whitened(problem.residuals(model), scale)
     columns, _ = design(problem, model, scale)
     normal, right = columns @ columns.T, columns @ residual
-    labels, scales = groups(model.found)
+    labels, scales = groups(model.found, beliefs)
     x = coordinates(model)
     frames = right.size - x.size
     target = _target(normal, right, float(residual @ residual), x)

@@ -22,35 +22,38 @@ from ...twin.features import Features, sites
 from ..algebra.fit import Fit, robust_scale
 from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
+from ..beliefs import Beliefs
 from ..hypotheses.library import families
-from ..hypotheses.ripple_lines import DENSE_ORDERS, RANGE, with_lines
+from ..hypotheses.ripple_lines import DENSE_ORDERS, with_lines
 from .shrinkage import shrunk_fit, shrunk_step
 
 CLOSED = 1e-5
 """Width of play [rad] that many small errors start from; less is none."""
 ONE_BY_ONE = ('quantization', 'payload', 'drift', 'measurement_scale')
 """Families kept only where the search has found them: not small errors of the arm's making."""
-SETUP = 60.0
-"""Chi-square of six degrees of freedom that a motion of the set-up must reach, over 40 looks."""
 
 
 def many_small(
-    problem: Problem, model: Model, exclude: Sequence[str], progress: Callable[[str], None]
+    problem: Problem,
+    model: Model,
+    exclude: Sequence[str],
+    beliefs: Beliefs,
+    progress: Callable[[str], None],
 ) -> tuple[Fit, Scale, Array]:
     """Return the fit of all families together, its noise and its prior precision."""
-    everything = model.with_found(_everything(problem, model, exclude))
+    everything = model.with_found(_everything(problem, model, exclude, beliefs))
     scale = robust_scale(problem, problem.residuals(model))
-    model, scale = shrunk_step(problem, everything, scale)
+    model, scale = shrunk_step(problem, everything, scale, beliefs)
     model = model.with_found(tuple(_coasting(effect) for effect in model.found))
     progress('families fitted together')
     if 'transmission_ripple' not in exclude:
-        model = with_lines(problem, model, scale)
+        model = with_lines(problem, model, scale, beliefs)
         progress('lines of high order looked for')
     if 'base' in problem.align:
-        model = with_setup(problem, model, scale)
+        model = with_setup(problem, model, scale, beliefs)
         progress('motion of the set-up looked for')
-    model, scale = shrunk_step(problem, model, scale)
-    result, precision = shrunk_fit(problem, model, scale)
+    model, scale = shrunk_step(problem, model, scale, beliefs)
+    result, precision = shrunk_fit(problem, model, scale, beliefs)
     return result, scale, precision
 
 
@@ -61,7 +64,9 @@ def _coasting(effect: Effect) -> Effect:
     return replace(effect, form='coast', width=CLOSED)  # type: ignore[call-arg]
 
 
-def _everything(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple[Effect, ...]:
+def _everything(
+    problem: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs
+) -> tuple[Effect, ...]:
     """Return every effect that fits linearly, at zero unless the search has found its value."""
     maker = problem.features(model)[0]
     have = {effect.key: effect for effect in model.found}
@@ -74,7 +79,7 @@ def _everything(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple
             if kind.applicable(maker.view, joint) is not None:
                 continue
             if kind.name == 'transmission_ripple':
-                out += _dense_ripple(maker, str(joint), problem.size)
+                out += _dense_ripple(maker, str(joint), problem.size, beliefs)
                 continue
             for seed in list(kind.seeds(maker.view, joint))[:2]:
                 if seed.name == 'backlash':
@@ -84,9 +89,9 @@ def _everything(problem: Problem, model: Model, exclude: Sequence[str]) -> tuple
     return tuple(out)
 
 
-def _dense_ripple(maker: Features, joint: str, rows: int) -> list[Effect]:
+def _dense_ripple(maker: Features, joint: str, rows: int, beliefs: Beliefs) -> list[Effect]:
     q = maker.view.joint(maker.twin.robot.index(joint))
-    if float(np.ptp(q)) < RANGE:
+    if float(np.ptp(q)) < beliefs.wave_range:
         return []
     # All joints' sines and cosines together stay below half the rows.
     highest = min(DENSE_ORDERS, rows // (4 * maker.twin.robot.n))
@@ -97,7 +102,7 @@ def _dense_ripple(maker: Features, joint: str, rows: int) -> list[Effect]:
     return [REGISTRY['transmission_ripple'](joint, zero, orders, zero)]  # type: ignore[call-arg]
 
 
-def with_setup(problem: Problem, model: Model, scale: Scale) -> Model:
+def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -> Model:
     """
     Return the model with the set-up's own creep and step in time, where they show.
 
@@ -117,6 +122,6 @@ def with_setup(problem: Problem, model: Model, scale: Scale) -> Model:
             chi = gram.gain(index)
             if best is None or chi > best[0]:
                 best = (chi, seed.from_atoms(gram.solve(index)))
-        if best is not None and best[0] > SETUP:
+        if best is not None and best[0] > beliefs.setup_chi2:
             model = model.with_found((*model.found, best[1]))
     return model

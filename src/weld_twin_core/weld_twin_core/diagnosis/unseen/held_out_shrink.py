@@ -13,18 +13,17 @@ from ...effects.setup_motion import of_the_robot, seen_from
 from ...recording import Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, usable
+from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Shrink
 from .unseen_stretches import TRUSTED, Unseen
 
 LARGE = 300
-FARTHEST = 1.0
-"""Log of a ratio between two motions beyond which it tells of a model that fits neither."""
-MOVED = 5.0
-"""A held-out bag whose frame is this many times better refitted stems from another set-up."""
 
 
-def held_out_shrink(found: Search, unseen: Unseen, holdout: Sequence[Recording]) -> Shrink:
+def held_out_shrink(
+    found: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
+) -> Shrink:
     """Return the gap before and after, on the held-out bags or on stretches taking their turn."""
     model = found.final.model
     steps, alone = _waterfall(unseen, model)
@@ -34,9 +33,9 @@ def held_out_shrink(found: Search, unseen: Unseen, holdout: Sequence[Recording])
     labels, source, elsewhere = unseen.trusted_labels(), 'blocked cross-validation', None
     if holdout:
         elsewhere = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
-        before, after, labels = _on_bags(found, holdout)
+        before, after, labels = _on_bags(found, holdout, beliefs.other_setup)
         source = ', '.join(r.name for r in holdout)
-    ratio, interval = ratio_interval(before, after, labels, elsewhere)
+    ratio, interval = ratio_interval(before, after, labels, elsewhere, beliefs.farthest)
     return Shrink(
         float(np.sqrt(before.mean())),
         float(np.sqrt(after.mean())),
@@ -76,7 +75,9 @@ def _waterfall(
     return tuple(steps), tuple(alone.items())
 
 
-def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array, Array]:
+def _on_bags(
+    found: Search, holdout: Sequence[Recording], other_setup: float
+) -> tuple[Array, Array, Array]:
     """Return squared errors before and after on held-out bags, and a stretch for every sample."""
     before: list[Array] = []
     after: list[Array] = []
@@ -85,7 +86,9 @@ def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array,
         problem = Problem((usable(recording),), frozenset({'base'}) & found.problem.align)
         pair, good = [], np.ones(problem.samples[0], dtype=bool)
         for model in (found.baseline.model, found.final.model):
-            parts = problem.residuals(_for_bag(problem, model, found.problem.recordings))
+            parts = problem.residuals(
+                _for_bag(problem, model, found.problem.recordings, other_setup)
+            )
             pair.append((parts[0][:3] ** 2).sum(axis=0))
             # What is an outlier shows best against the better model, which comes last.
             good = robust_scale(problem, parts).weights[0] >= TRUSTED
@@ -96,7 +99,9 @@ def _on_bags(found: Search, holdout: Sequence[Recording]) -> tuple[Array, Array,
     return np.concatenate(before), np.concatenate(after), np.concatenate(labels)
 
 
-def _for_bag(problem: Problem, model: Model, recordings: Sequence[Recording]) -> Model:
+def _for_bag(
+    problem: Problem, model: Model, recordings: Sequence[Recording], other_setup: float
+) -> Model:
     """Return the model with the base whose set-up the bag matches, or the bag's own."""
     recording = problem.recordings[0]
     choices = [
@@ -114,7 +119,7 @@ def _for_bag(problem: Problem, model: Model, recordings: Sequence[Recording]) ->
         bare = best.with_found(())
         frames = fit(problem, bare, problem.unit_scale()).model
         own = Model(model.robot, frames.bases, model.known, of_the_robot(model.found))
-        if min(sizes) > MOVED * _size(problem, own):
+        if min(sizes) > other_setup * _size(problem, own):
             return own
     return best
 
@@ -124,7 +129,11 @@ def _size(problem: Problem, model: Model) -> float:
 
 
 def ratio_interval(
-    before: Array, after: Array, labels: Array, elsewhere: float | None = None
+    before: Array,
+    after: Array,
+    labels: Array,
+    elsewhere: float | None = None,
+    farthest: float = np.inf,
 ) -> tuple[float, tuple[float, float]]:
     """
     Return RMS after over before and its 95 % interval, by leaving out one stretch at a time.
@@ -141,6 +150,8 @@ def ratio_interval(
     labels : array of int, shape (samples,)
     elsewhere : float, optional
         The same ratio on other recordings.
+    farthest : float
+        Logarithm of a ratio between the two beyond which it widens the interval no further.
 
     """
     ratio = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
@@ -157,6 +168,6 @@ def ratio_interval(
     variance = float((k - 1) / k * ((np.array(logs) - np.mean(logs)) ** 2).sum())
     if elsewhere is not None:
         apart = np.log(max(elsewhere, 1e-300) / max(ratio, 1e-300))
-        variance += min(abs(float(apart)), FARTHEST) ** 2
+        variance += min(abs(float(apart)), farthest) ** 2
     reach = 2.36 * np.sqrt(variance)  # Student t, 7 degrees of freedom
     return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))

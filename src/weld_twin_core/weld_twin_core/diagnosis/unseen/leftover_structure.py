@@ -19,10 +19,16 @@ import numpy as np
 from ...arrays import Array
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem, Scale
+from ..beliefs import Beliefs
 from .unseen_stretches import Base, Unseen
 
 KNOTS = 8
+"""Bumps over a range of angle or time: a bump is as wide as an eighth of it, finer ones would
+follow the noise."""
 RIDGES = (1e-2, 1.0, 1e2, 1e4)
+"""Prior precisions tried on columns of unit mean square, in units of noise: from free to still."""
+TOLD = 3
+"""Things that what remains depends on, told at the most; further ones are echoes of these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +54,7 @@ class Structure:
     depends_on: tuple[str, ...]
 
 
-def structure(unseen: Unseen, model: Model) -> Structure:
+def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
     """Return what generic columns add to a model on stretches not used for fitting."""
     base = unseen.base(range(len(model.found)))
     before = unseen.squares(base.residual)
@@ -59,7 +65,8 @@ def structure(unseen: Unseen, model: Model) -> Structure:
         found.append((gain, sure, name, squares))
     found.sort(key=lambda item: -item[0])
     gain, sure, _, squares = found[0]
-    names = tuple(name for g, s, name, _ in found[:3] if g > 0.02 and s > 2.0)
+    least, certain = beliefs.dependence_gain, beliefs.dependence_sure
+    names = tuple(name for g, s, name, _ in found[:TOLD] if g > least and s > certain)
     return Structure(float(np.sqrt(squares.mean())), gain, sure, names)
 
 

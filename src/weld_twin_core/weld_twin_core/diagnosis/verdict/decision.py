@@ -10,118 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...effects import REGISTRY
-from ...effects.transmission_ripple import TransmissionRipple
-from ..hypotheses.rivals import LISTED, Rival
+from ..beliefs import Beliefs
+from ..hypotheses.rivals import Rival
 from ..result import Family, Site
-from ..unseen.leftover_structure import Structure
-
-SURE = 0.85
-"""A leader less probable than this is not named alone."""
-STRUCTURE = 0.05
-"""Share of the squared gap that may stay unexplained before the answer is 'unknown'."""
-ABOVE = 1.3
-"""What remains must exceed an independently measured floor by this factor to count."""
-GAIN, CERTAIN = 0.03, 3.0
-"""Share of the squared error that a structure must take away, in standard errors as well."""
-BLATANT, LIKELY = 0.15, 1.5
-"""The same for a structure so large that a few stretches may hold all of it."""
-CANCEL = 5.0
-"""Effects whose squares sum to this many times the square of their sum cancel each other."""
-CROWD = 3
-"""More separate causes than this at once are more likely one that the library lacks."""
-CARRIED = 1.3
-"""What remains on a held-out motion over what remains on unseen stretches of those fitted: beyond
-this the model does not carry over, as a cause would that was found."""
-RISE, SHARE = 0.2, 0.12
-"""Rise above the floor, as a share of it, and as a share of the gap, that together halve the
-belief: a large gap leaves more of the physics that no model has, a small one more of the noise."""
-CARRIED_SHARE = 0.1
-"""Share of the gap that a model may leave on any motion before it is said not to carry over."""
-STACKED = 0.75
-"""Belief left when two effects at rest sit on one joint; a judgement."""
-CALIBRATION = 0.95
-"""Belief left for every cause named where all evidence agrees: no library is complete, and on some
-motions a cause that it lacks moves the tool exactly as those that it holds."""
-GLIMPSED = 0.6
-"""Belief left in a ripple of which less than a period was seen; a judgement."""
-DOUBTED = 0.75
-"""Belief in 'unknown' where effects fit but are no plausible explanation; a judgement."""
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """
-    What the verdict is drawn from.
-
-    Attributes
-    ----------
-    slots : tuple of tuple of Rival
-        For every found effect, itself and its rivals, most probable first.
-    structure : Structure
-        What generic columns still find.
-    gap, after, floor : float
-        RMS on unseen data before and after, and of the noise, [m].
-    fitted : float
-        RMS after on unseen stretches of the recordings fitted, [m]; the same as ``after`` where
-        nothing was held out.
-    independent : bool
-        Whether the floor was measured apart from any model.
-    parts : tuple of float
-        Squared contribution of every effect over the square of their sum.
-    glimpsed : tuple of str
-        Joints whose ripple was seen over less than a period.
-
-    """
-
-    slots: tuple[tuple[Rival, ...], ...]
-    structure: Structure
-    gap: float
-    after: float
-    floor: float
-    fitted: float
-    independent: bool
-    parts: tuple[float, ...]
-    glimpsed: tuple[str, ...] = ()
-
-    @property
-    def structured(self) -> bool:
-        """Return whether generic columns find something beyond doubt."""
-        gain, sure = self.structure.gain, self.structure.sure
-        return (gain > GAIN and sure > CERTAIN) or (gain > BLATANT and sure > LIKELY)
-
-    @property
-    def above_noise(self) -> bool:
-        """Return whether what remains rises above the floor."""
-        return self.structured or (self.independent and self.after > ABOVE * self.floor)
-
-    @property
-    def rise(self) -> float:
-        """Return by what share of an independent floor what remains stands above it."""
-        return max(self.after / self.floor - 1.0, 0.0) if self.independent else 0.0
-
-    @property
-    def carried(self) -> bool:
-        """Return whether the model does on a held-out motion what it does on those fitted."""
-        return (
-            self.after < ABOVE * self.floor
-            or self.after < CARRIED * self.fitted
-            or self.share < CARRIED_SHARE
-        )
-
-    @property
-    def share(self) -> float:
-        """Return what remains above the floor as a share of the gap."""
-        gap = max(self.gap**2 - self.floor**2, 1e-18)
-        return float(np.sqrt(max(self.after**2 - self.floor**2, 0.0) / gap))
-
-    @property
-    def left(self) -> float:
-        """Return the share of the squared gap above noise that is not explained."""
-        excess = max(self.gap**2 - self.floor**2, 0.05 * self.floor**2, 1e-18)
-        found = self.structure.gain * self.after**2 if self.structured else 0.0
-        high = self.independent and self.after > ABOVE * self.floor
-        over = self.after**2 - self.floor**2 if high else 0.0
-        return float(np.clip(max(found, over) / excess, 0.0, 1.0))
+from .evidence import Evidence
+from .weighing import Weighed
 
 
 @dataclass(frozen=True)
@@ -135,84 +28,120 @@ class Verdict:
     families: tuple[Family, ...] = ()
 
 
-def decide(evidence: Evidence) -> Verdict:
-    """Return the verdict."""
-    left = evidence.left
+def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
+    """
+    Return the verdict.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    beliefs : Beliefs, optional
+        The usual ones when left out.
+
+    """
+    case = Weighed(evidence, beliefs or Beliefs())
+    if evidence.families is not None:
+        return _of_families(case)
     if not evidence.slots:
-        if left > STRUCTURE:
-            return Verdict('unknown', _unknown_confidence(left), (), (_depends(evidence),))
-        return _none(evidence)
-    sets = tuple(_leaders(slot) for slot in evidence.slots)
-    doubt = _doubt(evidence)
-    if left > STRUCTURE or doubt is not None:
-        solid = tuple(
-            chosen
-            for chosen, part in zip(sets, evidence.parts, strict=True)
-            if len(chosen) == 1
-            and doubt is None
-            and part > left
-            and not _touched(chosen[0], evidence)
-        )
-        reason = _depends(evidence) if doubt is None else doubt
-        sure = _unknown_confidence(left) if doubt is None else DOUBTED
-        return Verdict('unknown', sure, solid, (reason,))
-    mass = [
-        sum(r.probability for r in slot if r.site in chosen)
-        for slot, chosen in zip(evidence.slots, sets, strict=True)
-    ]
-    complete = 1.0 / (1.0 + (left / STRUCTURE) ** 3)
-    confidence = float(np.prod(mass)) * complete * CALIBRATION ** len(sets)
-    if _stacked(sets):
-        confidence *= STACKED
-    if evidence.glimpsed:
-        confidence *= GLIMPSED
-    confidence /= 1.0 + min(evidence.rise / RISE, evidence.share / SHARE) ** 2
-    reasons = tuple(
-        _alike(slot, chosen)
-        for slot, chosen in zip(evidence.slots, sets, strict=True)
-        if len(chosen) > 1
-    )
+        return _of_nothing(case)
+    sets = tuple(_leaders(slot, case.beliefs) for slot in evidence.slots)
+    doubt = _doubt(case)
+    if doubt is not None:
+        return Verdict('unknown', case.beliefs.doubted, (), (doubt,))
+    if case.left > case.beliefs.unexplained:
+        return _incomplete(case, sets)
+    reasons = tuple(_alike(chosen) for chosen in sets if len(chosen) > 1)
     status = 'ambiguous' if reasons else 'identified'
-    return Verdict(status, confidence, sets, reasons)
+    return Verdict(status, _confidence(case, sets), sets, reasons)
 
 
-def _none(evidence: Evidence) -> Verdict:
-    """Return that there is no gap, with less belief where only the rest shows the noise."""
-    if not evidence.independent and evidence.after > ABOVE * evidence.floor:
+def _of_nothing(case: Weighed) -> Verdict:
+    """Return the verdict where no effect was found."""
+    told, beliefs = case.evidence, case.beliefs
+    if case.left > beliefs.unexplained:
+        return Verdict('unknown', _unknown_confidence(case), (), (_depends(told),))
+    if not told.independent and told.after > beliefs.above * told.floor:
         return Verdict(
             'none',
-            0.6,
+            beliefs.noise_unseen,
             (),
             (
                 'nothing is found, but what remains is not spread as noise is, and nothing on these '
                 'recordings shows the noise by itself: repeat some poses',
             ),
         )
-    return Verdict('none', CALIBRATION, (), ('the gap does not rise above the noise',))
+    return Verdict('none', beliefs.calibration, (), ('the gap does not rise above the noise',))
 
 
-def _doubt(evidence: Evidence) -> str | None:
+def _of_families(case: Weighed) -> Verdict:
+    """Return the families that earn their place on unseen data, each with its members."""
+    beliefs = case.beliefs
+    families = []
+    for told in case.evidence.families or ():
+        members = tuple(item for item in told.members if item[1] > beliefs.member_least_m)
+        named = told.fall > max(beliefs.family_worth * told.full, beliefs.family_sure * told.error)
+        if members:
+            families.append(Family(told.effect, named, told.rms_m, members))
+    families.sort(key=lambda family: -family.rms_m)
+    sets = tuple((site,) for family in families if family.named for site, _ in family.members)
+    status = 'unknown' if case.left > beliefs.unexplained else 'identified'
+    reasons = (
+        'many small errors act together; members of one family are fitted jointly and only their '
+        'sum is certain',
+    )
+    return Verdict(status, beliefs.families * case.complete, sets, reasons, tuple(families))
+
+
+def _incomplete(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> Verdict:
+    """Return 'unknown' with the effects that stand out beside what is left and apart from it."""
+    told = case.evidence
+    solid = tuple(
+        chosen
+        for chosen, part in zip(sets, told.parts, strict=True)
+        if len(chosen) == 1 and part > case.left and not _touched(chosen[0], told)
+    )
+    return Verdict('unknown', _unknown_confidence(case), solid, (_depends(told),))
+
+
+def _confidence(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> float:
+    """Return the probability that the sets named are right, and all there is."""
+    told, beliefs = case.evidence, case.beliefs
+    mass = [
+        sum(r.probability for r in slot if r.site in chosen)
+        for slot, chosen in zip(told.slots, sets, strict=True)
+    ]
+    out = float(np.prod(mass)) * case.complete * beliefs.calibration ** len(sets)
+    if _stacked(sets):
+        out *= beliefs.stacked
+    if told.glimpsed:
+        out *= beliefs.glimpsed
+    risen = min(case.rise / beliefs.rise, case.share / beliefs.rise_share)
+    return float(out / (1.0 + risen**beliefs.rise_power))
+
+
+def _doubt(case: Weighed) -> str | None:
     """Return why the effects found are no plausible explanation, however well they fit."""
-    if len(evidence.slots) > 1 and sum(evidence.parts) > CANCEL:
+    told, beliefs = case.evidence, case.beliefs
+    if len(told.slots) > 1 and sum(told.parts) > beliefs.cancel:
         return (
             'the effects that fit best nearly cancel each other: together they imitate a cause '
             'that is not in the library'
         )
-    count = sum(_orders(slot[0]) for slot in evidence.slots)
-    if count > CROWD:
+    count = sum(told.causes)
+    if count > beliefs.crowd:
         return (
             f'{count} separate effects would be needed at once: together they imitate a cause '
             'that is not in the library'
         )
-    bent = [joint for joint in evidence.glimpsed if _joints_at_rest(evidence).count(joint) > 1]
+    bent = [joint for joint in told.glimpsed if _joints_at_rest(told).count(joint) > 1]
     if bent:
         return (
             f'less than a period of ripple was seen over the angle of {" and ".join(bent)}, and '
             'with another effect on that joint it bends to anything that depends on the angle'
         )
-    if not evidence.carried:
+    if not case.carries:
         return (
-            f'what was found leaves {evidence.after / evidence.fitted:.1f} times as much on the '
+            f'what was found leaves {told.after / told.fitted:.1f} times as much on the '
             'held-out motion as on the recordings fitted: it imitates a cause that is not in the '
             'library'
         )
@@ -238,32 +167,24 @@ def _at_rest(sites: Iterable[Site]) -> list[str]:
     ]
 
 
-def _orders(rival: Rival) -> int:
-    """Return how many causes a slot stands for: every further order of a ripple is another."""
-    for effect in rival.fit.model.found:
-        is_it = (effect.name, effect.site) == (rival.site.effect, rival.site.joint)
-        if is_it and isinstance(effect, TransmissionRipple):
-            return int(np.size(effect.order))
-    return 1
-
-
 def _touched(site: Site, evidence: Evidence) -> bool:
     """Return whether what remains depends on the joint that an effect sits on."""
     return any(str(site.joint) in name for name in evidence.structure.depends_on)
 
 
-def _unknown_confidence(left: float) -> float:
-    return float(np.clip(0.7 + left, 0.7, 0.95))
+def _unknown_confidence(case: Weighed) -> float:
+    least, most = case.beliefs.unknown_least, case.beliefs.unknown_most
+    return float(np.clip(least + case.left, least, most))
 
 
-def _leaders(slot: tuple[Rival, ...]) -> tuple[Site, ...]:
+def _leaders(slot: tuple[Rival, ...], beliefs: Beliefs) -> tuple[Site, ...]:
     """Return the leader alone when it is sure, else all that are worth naming."""
-    if slot[0].probability >= SURE:
+    if slot[0].probability >= beliefs.sure:
         return (slot[0].site,)
-    return tuple(dict.fromkeys(r.site for r in slot if r.probability >= LISTED))
+    return tuple(dict.fromkeys(r.site for r in slot if r.probability >= beliefs.listed))
 
 
-def _alike(slot: tuple[Rival, ...], chosen: tuple[Site, ...]) -> str:
+def _alike(chosen: tuple[Site, ...]) -> str:
     names = ', '.join(str(site) for site in chosen)
     return f'{names} move the tool alike on these data: their fits differ by less than the noise'
 

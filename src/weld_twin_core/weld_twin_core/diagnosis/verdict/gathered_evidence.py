@@ -4,17 +4,28 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from ...effects.transmission_ripple import TransmissionRipple
 from ..algebra.noise_floor import NoiseFloor
+from ..beliefs import Beliefs
+from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
+from ..many.weighed_families import weighed_families
 from ..result import Shrink
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
-from .decision import Evidence
+from .evidence import Evidence
 from .partial_ripple import glimpsed
 
 
 def gathered(
-    found: Search, unseen: Unseen, leftover: Structure, shrink: Shrink, noise: NoiseFloor
+    found: Search,
+    unseen: Unseen,
+    leftover: Structure,
+    shrink: Shrink,
+    noise: NoiseFloor,
+    beliefs: Beliefs,
 ) -> Evidence:
     """
     Return the evidence for a verdict.
@@ -29,6 +40,7 @@ def gathered(
     shrink : Shrink
         On held-out recordings or on stretches taking their turn.
     noise : NoiseFloor
+    beliefs : Beliefs
 
     """
     everything = range(len(found.final.model.found))
@@ -41,7 +53,9 @@ def gathered(
         fitted=unseen.rms(unseen.predict(everything)),
         independent=noise.independent,
         parts=_parts(unseen),
-        glimpsed=glimpsed(found.problem, found.final.model),
+        causes=tuple(_causes(slot[0]) for slot in found.slots),
+        glimpsed=glimpsed(found.problem, found.final.model, beliefs),
+        families=weighed_families(found, unseen) if found.dense else None,
     )
 
 
@@ -50,3 +64,12 @@ def _parts(unseen: Unseen) -> tuple[float, ...]:
     parts = unseen.targets[1:]
     total = parts.sum(axis=0)
     return tuple(float(p @ p) / max(float(total @ total), 1e-300) for p in parts)
+
+
+def _causes(rival: Rival) -> int:
+    """Return how many causes a slot stands for: every further order of a ripple is another."""
+    for effect in rival.fit.model.found:
+        is_it = (effect.name, effect.site) == (rival.site.effect, rival.site.joint)
+        if is_it and isinstance(effect, TransmissionRipple):
+            return int(np.size(effect.order))
+    return 1

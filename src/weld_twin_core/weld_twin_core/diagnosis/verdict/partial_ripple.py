@@ -8,12 +8,10 @@ import numpy as np
 
 from ...effects.transmission_ripple import TransmissionRipple
 from ..algebra.problem import Model, Problem
-
-PERIOD = 0.8
-"""Periods of its highest order that a joint must pass through for a ripple to be told as one."""
+from ..beliefs import Beliefs
 
 
-def glimpsed(problem: Problem, model: Model) -> tuple[str, ...]:
+def glimpsed(problem: Problem, model: Model, beliefs: Beliefs) -> tuple[str, ...]:
     """Return the joints whose ripple was seen over less than a period."""
     names = model.robot.joint_names
     out = []
@@ -22,6 +20,6 @@ def glimpsed(problem: Problem, model: Model) -> tuple[str, ...]:
             i = names.index(str(effect.site))
             q = [recording.joints.q[:, i] for recording in problem.recordings]
             span = max(float(x.max()) for x in q) - min(float(x.min()) for x in q)
-            if np.max(effect.order) * span < PERIOD * 2.0 * np.pi:
+            if np.max(effect.order) * span < beliefs.periods * 2.0 * np.pi:
                 out.append(str(effect.site))
     return tuple(out)

@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every tuned number that decides a verdict, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+def _search(value: Any) -> Any:
+    """Return a field that decides which effects are found, and which rivals they have."""
+    return field(default=value, metadata={'step': 'search'})
+
+
+def _many(value: Any) -> Any:
+    """Return a field that decides whether and how many small errors are fitted together."""
+    return field(default=value, metadata={'step': 'many'})
+
+
+def _unseen(value: Any) -> Any:
+    """Return a field that judges unseen data before the verdict is drawn."""
+    return field(default=value, metadata={'step': 'unseen'})
+
+
+def _verdict(value: Any) -> Any:
+    """Return a field that only the verdict reads: it can be drawn anew from the same evidence."""
+    return field(default=value, metadata={'step': 'verdict'})
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """
+    What a diagnosis believes before it sees data, as numbers.
+
+    Each field says what it means, its unit, and where its value comes from. Where a value is a
+    judgement, `weld-twin lab beliefs` shows what hangs on it: it moves every number by 25 % both
+    ways on sealed development cases; docs/results/beliefs/beliefs.md keeps the last table. The
+    numbers by which data are refused as unsound lie with the checks, in `soundness`.
+    """
+
+    # Which effects are found -----------------------------------------------------------------
+
+    enter_nats: float = _search(6.0)
+    """Evidence [nats] that an effect must be worth to enter and to stay: odds of about 400 to 1,
+    for a hundred or so candidates of which any may enter by chance."""
+
+    close_nats: float = _search(8.0)
+    """Evidence [nats] below the best within which a candidate is fitted as well: the linear
+    ranking is a quadratic expansion, and misjudges a response that bends by a few nats."""
+
+    close_share: float = _search(0.15)
+    """The same as a share of the best: what the ranking misjudges grows with the effect."""
+
+    replacing_slack: float = _search(0.3)
+    """Share of the evidence of two effects by which one candidate may fall short in the linear
+    ranking and still be fitted in the place of both."""
+
+    invisible: float = _search(0.12)
+    """RMS change of the residual [noise] below which a lone effect is not worth a name, however
+    many rows vouch for it. A judgement."""
+
+    negligible: float = _search(0.25)
+    """RMS change of the residual [noise] below which an effect beside a larger one is not told
+    from that one's misfit. A judgement."""
+
+    hope: float = _search(0.3)
+    """Exponent by which autocorrelation is believed while causes are still missing, 0 to 1: the
+    residual is then the causes' own, and looks far more correlated than the noise is."""
+
+    misfit: float = _search(0.012)
+    """Share of an effect's amplitude by which its formula errs on a real arm: edges are soft,
+    springs harden, lags have a second pole. A judgement."""
+
+    misfit_directions: float = _search(30.0)
+    """Number of directions among all columns that such a misfit spreads over. A judgement."""
+
+    rival_nats: float = _search(15.0)
+    """Evidence [nats] below the best within which another effect is fitted as a rival."""
+
+    rival_share: float = _search(0.35)
+    """The same as a share of the best."""
+
+    temperature: float = _search(2.0)
+    """Evidence between rivals is divided by this: real physics is a little richer than any model
+    compared, so a nat is worth half of what it counts. A judgement."""
+
+    # Many small errors at once ---------------------------------------------------------------
+
+    many: int = _many(8)
+    """Effects found one by one on stations from which on they are many small ones acting together.
+    A judgement."""
+
+    several: int = _many(4)
+    """Effects found on stations from which on the many are tried as well, and taken if they
+    predict unseen stations better. A judgement: one more than `crowd` allows."""
+
+    better: float = _many(0.95)
+    """RMS on unseen stations, as a share of that of the few, that the many must stay below. A
+    judgement."""
+
+    member: float = _many(0.3)
+    """RMS at the tool, as a share of what all of them leave, from which an effect counts as one of
+    the many: a few large ones that tiny ones mend are one cause that the library lacks."""
+
+    tied_from: int = _many(3)
+    """Coordinates of one kind from which on they share a learned size: a variance learned from
+    two numbers says nothing."""
+
+    wave_range: float = _many(1.0)
+    """Travel [rad] of a joint from which on its waves are told from their neighbours' orders: over
+    less than a sixth of a turn, orders that differ by six look alike."""
+
+    line_chi2: float = _many(25.0)
+    """Chi-square of two degrees of freedom that a single line must reach: chance reaches it once
+    in 270000 looks, and some 2000 are taken."""
+
+    setup_chi2: float = _many(60.0)
+    """Chi-square of six degrees of freedom that a motion of the set-up must reach over some 40
+    looks. Chance reaches 25 once in 3000 looks; the rest is a judgement, as what no model of the
+    arm has looks like a motion of the set-up too."""
+
+    family_worth: float = _many(0.03)
+    """Share of the squared unseen error by which it must grow without a family to name it."""
+
+    family_sure: float = _many(2.0)
+    """The same in standard errors between stretches: one in forty by chance."""
+
+    member_least_m: float = _many(1e-6)
+    """RMS at the tool [m] below which a member is not listed: no instrument sees it."""
+
+    # What unseen data say --------------------------------------------------------------------
+
+    dependence_gain: float = _unseen(0.02)
+    """Share of the squared unseen error from which what a generic column explains is told."""
+
+    dependence_sure: float = _unseen(2.0)
+    """The same in standard errors between stretches."""
+
+    other_setup: float = _unseen(5.0)
+    """Times by which a held-out recording must fit better with a frame of its own to stem from
+    another set-up. A judgement."""
+
+    farthest: float = _unseen(1.0)
+    """Logarithm of a ratio between two motions from which on it says no more about the interval:
+    a model that leaves e times as much elsewhere fits neither."""
+
+    # The verdict -----------------------------------------------------------------------------
+
+    sure: float = _verdict(0.85)
+    """Probability from which on a leader is named alone."""
+
+    listed: float = _verdict(0.03)
+    """Probability from which on a rival is named beside a leader that is not sure."""
+
+    unexplained: float = _verdict(0.05)
+    """Share of the squared gap that may stay unexplained before the answer is 'unknown', and at
+    which the belief in a complete answer has halved."""
+
+    unexplained_power: float = _verdict(3.0)
+    """How steeply that belief falls about its half."""
+
+    least_excess: float = _verdict(0.05)
+    """Share of the squared floor that a gap counts as standing above it at the least; keeps the
+    share unexplained from a division by next to nothing."""
+
+    above: float = _verdict(1.3)
+    """What remains must exceed an independently measured floor by this factor to count; the floor
+    itself is known to a tenth or so, and noise has tails."""
+
+    structure_gain: float = _verdict(0.03)
+    """Share of the squared unseen error that a structure must take away to be one,"""
+
+    structure_sure: float = _verdict(3.0)
+    """and the same in its standard errors between stretches."""
+
+    blatant_gain: float = _verdict(0.15)
+    """The same for a structure so large that a few stretches may hold all of it,"""
+
+    blatant_sure: float = _verdict(1.5)
+    """and its standard errors, which are then large as well."""
+
+    cancel: float = _verdict(5.0)
+    """Effects whose squares sum to this many times the square of their sum cancel each other."""
+
+    crowd: int = _verdict(3)
+    """Separate causes at once beyond which they are more likely one that the library lacks."""
+
+    carried: float = _verdict(1.3)
+    """What remains on a held-out motion over what remains on unseen stretches of those fitted:
+    beyond this the model does not carry over, as a cause would that was found."""
+
+    carried_share: float = _verdict(0.1)
+    """Share of the gap that a model may leave on any motion before it is said not to carry over."""
+
+    rise: float = _verdict(0.2)
+    """Rise of what remains above the floor, as a share of it,"""
+
+    rise_share: float = _verdict(0.12)
+    """and as a share of the gap, that together halve the belief: a large gap leaves more of the
+    physics that no model has, a small one more of the noise."""
+
+    rise_power: float = _verdict(2.0)
+    """How steeply that belief falls about its half."""
+
+    stacked: float = _verdict(0.75)
+    """Belief left when two effects that show at rest sit on one joint: two may stand for a third."""
+
+    calibration: float = _verdict(0.95)
+    """Belief left for every cause named where all evidence agrees: no library is complete, and on
+    some motions a cause that it lacks moves the tool exactly as those that it holds."""
+
+    periods: float = _verdict(0.8)
+    """Periods of its finest wave that a joint must pass through for a wave to be told as one."""
+
+    glimpsed: float = _verdict(0.6)
+    """Belief left in a wave of which less was seen."""
+
+    doubted: float = _verdict(0.75)
+    """Belief in 'unknown' where effects fit but are no plausible explanation."""
+
+    unknown_least: float = _verdict(0.7)
+    """Belief in 'unknown' where little is unexplained; the share unexplained is added,"""
+
+    unknown_most: float = _verdict(0.95)
+    """up to this."""
+
+    noise_unseen: float = _verdict(0.6)
+    """Belief in 'none' where nothing on the recordings shows the noise by itself and what remains
+    is not spread as noise is."""
+
+    families: float = _verdict(0.75)
+    """Belief in the families named where nothing is left: dozens of errors at once are seldom put
+    together on purpose."""

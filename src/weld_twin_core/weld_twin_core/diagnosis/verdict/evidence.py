@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a verdict is drawn from, as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..hypotheses.rivals import Rival
+from ..many.weighed_families import WeighedFamily
+from ..unseen.leftover_structure import Structure
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """
+    What the verdict is drawn from.
+
+    Attributes
+    ----------
+    slots : tuple of tuple of Rival
+        For every found effect, itself and its rivals, most probable first.
+    structure : Structure
+        What generic columns still find.
+    gap, after, floor : float
+        RMS on unseen data before and after, and of the noise, [m].
+    fitted : float
+        RMS after on unseen stretches of the recordings fitted, [m]; the same as ``after`` where
+        nothing was held out.
+    independent : bool
+        Whether the floor was measured apart from any model.
+    parts : tuple of float
+        Squared contribution of every effect over the square of their sum.
+    causes : tuple of int
+        How many separate causes every slot stands for.
+    glimpsed : tuple of str
+        Joints of which a wave was seen over too little of a period.
+    families : tuple of WeighedFamily, optional
+        Where many small errors were fitted together: what each kind accounts for.
+
+    """
+
+    slots: tuple[tuple[Rival, ...], ...]
+    structure: Structure
+    gap: float
+    after: float
+    floor: float
+    fitted: float
+    independent: bool
+    parts: tuple[float, ...]
+    causes: tuple[int, ...] = ()
+    glimpsed: tuple[str, ...] = ()
+    families: tuple[WeighedFamily, ...] | None = None

@@ -11,6 +11,7 @@ from import_graph import (
     circles,
     grouped,
     import_graph,
+    imported_names,
     layer_table,
     module_files,
 )
@@ -98,6 +99,14 @@ def test_every_room_has_its_layer_in_the_architecture_page(package):
 def test_rooms_point_to_rooms_below_them(package):
     order = [f'{package}.{room}' for room in LAYERS[package]]
     assert set(against_order(grouped(GRAPH, 2), order)) == UPWARD.get(package, set())
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_tests_of_a_package_import_it_and_those_below_alone(package):
+    allowed = set(PACKAGES[: PACKAGES.index(package) + 1])
+    for file in sorted((ROOT / 'src' / package / 'test').rglob('*.py')):
+        named = {name.split('.')[0] for name in imported_names(file.stem, file)}
+        assert named & set(PACKAGES) <= allowed, file
 
 
 def test_no_files_import_each_other_in_a_circle():

@@ -11,7 +11,6 @@ from scipy.interpolate import CubicHermiteSpline
 
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.recording import JointMotion
-from weld_twin_lab.campaigns.live.listener import HealthListener
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import (
     JOINT_STATES,
@@ -23,6 +22,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 from weld_twin_msgs_py.robots import write_urdf
 from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.deviation_markers import DeviationMarkers
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from weld_twin_core.errors import DataError
-from weld_twin_lab.campaigns.live.listener import HealthListener
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
+from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.bag_player import Playing, play
 
 BAG = Path(__file__).parents[4] / 'bags/elbow_play'

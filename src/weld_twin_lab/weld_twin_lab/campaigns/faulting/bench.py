@@ -23,8 +23,7 @@ from weld_twin_msgs_py.messages.topics import (
     Topic,
 )
 from weld_twin_nodes.harness import Cell, NodeProcess
-
-from ..live.listener import HealthListener
+from weld_twin_nodes.harness.health_listener import HealthListener
 
 RATE = 100.0
 S = 1_000_000_000

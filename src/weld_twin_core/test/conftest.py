@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Make the cells of the soundness tests importable here too."""
+"""Cells of the soundness tests for all folders; bundled robots."""
 
 import sys
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 
 from weld_twin_core.arm import catalog
 
-sys.path.insert(0, str(Path(__file__).parent.parent / 'soundness'))
+sys.path.insert(0, str(Path(__file__).parent / 'soundness'))
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import REGISTRY, MemoryEffect, effects_from_list
 from weld_twin_core.twin.twin import Twin
 
-PAGE = (Path(__file__).parents[4] / 'docs' / 'effects.md').read_text(encoding='utf-8')
+PAGE = (Path(__file__).parents[2] / 'docs' / 'effects.md').read_text(encoding='utf-8')
 COLUMNS = ('of', 'parameters', 'options', 'definition', 'needs', 'memory', 'derivative')
 
 

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The command that recovers a recording which was cut short."""
+
+import numpy as np
+import pytest
+
+from weld_twin_msgs_py.bags import BagReader, GrowingBag
+from weld_twin_msgs_py.messages.to_messages import bag_messages
+from weld_twin_msgs_py.messages.topics import JOINT_STATES
+from weld_twin_msgs_py.messages.typestore import TYPES
+
+FLUSHED = 700
+
+
+@pytest.fixture(params=['mcap', 'sqlite3'])
+def cut_short(request, tmp_path):
+    """Return the name of a recording whose recorder died after it had flushed."""
+    bag = GrowingBag(tmp_path / 'bag', storage=request.param).open()
+    for number in range(FLUSHED):
+        state = bag_messages().joint_state(number, ('a', 'b'), np.zeros(2))
+        data = bytes(TYPES.serialize_cdr(state, JOINT_STATES.type))
+        bag.write_cdr(JOINT_STATES.name, JOINT_STATES.type, data, 1_000_000 * number)
+    bag.flush()
+    bag.release()
+    return tmp_path / 'bag'
+
+
+def test_a_reader_leads_to_the_command(cut_short, weld_twin):
+    said = weld_twin('info', cut_short)
+    assert said.code == 2
+    assert f"'weld-twin recover {cut_short}'" in said.err
+
+
+def test_the_command_says_what_it_found_and_writes_where_it_is_told(cut_short, weld_twin):
+    there = cut_short.parent / 'there'
+    said = weld_twin('recover', cut_short, '--out', there)
+    assert said.code == 0
+    with BagReader(there) as bag:
+        count = len(list(bag.messages([JOINT_STATES.name])))
+    assert count == FLUSHED
+    assert f'{count}  /joint_states' in said.out
+    assert 'the original stays' in said.out
+    assert not cut_short.exists()
+    again = weld_twin('recover', cut_short, '--out', there)
+    assert again.code == 2
+    assert 'is not overwritten' in again.err

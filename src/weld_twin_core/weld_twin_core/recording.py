@@ -17,6 +17,26 @@ from .errors import DataError
 WRENCH_FRAMES = ('tool', 'base')
 
 
+def backward_rates(t: Array, values: Array) -> Array:
+    """
+    Return how fast values change since the sample before, zero at the first.
+
+    Parameters
+    ----------
+    t : array, shape (N,) [s]
+        Strictly increasing.
+    values : array, shape (..., N, n)
+
+    Returns
+    -------
+    array, shape (..., N, n) [1/s]
+
+    """
+    rates = np.zeros_like(values)
+    rates[..., 1:, :] = np.diff(values, axis=-2) / np.diff(t)[:, None]
+    return rates
+
+
 @dataclass(frozen=True, eq=False)
 class JointMotion:
     """
@@ -79,6 +99,18 @@ class JointMotion:
         edge: Literal[1, 2] = 2 if self.t.size > 2 else 1
         rates = np.gradient(self.q, self.t, axis=0, edge_order=edge)
         return readonly(rates, self.q.shape, 'joint velocities')
+
+    @cached_property
+    def causal_velocity(self) -> Array:
+        """
+        Return joint velocity as far as it is known at each stamp, shape (N, n).
+
+        As measured, else the step since the sample before: a running twin knows no more, and
+        over a recording the twin must say the same.
+        """
+        if self.qd is not None or self.static:
+            return self.velocity
+        return readonly(backward_rates(self.t, self.q), self.q.shape, 'joint velocities')
 
     def nearest(self, t: Array) -> np.ndarray:
         """
@@ -165,7 +197,7 @@ class Measurements:
                 )
             object.__setattr__(self, 'sigma', sigma)
 
-    def take(self, index: Array) -> Measurements:
+    def take(self, index: np.ndarray) -> Measurements:
         """
         Return some of the measurements.
 
@@ -193,6 +225,9 @@ class Signal:
         Stamps on the joint clock, strictly increasing.
     value : array, shape (K,) or (K, 6)
         Temperatures [degC], or force and torque [N, N m].
+    held : bool
+        A sample is in force until the next one, as a running twin has it; else the signal is
+        straight between samples.
 
     Raises
     ------
@@ -210,6 +245,7 @@ class Signal:
 
     t: Array
     value: Array
+    held: bool = False
 
     def __post_init__(self) -> None:
         t = increasing(self.t, 'signal stamps')
@@ -221,13 +257,16 @@ class Signal:
 
     def at(self, t: Array) -> Array:
         """
-        Return the signal at other times by straight lines, held at the ends.
+        Return the signal at other times; beyond its ends it is that of the first or last sample.
 
         Parameters
         ----------
         t : array, any shape [s]
 
         """
+        if self.held:
+            in_force = np.maximum(np.searchsorted(self.t, t, side='right') - 1, 0)
+            return np.asarray(self.value[in_force])
         if self.value.ndim == 1:
             return np.interp(t, self.t, self.value)
         columns = [np.interp(t, self.t, column) for column in self.value.T]
@@ -311,6 +350,19 @@ class Recording:
 
         """
         return replace(self, measured=measured)
+
+    def looking_back(self) -> Recording:
+        """
+        Return the recording with its side signals straight between samples.
+
+        A running twin has to hold what it heard last; an analysis of the past knows the sample
+        after as well.
+        """
+        wrench, temperature = (
+            None if signal is None else replace(signal, held=False)
+            for signal in (self.wrench, self.temperature)
+        )
+        return replace(self, wrench=wrench, temperature=temperature)
 
     def thinned(self, measurements: int, joints: int) -> Recording:
         """

@@ -13,7 +13,7 @@ import numpy as np
 from ..arm.chain import Shift
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect, Stage, View
-from ..recording import JointMotion
+from ..recording import JointMotion, backward_rates
 
 Tangent = tuple[int, int, Shift]
 """Effect, component, and the derivative of the channels by it."""
@@ -71,10 +71,8 @@ def added(joints: Array, shift: Shift) -> Array:
 
 
 def rates(motion: JointMotion, moved: Array) -> Array | float:
-    """Return how fast displacements (..., N, n) change along the joint stream [1/s]."""
-    if motion.static or motion.t.size < 2:
-        return 0.0
-    return np.gradient(moved, motion.t, axis=-2)
+    """Return how fast displacements (..., N, n) change since the joint state before [1/s]."""
+    return 0.0 if motion.static else backward_rates(motion.t, moved)
 
 
 def _pushed(effect: MemoryEffect, view: View, shift: Shift) -> dict[Any, Array]:

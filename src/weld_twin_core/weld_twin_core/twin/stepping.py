@@ -58,6 +58,8 @@ class LiveTwin:
         self._states: dict[tuple[Any, ...], Any] = {}
         self._start = 0.0
         self._last = -np.inf
+        self._command = Rate()
+        self._moved = Rate()
 
     @property
     def twin(self) -> Twin:
@@ -73,6 +75,7 @@ class LiveTwin:
         """Forget the motion so far, as after a jump back in time."""
         self._states.clear()
         self._last = -np.inf
+        self._command, self._moved = Rate(), Rate()
 
     def step(
         self,
@@ -92,6 +95,7 @@ class LiveTwin:
             Stamp; not before the one of the last call.
         q : array, shape (n,) [rad or m]
         qd : array, shape (n,) [rad/s or m/s], optional
+            A velocity that is left out is the step since the call before.
         wrench : array, shape (6,) [N, N m], optional
             Force and torque on the tool.
         temperature : float [degC], optional
@@ -105,9 +109,11 @@ class LiveTwin:
 
         """
         q = self._checked(t, q)
+        step = self._command.since_before(t, q)
+        qd = step if qd is None else np.asarray(qd, dtype=np.float64)
         if not self.twin.effects:
             return q.copy(), self._nominal(q)
-        view = self._remembered(self._view(t, q, qd, wrench, temperature, wrench_frame))
+        view = self._remembered(t, self._view(t, q, qd, wrench, temperature, wrench_frame))
         view = self.twin.displaced(view)
         joints = view.q[0].copy()
         others = {}
@@ -157,7 +163,7 @@ class LiveTwin:
         self,
         t: float,
         q: Array,
-        qd: Array | None,
+        qd: Array,
         wrench: Array | None,
         temperature: float | None,
         wrench_frame: str,
@@ -168,19 +174,38 @@ class LiveTwin:
             stamp,
             stamp - self._start,
             q[None],
-            np.zeros_like(q)[None] if qd is None else np.asarray(qd)[None],
+            qd[None],
             False,
             None if wrench is None else np.asarray(wrench)[None],
             wrench_frame,
             None if temperature is None else np.array([temperature]),
         )
 
-    def _remembered(self, view: View) -> View:
+    def _remembered(self, t: float, view: View) -> View:
         """Run the effects with memory, each on what the one before left, and keep their states."""
         seen: Counter[tuple[str, ...]] = Counter()
-        for _, effect in in_series(self.twin.effects):
+        effects = in_series(self.twin.effects)
+        if not effects:
+            return view
+        command = view.q
+        for _, effect in effects:
             key = (seen[effect.key], *effect.key)
             seen[effect.key] += 1
             shift, self._states[key] = effect.run(view, self._states.get(key))
             view = replace(view, q=added(view.q, shift))
-        return view
+        moved = self._moved.since_before(t, (view.q - command)[0])
+        return replace(view, qd=view.qd + moved)
+
+
+class Rate:
+    """How fast values change from one call to the next, as `recording.backward_rates` has it."""
+
+    def __init__(self) -> None:
+        self._before: tuple[float, Array] | None = None
+
+    def since_before(self, t: float, values: Array) -> Array:
+        """Return the rate since the call before, shape as values [1/s]; zero at the first."""
+        before, self._before = self._before, (t, values.copy())
+        if before is None or t <= before[0]:
+            return np.zeros_like(values)
+        return (values - before[1]) / (t - before[0])

@@ -221,7 +221,7 @@ class Twin:
     def joint_view(self, recording: Recording) -> View:
         """Return what effects with memory see: the commanded motion on its own stamps."""
         motion = recording.joints
-        return _view(self.robot, recording, motion.t, motion.q, motion.velocity)
+        return _view(self.robot, recording, motion.t, motion.q, motion.causal_velocity)
 
     def _evaluate(self, recording: Recording, at: Array | None, want: bool) -> Evaluation:
         view, tangents = self._sampled(recording, at, want)
@@ -233,7 +233,7 @@ class Twin:
         motion = recording.joints
         moved, tangents = run_all(self.effects, self.joint_view(recording), want)
         if at is None:
-            t, q, qd = motion.t, motion.q, motion.velocity
+            t, q, qd = motion.t, motion.q, motion.causal_velocity
             picker = None
         else:
             t = np.asarray(at, dtype=np.float64)

@@ -1,28 +1,27 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Growing columns of stamped numbers, and what to do with stamps that repeat or go back."""
+"""Growing columns of stamped numbers, and a tally of the messages that gave none."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
-from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-CLOCK_JUMP = 1_000_000_000
+from ..assembly import Samples
+from ..assembly.frame_names import OtherFrame
+from ..assembly.joint_states import Incomplete
+from ..assembly.stamp_order import Late
+from ..messages.from_messages import NANOSECONDS, Unstamped
+
+CLOCK_JUMP = NANOSECONDS
 """A step back by more than this [ns] is a clock that was set, not a late packet."""
 
-
-class Samples(NamedTuple):
-    """Stamps, shape (N,) [int64 ns], strictly increasing, and values, shape (N, width)."""
-
-    ns: np.ndarray
-    values: Array
-    notes: tuple[str, ...]
+LEFT_OUT = (Unstamped, Late, Incomplete, OtherFrame)
+"""What costs a sample and not the recording: the running nodes leave it out as well."""
 
 
 class Stream:
@@ -31,8 +30,10 @@ class Stream:
     def __init__(self, topic: str, width: int) -> None:
         self.topic = topic
         self.width = width
-        self.unstamped = 0
+        self.messages = 0
         self.frames: set[str] = set()
+        self._unstamped = self._late = self._repeated = 0
+        self._other: dict[type[DataError], tuple[int, str]] = {}
         self._ns = array('q')
         self._values = array('d')
 
@@ -41,51 +42,70 @@ class Stream:
         return len(self._ns)
 
     def append(self, ns: int, values: Iterable[float]) -> None:
-        """Add one sample."""
+        """Add one sample, later than the one before."""
         self._ns.append(ns)
         self._values.extend(values)
 
-    def samples(self) -> Samples:
+    def leave_out(self, error: DataError) -> None:
         """
-        Return the samples in the order of their stamps.
-
-        Late packets are put in order and repeated stamps dropped, both with a note.
+        Count a message that gives no sample, by what is wrong with it.
 
         Raises
         ------
         DataError
-            No message has a stamp, or the clock jumped back during the recording.
+            Its stamp is so far behind that the clock was set.
 
         """
-        if self.unstamped and not len(self):
+        if isinstance(error, Unstamped):
+            self._unstamped += 1
+        elif isinstance(error, Late):
+            if error.behind > CLOCK_JUMP:
+                raise self.jumped(error.behind)
+            self._repeated += error.behind == 0
+            self._late += error.behind > 0
+        else:
+            told = f"message {self.messages - 1} of '{self.topic}': {error}"
+            count, first = self._other.get(type(error), (0, told))
+            self._other[type(error)] = count + 1, first
+
+    def jumped(self, back: int) -> DataError:
+        """Return the error of a clock that was set back by so much [ns] at the last message."""
+        return DataError(
+            f"the stamps of '{self.topic}' jump back by {back * 1e-9:.3f} s at message "
+            f'{self.messages - 1}: the clock was set or the bag holds two runs; cut it there'
+        )
+
+    def samples(self) -> Samples:
+        """
+        Return the samples.
+
+        Raises
+        ------
+        DataError
+            There are none; the message says what all of its messages lack.
+
+        """
+        if not len(self):
+            for _, sentence in self._other.values():
+                raise DataError(sentence)
+            if not self._unstamped:
+                raise DataError(f"no message of '{self.topic}' gives a sample")
             raise DataError(
-                f"header.stamp is unset in all {self.unstamped} messages of '{self.topic}'; set "
+                f"header.stamp is unset in all {self._unstamped} messages of '{self.topic}'; set "
                 'it where the sample is taken, the time of recording cannot stand in for it'
             )
         ns = np.frombuffer(self._ns, dtype=np.int64)
-        values = np.frombuffer(self._values, dtype=np.float64).reshape(-1, self.width)
-        notes = []
-        if self.unstamped:
-            notes.append(f"{self.unstamped} messages of '{self.topic}' without a stamp dropped")
-        late = np.flatnonzero(np.diff(ns) < 0)
-        if late.size:
-            self._refuse_jump(ns)
-            order = np.argsort(ns, kind='stable')
-            ns, values = ns[order], values[order]
-            notes.append(f"{late.size} late messages of '{self.topic}' put in order")
-        fresh = np.concatenate([[True], np.diff(ns) > 0]) if ns.size else np.zeros(0, bool)
-        if not fresh.all():
-            count = int((~fresh).sum())
-            notes.append(f"{count} messages of '{self.topic}' with a repeated stamp dropped")
-        if len(self.frames) > 1:
-            notes.append(f"'{self.topic}' changes its frame_id: {', '.join(sorted(self.frames))}")
-        return Samples(ns[fresh], values[fresh], tuple(notes))
+        return Samples(ns, np.frombuffer(self._values, dtype=np.float64).reshape(-1, self.width))
 
-    def _refuse_jump(self, ns: np.ndarray) -> None:
-        back = np.maximum.accumulate(ns) - ns
-        k = int(back.argmax())
-        if back[k] > CLOCK_JUMP:
-            raise DataError(
-                f"the stamps of '{self.topic}' jump back by {back[k] * 1e-9:.3f} s at message "
-                f'{k}: the clock was set or the bag holds two runs; cut it there'
-            )
+    def notes(self) -> tuple[str, ...]:
+        """Return what was left out, and whether the frame changes."""
+        counted = (
+            (self._unstamped, 'without a stamp dropped'),
+            (self._late, 'with a stamp before the last one dropped'),
+            (self._repeated, 'with a repeated stamp dropped'),
+            *((count, f'left out, as {sentence}') for count, sentence in self._other.values()),
+        )
+        out = [f"{count} messages of '{self.topic}' {what}" for count, what in counted if count]
+        if len(self.frames) > 1:
+            out.append(f"'{self.topic}' changes its frame_id: {', '.join(sorted(self.frames))}")
+        return tuple(out)

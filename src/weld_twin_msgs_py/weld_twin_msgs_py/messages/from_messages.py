@@ -24,20 +24,24 @@ from weld_twin_core.recording import JointMotion
 NANOSECONDS = 1_000_000_000
 
 
+class Unstamped(DataError):
+    """The header stamp of a message was never set."""
+
+
 def stamp_ns(message: Any) -> int:
     """
     Return the header stamp [ns].
 
     Raises
     ------
-    DataError
+    Unstamped
         The stamp was never set, or is not a time.
 
     """
     stamp = message.header.stamp
     ns = int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
     if ns <= 0:
-        raise DataError(
+        raise Unstamped(
             f'header.stamp is {ns} ns: the publisher left it unset, so the sample has no place in '
             'time; set header.stamp where the sample is taken'
         )

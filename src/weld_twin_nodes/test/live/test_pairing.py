@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from weld_twin_core.errors import DataError
 from weld_twin_core.metrics.deviation import deviation_metrics
 from weld_twin_core.metrics.running import RunningMetrics
+from weld_twin_msgs_py.assembly.stamp_order import RESTART_AFTER, Forward
 from weld_twin_nodes.streams.pairing import Pairing
-from weld_twin_nodes.streams.stamp_order import RESTART_AFTER, Forward
 
 MS = 1_000_000
 

@@ -14,6 +14,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POINT
@@ -51,8 +52,8 @@ def filled(duration=60.0, effects=(OFFSET,), seconds=12.0):
     window = Window(load('ur5'), duration)
     for t, q, p in zip(motion.t, motion.q, points(effects, motion), strict=True):
         stamp = START + round(t * 1e9)
-        window.take_joints(make.joint_state(stamp, load('ur5').joint_names, q))
-        window.take_point(make.point(stamp, p))
+        window.take(Role.JOINTS, make.joint_state(stamp, load('ur5').joint_names, q))
+        window.take(Role.POINT, make.point(stamp, p))
     return window
 
 
@@ -66,15 +67,15 @@ def test_the_window_holds_its_duration_and_no_more():
 def test_a_stream_without_stamps_moving_on_is_bounded_by_number():
     window, make = Window(ONE_JOINT, 1e6), bag_messages()
     for k in range(1, LONGEST + 100):
-        window.take_joints(make.joint_state(k, ('a',), np.zeros(1)))
-    assert len(window._streams['joints']) == LONGEST
+        window.take(Role.JOINTS, make.joint_state(k, ('a',), np.zeros(1)))
+    assert len(window._streams[Role.JOINTS]) == LONGEST
 
 
 def test_a_resting_arm_gives_nothing_to_diagnose():
     window, make, names = Window(ONE_JOINT, 60.0), bag_messages(), ('a',)
     for k in range(1000):
-        window.take_joints(make.joint_state(START + k * 10_000_000, names, np.ones(1)))
-        window.take_point(make.point(START + k * 10_000_000, np.zeros(3)))
+        window.take(Role.JOINTS, make.joint_state(START + k * 10_000_000, names, np.ones(1)))
+        window.take(Role.POINT, make.point(START + k * 10_000_000, np.zeros(3)))
     assert window.recording(least=1.0) is None
 
 
@@ -84,7 +85,7 @@ def test_a_bag_played_again_starts_a_new_window():
     for t, q in zip(motion.t, motion.q, strict=True):
         stamp = START - 3_600_000_000_000 + round(t * 1e9)
         try:
-            window.take_joints(make.joint_state(stamp, load('ur5').joint_names, q))
+            window.take(Role.JOINTS, make.joint_state(stamp, load('ur5').joint_names, q))
         except Exception as error:  # the first few are refused, as a late sample would be
             assert 'not after the last one' in str(error)
     assert window.last is None

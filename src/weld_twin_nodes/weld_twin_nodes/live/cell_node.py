@@ -171,6 +171,12 @@ class CellNode(Node):
             state.last_reason = reason
         self.warn(source, f'{source}: {reason} ({self.refused} refused so far)')
 
+    def remark(self, sentence: str) -> None:
+        """Tell once what was taken for granted: in the log, and in the node's health as long."""
+        if sentence not in self.health.remarks:
+            self.health.remarks.append(sentence)
+            self.get_logger().info(sentence)
+
     def warn(self, source: str, sentence: str) -> None:
         """Write a sentence into the log, unless one from the same source was written just now."""
         now = time.monotonic()

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from weld_twin_msgs_py.assembly.frame_names import BASE
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_write import Vector3Encoder
 from weld_twin_msgs_py.messages.topics import (
@@ -18,7 +19,6 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..streams.deviation_stream import METRICS, Deviation, Deviations
-from ..streams.frame_names import BASE
 from .cell_node import CellNode
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run

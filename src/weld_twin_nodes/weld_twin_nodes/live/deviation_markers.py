@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import DEVIATION, MARKERS, MEASURED_POINT, MEASURED_POSE
 
-from ..streams.frame_names import WORLD
 from .cell_node import CellNode
 from .deviation_lines import DeviationLines
 from .robot_settings import ROBOT_SETTINGS, robot_of

@@ -7,10 +7,10 @@ from __future__ import annotations
 from typing import Any
 
 from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder, PoseEncoder
 from weld_twin_msgs_py.messages.topics import ACTUAL_JOINT_STATES, MEASURED_POSE
 
-from ..streams.frame_names import WORLD
 from ..streams.injected_noise import Noise
 from ..streams.twin_stream import Sample
 from .model_node import ModelNode

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.messages.cdr_write import PoseEncoder
 from weld_twin_msgs_py.messages.topics import TWIN_POSE
 
-from ..streams.frame_names import WORLD
 from ..streams.twin_stream import Sample
 from .model_node import ModelNode
 from .run_node import run

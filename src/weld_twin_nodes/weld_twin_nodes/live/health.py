@@ -92,6 +92,7 @@ class Health:
         self._patience = patience
         self.inputs: dict[str, Input] = {}
         self.lasting: dict[str, str] = {}
+        self.remarks: list[str] = []
         self._said: list[str] = []
         self._said_in_all = 0
 
@@ -113,7 +114,11 @@ class Health:
             self._node,
             WARN if told else OK,
             '; '.join(told) or 'running',
-            {'inputs': len(self.inputs), 'told': self._said_in_all},
+            {
+                'inputs': len(self.inputs),
+                'told': self._said_in_all,
+                **{f'remark_{k}': sentence for k, sentence in enumerate(self.remarks)},
+            },
         )
         self._said.clear()
         return [own, *(item.status(self._node, now) for item in self.inputs.values())]

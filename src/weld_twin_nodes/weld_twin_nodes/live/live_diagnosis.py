@@ -5,14 +5,17 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 from weld_twin_core.diagnosis.algebra.problem import frames_named
+from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.messages.topics import (
     DIAGNOSIS,
     JOINT_STATES,
     MEASURED_POINT,
     MEASURED_POSE,
+    MEASURED_SIGMA,
     TEMPERATURE,
     TOOL_WRENCH,
 )
@@ -28,6 +31,14 @@ from .settings import Setting
 LOOK_EVERY = 0.2
 LEVELS = {'none': 0, 'identified': 1, 'ambiguous': 1, 'unknown': 1}
 """Of the diagnostic message: ok, or a warning."""
+INPUTS = {
+    TOOL_WRENCH: Role.WRENCH,
+    TEMPERATURE: Role.TEMPERATURE,
+    MEASURED_SIGMA: Role.SIGMA,
+    MEASURED_POSE: Role.POSE,
+    MEASURED_POINT: Role.POINT,
+    JOINT_STATES: Role.JOINTS,
+}
 
 
 class LiveDiagnosis(CellNode):
@@ -57,11 +68,9 @@ class LiveDiagnosis(CellNode):
         self._seen: int | None = None
         self._speaking = False
         self._verdict = self.offer(DIAGNOSIS)
-        self.listen(TOOL_WRENCH, self._window.take_wrench)
-        self.listen(TEMPERATURE, self._window.take_temperature)
-        self.listen(MEASURED_POSE, self._window.take_pose)
-        self.listen(MEASURED_POINT, self._window.take_point)
-        self.listen(JOINT_STATES, self._window.take_joints, required=True)
+        for topic, role in INPUTS.items():
+            required = role is Role.JOINTS
+            self.listen(topic, partial(self._window.take, role), required=required)
         self.every(LOOK_EVERY, self._look)
 
     def destroy_node(self) -> None:

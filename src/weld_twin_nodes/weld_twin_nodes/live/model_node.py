@@ -47,7 +47,7 @@ class ModelNode(CellNode):
 
     def start(self) -> None:
         """Take input; to be called when the outputs are there."""
-        self.listen(TOOL_WRENCH, self.stream.take_wrench)
+        self.listen(TOOL_WRENCH, self._on_wrench)
         self.listen(TEMPERATURE, self.stream.take_temperature)
         self._input = self.listen(JOINT_STATES, self._on_joints, required=True)
 
@@ -55,9 +55,14 @@ class ModelNode(CellNode):
         """Forget the motion so far."""
         self.stream.reset()
 
+    def _on_wrench(self, message: Any) -> None:
+        self.stream.take_wrench(message)
+        if self.stream.remark:
+            self.remark(self.stream.remark)
+
     def _on_joints(self, message: Any) -> None:
         sample = self.stream.step(message)
-        self._input.others = self.stream.joints.others
+        self._input.others = self.stream.passed_over
         if sample is not None:
             self.publish(sample)
 

@@ -12,6 +12,7 @@ from rclpy.duration import Duration
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
+from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
 from weld_twin_msgs_py.messages.topics import (
@@ -24,7 +25,6 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..offline.seam_motion import backward, joint_motion, plan_through, sampled, stamps, thinned
-from ..streams.frame_names import WORLD
 from .cell_node import CellNode
 from .pacing import Pump
 from .robot_settings import ROBOT_SETTINGS, robot_of

@@ -16,6 +16,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly.frame_names import BASE, WORLD
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 from weld_twin_msgs_py.messages.to_messages import Messages
 from weld_twin_msgs_py.messages.topics import (
@@ -28,7 +29,6 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..streams.deviation_stream import METRICS, Deviation, Deviations
-from ..streams.frame_names import BASE, WORLD
 from ..streams.injected_noise import Noise
 
 METRICS_EVERY = 50

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
-
-from .stamp_order import Forward
+from weld_twin_msgs_py.assembly.stamp_order import Forward
 
 NANOSECOND = 1e-9
 USUAL = 16

@@ -11,10 +11,9 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.messages import from_messages
-
-from .joint_assembly import JointStates
-from .stamp_order import Forward
+from weld_twin_msgs_py.assembly import Intake, Role, Taken
+from weld_twin_msgs_py.assembly.held_signal import HeldSignal
+from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
 
 class Sample(NamedTuple):
@@ -40,46 +39,59 @@ class Sample(NamedTuple):
 
 
 class JointStream:
-    """A live twin fed with messages; wrench and temperature are held until the next one."""
+    """
+    A live twin fed with messages.
+
+    Wrench and temperature are in force from their own stamp to the next one's. The poses are
+    those that the twin gives over the recording of the same messages.
+    """
 
     def __init__(self, twin: Twin) -> None:
         self._live = twin.live()
-        self._delay = round(twin.delay * from_messages.NANOSECONDS)
-        self.joints = JointStates(twin.robot)
-        self._order = Forward()
+        self._delay = round(twin.delay * NANOSECONDS)
+        self._intake = Intake(twin.robot)
         self._epoch: int | None = None
-        self._before: tuple[int, Array] | None = None
-        self._wrench: Array | None = None
-        self._wrench_frame = 'tool'
-        self._temperature: float | None = None
+        self._wrench = HeldSignal()
+        self._temperature = HeldSignal()
 
     @property
     def twin(self) -> Twin:
         """Return the robot with its effects."""
         return self._live.twin
 
+    @property
+    def passed_over(self) -> int:
+        """Return how many joint states made no sample of their own and were not refused."""
+        return self._intake.joints.others + self._intake.joints.parts
+
+    @property
+    def remark(self) -> str:
+        """Return what is to be told of the frame of the wrench; empty where it is clear."""
+        return self._intake.wrench_frame.remark
+
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""
         self._live.twin = twin
-        self._delay = round(twin.delay * from_messages.NANOSECONDS)
+        self._delay = round(twin.delay * NANOSECONDS)
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock; wrench and temperature hold."""
-        self._order.reset()
+        self._intake.reset()
         self._forget()
 
     def _forget(self) -> None:
         self._live.reset()
-        self._epoch = self._before = None
+        self._wrench.hold()
+        self._temperature.hold()
+        self._epoch = None
 
     def take_wrench(self, message: Any) -> None:
         """Take the load on the tool."""
-        self._wrench = from_messages.wrench(message)
-        self._wrench_frame = 'base' if 'base' in message.header.frame_id else 'tool'
+        _keep(self._wrench, self._intake.take(Role.WRENCH, message))
 
     def take_temperature(self, message: Any) -> None:
         """Take the temperature."""
-        self._temperature = from_messages.temperature(message)
+        _keep(self._temperature, self._intake.take(Role.TEMPERATURE, message))
 
     def step(self, message: Any) -> Sample | None:
         """
@@ -91,29 +103,27 @@ class JointStream:
             The message cannot be used; nothing has changed then.
 
         """
-        sample = self.joints.take(message)
-        if sample is None:
+        taken = self._intake.take(Role.JOINTS, message)
+        if taken is None:
             return None
-        stamp, q, qd = sample
-        if self._order.restarted_at(stamp):
+        stamp, row, restarted = taken
+        if restarted:
             self._forget()
         if self._epoch is None:
             self._epoch = stamp
-        if qd is None:
-            qd = self._difference(stamp, q)
+        n = self.twin.robot.n
+        temperature = self._temperature.at(stamp)
         joints, poses = self._live.step(
             (stamp - self._epoch) * 1e-9,
-            q,
-            qd,
-            self._wrench,
-            self._temperature,
-            self._wrench_frame,
+            row[:n],
+            None if np.isnan(row[n:]).any() else row[n:],
+            self._wrench.at(stamp),
+            None if temperature is None else float(temperature[0]),
+            self._intake.wrench_frame.meaning,
         )
-        self._before = (stamp, q)
         return Sample(stamp, stamp + self._delay, joints, poses)
 
-    def _difference(self, stamp: int, q: Array) -> Array:
-        """Return the velocity since the sample before, for controllers that do not tell it."""
-        if self._before is None:
-            return np.zeros_like(q)
-        return (q - self._before[1]) * (from_messages.NANOSECONDS / (stamp - self._before[0]))
+
+def _keep(signal: HeldSignal, taken: Taken | None) -> None:
+    if taken is not None:
+        signal.add(taken.stamp, taken.row, restarted=taken.restarted)

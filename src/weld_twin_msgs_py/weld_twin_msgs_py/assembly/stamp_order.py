@@ -10,6 +10,22 @@ RESTART_AFTER = 10
 """Refusals in a row, in order among themselves, after which time has started anew."""
 
 
+class Late(DataError):
+    """
+    The stamp of a sample is not after the last one of its stream.
+
+    Attributes
+    ----------
+    behind : int [ns]
+        How far it is behind; 0 for a stamp that repeats.
+
+    """
+
+    def __init__(self, sentence: str, behind: int = 0) -> None:
+        super().__init__(sentence)
+        self.behind = behind
+
+
 class Forward:
     """Lets stamps [ns] through that increase; one bad stamp costs a sample, not the stream."""
 
@@ -36,14 +52,14 @@ class Forward:
 
         Raises
         ------
-        DataError
+        Late
             The stamp is not after the last one.
 
         """
         if self.last is None and self._ended is not None and stamp > self._ended:
             self._late += 1
             if self._late < RESTART_AFTER:
-                raise DataError(f'the stamp {stamp * 1e-9:.6f} s is of before the clock jumped')
+                raise Late(f'the stamp {stamp * 1e-9:.6f} s is of before the clock jumped')
         if self.last is None or stamp > self.last:
             self.last, self._ended = stamp, None
             self._behind.clear()
@@ -52,9 +68,10 @@ class Forward:
             self._behind.clear()
         self._behind.append(stamp)
         if len(self._behind) < RESTART_AFTER:
-            raise DataError(
+            raise Late(
                 f'the stamp {stamp * 1e-9:.6f} s is not after the last one, '
-                f'{self.last * 1e-9:.6f} s; the sample is left out'
+                f'{self.last * 1e-9:.6f} s; the sample is left out',
+                self.last - stamp,
             )
         self.last = stamp
         self._behind.clear()

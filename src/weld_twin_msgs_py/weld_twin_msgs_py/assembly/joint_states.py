@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,8 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.messages import from_messages
+
+from ..messages import from_messages
 
 _SLACK = 1e-6
 """What `Robot.check_positions` allows beyond a limit [rad or m]."""
@@ -27,6 +28,10 @@ class JointSample(NamedTuple):
     qd: Array | None
 
 
+class Incomplete(DataError):
+    """Joints of the robot are missing: in a message, or at a stamp that has passed."""
+
+
 class JointStates:
     """
     Takes joint states; gives samples of one robot.
@@ -34,13 +39,29 @@ class JointStates:
     Messages about other joints are passed over. Joints spread over several publishers are put
     together where their stamps are equal, as those of one controller manager are; to hold one
     joint at its last position while another moves on would be a pose the arm never had.
+
+    Parameters
+    ----------
+    robot : Robot
+    limits : bool
+        Whether positions beyond the joints' limits are refused. A running node does; a recording
+        is read with them, for they tell of swapped joints and of degrees taken for radians.
+
+    Attributes
+    ----------
+    others : int
+        Messages that hold no joint of the robot.
+    parts : int
+        Messages that hold some joints and wait for the rest.
+
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, *, limits: bool = True) -> None:
         self._robot = robot
         self._names = robot.joint_names
+        slack = _SLACK if limits else inf
         self._ranges = [
-            (low - _SLACK, high + _SLACK)
+            (low - slack, high + slack)
             for low, high in zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)
         ]
         self._usual: Any = None
@@ -48,7 +69,7 @@ class JointStates:
         self._spread: set[str] = set()
         self._stamp = 0
         self._parts: dict[str, tuple[float, float]] = {}
-        self.others = 0
+        self.others = self.parts = 0
 
     def take(self, message: Any) -> JointSample | None:
         """
@@ -56,6 +77,8 @@ class JointStates:
 
         Raises
         ------
+        Incomplete
+            Joints are missing and will not come any more.
         DataError
             The message cannot be used.
 
@@ -66,7 +89,9 @@ class JointStates:
             if quick is not None:
                 return quick
         present = from_messages.joints_present(message, self._names)
-        if not present and message.name:
+        if not present:
+            if not message.name:
+                raise Incomplete('the joint state names no joint')
             self.others += 1
             return None
         if 0 < len(present) < len(self._names):
@@ -110,14 +135,16 @@ class JointStates:
         }
         self._spread.update(present)
         if len(self._spread) < len(self._names):
-            from_messages.joint_positions(message, self._names)  # has the sentence
+            missing = next(name for name in self._names if name not in self._spread)
+            listed = ', '.join(message.name)
+            raise Incomplete(f'the joint state has no joint {missing!r}; it has {listed}')
         if stamp != before and 0 < len(left) < len(self._names):
-            raise DataError(
+            raise Incomplete(
                 f'joint {left[0]!r} never came with the stamp {before * 1e-9:.6f} s; publish all '
                 'joints in one message, or with equal stamps'
             )
         if self._missing(self._parts):
-            self.others += 1
+            self.parts += 1
             return None
         return self._whole()
 

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages to rows of numbers, each stream in the order of its stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from math import hypot, isfinite, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import matrix_from_quaternion
+from weld_twin_core.arrays import Array
+
+from ..messages import from_messages
+from .frame_names import WrenchFrame
+from .joint_states import JointStates
+from .stamp_order import Forward
+
+
+class Role(Enum):
+    """What the messages of a topic tell."""
+
+    JOINTS = 'joints'
+    POSE = 'pose'
+    POINT = 'point'
+    SIGMA = 'sigma'
+    WRENCH = 'wrench'
+    TEMPERATURE = 'temperature'
+
+
+class Taken(NamedTuple):
+    """
+    A message that has its place in its stream.
+
+    Attributes
+    ----------
+    stamp : int [ns]
+    row : array, shape (width,)
+        Joints: positions, then velocities, NaN where they are not told. Pose: position,
+        quaternion x y z w, sigma [m] or NaN. Point, sigma: three numbers. Wrench: force and
+        torque. Temperature: one number.
+    restarted : bool
+        It begins a new run: the stamps before it lie in its future.
+
+    """
+
+    stamp: int
+    row: Array
+    restarted: bool
+
+
+class Intake:
+    """
+    Takes the messages of one cell.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its joint names pick the columns.
+    limits : bool
+        Whether joint positions beyond the limits are refused; see `JointStates`.
+
+    Attributes
+    ----------
+    joints : JointStates
+    wrench_frame : WrenchFrame
+
+    """
+
+    def __init__(self, robot: Robot, *, limits: bool = True) -> None:
+        self.joints = JointStates(robot, limits=limits)
+        self.wrench_frame = WrenchFrame(robot)
+        self._orders = {role: Forward() for role in Role}
+        self._rows: dict[Role, Callable[[Any], Array]] = {
+            Role.POSE: _pose_row,
+            Role.POINT: from_messages.point,
+            Role.SIGMA: from_messages.vector3,
+            Role.WRENCH: self._wrench_row,
+            Role.TEMPERATURE: lambda message: np.array([from_messages.temperature(message)]),
+        }
+
+    @staticmethod
+    def width(role: Role, robot: Robot) -> int:
+        """Return how many numbers a row has."""
+        widths = {Role.POSE: 8, Role.POINT: 3, Role.SIGMA: 3, Role.WRENCH: 6, Role.TEMPERATURE: 1}
+        return widths.get(role, 2 * robot.n)
+
+    def last(self, role: Role) -> int | None:
+        """Return the stamp of the last sample of a stream [ns]."""
+        return self._orders[role].last
+
+    def reset(self) -> None:
+        """Begin anew, as after a jump of the clock."""
+        for order in self._orders.values():
+            order.reset()
+
+    def take(self, role: Role, message: Any) -> Taken | None:
+        """
+        Return the sample that a message gives, None if joints of other messages are awaited.
+
+        Raises
+        ------
+        Unstamped, Late, Incomplete, OtherFrame
+            The sample is to be left out, the stream goes on.
+        DataError
+            The message cannot be used.
+
+        """
+        if role is Role.JOINTS:
+            return self._joints(message)
+        stamp = from_messages.stamp_ns(message)
+        row = self._rows[role](message)
+        return Taken(stamp, row, self._orders[role].restarted_at(stamp))
+
+    def _joints(self, message: Any) -> Taken | None:
+        sample = self.joints.take(message)
+        if sample is None:
+            return None
+        qd = np.full(sample.q.size, nan) if sample.qd is None else sample.qd
+        restarted = self._orders[Role.JOINTS].restarted_at(sample.stamp)
+        return Taken(sample.stamp, np.concatenate([sample.q, qd]), restarted)
+
+    def _wrench_row(self, message: Any) -> Array:
+        row = from_messages.wrench(message)
+        self.wrench_frame.take(message.header.frame_id)
+        return row
+
+
+def _pose_row(message: Any) -> Array:
+    """Return position, quaternion and sigma (NaN when the message has none)."""
+    inner = getattr(message.pose, 'pose', message.pose)
+    p, q = inner.position, inner.orientation
+    sigma = None if inner is message.pose else from_messages.position_sigma(message)
+    row = [p.x, p.y, p.z, q.x, q.y, q.z, q.w, nan if sigma is None else sigma]
+    if not (isfinite(sum(row[:3])) and abs(hypot(*row[3:7]) - 1.0) < 0.009):
+        from_messages.pose(message)  # has the sentence, and the bound
+    return np.array(row)
+
+
+def rotations(rows: Array) -> Array:
+    """Return the rotation matrices, shape (N, 3, 3), of pose rows, shape (N, 8)."""
+    return matrix_from_quaternion(rows[:, 3:7], 'orientation')

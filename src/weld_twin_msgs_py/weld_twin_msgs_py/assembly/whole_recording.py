@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Streams of rows to a `Recording`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import (
+    JointMotion,
+    Measurements,
+    Recording,
+    Signal,
+    backward_rates,
+)
+
+from .intake import Role, rotations
+from .station_stamps import looks_static
+
+LATE_WRENCH = 1.0
+"""
+A wrench that begins within this time [s] of the joint states was there from the start.
+
+Its first sample is awaited then, and what was measured before it is left out. One that begins
+later was switched on later.
+"""
+
+
+class Samples(NamedTuple):
+    """Stamps, shape (N,) [int64 ns], strictly increasing, and rows, shape (N, width)."""
+
+    ns: np.ndarray
+    rows: Array
+
+
+def assembled(
+    name: str,
+    robot: Robot,
+    streams: Mapping[Role, Samples],
+    *,
+    wrench_frame: str = 'tool',
+    static: bool | None = False,
+    notes: tuple[str, ...] = (),
+) -> Recording:
+    """
+    Return the recording that streams make; it counts from the first joint state.
+
+    Parameters
+    ----------
+    name : str
+    robot : Robot
+    streams : mapping
+        Rows as `Intake` gives them, the joints among them. Poses are used before points.
+    wrench_frame : str
+        'tool' or 'base'.
+    static : bool, optional
+        Whether the joint states are stations at rest; None looks at the stamps.
+    notes : tuple of str
+        What is to be said of the streams.
+
+    Raises
+    ------
+    DataError
+        The streams have no time in common, or numbers that cannot be used.
+
+    """
+    epoch = int(streams[Role.JOINTS].ns[0])
+    motion = _motion(robot, streams[Role.JOINTS])
+    measured = _measurements(streams, epoch)
+    if static is None:
+        static = looks_static(robot, motion, measured)
+    if static:
+        motion = JointMotion(motion.t, motion.q, static=True)
+        notes += (f'{motion.t.size} static stations: the motion between them is not known',)
+    elif measured is not None:
+        _refuse_apart(motion, measured)
+    wrench = streams.get(Role.WRENCH)
+    if wrench is not None and not static:
+        wrench, measured, said = _unloaded_before(wrench, epoch, measured)
+        notes += said
+    return Recording(
+        name,
+        motion,
+        measured,
+        _signal(wrench, epoch, static),
+        wrench_frame,
+        _signal(streams.get(Role.TEMPERATURE), epoch, static),
+        epoch,
+        notes,
+    )
+
+
+def _signal(samples: Samples | None, epoch: int, static: bool) -> Signal | None:
+    """Return a side signal; stations have no timing, so none of them holds until the next."""
+    if samples is None:
+        return None
+    rows = samples.rows[:, 0] if samples.rows.shape[1] == 1 else samples.rows
+    return Signal(seconds(samples.ns, epoch), rows, held=not static)
+
+
+def seconds(ns: np.ndarray, epoch: int) -> Array:
+    """Return stamps [ns] as seconds since an epoch [ns]."""
+    return np.asarray((ns - epoch) * 1e-9)
+
+
+def _motion(robot: Robot, joints: Samples) -> JointMotion:
+    """Return the joint stream; velocities some messages lack are steps since the one before."""
+    t = seconds(joints.ns, int(joints.ns[0]))
+    q, qd = joints.rows[:, : robot.n], joints.rows[:, robot.n :]
+    untold = np.isnan(qd).any(axis=1, keepdims=True)
+    if untold.all():
+        return JointMotion(t, q)
+    return JointMotion(t, q, np.where(untold, backward_rates(t, q), qd))
+
+
+def _measurements(streams: Mapping[Role, Samples], epoch: int) -> Measurements | None:
+    if Role.POSE in streams:
+        ns, rows = streams[Role.POSE]
+        rotation, sigma = rotations(rows), rows[:, 7]
+    elif Role.POINT in streams:
+        ns, rows = streams[Role.POINT]
+        rotation, sigma = None, np.full(ns.size, np.nan)
+    else:
+        return None
+    if Role.SIGMA in streams:
+        sigma = _matched_sigma(ns, streams[Role.SIGMA], sigma)
+    known = None if np.isnan(sigma).any() else sigma
+    return Measurements(seconds(ns, epoch), rows[:, :3], rotation, known)
+
+
+def _matched_sigma(ns: np.ndarray, given: Samples, sigma: Array) -> Array:
+    """Return the sigma of the same stamp, its axes joined by their mean square."""
+    at = np.clip(np.searchsorted(given.ns, ns), 0, given.ns.size - 1)
+    same = given.ns[at] == ns
+    return np.where(same, np.sqrt((given.rows[at] ** 2).mean(axis=1)), sigma)
+
+
+def _refuse_apart(motion: JointMotion, measured: Measurements) -> None:
+    """Two clocks with nothing in common would silently pair everything with one joint state."""
+    gap = max(measured.t[0] - motion.t[-1], motion.t[0] - measured.t[-1])
+    if gap > 0.0:
+        raise DataError(
+            f'measurements and joint states do not overlap in time, they are {gap:.3f} s '
+            'apart: their stamps come from different clocks'
+        )
+
+
+def _unloaded_before(
+    wrench: Samples, epoch: int, measured: Measurements | None
+) -> tuple[Samples, Measurements | None, tuple[str, ...]]:
+    """
+    Return the wrench with no load before its first sample, and what can be compared with it.
+
+    A live twin knows no load before it is told one. What was measured meanwhile would show the
+    load as a deviation.
+    """
+    late = (int(wrench.ns[0]) - epoch) * 1e-9
+    if late <= 0.0:
+        return wrench, measured, ()
+    start = Samples(np.array([epoch], dtype=np.int64), np.zeros((1, 6)))
+    whole = Samples(*(np.concatenate(pair) for pair in zip(start, wrench, strict=True)))
+    if late > LATE_WRENCH:
+        said = f'the wrench begins {late:.3f} s after the joint states; no load is taken before'
+        return whole, measured, (said,)
+    if measured is None:
+        return whole, None, ()
+    told = np.flatnonzero(measured.t >= late)
+    count = measured.t.size - told.size
+    if not count or not told.size:
+        return whole, measured, ()
+    said = f'{count} measurements from before the first wrench are left out'
+    return whole, measured.take(told), (said,)

@@ -29,7 +29,11 @@ class JointSample(NamedTuple):
 
 
 class Incomplete(DataError):
-    """Joints of the robot are missing: in a message, or at a stamp that has passed."""
+    """Joints of the robot are missing at a stamp that has passed."""
+
+
+class Missing(Incomplete):
+    """Joints of the robot are missing, and no message so far held them."""
 
 
 class JointStates:
@@ -91,7 +95,7 @@ class JointStates:
         present = from_messages.joints_present(message, self._names)
         if not present:
             if not message.name:
-                raise Incomplete('the joint state names no joint')
+                raise Missing('the joint state names no joint')
             self.others += 1
             return None
         if 0 < len(present) < len(self._names):
@@ -137,7 +141,7 @@ class JointStates:
         if len(self._spread) < len(self._names):
             missing = next(name for name in self._names if name not in self._spread)
             listed = ', '.join(message.name)
-            raise Incomplete(f'the joint state has no joint {missing!r}; it has {listed}')
+            raise Missing(f'the joint state has no joint {missing!r}; it has {listed}')
         if stamp != before and 0 < len(left) < len(self._names):
             raise Incomplete(
                 f'joint {left[0]!r} never came with the stamp {before * 1e-9:.6f} s; publish all '

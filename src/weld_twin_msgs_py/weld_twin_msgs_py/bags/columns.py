@@ -13,7 +13,7 @@ from weld_twin_core.errors import DataError
 
 from ..assembly import Samples
 from ..assembly.frame_names import OtherFrame
-from ..assembly.joint_states import Incomplete
+from ..assembly.joint_states import Incomplete, Missing
 from ..assembly.stamp_order import Late
 from ..messages.from_messages import NANOSECONDS, Unstamped
 
@@ -103,7 +103,11 @@ class Stream:
             (self._unstamped, 'without a stamp dropped'),
             (self._late, 'with a stamp before the last one dropped'),
             (self._repeated, 'with a repeated stamp dropped'),
-            *((count, f'left out, as {sentence}') for count, sentence in self._other.values()),
+            *(
+                (count, f'left out, as {sentence}')
+                for kind, (count, sentence) in self._other.items()
+                if kind is not Missing  # the other publishers came a moment later
+            ),
         )
         out = [f"{count} messages of '{self.topic}' {what}" for count, what in counted if count]
         if len(self.frames) > 1:

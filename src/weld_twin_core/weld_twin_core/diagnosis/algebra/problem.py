@@ -240,6 +240,8 @@ def usable(recording: Recording) -> Recording:
     """
     Return the recording with the measurements that lie inside its joint stream.
 
+    Its side signals are straight between samples, whatever a running twin makes of them.
+
     Raises
     ------
     DataError
@@ -258,7 +260,7 @@ def usable(recording: Recording) -> Recording:
             f'({joints.t[0]:.3f} to {joints.t[-1]:.3f} s against {measured.t[0]:.3f} to '
             f'{measured.t[-1]:.3f} s); the two clocks differ'
         )
-    return recording.with_measured(measured.take(inside))
+    return recording.looking_back().with_measured(measured.take(inside))
 
 
 def _measured(recording: Recording) -> Measurements:

@@ -1,0 +1,353 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The running twin and the twin over a bag say the same of the same messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.rotation import rotation_matrix
+from weld_twin_core.effects import (
+    REGISTRY,
+    Effect,
+    Parameter,
+    Stage,
+    effect_from_mapping,
+)
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import Signal
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly import Role
+from weld_twin_msgs_py.bags import BagReader, BagWriter, read_recording
+from weld_twin_msgs_py.messages.to_messages import bag_messages
+from weld_twin_nodes.live.diagnosis_window import Window
+from weld_twin_nodes.streams.twin_stream import JointStream
+
+START = 1_700_000_000_123_456_789
+MS = 1_000_000
+ARM = load('ur5')
+NAMES = ARM.joint_names
+MAKE = bag_messages()
+ELBOW = {'joint': 'elbow_joint'}
+EXAMPLES = {
+    'axis_parallelism': {**ELBOW, 'dbeta': 1e-3},
+    'backlash': {**ELBOW, 'width': 5e-3},
+    'base_pose': {'xyz': [1e-3, 2e-3, -1e-3], 'rotvec': [1e-3, 0.0, 2e-3]},
+    'cartesian_compliance': {'compliance': [1e-6, 2e-6, 3e-6]},
+    'drift': {'xyz_rate': [1e-4, 0.0, -2e-4]},
+    'gear_ratio': {**ELBOW, 'scale': 1e-3},
+    'joint_compliance': {**ELBOW, 'compliance': 1e-5},
+    'joint_coupling': {**ELBOW, 'source': 'wrist_1_joint', 'ratio': 1e-3},
+    'joint_offset': {**ELBOW, 'offset': 1e-3},
+    'link_length': {**ELBOW, 'da': 1e-3},
+    'link_offset': {**ELBOW, 'dd': 1e-3},
+    'link_twist': {**ELBOW, 'dalpha': 1e-3},
+    'measurement_noise': {'sigma': 1e-4},
+    'measurement_scale': {'scale': 1e-4},
+    'payload': {'mass': 3.0, 'com': [0.0, 0.02, 0.1]},
+    'quantization': {**ELBOW, 'step': 1e-3},
+    'servo_lag': {**ELBOW, 'time_constant': 0.02},
+    'setup_settling': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 1e-3, 0.0], 'time_constant': 1.0},
+    'setup_step': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 1e-3, 0.0], 'time': 0.7},
+    'thermal_growth': {'coefficient': 1.2e-5},
+    'time_delay': {'delay': 0.004},
+    'tool_pose': {'xyz': [1e-3, 2e-3, -1e-3], 'rotvec': [1e-3, 0.0, 2e-3]},
+    'transmission_ripple': {**ELBOW, 'amplitude': 1e-3, 'order': 100.0, 'phase': 0.3},
+    'vibration': {**ELBOW, 'frequency': 8.0, 'damping': 0.05, 'gain': 0.3},
+}
+SPRING = effect_from_mapping({'effect': 'joint_compliance', **ELBOW, 'compliance': 1e-5})
+LAG = effect_from_mapping({'effect': 'servo_lag', **ELBOW, 'time_constant': 0.02})
+
+
+@dataclass(frozen=True, eq=False)
+class Damper(Effect):
+    """An effect that sees the velocity, as one of a user's own may."""
+
+    joint: str
+    time: float = 0.0
+
+    name = 'damper'
+    of = 'joint'
+    stage = Stage.JOINT
+    parameters = (Parameter('time', 's'),)
+
+    def displace(self, view):
+        i = view.robot.index(self.joint)
+        return {('q', i): -self.time * view.qd[..., i]}
+
+
+def motion(count=300):
+    """Return stamps [ns] on an uneven beat of about 125 Hz, positions and velocities."""
+    rng = np.random.default_rng(5)
+    ns = START + np.cumsum(rng.integers(6 * MS, 10 * MS, count))
+    t = (ns - START) * 1e-9
+    phase = np.arange(6)
+    q = 0.5 * np.sin(np.outer(t, 1.0 + 0.31 * phase) + phase) + [0, -1.2, 1.4, -1, -1.5, 0]
+    return ns.tolist(), q, rng.normal(size=q.shape)
+
+
+def joints(qd=True):
+    """Yield (stamp, topic, message) of whole joint states."""
+    for k, (ns, q, rate) in enumerate(zip(*motion(), strict=True)):
+        told = rate if qd is True or (qd == 'some' and k % 3) else None
+        yield ns, '/joint_states', MAKE.joint_state(ns, NAMES, q, told)
+
+
+def sides(frame='tool0', first=0):
+    """Yield a wrench at 100 Hz and a temperature at 3 Hz, on clocks of their own."""
+    rng = np.random.default_rng(6)
+    for ns in range(START + first, START + 2_400 * MS, 10 * MS):
+        yield ns, '/tool_wrench', MAKE.wrench(ns, 40.0 * rng.normal(size=6), frame)
+    for ns in range(START + 5 * MS, START + 2_400 * MS, 330 * MS):
+        yield ns, '/temperature', MAKE.temperature(ns, float(rng.uniform(20.0, 60.0)))
+
+
+def in_order(*streams):
+    """Return entries as a recorder would write them, the sensors' before the arm's."""
+    return sorted((entry for stream in streams for entry in stream), key=lambda entry: entry[0])
+
+
+def compare(path, entries, effects, robot=ARM, at_least=200):
+    """Assert equal poses of the live twin and the twin over the bag; return the recording."""
+    with BagWriter(path) as bag:
+        for log, (_, topic, message) in enumerate(entries):
+            bag.write(topic, message, START + log)
+    twin = Twin(robot, effects)
+    recording = read_recording(path, robot)
+    offline = twin.poses(recording)
+    stamps = [recording.epoch_ns + round(t * 1e9) for t in recording.joints.t.tolist()]
+    place = {stamp: k for k, stamp in enumerate(stamps)}
+    live = played(path, twin)
+    assert at_least <= len(live) <= len(stamps)
+    for stamp, pose_stamp, _, poses in live:
+        k = place[stamp]
+        np.testing.assert_allclose(poses.position, offline.position[k], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(poses.rotation, offline.rotation[k], rtol=0.0, atol=1e-12)
+        assert pose_stamp == stamp + round(twin.delay * 1e9)
+    return recording, {stamp for stamp, *_ in live} - set(stamps)
+
+
+def played(path, twin):
+    """Return what a running twin gives, message by message; what it refuses, it leaves out."""
+    stream, out = JointStream(twin), []
+    take = {
+        '/joint_states': stream.step,
+        '/tool_wrench': stream.take_wrench,
+        '/temperature': stream.take_temperature,
+    }
+    with BagReader(path) as bag:
+        for topic, _, _, message in bag.messages(take):
+            try:
+                sample = take[topic](message)
+            except DataError:
+                continue
+            if sample is not None:
+                out.append(sample)
+    return out
+
+
+def example(name):
+    return effect_from_mapping({'effect': name, **EXAMPLES[name]})
+
+
+@pytest.mark.parametrize('name', sorted(REGISTRY))
+def test_every_effect_is_the_same_live_and_offline(tmp_path, name):
+    assert name in EXAMPLES, f'give an example of {name} here'
+    compare(tmp_path / 'bag', in_order(sides(), joints()), (example(name), SPRING))
+
+
+@pytest.mark.parametrize('qd', [True, 'some', False])
+def test_velocities_are_those_told_else_the_step_since_the_sample_before(tmp_path, qd):
+    effects = (Damper('elbow_joint', 0.05), LAG)
+    recording, _ = compare(tmp_path / 'bag', in_order(sides(), joints(qd)), effects)
+    nothing = Twin(ARM, (LAG,)).poses(recording).position
+    assert np.abs(nothing - Twin(ARM, effects).poses(recording).position).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ('frame', 'meaning'),
+    [
+        ('', 'tool'),
+        ('tool0', 'tool'),
+        ('left/tool0', 'tool'),
+        ('base', 'base'),
+        ('/base_link', 'base'),
+        ('world', 'base'),
+        ('map', 'base'),
+        ('force_sensor_database', 'tool'),
+        ('ft_frame', 'tool'),
+    ],
+)
+def test_a_wrench_frame_means_the_same_live_and_offline(tmp_path, frame, meaning):
+    entries = in_order(sides(frame), joints())
+    effects = (example('cartesian_compliance'), SPRING)
+    recording, _ = compare(tmp_path / 'bag', entries, effects)
+    assert recording.wrench_frame == meaning
+    told = [note for note in recording.notes if 'taken for the tool frame' in note]
+    assert bool(told) == (frame in ('force_sensor_database', 'ft_frame'))
+
+
+@pytest.mark.parametrize('frame', ['gripper_base', 'torch_base_link'])
+def test_a_frame_that_may_be_base_or_tool_is_refused_live_and_offline(tmp_path, frame):
+    with BagWriter(tmp_path / 'bag') as bag:
+        for ns, topic, message in in_order(sides(frame), joints()):
+            bag.write(topic, message, ns)
+    with pytest.raises(DataError, match="may be the robot's base or part of the tool") as offline:
+        read_recording(tmp_path / 'bag', ARM)
+    with pytest.raises(DataError) as live:
+        JointStream(Twin(ARM)).take_wrench(MAKE.wrench(START, np.ones(6), frame))
+    assert str(live.value) in str(offline.value)
+
+
+def test_world_is_not_base_where_the_base_is_turned(tmp_path):
+    pose = np.eye(4)
+    pose[:3, :3] = rotation_matrix(np.array([0.0, 0.0, 0.3]))
+    turned = replace(ARM, T_world_base=pose)
+    with pytest.raises(DataError, match='turned against the base'):
+        compare(tmp_path / 'bag', in_order(sides('world'), joints()), (SPRING,), turned)
+    with pytest.raises(DataError, match='turned against the base'):
+        JointStream(Twin(turned)).take_wrench(MAKE.wrench(START, np.ones(6), 'map'))
+
+
+def test_a_wrench_that_changes_its_frame_is_left_out_from_there(tmp_path):
+    wrench, other = list(sides('tool0')), list(sides('base'))
+    mixed = [b if k % 5 == 4 else a for k, (a, b) in enumerate(zip(wrench, other, strict=True))]
+    recording, _ = compare(tmp_path / 'bag', in_order(mixed, joints()), (SPRING,))
+    assert recording.wrench_frame == 'tool'
+    assert any("left out, as message 4 of '/tool_wrench'" in note for note in recording.notes)
+
+
+def test_a_signal_that_begins_late_is_unknown_before(tmp_path):
+    compare(tmp_path / 'bag', in_order(sides(first=300 * MS), joints()), (SPRING,))
+    effects = (example('thermal_growth'), LAG)
+    warm = [entry for entry in sides() if entry[1] == '/temperature'][1:]
+    with BagWriter(tmp_path / 'warm') as bag:
+        for ns, topic, message in in_order(warm, joints()):
+            bag.write(topic, message, ns)
+    recording, live = (
+        read_recording(tmp_path / 'warm', ARM),
+        played(tmp_path / 'warm', Twin(ARM, effects)),
+    )
+    first = next(k for k, ns in enumerate(motion()[0]) if ns >= warm[0][0])
+    assert len(live) == recording.joints.t.size - first
+    offline = Twin(ARM, effects).poses(recording)
+    for k, sample in enumerate(live, first):
+        np.testing.assert_allclose(
+            sample.poses.position, offline.position[k], rtol=0.0, atol=1e-12
+        )
+
+
+def spread():
+    """Yield joint states of two controllers, which now and then come in another order."""
+    for k, (ns, q, qd) in enumerate(zip(*motion(), strict=True)):
+        parts = [
+            MAKE.joint_state(ns, NAMES[part], q[part], qd[part])
+            for part in (slice(0, 2), slice(2, 6))
+        ]
+        for part in parts if k % 3 else parts[::-1]:
+            yield ns, '/joint_states', part
+        if k % 7 == 0:
+            yield ns, '/joint_states', MAKE.joint_state(ns, ('finger',), [0.1])
+
+
+def test_joints_spread_over_publishers_make_the_same_arm(tmp_path):
+    recording, _ = compare(tmp_path / 'bag', in_order(sides(), spread()), (LAG, SPRING))
+    assert recording.joints.t.size == 300
+
+
+def test_joints_that_never_meet_are_left_out_alike(tmp_path):
+    entries = [entry for k, entry in enumerate(spread()) if k % 41 != 20]
+    recording, _ = compare(tmp_path / 'bag', in_order(sides(), entries), (LAG, SPRING))
+    assert recording.joints.t.size < 300
+    assert any('never came with the stamp' in note for note in recording.notes)
+
+
+def test_repeated_and_backward_stamps_are_left_out_alike(tmp_path):
+    entries = list(joints())
+    for k in (40, 90, 91, 200):
+        entries.insert(k + 3, entries[k])
+    entries.insert(120, entries[119])
+    sensors = sorted(sides(), key=lambda entry: entry[0])
+    sensors.insert(60, sensors[57])
+    mixed = merged_as_logged(sensors, entries)
+    recording, other = compare(tmp_path / 'bag', mixed, (LAG, SPRING, example('thermal_growth')))
+    assert not other
+    assert recording.joints.t.size == 300
+    assert any("4 messages of '/joint_states' with a stamp before" in n for n in recording.notes)
+
+
+def merged_as_logged(sensors, arm):
+    """Return both in the order in which they came, which is not that of their stamps."""
+    out, sensors = [], list(sensors)
+    latest = 0
+    for entry in arm:
+        latest = max(latest, entry[0])
+        while sensors and sensors[0][0] <= latest:
+            out.append(sensors.pop(0))
+        out.append(entry)
+    return out
+
+
+def test_a_clock_that_was_set_back_ends_a_recording_and_begins_a_run():
+    stream = JointStream(Twin(ARM, (LAG,)))
+    entries = list(joints())
+    for _, _, message in entries:
+        stream.step(message)
+    again = []
+    for _, _, message in entries:
+        try:
+            again.append(stream.step(message))
+        except DataError as error:
+            assert 'not after the last one' in str(error)
+    assert len(again) == 300 - 9
+
+
+def test_a_bag_of_two_runs_is_refused(tmp_path):
+    with BagWriter(tmp_path / 'bag') as bag:
+        for k, (_, topic, message) in enumerate([*joints(), *list(joints())[250:]]):
+            bag.write(topic, message, START + k)
+    with pytest.raises(DataError, match=r"'/joint_states' jump back by 0\.\d+ s at message"):
+        read_recording(tmp_path / 'bag', ARM)
+
+
+def test_the_window_of_the_live_diagnosis_is_the_recording_of_the_bag(tmp_path):
+    entries = in_order(sides('map'), spread(), measured())
+    with BagWriter(tmp_path / 'bag') as bag:
+        for k, (_, topic, message) in enumerate(entries):
+            bag.write(topic, message, START + k)
+    window, roles = (
+        Window(ARM, 60.0),
+        {
+            '/joint_states': Role.JOINTS,
+            '/tool_wrench': Role.WRENCH,
+            '/temperature': Role.TEMPERATURE,
+            '/measured/tool_pose': Role.POSE,
+        },
+    )
+    for _, topic, message in entries:
+        try:
+            window.take(roles[topic], message)
+        except DataError:
+            assert topic == '/joint_states'
+    live, bag = window.recording(1.0), read_recording(tmp_path / 'bag', ARM)
+    assert (live.epoch_ns, live.wrench_frame) == (bag.epoch_ns, 'base')
+    for name in ('t', 'q', 'qd'):
+        np.testing.assert_array_equal(getattr(live.joints, name), getattr(bag.joints, name))
+    inside = bag.measured.t >= 0.0
+    np.testing.assert_array_equal(live.measured.rotation, bag.measured.rotation[inside])
+    for signal in ('wrench', 'temperature'):
+        ours, theirs = getattr(live, signal), getattr(bag, signal)
+        np.testing.assert_array_equal(ours.value, theirs.value)
+        assert ours.held and isinstance(theirs, Signal)
+
+
+def measured():
+    """Yield measured poses at 60 Hz."""
+    rng = np.random.default_rng(8)
+    for ns in range(START, START + 2_300 * MS, 16_666_667):
+        rotation = rotation_matrix(rng.normal(size=3))
+        yield ns, '/measured/tool_pose', MAKE.pose(ns, rng.normal(size=3), rotation)

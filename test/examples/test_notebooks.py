@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The notebooks run from top to bottom, show pictures, and say what they set out to show."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import nbformat
+import pytest
+from jupyter_client.manager import AsyncKernelManager
+from nbclient import NotebookClient
+
+FOLDER = Path(__file__).parents[2] / 'examples'
+SHOWN = {
+    'first_diagnosis': ('status:     identified', 'backlash of elbow_joint'),
+    'your_own_csv': ('joint_offset of elbow_joint', 'link_length of elbow_joint'),
+    'your_own_urdf': ('tool at zero: [ 1.04 -0.    1.05] m', "['backlash']"),
+    'live_nodes': ('300 poses of the twin, 300 measured poses',),
+    'tolerance_study': ('of the robots', 'with half the tolerance of'),
+    'an_effect_of_your_own': ('without it: unknown', "with it:    identified ['column_bend']"),
+}
+LARGEST = 10_000
+"""Bytes of a notebook without outputs; one with them is ten times that."""
+
+
+@pytest.fixture
+def sockets():
+    """Return the start of the paths of a kernel's sockets; the system allows 107 letters."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield f'{folder}/socket'
+
+
+def test_every_notebook_is_run_here():
+    assert sorted(path.stem for path in FOLDER.glob('*.ipynb')) == sorted(SHOWN)
+
+
+@pytest.mark.parametrize('name', SHOWN)
+def test_a_notebook_is_kept_without_outputs(name):
+    path = FOLDER / f'{name}.ipynb'
+    cells = nbformat.read(path, as_version=4).cells
+    assert path.stat().st_size < LARGEST
+    assert [cell for cell in cells if cell.get('outputs') or cell.get('execution_count')] == []
+
+
+@pytest.mark.parametrize('name', SHOWN)
+def test_a_notebook_runs_and_shows_what_it_promises(name, tmp_path, monkeypatch, sockets):
+    if name == 'live_nodes':
+        pytest.importorskip('rclpy', reason='needs ROS 2')
+    # A cell works in a folder of its own; the kernel listens on sockets there, not on TCP.
+    monkeypatch.setenv('JUPYTER_RUNTIME_DIR', str(tmp_path / 'run'))
+    monkeypatch.setenv('IPYTHONDIR', str(tmp_path))
+    monkeypatch.setenv('MPLBACKEND', 'module://matplotlib_inline.backend_inline')
+    book = nbformat.read(FOLDER / f'{name}.ipynb', as_version=4)
+    manager = AsyncKernelManager(kernel_name='python3', transport='ipc', ip=sockets)
+    NotebookClient(
+        book, km=manager, timeout=120, resources={'metadata': {'path': str(tmp_path)}}
+    ).execute()
+    outputs = [out for cell in book.cells for out in cell.get('outputs', ())]
+    assert any('image/png' in out.get('data', {}) for out in outputs), 'no picture'
+    printed = ''.join(out.get('text', '') for out in outputs)
+    assert [words for words in SHOWN[name] if words not in printed] == []

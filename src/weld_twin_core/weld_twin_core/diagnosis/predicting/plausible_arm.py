@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What an arm of this kind may have, whether or not it was found, and how large it may be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...effects.registry import REGISTRY
+from ...effects.transmission_ripple import TransmissionRipple
+from ...twin.features import Features
+
+EVERYWHERE = (
+    'joint_offset',
+    'link_length',
+    'link_offset',
+    'link_twist',
+    'axis_parallelism',
+    'gear_ratio',
+    'joint_compliance',
+)
+"""Families that every joint of every arm has a little of."""
+ORDERS = np.arange(1.0, 5.0)
+"""Ripple orders [1/rev] that bend a joint's whole range; finer ones are part of what is left over,
+for they are as large inside as outside what was recorded."""
+WIDTH = 2.0
+"""Standard deviation of a coordinate in units of its typical size (`Parameter.typical`); only the
+start, the size of this arm's own errors is learned family by family."""
+SPACING = 0.1
+"""Distance of the knots of a joint's fine curve [rad or m]: shorter than the orders above bend."""
+KNOTS = 30
+"""Most knots per joint."""
+FINE = 1e-4
+"""Usual height of the fine curve [rad]: ripple of the orders above four."""
+MOST = 24
+"""Coordinates of one ripple effect; more of them are high orders, part of what is left over."""
+
+
+def directions(robot: Robot, found: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the effects whose coordinates are uncertain, at the values found or at zero."""
+    out: list[Effect] = []
+    for name in EVERYWHERE:
+        out += [_at(found, name, joint) for joint in robot.joint_names]
+    for joint, slides in zip(robot.joint_names, robot.prismatic, strict=True):
+        if not slides:
+            zero = np.zeros(ORDERS.size)
+            out.append(TransmissionRipple(joint, zero, ORDERS, zero))
+    out.append(_at(found, 'time_delay', None))
+    for effect in found:
+        if isinstance(effect, TransmissionRipple):
+            out += _finer(effect)
+        elif effect.cause and effect.key not in {e.key for e in out}:
+            out.append(effect)
+    return tuple(e for e in out if e.coordinates().size)
+
+
+def _at(found: Sequence[Effect], name: str, joint: str | None) -> Effect:
+    for effect in found:
+        if effect.name == name and effect.site == joint:
+            return effect
+    kind = REGISTRY[name]
+    return kind() if joint is None else kind(joint)  # type: ignore[call-arg]
+
+
+def _finer(effect: TransmissionRipple) -> list[Effect]:
+    """Return the part of a ripple that the orders of every arm do not have."""
+    orders = np.atleast_1d(np.asarray(effect.order, dtype=np.float64))
+    other = ~np.isin(orders, ORDERS)
+    if not other.any() or 2 * other.sum() > MOST:
+        return []
+    amplitude, phase = (
+        np.broadcast_to(np.asarray(v, dtype=np.float64), orders.shape)[other]
+        for v in (effect.amplitude, effect.phase)
+    )
+    return [TransmissionRipple(effect.joint, amplitude, orders[other], phase)]
+
+
+def values(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
+    """Return the value that the fitted model has for every coordinate, shape (K,)."""
+    return np.concatenate([np.zeros(0), *(_value(e, found) for e in effects)])
+
+
+def _value(effect: Effect, found: Sequence[Effect]) -> Array:
+    if not isinstance(effect, TransmissionRipple) or not np.array_equal(effect.order, ORDERS):
+        return effect.coordinates()
+    out = np.zeros((ORDERS.size, 2))
+    for other in found:
+        if isinstance(other, TransmissionRipple) and other.joint == effect.joint:
+            pairs = other.coordinates().reshape(-1, 2)
+            for order, pair in zip(np.atleast_1d(other.order), pairs, strict=True):
+                out[ORDERS == order] += pair
+    return out.ravel()
+
+
+def groups(effects: Sequence[Effect]) -> Array:
+    """Return the family number of every coordinate, shape (K,)."""
+    names = list(dict.fromkeys(effect.name for effect in effects))
+    sizes = [effect.coordinates().size for effect in effects]
+    return np.repeat([names.index(effect.name) for effect in effects], sizes).astype(int)
+
+
+def widths(effects: Sequence[Effect], at: Array) -> Array:
+    """
+    Return the standard deviation of every coordinate before the data, shape (K,).
+
+    ``at`` holds the fitted values; one beyond the usual size is not unusual for this arm.
+    """
+    sizes = []
+    for effect in effects:
+        size = WIDTH * effect.coordinate_scales()
+        if isinstance(effect, TransmissionRipple):
+            # Eccentric gears: an order's amplitude falls with its number.
+            size = size / np.repeat(np.sqrt(np.atleast_1d(effect.order)), 2)
+        sizes.append(size)
+    return np.asarray(np.concatenate([np.zeros(0), *sizes]))
+
+
+def straight(effects: Sequence[Effect]) -> Array:
+    """Return which coordinates are counted from zero, shape (K,); others from the fitted one."""
+    out: list[bool] = []
+    for effect in effects:
+        if isinstance(effect, TransmissionRipple):
+            out += [True] * effect.coordinates().size
+        else:
+            out += [p.linear for p, _ in effect.components() if p.differentiable]
+    return np.array(out, dtype=bool)
+
+
+def fine_knots(motions: Sequence[Array]) -> list[Array]:
+    """Return knots along every joint's recorded range, one array (K,) for each joint [rad, m]."""
+    q = np.concatenate(motions)
+    out = []
+    for low, high in zip(q.min(axis=0), q.max(axis=0), strict=True):
+        count = int(np.clip(np.ceil((high - low) / SPACING), 1, KNOTS))
+        out.append(np.linspace(low, high, count + 1))
+    return out
+
+
+def fine_columns(features: Features, knots: Sequence[Array]) -> Array:
+    """Return d pose / d height of every joint's curve at its knots, shape (K, 6, M)."""
+    out = []
+    for i, places in enumerate(knots):
+        at = np.asarray(features.run.view.joint(i))
+        width = places[1] - places[0] if places[-1] > places[0] else 1.0
+        hats = np.maximum(0.0, 1.0 - np.abs(at - places[:, None]) / width)
+        out.append(hats[:, None] * features.column(('q', i)))
+    return np.concatenate(out)

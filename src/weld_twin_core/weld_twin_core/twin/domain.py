@@ -1,0 +1,258 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What was recorded, and how far outside of it a motion goes, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arm.robot import Robot
+from ..arrays import Array
+from ..recording import Recording
+
+LEAST_MARGIN = 0.02
+"""A joint this near [rad or m] to where it was recorded counts as recorded there: one degree."""
+SPACINGS = 3.0
+"""Stations stand so many mean distances apart that a further one of the same kind lies closer than
+that to one of them, or beyond the last, in 95 of 100 cases."""
+SPEED_MARGIN = (1.25, 0.05)
+"""Faster than recorded from this factor and this much [rad/s or m/s] on: velocity is differentiated
+and rings."""
+LOAD_MARGIN = (1.25, 5.0)
+"""The same of force [N] and torque [N m]: force sensors drift by some newtons."""
+WARM_MARGIN = 2.0
+"""Warmer or colder than recorded from here on [K]; thermometers stand anywhere."""
+
+
+class Outside(NamedTuple):
+    """A stretch of a motion outside what was recorded: first and last sample, and why."""
+
+    first: int
+    last: int
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """
+    What the recordings have shown.
+
+    Attributes
+    ----------
+    joints : tuple of str
+    ranges : tuple of tuple of (float, float)
+        For every joint, where it was measured: separate intervals, in order [rad or m].
+    margins : tuple of float
+        How far beyond an interval a joint still counts as recorded there [rad or m].
+    turns : tuple of bool
+        Joints whose angle means the same after a full turn.
+    speeds : tuple of float, optional
+        Fastest measured motion of every joint [rad/s or m/s]; None for stations at rest.
+    load : tuple of float, optional
+        Largest force [N] and torque [N m] on the tool; None where no wrench was recorded.
+    temperature : tuple of float, optional
+        Lowest and highest [degC]; None where it was not recorded.
+
+    """
+
+    joints: tuple[str, ...]
+    ranges: tuple[tuple[tuple[float, float], ...], ...]
+    margins: tuple[float, ...]
+    turns: tuple[bool, ...]
+    speeds: tuple[float, ...] | None = None
+    load: tuple[float, float] | None = None
+    temperature: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording], robot: Robot) -> Domain:
+        """Return what measurements of some recordings have shown."""
+        pairs = [_measured(r) for r in recordings]
+        q = np.concatenate([pair[0] for pair in pairs])
+        moving = [pair[1] for r, pair in zip(recordings, pairs, strict=True)
+                  if not r.joints.static]
+        margins = _margins(q, not moving)
+        ranges = tuple(
+            _intervals(q[:, i], margin) for i, margin in enumerate(margins)
+        )
+        speeds = None
+        if moving:
+            speeds = tuple(float(v) for v in np.abs(np.concatenate(moving)).max(axis=0))
+        return cls(
+            robot.joint_names,
+            ranges,
+            tuple(float(m) for m in margins),
+            tuple(not slides for slides in robot.prismatic),
+            speeds,
+            _load(recordings),
+            _temperature(recordings),
+        )
+
+    def beyond(self, q: Array) -> Array:
+        """
+        Return how far every joint is from where it was measured, shape (M, n) [rad or m].
+
+        Angles count modulo a full turn.
+
+        Parameters
+        ----------
+        q : array, shape (M, n)
+
+        """
+        out = np.empty(q.shape)
+        for i, intervals in enumerate(self.ranges):
+            low, high = np.array(intervals).T
+            shifts = (-2.0 * np.pi, 0.0, 2.0 * np.pi) if self.turns[i] else (0.0,)
+            away = [
+                np.maximum(np.maximum(low - v, v - high), 0.0).min(axis=1)
+                for v in (q[:, i, None] + shift for shift in shifts)
+            ]
+            out[:, i] = np.min(away, axis=0)
+        return out
+
+    def outside(
+        self,
+        t: Array,
+        q: Array,
+        qd: Array | None = None,
+        wrench: Array | None = None,
+        temperature: Array | None = None,
+    ) -> list[Outside]:
+        """
+        Return the stretches of a motion that lie outside what was recorded, by reason.
+
+        Parameters
+        ----------
+        t : array, shape (M,) [s]
+        q, qd : array, shape (M, n)
+            ``qd`` is left out for stations at rest.
+        wrench : array, shape (M, 6), optional [N, N m]
+        temperature : array, shape (M,), optional [degC]
+
+        """
+        away = self.beyond(q)
+        out: list[Outside] = []
+        for i, name in enumerate(self.joints):
+            unit = 'rad' if self.turns[i] else 'm'
+            for first, last in runs(away[:, i] > self.margins[i]):
+                most = float(away[first : last + 1, i].max())
+                out.append(Outside(first, last,
+                                   f'{name} is {most:.2g} {unit} beyond what was recorded'))
+        out += self._too_fast(qd) + self._too_loaded(wrench) + self._too_warm(temperature)
+        return sorted(out)
+
+    def _too_fast(self, qd: Array | None) -> list[Outside]:
+        if qd is None:
+            return []
+        known = np.zeros(len(self.joints)) if self.speeds is None else np.array(self.speeds)
+        limit = SPEED_MARGIN[0] * known + SPEED_MARGIN[1]
+        speed = np.abs(qd)
+        out = []
+        for first, last in runs((speed > limit).any(axis=1)):
+            part = speed[first : last + 1]
+            i = int((part / limit).max(axis=0).argmax())
+            unit = 'rad/s' if self.turns[i] else 'm/s'
+            if self.speeds is None:
+                why = (f'{self.joints[i]} moves at up to {part[:, i].max():.2g} {unit}, only '
+                       'stations at rest were recorded')
+            else:
+                why = (f'{self.joints[i]} moves at up to {part[:, i].max():.2g} {unit}, at most '
+                       f'{known[i]:.2g} {unit} was recorded')
+            out.append(Outside(first, last, why))
+        return out
+
+    def _too_loaded(self, wrench: Array | None) -> list[Outside]:
+        if wrench is None:
+            return []
+        out = []
+        for k, (name, unit) in enumerate((('force', 'N'), ('torque', 'N m'))):
+            size = np.linalg.norm(wrench[:, 3 * k : 3 * k + 3], axis=1)
+            known = 0.0 if self.load is None else self.load[k]
+            for first, last in runs(size > LOAD_MARGIN[0] * known + LOAD_MARGIN[1]):
+                most = size[first : last + 1].max()
+                out.append(Outside(first, last,
+                    f'the {name} on the tool is up to {most:.3g} {unit}, at most {known:.3g} '
+                    f'{unit} was recorded'))
+        return out
+
+    def _too_warm(self, temperature: Array | None) -> list[Outside]:
+        if temperature is None or self.temperature is None:
+            return []
+        low, high = self.temperature
+        off = np.maximum(low - temperature, temperature - high)
+        return [
+            Outside(first, last,
+                f'it is {off[first : last + 1].max():.2g} K beyond the {low:.1f} to {high:.1f} '
+                'degC that were recorded')
+            for first, last in runs(off > WARM_MARGIN)
+        ]
+
+    def sentences(self) -> list[str]:
+        """Return the joint ranges as people read them, one sentence for each joint."""
+        out = []
+        for name, intervals, turns in zip(self.joints, self.ranges, self.turns, strict=True):
+            factor, unit = (180.0 / np.pi, 'deg') if turns else (1e3, 'mm')
+            spans = ' and '.join(
+                f'{low * factor:.1f} to {high * factor:.1f}' for low, high in intervals
+            )
+            out.append(f'{name}: {spans} {unit}')
+        return out
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers and lists."""
+        return {
+            'joints': [
+                {'name': name, 'measured': [list(pair) for pair in intervals], 'margin': margin,
+                 'turns': turns}
+                for name, intervals, margin, turns in zip(
+                    self.joints, self.ranges, self.margins, self.turns, strict=True)
+            ],
+            'speeds': None if self.speeds is None else list(self.speeds),
+            'load': None if self.load is None else list(self.load),
+            'temperature': None if self.temperature is None else list(self.temperature),
+        }
+
+
+def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return first and last index of every run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+
+
+def _measured(recording: Recording) -> tuple[Array, Array]:
+    """Return position and velocity of the joints where the tool was measured."""
+    measured = recording.measured
+    return recording.joints.at(recording.joints.t if measured is None else measured.t)
+
+
+def _margins(q: Array, stations: bool) -> Array:
+    span = np.ptp(q, axis=0)
+    share = SPACINGS / max(q.shape[0] - 1, 1) if stations else 0.0
+    return np.maximum(LEAST_MARGIN, share * span)
+
+
+def _intervals(values: Array, margin: float) -> tuple[tuple[float, float], ...]:
+    """Return where a joint was, gaps of less than two margins closed."""
+    ordered = np.sort(values)
+    cuts = np.flatnonzero(np.diff(ordered) > 2.0 * margin)
+    lows = ordered[np.concatenate([[0], cuts + 1])]
+    highs = ordered[np.concatenate([cuts, [ordered.size - 1]])]
+    return tuple((float(a), float(b)) for a, b in zip(lows, highs, strict=True))
+
+
+def _load(recordings: Sequence[Recording]) -> tuple[float, float] | None:
+    values = [r.wrench.value for r in recordings if r.wrench is not None]
+    if not values:
+        return None
+    parts = np.linalg.norm(np.concatenate(values).reshape(-1, 2, 3), axis=2).max(axis=0)
+    return float(parts[0]), float(parts[1])
+
+
+def _temperature(recordings: Sequence[Recording]) -> tuple[float, float] | None:
+    values = [r.temperature.value for r in recordings if r.temperature is not None]
+    if not values:
+        return None
+    return float(min(v.min() for v in values)), float(max(v.max() for v in values))

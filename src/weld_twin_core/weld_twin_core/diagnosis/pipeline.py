@@ -15,6 +15,7 @@ from .beliefs import Beliefs
 from .frames.aligned import aligned
 from .hypotheses.search import search
 from .many.fitted_together import fitted_together
+from .predicting.allowed import allowed
 from .result import Diagnosis
 from .soundness import check
 from .unseen.held_out_shrink import held_out_shrink
@@ -105,6 +106,8 @@ def diagnose(
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
     evidence = gathered(found, unseen, leftover, shrink, noise, beliefs)
     verdict = decide(evidence, beliefs)
+    posterior = allowed(found.problem, found.final.model, found.scale, found.precision, noise)
+    progress('weighed what the data leave open')
     return answer(
         found=found,
         unseen=unseen,
@@ -114,4 +117,5 @@ def diagnose(
         shrink=shrink,
         checks=checks,
         beliefs=beliefs,
+        posterior=posterior,
     )

@@ -12,6 +12,7 @@ import numpy as np
 from ..arrays import Array
 from ..effects.effect import Effect
 from ..recording import Recording
+from ..twin.posterior import Posterior, as_dict
 from .algebra.problem import Model
 
 SCHEMA = 'weld_twin/diagnosis/1'
@@ -236,6 +237,8 @@ class Diagnosis:
     """Where many small errors act together: what each kind accounts for, largest first."""
     evidence: object = None
     """What the verdict was drawn from, `verdict.evidence.Evidence`, to draw it anew."""
+    posterior: Posterior | None = None
+    """The models that the recordings allow: what makes a prediction certain or not."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
@@ -295,6 +298,7 @@ class Diagnosis:
                 'known': [effect.to_mapping() for effect in self.model.known],
                 'found': [effect.to_mapping() for effect in self.model.found],
             },
+            'posterior': None if self.posterior is None else as_dict(self.posterior),
         }
 
     def _where(self) -> dict[str, Any]:

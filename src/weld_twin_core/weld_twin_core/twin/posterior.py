@@ -6,15 +6,17 @@ How sure a twin is of its poses: a Gaussian over frames and effects, carried to 
 A fitted model is one point in a cloud of models that the recordings allow. The cloud is a Gaussian
 over the coordinates of the frames and of every effect that an arm of this kind may have, found or
 not: narrow in directions that the recordings have shown, as wide as such arms differ in the
-others. To first order the covariance of a pose is that cloud seen through the twin's derivatives,
-with what no effect explained on postures left out of the fit (`Leftover`) on top.
+others. To first order the covariance of a pose is that cloud seen through the twin's derivatives.
+On top comes a discrepancy, what no parameter explains; it alone grows with the distance from what
+was recorded.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -22,13 +24,15 @@ from ..arrays import Array, readonly
 from ..effects.effect import Effect
 from ..errors import DataError, ModelError
 from ..recording import Recording
+from .domain import Domain
 from .features import Features
 from .twin import Twin
 
 CHUNK = 2000
 """Samples at once; a hundred coordinates of so many poses take some ten megabytes."""
-SETTLED = 1e-12
+SETTLED = 1e-13
 """Share of the largest variance, coordinates at unit size, below which a direction is certain."""
+AXES = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,25 +102,52 @@ class Directions:
         return out
 
 
-AXES = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
-
-
-@dataclass(frozen=True)
-class Leftover:
+@dataclass(frozen=True, eq=False)
+class Discrepancy:
     """
-    What the model leaves on postures it was not fitted on, the instrument's noise taken off.
+    What no parameter explains.
 
     Attributes
     ----------
     position : float [m]
-        Standard deviation per axis.
+        Standard deviation per axis where it was recorded: what the model leaves on postures
+        that it was not fitted on, the instrument's noise taken off.
     orientation : float [rad]
         The same about each axis.
+    curves : array, shape (n,) [rad or m]
+        How far every joint may be off its reading where it was never seen, beyond what the
+        parameters say: gear errors too fine to be carried over.
+    reach : float [rad or m]
+        Distance beyond what was recorded at which a curve counts in full.
 
     """
 
     position: float
     orientation: float
+    curves: Array
+    reach: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'curves', readonly(self.curves, (None,), 'curves'))
+
+    def covariance(self, joint_columns: Array, beyond: Array) -> Array:
+        """
+        Return its part of the covariance, shape (M, 6, 6).
+
+        Parameters
+        ----------
+        joint_columns : array, shape (n, 6, M)
+            d pose / d joint.
+        beyond : array, shape (M, n)
+            How far every joint is from where it was recorded.
+
+        """
+        size = self.curves[:, None] * np.minimum(beyond.T / self.reach, 1.0)
+        moved = joint_columns * size[:, None]
+        out = np.einsum('nim,njm->mij', moved, moved)
+        own = np.repeat([self.position, self.orientation], 3) ** 2
+        out[:, np.arange(6), np.arange(6)] += own
+        return np.asarray(out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +161,20 @@ class Posterior:
     mean : array, shape (P,)
         Where the middle of the allowed models lies, counted from the fitted one.
     covariance : array, shape (P, P)
-    leftover : Leftover
+    discrepancy : Discrepancy
+    domain : Domain
+        What was recorded.
+    left_open : tuple of str
+        Directions that the recordings do not show, in words; they are as they were given.
 
     """
 
     directions: Directions
     mean: Array
     covariance: Array
-    leftover: Leftover
+    discrepancy: Discrepancy
+    domain: Domain
+    left_open: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = self.directions.count
@@ -145,7 +182,7 @@ class Posterior:
         covariance = readonly(self.covariance, (count, count), 'posterior covariance')
         size = np.abs(covariance).max(initial=0.0)
         if np.abs(covariance - covariance.T).max(initial=0.0) > 1e-9 * size:
-            raise DataError('posterior covariance is not symmetric')
+            raise DataError('the posterior covariance is not symmetric')
         object.__setattr__(self, 'covariance', covariance)
 
     @cached_property
@@ -155,43 +192,54 @@ class Posterior:
 
         The last column is the mean: a model that is not the middle of what is allowed is off by
         that much too.
+
+        Raises
+        ------
+        DataError
+            A variance is negative.
+
         """
         size = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
         # At unit size, so that metres and radians, open and settled coordinates weigh alike.
         values, vectors = np.linalg.eigh(self.covariance * np.outer(unit, unit))
-        most = values.max(initial=0.0)
-        if values.min(initial=0.0) < -1e-6 * max(most, 1.0):
-            raise DataError('posterior covariance has a negative variance')
+        most = max(float(values.max(initial=0.0)), 1e-300)
+        if values.min(initial=0.0) < -1e-6 * most:
+            raise DataError('the posterior covariance has a negative variance')
         live = values > SETTLED * most
         factor = size[:, None] * vectors[:, live] * np.sqrt(values[live])
         return np.column_stack([factor, self.mean])
 
-    def pose_covariance(self, columns: Array) -> Array:
+    def pose_covariance(self, features: Features, setup: int = 0) -> Array:
         """
-        Return the covariance of poses, shape (M, 6, 6) [m^2, m rad, rad^2].
+        Return the covariance of the true pose about the twin's, shape (M, 6, 6).
 
-        Parameters
-        ----------
-        columns : array, shape (P, 6, M)
-            As `Directions.columns` returns them.
+        Position first [m^2], then turns about the world's fixed axes [rad^2]; without the noise
+        of the instrument that will measure it.
+
+        Raises
+        ------
+        ModelError
+            There is no such base frame.
 
         """
+        if 'base' in self.directions.frames and not 0 <= setup < self.directions.setups:
+            raise ModelError(f'the posterior has no base frame {setup}')
+        columns = self.directions.columns(features, setup)
         moved = np.tensordot(self.spread, columns, axes=(0, 0))
         out = np.einsum('rim,rjm->mij', moved, moved, optimize=True)
-        own = np.repeat([self.leftover.position, self.leftover.orientation], 3) ** 2
-        out[:, np.arange(6), np.arange(6)] += own
-        return out
+        joints = [features.column(('q', i)) for i in range(features.twin.robot.n)]
+        q, _ = features.recording.joints.at(features.at)
+        return np.asarray(
+            out + self.discrepancy.covariance(np.stack(joints), self.domain.beyond(q))
+        )
 
 
 def pose_covariances(
     posterior: Posterior, twin: Twin, recording: Recording, at: Array, setup: int = 0
 ) -> Array:
     """
-    Return the covariance of the true pose about the twin's, shape (M, 6, 6).
-
-    Position first [m^2], then turns about the world's fixed axes [rad^2]; without the noise of
-    the instrument that will measure it.
+    Return `Posterior.pose_covariance` of a long motion, shape (M, 6, 6), in pieces.
 
     Parameters
     ----------
@@ -203,18 +251,9 @@ def pose_covariances(
     setup : int
         Which base frame of the posterior.
 
-    Raises
-    ------
-    ModelError
-        There is no such base frame.
-
     """
-    if not 0 <= setup < max(posterior.directions.setups, 1):
-        raise ModelError(f'the posterior has no base frame {setup}')
     parts = [
-        posterior.pose_covariance(
-            posterior.directions.columns(Features(twin, recording, piece), setup)
-        )
+        posterior.pose_covariance(Features(twin, recording, piece), setup)
         for piece in _pieces(at)
     ]
     return np.concatenate([np.zeros((0, 6, 6)), *parts])
@@ -230,6 +269,27 @@ def largest_sigma(covariances: Array) -> Array:
     return np.asarray(np.sqrt(np.linalg.eigvalsh(covariances[:, :3, :3])[:, -1]))
 
 
-def coordinate_sizes(effects: Sequence[Effect]) -> Array:
-    """Return the fit coordinates of effects, one after the other, shape (K,)."""
-    return np.concatenate([np.zeros(0), *(effect.coordinates() for effect in effects)])
+def as_dict(posterior: Posterior) -> dict[str, Any]:
+    """Return plain numbers, lists and strings: the entry ``posterior`` of diagnosis.json."""
+    what, rest = posterior.directions, posterior.discrepancy
+    deviation = np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0))
+    return {
+        'frames': list(what.frames),
+        'setups': what.setups,
+        'effects': [effect.to_mapping() for effect in what.effects],
+        'coordinates': [
+            {'name': name, 'std': float(std), 'mean': float(mean)}
+            for name, std, mean in zip(what.names(), deviation, posterior.mean, strict=True)
+        ],
+        'covariance': [
+            [float(v) for v in row[: k + 1]] for k, row in enumerate(posterior.covariance)
+        ],
+        'discrepancy': {
+            'position_m': rest.position,
+            'orientation_rad': rest.orientation,
+            'curves': [float(v) for v in rest.curves],
+            'reach': rest.reach,
+        },
+        'recorded': posterior.domain.as_dict(),
+        'left_open': list(posterior.left_open),
+    }

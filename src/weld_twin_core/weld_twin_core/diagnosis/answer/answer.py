@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from ...twin.posterior import Posterior
 from ..advice import actions
 from ..advice.next_step import next_step
 from ..algebra.noise_floor import NoiseFloor
@@ -29,6 +30,7 @@ def answer(
     shrink: Shrink,
     checks: tuple[Check, ...],
     beliefs: Beliefs,
+    posterior: Posterior,
 ) -> Diagnosis:
     """
     Return the diagnosis.
@@ -45,6 +47,8 @@ def answer(
     checks : tuple of Check
         Whether the data are sound.
     beliefs : Beliefs
+    posterior : Posterior
+        The models that the recordings allow.
 
     """
     effects = named_effects(found, unseen, verdict)
@@ -68,4 +72,5 @@ def answer(
         recordings=found.problem.recordings,
         families=verdict.families,
         evidence=evidence,
+        posterior=posterior,
     )

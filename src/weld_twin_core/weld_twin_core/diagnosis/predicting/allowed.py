@@ -15,24 +15,28 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
-from ...effects.effect import Effect
+from ...recording import Recording
+from ...twin.domain import Domain
 from ...twin.posterior import Directions, Posterior
-from ..algebra.evidence_score import effective_share
+from ..algebra.independent_rows import effective_share
 from ..algebra.fit import coordinates, design
+from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Model, Problem, Scale
-from .leftover import leftover, posture_blocks
-from .plausible_arm import directions, groups, straight, values, widths
+from . import plausible_arm
+from .leftover import Unseen, leftover, posture_blocks
+from .left_open import left_open
 
 ROWS = 9000
 """Rows looked at; more show the same directions."""
 FRAME_WIDTHS = (0.05, 0.05)
-"""Standard deviation of an aligned frame about the fitted one before the data [m, rad]."""
+"""Standard deviation of an aligned frame about the fitted one before the data [m, rad]: a guess at
+a flange or a tripod is good to some centimetres and degrees."""
 ROUNDS = 12
 TRUST = 4.0
 """So many coordinates' worth of belief in the usual sizes, against what this arm shows."""
@@ -49,14 +53,25 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Whitened rows of the fitted model: columns (P, R), residual (R,), both in noise."""
+    """
+    Whitened rows at the fitted model, in units of its noise.
+
+    ``columns`` (P, rows) are those of the coordinates of a `Prior`, ``residual`` (rows,) is what
+    the model leaves, ``share`` the part of the rows that count as independent.
+    """
 
     columns: Array
     residual: Array
     share: float
 
+    def kept(self, keep: Array) -> Rows:
+        """Return some of the rows."""
+        return replace(self, columns=self.columns[:, keep], residual=self.residual[keep])
 
-def allowed(problem: Problem, model: Model, scale: Scale, precision: Array) -> Posterior:
+
+def allowed(
+    problem: Problem, model: Model, scale: Scale, precision: Array, floor: NoiseFloor
+) -> Posterior:
     """
     Return the models that the recordings allow.
 
@@ -66,57 +81,100 @@ def allowed(problem: Problem, model: Model, scale: Scale, precision: Array) -> P
         A model fitted to all measurements.
     precision : array, shape (K,)
         Prior precision of the found effects' coordinates in that fit; may be empty.
+    floor : NoiseFloor
+        What the recordings themselves say of the instrument's noise.
 
     """
+    recordings = problem.recordings
     problem, scale = _thinned(problem, scale)
-    effects = directions(model.robot, model.found)
+    effects = plausible_arm.directions(model.robot, model.found)
     frames = tuple(frame for frame in ('base', 'tool') if frame in problem.align)
     what = Directions(frames, len(problem.recordings), effects)
-    makers = problem.features(model)
-    parts = [
-        what.columns(maker, k)[:, : problem.rows[k]] for k, maker in enumerate(makers)
-    ]
+    knots = plausible_arm.fine_knots([_joints(r) for r in problem.recordings])
+    rows = _rows(problem, model, scale, what, knots)
+    prior = _prior(what, model, sum(k.size for k in knots))
+    width, noise = learned(rows, prior)
+    mean, covariance = conditioned(rows, prior, width, noise)
+    count = what.count
+    unseen = _unseen(problem, model, scale, precision, rows)
+    position, orientation = leftover(
+        problem,
+        scale,
+        unseen,
+        lambda keep: conditioned(rows.kept(keep), prior, width, noise),
+        floor,
+    )
+    curve = width[-1] if width.size > count else 0.0
+    rest = plausible_arm.discrepancy(model.robot, position, orientation, curve)
+    return Posterior(
+        what,
+        mean[:count],
+        covariance[:count, :count],
+        rest,
+        Domain.of(recordings, model.robot),
+        left_open(problem, model, scale),
+    )
+
+
+def _joints(recording: Recording) -> Array:
+    measured = recording.measured
+    return recording.joints.at(recording.joints.t if measured is None else measured.t)[0]
+
+
+def _rows(
+    problem: Problem, model: Model, scale: Scale, what: Directions, knots: list[Array]
+) -> Rows:
+    parts = []
+    for k, maker in enumerate(problem.features(model)):
+        both = (what.columns(maker, k), plausible_arm.fine_columns(maker, knots))
+        parts.append(np.concatenate(both)[:, : problem.rows[k]])
     residual = problem.whitened(problem.residuals(model), scale)
     share = effective_share(residual, problem.rows, problem.samples)
-    fine = [fine_columns(maker)[:, : problem.rows[k]] for k, maker in enumerate(makers)]
-    rows = Rows(problem.whitened(parts, scale), residual, share)
-    prior = _prior(what, effects, model)
-    sizes, noise = learned(rows, prior)
-    mean, covariance = conditioned(rows, prior, sizes, noise)
-    labels = posture_blocks(problem)
+    return Rows(problem.whitened(parts, scale), residual, share)
+
+
+def _unseen(
+    problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows
+) -> Unseen:
     own, _ = design(problem, model, scale)
-    pull = np.zeros(own.shape[0])
-    x = np.zeros(own.shape[0])
+    pull, x = np.zeros(own.shape[0]), np.zeros(own.shape[0])
     if precision.size:
-        pull[own.shape[0] - precision.size :] = precision
-        x[own.shape[0] - precision.size :] = coordinates(model)
-    rest = leftover(problem, scale, rows, own, pull, pull * x, labels,
-                    lambda keep: conditioned(_kept(rows, keep), prior, sizes, noise))
-    return Posterior(what, mean, covariance, rest)
-
-
-def _kept(rows: Rows, keep: Array) -> Rows:
-    return Rows(rows.columns[:, keep], rows.residual[keep], rows.share)
+        pull[-precision.size :], x[-precision.size :] = precision, coordinates(model)
+    return Unseen(own, pull, pull * x, rows.columns, rows.residual, posture_blocks(problem))
 
 
 def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:
-    if problem.size <= ROWS:
-        return problem, scale
+    """Return fewer measurements of a long recording, with the weights that belong to them."""
     thin = problem.thinned(ROWS)
+    if thin is problem:
+        return problem, scale
     kept = []
     for full, part, weight in zip(problem.recordings, thin.recordings, scale.weights, strict=True):
-        assert full.measured is not None and part.measured is not None
+        assert full.measured is not None
+        assert part.measured is not None
         kept.append(weight[np.searchsorted(full.measured.t, part.measured.t)])
-    return thin, Scale(scale.position, scale.orientation, tuple(kept))
+    return thin, replace(scale, weights=tuple(kept))
 
 
-def _prior(what: Directions, effects: tuple[Effect, ...], model: Model) -> Prior:
-    frames = what.frame_count
-    now = values(effects, model.found)
-    width = np.concatenate([np.tile(np.repeat(FRAME_WIDTHS, 3), frames // 6), widths(effects, now)])
-    middle = np.concatenate([np.zeros(frames), np.where(straight(effects), -now, 0.0)])
-    group = np.concatenate([np.full(frames, -1), groups(effects)]).astype(int)
-    return Prior(middle, width, group)
+def _prior(what: Directions, model: Model, fine: int) -> Prior:
+    """Return the prior of frames, effects and the fine curves' heights."""
+    frames, effects = what.frame_count, what.effects
+    group = plausible_arm.groups(effects)
+    return Prior(
+        np.concatenate(
+            [np.zeros(frames), plausible_arm.middles(effects, model.found), np.zeros(fine)]
+        ),
+        np.concatenate(
+            [
+                np.tile(np.repeat(FRAME_WIDTHS, 3), frames // 6),
+                plausible_arm.widths(effects),
+                np.full(fine, plausible_arm.FINE),
+            ]
+        ),
+        np.concatenate(
+            [np.full(frames, -1), group, np.full(fine, group.max(initial=-1) + 1)]
+        ).astype(int),
+    )
 
 
 def learned(rows: Rows, prior: Prior) -> tuple[Array, float]:
@@ -126,26 +184,24 @@ def learned(rows: Rows, prior: Prior) -> tuple[Array, float]:
     rss = rows.share * float(rows.residual @ rows.residual)
     count = rows.share * rows.residual.size
     middle = prior.middle / prior.width
-    scale, noise = np.ones(prior.group.max(initial=-1) + 1), 1.0
+    grown, noise = np.ones(prior.group.max(initial=-1) + 1), 1.0
+    size = np.ones(prior.width.size)
     for _ in range(ROUNDS):
-        size = np.where(prior.group >= 0, scale[prior.group], 1.0)
         step, spread = _solved(normal / noise, right / noise, middle, size)
-        at = step - middle
-        known = 1.0 - spread / size**2
+        known = np.clip(1.0 - spread / size**2, 0.0, 1.0)
         left = rss - 2.0 * right @ step + step @ normal @ step
         noise = max(left / max(count - known.sum(), 1.0), 1e-6)
-        for k in range(scale.size):
+        for k in range(grown.size):
             mine = prior.group == k
-            free = float(np.clip(known[mine], 0.0, 1.0).sum())
-            scale[k] = np.sqrt(((at[mine] ** 2).sum() + TRUST) / (free + TRUST))
-    size = np.where(prior.group >= 0, scale[prior.group], 1.0)
+            shown = float(((step - middle)[mine] ** 2).sum())
+            grown[k] = np.sqrt((shown + TRUST) / (known[mine].sum() + TRUST))
+        size = np.where(prior.group >= 0, grown[prior.group], 1.0)
     return prior.width * size, noise
 
 
 def _solved(normal: Array, right: Array, middle: Array, size: Array) -> tuple[Array, Array]:
     """Return mean and variance of coordinates with a prior about ``middle``, shapes (P,)."""
-    system = normal * np.outer(size, size) + np.eye(size.size)
-    factor = cho_factor(system)
+    factor = cho_factor(normal * np.outer(size, size) + np.eye(size.size))
     mean = middle + size * cho_solve(factor, size * (right - normal @ middle))
     spread = np.diag(cho_solve(factor, np.eye(size.size))) * size**2
     return mean, spread

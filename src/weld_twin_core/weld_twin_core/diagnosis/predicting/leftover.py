@@ -10,67 +10,172 @@ fitted on the others; what is left over is as large as makes nine of ten of thos
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
 from ...arrays import Array
-from ...twin.posterior import Leftover
 from ..algebra.fit import solve_scaled
-from ..algebra.noise_floor import noise_floor
+from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem, Scale
 
-BLOCKS = 8
+HALVINGS = 3
+"""Eight blocks: each leaves out an eighth, few enough for the others to stand for the fit."""
 HOLD = 0.9
 """Share of unseen postures that their regions shall hold."""
+STEPS = 60
+"""Halvings of the bracket in which the size is sought; far below rounding."""
+
+Given = Callable[[Array], tuple[Array, Array]]
+"""Mean and covariance of the coordinates given a mask of rows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """
+    What predicts rows from others.
+
+    Attributes
+    ----------
+    own : array, shape (K, rows)
+        Whitened columns of frames and found effects: what the fit turned.
+    precision, pull : array, shape (K,)
+        Of the fit's prior, and how hard it pulls from where the fit is.
+    columns : array, shape (P, rows)
+        Those of the coordinates that are uncertain.
+    residual : array, shape (rows,)
+    labels : array, shape (rows,)
+        Block of like posture of every row.
+
+    """
+
+    own: Array
+    precision: Array
+    pull: Array
+    columns: Array
+    residual: Array
+    labels: Array
 
 
 def posture_blocks(problem: Problem) -> Array:
     """
     Return a block number for every row: neighbours in joint space, whenever they were visited.
 
-    Halved three times at the median of the direction in which the joints vary most.
+    Halved a few times at the median of the direction in which the joints vary most.
     """
-    joints = [
-        r.joints.at(r.measured.t)[0] for r in problem.recordings if r.measured is not None
-    ]
-    q = np.concatenate(joints)
+    q = np.concatenate(
+        [r.joints.at(r.measured.t)[0] for r in problem.recordings if r.measured is not None]
+    )
     labels = np.zeros(q.shape[0], dtype=int)
-    for _ in range(int(np.log2(BLOCKS))):
+    for _ in range(HALVINGS):
         halves = labels * 2
         for k in np.unique(labels):
             mine = np.flatnonzero(labels == k)
             centred = q[mine] - q[mine].mean(axis=0)
             along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
-            upper = np.argsort(along, kind='stable')[mine.size // 2 :]
-            halves[mine[upper]] += 1
+            halves[mine[np.argsort(along, kind='stable')[mine.size // 2 :]]] += 1
         labels = halves
-    counts = np.repeat(problem.rows, problem.samples)
-    return np.repeat(labels, counts)
+    rows = np.concatenate(
+        [np.full(m, c) for c, m in zip(problem.rows, problem.samples, strict=True)]
+    )
+    return np.repeat(labels, rows)
 
 
 def leftover(
-    problem: Problem,
-    scale: Scale,
-    rows,
-    own: Array,
-    precision: Array,
-    pull: Array,
-    labels: Array,
-    given: Callable[[Array], tuple[Array, Array]],
-) -> Leftover:
-    errors = rows.residual.copy()
-    normal = own @ own.T + np.diag(precision)
-    right = own @ rows.residual - pull
-    cov = []
-    index = []
-    for b in np.unique(labels):
-        out = labels == b
-        mine = own[:, out]
-        step = solve_scaled(normal - mine @ mine.T, right - mine @ rows.residual[out], 1e-9)
+    problem: Problem, scale: Scale, unseen: Unseen, given: Given, floor: NoiseFloor
+) -> tuple[float, float]:
+    """
+    Return the standard deviation per axis of what is left over, position [m] and turn [rad].
+
+    Parameters
+    ----------
+    problem, scale : Problem, Scale
+    unseen : Unseen
+    given : callable
+        Mean and covariance of the uncertain coordinates given a mask of rows.
+    floor : NoiseFloor
+        What the recordings themselves say of the instrument's noise.
+
+    """
+    samples = _by_sample(problem)
+    errors, moments = _predicted(unseen, given, samples)
+    good = np.concatenate([w for w in scale.weights])
+    out = []
+    for part, unit in ((slice(0, 3), scale.position), (slice(3, 6), scale.orientation)):
+        wide = [k for k, index in enumerate(samples) if index.size >= part.stop]
+        if not wide:
+            out.append(0.0)
+            continue
+        weight = np.sqrt(good[wide])[:, None]
+        e = np.array([errors[k][part] for k in wide]) * unit / weight
+        v = np.array([moments[k][part, part] for k in wide]) * unit**2 / weight[:, None] ** 2
+        out.append(_size(e, v))
+    if not out[1]:
+        # Without measured turns the tool turns as much as it shifts on an arm of a metre.
+        out[1] = out[0]
+    return _quiet(problem, out[0], floor), out[1]
+
+
+def _by_sample(problem: Problem) -> list[Array]:
+    """Return the row numbers of every sample."""
+    out, at = [], 0
+    for c, m in zip(problem.rows, problem.samples, strict=True):
+        out += list(at + np.arange(c * m).reshape(m, c))
+        at += c * m
+    return out
+
+
+def _predicted(
+    unseen: Unseen, given: Given, samples: list[Array]
+) -> tuple[list[Array], list[Array]]:
+    """Return the error of every sample predicted from other blocks, and its second moment."""
+    errors = np.array(unseen.residual)
+    normal = unseen.own @ unseen.own.T + np.diag(unseen.precision)
+    right = unseen.own @ unseen.residual - unseen.pull
+    factors = {}
+    for b in np.unique(unseen.labels):
+        out = unseen.labels == b
+        mine = unseen.own[:, out]
+        step = solve_scaled(normal - mine @ mine.T, right - mine @ unseen.residual[out], 1e-9)
         errors[out] -= step @ mine
         mean, covariance = given(~out)
-        c = rows.columns[:, out]
-        s = np.column_stack([np.linalg.cholesky(covariance + 1e-300), mean]) if False else None
-        cov.append((c, mean, covariance)); index.append(np.flatnonzero(out))
-    return errors, cov, index
+        # The mean is counted from the fit to all rows, the error from the fit to the others.
+        moved = mean @ unseen.columns[:, out] - step @ mine
+        factors[b] = (covariance, dict(zip(np.flatnonzero(out).tolist(), moved, strict=True)))
+    moments = []
+    for index in samples:
+        covariance, moved = factors[unseen.labels[index[0]]]
+        columns = unseen.columns[:, index]
+        shift = np.array([moved[k] for k in index.tolist()])
+        moments.append(columns.T @ covariance @ columns + np.outer(shift, shift))
+    return [errors[index] for index in samples], moments
+
+
+def _size(errors: Array, moments: Array) -> float:
+    """Return the deviation per axis that makes regions hold as many errors as they shall."""
+    limit = float(chi2.ppf(HOLD, 3))
+    eye = np.eye(3)
+
+    def held(variance: float) -> float:
+        solved = np.linalg.solve(moments + (variance + 1e-18) * eye, errors[..., None])[..., 0]
+        return float(np.mean((errors * solved).sum(axis=1) <= limit))
+
+    low, high = 0.0, float((errors**2).sum(axis=1).max()) + 1e-18
+    if held(low) >= HOLD:
+        return 0.0
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if held(middle) >= HOLD else (middle, high)
+    return float(np.sqrt(high))
+
+
+def _quiet(problem: Problem, size: float, floor: NoiseFloor) -> float:
+    """Return a size without the instrument's noise, as far as that is known by itself."""
+    told = [
+        float(np.median(r.measured.sigma))
+        for r in problem.recordings
+        if r.measured is not None and r.measured.sigma is not None
+    ]
+    noise = float(np.mean(told)) if told else floor.sigma * floor.independent
+    return float(np.sqrt(max(size**2 - noise**2, 0.0)))

@@ -14,6 +14,7 @@ from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ...effects.transmission_ripple import TransmissionRipple
 from ...twin.features import Features
+from ...twin.posterior import Discrepancy
 
 EVERYWHERE = (
     'joint_offset',
@@ -37,6 +38,8 @@ KNOTS = 30
 """Most knots per joint."""
 FINE = 1e-4
 """Usual height of the fine curve [rad]: ripple of the orders above four."""
+RIPPLE = 0.5
+"""Low orders of a good gear, in units of the typical ripple at any order."""
 MOST = 24
 """Coordinates of one ripple effect; more of them are high orders, part of what is left over."""
 
@@ -80,20 +83,38 @@ def _finer(effect: TransmissionRipple) -> list[Effect]:
     return [TransmissionRipple(effect.joint, amplitude, orders[other], phase)]
 
 
-def values(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
-    """Return the value that the fitted model has for every coordinate, shape (K,)."""
-    return np.concatenate([np.zeros(0), *(_value(e, found) for e in effects)])
+def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
+    """
+    Return where the prior of every coordinate lies, counted from the fitted model, shape (K,).
+
+    Small errors are counted from zero. What bends the twin (a frequency) is counted from the fit,
+    and so is the ripple of a joint that was fitted with many orders at once: their sizes were
+    learned together there, and some of them alone must not be drawn back.
+    """
+    dense = {
+        effect.joint
+        for effect in found
+        if isinstance(effect, TransmissionRipple) and np.size(effect.order) > ORDERS.size
+    }
+    out = [np.zeros(0)]
+    for effect in effects:
+        if isinstance(effect, TransmissionRipple):
+            out.append(0.0 * effect.coordinates() if effect.joint in dense else -_low(effect, found))
+            continue
+        straight = [p.linear for p, _ in effect.components() if p.differentiable]
+        out.append(np.where(straight, -effect.coordinates(), 0.0))
+    return np.concatenate(out)
 
 
-def _value(effect: Effect, found: Sequence[Effect]) -> Array:
-    if not isinstance(effect, TransmissionRipple) or not np.array_equal(effect.order, ORDERS):
-        return effect.coordinates()
-    out = np.zeros((ORDERS.size, 2))
+def _low(effect: TransmissionRipple, found: Sequence[Effect]) -> Array:
+    """Return what the fitted model has on the orders of a ripple, pairs as its coordinates."""
+    orders = np.atleast_1d(np.asarray(effect.order, dtype=np.float64))
+    out = np.zeros((orders.size, 2))
     for other in found:
         if isinstance(other, TransmissionRipple) and other.joint == effect.joint:
             pairs = other.coordinates().reshape(-1, 2)
             for order, pair in zip(np.atleast_1d(other.order), pairs, strict=True):
-                out[ORDERS == order] += pair
+                out[orders == order] += pair
     return out.ravel()
 
 
@@ -104,31 +125,16 @@ def groups(effects: Sequence[Effect]) -> Array:
     return np.repeat([names.index(effect.name) for effect in effects], sizes).astype(int)
 
 
-def widths(effects: Sequence[Effect], at: Array) -> Array:
-    """
-    Return the standard deviation of every coordinate before the data, shape (K,).
-
-    ``at`` holds the fitted values; one beyond the usual size is not unusual for this arm.
-    """
-    sizes = []
+def widths(effects: Sequence[Effect]) -> Array:
+    """Return the standard deviation of every coordinate before the data, shape (K,)."""
+    sizes = [np.zeros(0)]
     for effect in effects:
         size = WIDTH * effect.coordinate_scales()
         if isinstance(effect, TransmissionRipple):
             # Eccentric gears: an order's amplitude falls with its number.
-            size = size / np.repeat(np.sqrt(np.atleast_1d(effect.order)), 2)
+            size = RIPPLE * size / np.repeat(np.sqrt(np.atleast_1d(effect.order)), 2)
         sizes.append(size)
-    return np.asarray(np.concatenate([np.zeros(0), *sizes]))
-
-
-def straight(effects: Sequence[Effect]) -> Array:
-    """Return which coordinates are counted from zero, shape (K,); others from the fitted one."""
-    out: list[bool] = []
-    for effect in effects:
-        if isinstance(effect, TransmissionRipple):
-            out += [True] * effect.coordinates().size
-        else:
-            out += [p.linear for p, _ in effect.components() if p.differentiable]
-    return np.array(out, dtype=bool)
+    return np.concatenate(sizes)
 
 
 def fine_knots(motions: Sequence[Array]) -> list[Array]:
@@ -150,3 +156,9 @@ def fine_columns(features: Features, knots: Sequence[Array]) -> Array:
         hats = np.maximum(0.0, 1.0 - np.abs(at - places[:, None]) / width)
         out.append(hats[:, None] * features.column(('q', i)))
     return np.concatenate(out)
+
+
+def discrepancy(robot: Robot, position: float, orientation: float, fine: float) -> Discrepancy:
+    """Return what no parameter explains, with gears as uneven where they were not seen."""
+    curves = np.where(robot.prismatic, 0.0, fine)
+    return Discrepancy(position, orientation, curves, SPACING)

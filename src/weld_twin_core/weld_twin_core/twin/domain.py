@@ -72,12 +72,11 @@ class Domain:
         """Return what measurements of some recordings have shown."""
         pairs = [_measured(r) for r in recordings]
         q = np.concatenate([pair[0] for pair in pairs])
-        moving = [pair[1] for r, pair in zip(recordings, pairs, strict=True)
-                  if not r.joints.static]
+        moving = [
+            pair[1] for r, pair in zip(recordings, pairs, strict=True) if not r.joints.static
+        ]
         margins = _margins(q, not moving)
-        ranges = tuple(
-            _intervals(q[:, i], margin) for i, margin in enumerate(margins)
-        )
+        ranges = tuple(_intervals(q[:, i], margin) for i, margin in enumerate(margins))
         speeds = None
         if moving:
             speeds = tuple(float(v) for v in np.abs(np.concatenate(moving)).max(axis=0))
@@ -115,7 +114,6 @@ class Domain:
 
     def outside(
         self,
-        t: Array,
         q: Array,
         qd: Array | None = None,
         wrench: Array | None = None,
@@ -126,7 +124,6 @@ class Domain:
 
         Parameters
         ----------
-        t : array, shape (M,) [s]
         q, qd : array, shape (M, n)
             ``qd`` is left out for stations at rest.
         wrench : array, shape (M, 6), optional [N, N m]
@@ -139,8 +136,9 @@ class Domain:
             unit = 'rad' if self.turns[i] else 'm'
             for first, last in runs(away[:, i] > self.margins[i]):
                 most = float(away[first : last + 1, i].max())
-                out.append(Outside(first, last,
-                                   f'{name} is {most:.2g} {unit} beyond what was recorded'))
+                out.append(
+                    Outside(first, last, f'{name} is {most:.2g} {unit} beyond what was recorded')
+                )
         out += self._too_fast(qd) + self._too_loaded(wrench) + self._too_warm(temperature)
         return sorted(out)
 
@@ -151,16 +149,20 @@ class Domain:
         limit = SPEED_MARGIN[0] * known + SPEED_MARGIN[1]
         speed = np.abs(qd)
         out = []
-        for first, last in runs((speed > limit).any(axis=1)):
+        for first, last in runs(np.asarray((speed > limit).any(axis=1))):
             part = speed[first : last + 1]
             i = int((part / limit).max(axis=0).argmax())
             unit = 'rad/s' if self.turns[i] else 'm/s'
             if self.speeds is None:
-                why = (f'{self.joints[i]} moves at up to {part[:, i].max():.2g} {unit}, only '
-                       'stations at rest were recorded')
+                why = (
+                    f'{self.joints[i]} moves at up to {part[:, i].max():.2g} {unit}, only '
+                    'stations at rest were recorded'
+                )
             else:
-                why = (f'{self.joints[i]} moves at up to {part[:, i].max():.2g} {unit}, at most '
-                       f'{known[i]:.2g} {unit} was recorded')
+                why = (
+                    f'{self.joints[i]} moves at up to {part[:, i].max():.2g} {unit}, at most '
+                    f'{known[i]:.2g} {unit} was recorded'
+                )
             out.append(Outside(first, last, why))
         return out
 
@@ -173,9 +175,14 @@ class Domain:
             known = 0.0 if self.load is None else self.load[k]
             for first, last in runs(size > LOAD_MARGIN[0] * known + LOAD_MARGIN[1]):
                 most = size[first : last + 1].max()
-                out.append(Outside(first, last,
-                    f'the {name} on the tool is up to {most:.3g} {unit}, at most {known:.3g} '
-                    f'{unit} was recorded'))
+                out.append(
+                    Outside(
+                        first,
+                        last,
+                        f'the {name} on the tool is up to {most:.3g} {unit}, at most {known:.3g} '
+                        f'{unit} was recorded',
+                    )
+                )
         return out
 
     def _too_warm(self, temperature: Array | None) -> list[Outside]:
@@ -184,9 +191,12 @@ class Domain:
         low, high = self.temperature
         off = np.maximum(low - temperature, temperature - high)
         return [
-            Outside(first, last,
+            Outside(
+                first,
+                last,
                 f'it is {off[first : last + 1].max():.2g} K beyond the {low:.1f} to {high:.1f} '
-                'degC that were recorded')
+                'degC that were recorded',
+            )
             for first, last in runs(off > WARM_MARGIN)
         ]
 
@@ -205,10 +215,15 @@ class Domain:
         """Return plain numbers and lists."""
         return {
             'joints': [
-                {'name': name, 'measured': [list(pair) for pair in intervals], 'margin': margin,
-                 'turns': turns}
+                {
+                    'name': name,
+                    'measured': [list(pair) for pair in intervals],
+                    'margin': margin,
+                    'turns': turns,
+                }
                 for name, intervals, margin, turns in zip(
-                    self.joints, self.ranges, self.margins, self.turns, strict=True)
+                    self.joints, self.ranges, self.margins, self.turns, strict=True
+                )
             ],
             'speeds': None if self.speeds is None else list(self.speeds),
             'load': None if self.load is None else list(self.load),
@@ -231,7 +246,7 @@ def _measured(recording: Recording) -> tuple[Array, Array]:
 def _margins(q: Array, stations: bool) -> Array:
     span = np.ptp(q, axis=0)
     share = SPACINGS / max(q.shape[0] - 1, 1) if stations else 0.0
-    return np.maximum(LEAST_MARGIN, share * span)
+    return np.asarray(np.maximum(LEAST_MARGIN, share * span))
 
 
 def _intervals(values: Array, margin: float) -> tuple[tuple[float, float], ...]:

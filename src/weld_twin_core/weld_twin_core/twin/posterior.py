@@ -61,10 +61,15 @@ class Directions:
         """Return the number of frame coordinates."""
         return 6 * (('base' in self.frames) * self.setups + ('tool' in self.frames))
 
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """Return the number of coordinates of every effect."""
+        return tuple(effect.coordinates().size for effect in self.effects)
+
     @property
     def count(self) -> int:
         """Return the number of coordinates."""
-        return self.frame_count + sum(e.coordinates().size for e in self.effects)
+        return self.frame_count + sum(self.sizes)
 
     def names(self) -> list[str]:
         """Return a name for every coordinate: 'base 0.x', 'joint_offset elbow_joint 0'."""
@@ -73,9 +78,9 @@ class Directions:
             out += [f'base {k}.{axis}' for k in range(self.setups) for axis in AXES]
         if 'tool' in self.frames:
             out += [f'tool.{axis}' for axis in AXES]
-        for effect in self.effects:
+        for effect, size in zip(self.effects, self.sizes, strict=True):
             where = f' {effect.site}' if effect.site else ''
-            out += [f'{effect.name}{where} {k}' for k in range(effect.coordinates().size)]
+            out += [f'{effect.name}{where} {k}' for k in range(size)]
         return out
 
     def columns(self, features: Features, setup: int) -> Array:
@@ -94,8 +99,7 @@ class Directions:
             for k in range(6):
                 out[at + k] = features.column(('tool', k))
             at += 6
-        for effect in self.effects:
-            size = effect.coordinates().size
+        for effect, size in zip(self.effects, self.sizes, strict=True):
             if effect.applicable(features.view, effect.site) is None:
                 out[at : at + size] = features.columns(effect, atoms=False)
             at += size
@@ -253,8 +257,7 @@ def pose_covariances(
 
     """
     parts = [
-        posterior.pose_covariance(Features(twin, recording, piece), setup)
-        for piece in _pieces(at)
+        posterior.pose_covariance(Features(twin, recording, piece), setup) for piece in _pieces(at)
     ]
     return np.concatenate([np.zeros((0, 6, 6)), *parts])
 

@@ -15,6 +15,7 @@ def test_names_and_types_are_those_of_the_public_interface():
         '/measured/tool_point': 'geometry_msgs/PointStamped',
         '/measured/sigma': 'geometry_msgs/Vector3Stamped',
         '/twin/tool_pose': 'geometry_msgs/PoseStamped',
+        '/twin/tool_pose_with_covariance': 'geometry_msgs/PoseWithCovarianceStamped',
         '/deviation': 'geometry_msgs/Vector3Stamped',
         '/deviation/metrics': 'diagnostic_msgs/DiagnosticArray',
         '/diagnosis': 'diagnostic_msgs/DiagnosticArray',

@@ -27,6 +27,7 @@ from ..messages.topics import (
     MEASURED_SIGMA,
     TEMPERATURE,
     TOOL_WRENCH,
+    TWIN_COVARIANCE,
     TWIN_POSE,
 )
 from .writer import BagWriter
@@ -41,6 +42,7 @@ def write_recording(
     *,
     actual: Array | None = None,
     twin: tuple[Array, Array] | None = None,
+    covariance: Array | None = None,
     deviation: Array | None = None,
     storage: str = 'mcap',
     provenance: Mapping[str, Any] | None = None,
@@ -60,6 +62,8 @@ def write_recording(
         Joint positions with the joint-space effects, for ``/actual/joint_states``.
     twin : tuple of arrays, shapes (N, 3) and (N, 3, 3), optional
         Twin poses at the joint stamps, for ``/twin/tool_pose``.
+    covariance : array, shape (N, 6, 6), optional
+        Of the twin poses, for ``/twin/tool_pose_with_covariance`` [m^2, rad^2].
     deviation : array, shape (M, 3), optional
         Measured minus twin at the measurement stamps, for ``/deviation``.
     storage : str
@@ -85,6 +89,8 @@ def write_recording(
         parts.append(entries.joints(ACTUAL_JOINT_STATES.name, robot, actual, None))
     if twin is not None:
         parts.append(entries.poses(TWIN_POSE.name, recording.joints.t, *twin))
+    if twin is not None and covariance is not None:
+        parts.append(entries.sure_poses(recording.joints.t, *twin, covariance))
     if deviation is not None and recording.measured is not None:
         parts.append(entries.vectors(DEVIATION.name, recording.measured.t, deviation))
     with BagWriter(path, storage=storage, provenance=made) as bag:
@@ -150,6 +156,18 @@ class _Entries:
     def poses(self, topic: str, t: Array, position: Array, rotation: Array) -> Iterator[_Entry]:
         """Return poses, shapes (K, 3) and (K, 3, 3)."""
         return self._each(topic, t, lambda ns, k: self.make.pose(ns, position[k], rotation[k]))
+
+    def sure_poses(
+        self, t: Array, position: Array, rotation: Array, covariance: Array
+    ) -> Iterator[_Entry]:
+        """Return poses with covariance, shapes (K, 3), (K, 3, 3) and (K, 6, 6)."""
+        return self._each(
+            TWIN_COVARIANCE.name,
+            t,
+            lambda ns, k: self.make.pose_with_covariance(
+                ns, position[k], rotation[k], covariance[k]
+            ),
+        )
 
     def vectors(self, topic: str, t: Array, vectors: Array) -> Iterator[_Entry]:
         """Return vectors, shape (K, 3)."""

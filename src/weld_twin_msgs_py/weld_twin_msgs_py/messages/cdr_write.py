@@ -41,6 +41,31 @@ class PoseEncoder:
         )
 
 
+class PoseCovarianceEncoder:
+    """
+    Serialises PoseWithCovarianceStamped messages of one frame.
+
+    Parameters
+    ----------
+    frame_id : str
+
+    """
+
+    def __init__(self, frame_id: str) -> None:
+        self._head, self._body = _stamped(frame_id, '43d')
+
+    def __call__(self, ns: int, position: Array, rotation: Array, covariance: Array) -> bytes:
+        """Return the message of a stamp [ns], (3,) [m], (3, 3) and (6, 6) [m^2, rad^2]."""
+        return self._body.pack(
+            b'\0\1\0\0',
+            *divmod(ns, NANOSECONDS),
+            self._head,
+            *position.tolist(),
+            *quaternion(rotation),
+            *covariance.ravel().tolist(),
+        )
+
+
 class Vector3Encoder:
     """
     Serialises Vector3Stamped messages of one frame.

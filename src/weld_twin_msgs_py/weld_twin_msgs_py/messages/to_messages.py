@@ -70,13 +70,49 @@ class Messages:
 
     def pose(self, ns: int, position: Array, rotation: Array, frame_id: str = 'base') -> Any:
         """Return a PoseStamped from position (3,) [m] and rotation (3, 3)."""
-        x, y, z, w = quaternion(rotation)
-        turned = self._make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
+        return self._make(
+            'geometry_msgs/msg/PoseStamped',
+            header=self.header(ns, frame_id),
+            pose=self._pose(position, rotation),
+        )
+
+    def pose_with_covariance(
+        self,
+        ns: int,
+        position: Array,
+        rotation: Array,
+        covariance: Array,
+        frame_id: str = 'base',
+    ) -> Any:
+        """
+        Return a PoseWithCovarianceStamped.
+
+        Parameters
+        ----------
+        ns : int
+        position : array, shape (3,) [m]
+        rotation : array, shape (3, 3)
+        covariance : array, shape (6, 6)
+            Position first [m^2], then turns about the fixed axes of the frame [rad^2].
+        frame_id : str
+
+        """
         inner = self._make(
-            'geometry_msgs/msg/Pose', position=self._xyz('Point', position), orientation=turned
+            'geometry_msgs/msg/PoseWithCovariance',
+            pose=self._pose(position, rotation),
+            covariance=np.array(covariance, dtype=np.float64).reshape(36),
         )
         return self._make(
-            'geometry_msgs/msg/PoseStamped', header=self.header(ns, frame_id), pose=inner
+            'geometry_msgs/msg/PoseWithCovarianceStamped',
+            header=self.header(ns, frame_id),
+            pose=inner,
+        )
+
+    def _pose(self, position: Array, rotation: Array) -> Any:
+        x, y, z, w = quaternion(rotation)
+        turned = self._make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
+        return self._make(
+            'geometry_msgs/msg/Pose', position=self._xyz('Point', position), orientation=turned
         )
 
     def point(self, ns: int, position: Array, frame_id: str = 'base') -> Any:

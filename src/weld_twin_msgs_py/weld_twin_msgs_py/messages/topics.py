@@ -119,6 +119,12 @@ TWIN_POSE = _result(
     1000,
     'where the twin says the tool is [m]',
 )
+TWIN_COVARIANCE = _result(
+    '/twin/tool_pose_with_covariance',
+    'geometry_msgs/msg/PoseWithCovarianceStamped',
+    1000,
+    'the same pose and how sure it is: of the true pose, turns about the world axes [m^2, rad^2]',
+)
 DEVIATION = _result(
     '/deviation',
     'geometry_msgs/msg/Vector3Stamped',
@@ -159,6 +165,7 @@ TOPICS = (
     MEASURED_POINT,
     MEASURED_SIGMA,
     TWIN_POSE,
+    TWIN_COVARIANCE,
     DEVIATION,
     DEVIATION_METRICS,
     DIAGNOSIS,

@@ -6,28 +6,71 @@ from __future__ import annotations
 
 from typing import Any
 
+from weld_twin_core.twin.live_posterior import LivePosterior
+from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly.frame_names import WORLD
-from weld_twin_msgs_py.messages.cdr_write import PoseEncoder
-from weld_twin_msgs_py.messages.topics import TWIN_POSE
+from weld_twin_msgs_py.files.posterior_entry import read_posterior
+from weld_twin_msgs_py.messages.cdr_write import PoseCovarianceEncoder, PoseEncoder
+from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
+from weld_twin_msgs_py.messages.topics import TWIN_COVARIANCE, TWIN_POSE
 
 from ..streams.twin_stream import Sample
 from .model_node import ModelNode
 from .run_node import run
 
+OUTSIDE = 'outside what was recorded'
+
 
 class ForwardKinematicsTwin(ModelNode):
-    """Publishes the twin's tool pose for every joint state."""
+    """Publishes the twin's tool pose for every joint state, and how sure it is of it."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('forward_kinematics_twin', **kwargs)
         self._pose = self.offer(TWIN_POSE)
+        self._sure_pose = self.offer(TWIN_COVARIANCE, awaited=False)
         self._encode = PoseEncoder(WORLD)
+        self._encode_sure = PoseCovarianceEncoder(WORLD)
+        self._sureness = self._read_sureness()
         self.start()
 
     def publish(self, sample: Sample) -> None:
         """Publish where the tool should be, at the stamp a measurement of it would carry."""
         position, rotation = sample.poses
         self._pose.publish(self._encode(sample.pose_stamp, position, rotation))
+        if self._sureness is None:
+            return
+        covariance = self._sureness.covariance(
+            self.stream.twin,
+            sample.stamp / NANOSECONDS,
+            sample.q,
+            sample.wrench,
+            sample.wrench_frame,
+            sample.temperature,
+        )
+        self._tell_outside(self._sureness.outside)
+        self._sure_pose.publish(
+            self._encode_sure(sample.pose_stamp, position, rotation, covariance)
+        )
+
+    def on_twin(self, twin: Twin) -> None:
+        """Go on with changed effects, and with the certainty of the model as it is now."""
+        super().on_twin(twin)
+        self._sureness = self._read_sureness()
+
+    def _read_sureness(self) -> LivePosterior | None:
+        """Return how sure the model is; None for an effects file or an older diagnosis."""
+        path = self.setting('model')
+        if not path.lower().endswith('.json'):
+            return None
+        posterior = read_posterior(self.robot, path)
+        return None if posterior is None else LivePosterior(posterior)
+
+    def _tell_outside(self, reasons: tuple[str, ...]) -> None:
+        """Keep a warning among the diagnostics as long as the arm is outside."""
+        if reasons:
+            self.health.lasting[OUTSIDE] = f'{OUTSIDE}: {"; ".join(reasons)}'
+        else:
+            self.health.lasting.pop(OUTSIDE, None)
 
 
 def main(args: list[str] | None = None) -> int:

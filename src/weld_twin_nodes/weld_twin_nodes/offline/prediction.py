@@ -1,18 +1,22 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The twin with identified effects over a whole recording."""
+"""The twin with identified effects over a whole recording, and how sure it is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import Recording
+from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import (
@@ -23,19 +27,97 @@ from weld_twin_msgs_py.files.diagnosis_model import (
     timed,
 )
 from weld_twin_msgs_py.files.input_files import hashed
+from weld_twin_msgs_py.files.posterior_entry import read_posterior
+from weld_twin_msgs_py.files.whole_files import write_text
 
 from .told_twin import build_twin
 
+BESIDE = 'prediction.json'
+"""Beside the bag: the stretches outside what was recorded."""
 
-def prediction_twin(
+
+MOST = 3
+"""Stretches told on the terminal; the others are in the file."""
+
+
+class Stretch(NamedTuple):
+    """A stretch of a motion outside what was recorded [s from its first stamp], and why."""
+
+    t_start: float
+    t_end: float
+    why: str
+
+
+class Predictor(NamedTuple):
+    """
+    A twin and how sure it is.
+
+    Attributes
+    ----------
+    twin : Twin
+    posterior : Posterior or None
+        None for an effects file, or a diagnosis written without one.
+    setup : int
+        Which base frame of the posterior, counted from 0.
+
+    """
+
+    twin: Twin
+    posterior: Posterior | None = None
+    setup: int = 0
+
+    def covariances(self, recording: Recording) -> Array | None:
+        """Return the covariance of the true pose at every joint state, shape (N, 6, 6)."""
+        if self.posterior is None:
+            return None
+        return pose_covariances(
+            self.posterior, self.twin, recording, recording.joints.t, self.setup
+        )
+
+    def outside(self, recording: Recording) -> list[Stretch]:
+        """Return the stretches of a motion that lie outside what was recorded."""
+        if self.posterior is None:
+            return []
+        motion = recording.joints
+        wrench, temperature = recording.wrench, recording.temperature
+        found = self.posterior.domain.outside(
+            motion.q,
+            None if motion.static else motion.velocity,
+            None if wrench is None else wrench.at(motion.t),
+            None if temperature is None else temperature.at(motion.t),
+        )
+        t = motion.t - motion.t[0]
+        return [Stretch(float(t[a]), float(t[b]), why) for a, b, why in found]
+
+
+class Written(NamedTuple):
+    """
+    What a prediction came to.
+
+    Attributes
+    ----------
+    rms_m : float or None
+        RMS of measured minus twin, where something was measured.
+    outside : sequence of Stretch
+    sigma_m : float or None
+        Median of the standard deviation of position in its worst direction.
+
+    """
+
+    rms_m: float | None
+    outside: Sequence[Stretch]
+    sigma_m: float | None
+
+
+def predictor(
     robot: Robot,
     path: Path | str,
     bag: Path | str,
     recording: Recording,
     setup: int | None = None,
-) -> Twin:
+) -> Predictor:
     """
-    Return the twin of a model file for a bag.
+    Return the twin of a model file for a bag, and how sure it is.
 
     Parameters
     ----------
@@ -56,44 +138,49 @@ def prediction_twin(
 
     """
     if Path(path).suffix.lower() != '.json' or 'model' not in read_diagnosis(path):
-        return build_twin(robot, path)
+        return Predictor(build_twin(robot, path))
     model = read_model(robot, path)
     if setup is not None:
         load_model(robot, path, setup - 1)
-        return timed(path, model, setup - 1, recording)
-    if len(model.bases) == 1:
-        return timed(path, model, 0, recording)
+        chosen = setup - 1
+    elif len(model.bases) == 1:
+        chosen = 0
+    else:
+        chosen = _setup_of(path, model, bag)
+    twin = timed(path, model, chosen, recording)
+    return Predictor(twin, read_posterior(robot, path), chosen)
+
+
+def _setup_of(path: Path | str, model: Model, bag: Path | str) -> int:
+    """Return which recording of a diagnosis with several base frames a bag is."""
     known = [
         item['sha256']
         for item in read_diagnosis(path).get('inputs', [])
         if item['use'] == 'recording'
     ]
     own = hashed('recording', bag).sha256
-    if own not in known:
-        if one_base(model):
-            return timed(path, model, 0, recording)
-        raise ModelError(
-            f"diagnosis '{path}' has a base frame for each of its {len(model.bases)} recordings "
-            f"and '{bag}' is none of them; choose one with --setup 1 to {len(model.bases)}"
-        )
-    return timed(path, model, known.index(own), recording)
+    if own in known:
+        return known.index(own)
+    if one_base(model):
+        return 0
+    raise ModelError(
+        f"diagnosis '{path}' has a base frame for each of its {len(model.bases)} recordings "
+        f"and '{bag}' is none of them; choose one with --setup 1 to {len(model.bases)}"
+    )
 
 
 def write_prediction(
     path: Path | str,
-    twin: Twin,
+    model: Predictor,
     recording: Recording,
     *,
     storage: str = 'mcap',
     provenance: Mapping[str, Any] | None = None,
-) -> float | None:
+) -> Written:
     """
-    Write the recording with the twin's pose at every joint state, and deviations.
+    Write the recording with the twin's pose at every joint state, its covariance, deviations.
 
-    Returns
-    -------
-    float or None
-        RMS of measured minus twin [m], where something was measured.
+    The stretches outside what was recorded go into `BESIDE`, in the bag's directory.
 
     Raises
     ------
@@ -101,7 +188,9 @@ def write_prediction(
         The path exists or cannot be written.
 
     """
+    twin = model.twin
     poses = twin.poses(recording, recording.joints.t)
+    covariances, outside = model.covariances(recording), model.outside(recording)
     measured = recording.measured
     deviation = None
     if measured is not None and measured.t.size:
@@ -113,8 +202,39 @@ def write_prediction(
         recording,
         twin.robot,
         twin=(poses.position, poses.rotation),
+        covariance=covariances,
         deviation=deviation,
         storage=storage,
         provenance={**made, **(provenance or {})},
     )
-    return None if deviation is None else float(np.sqrt((deviation**2).sum(axis=1).mean()))
+    if model.posterior is not None:
+        write_outside(Path(path), outside)
+    return Written(
+        None if deviation is None else float(np.sqrt((deviation**2).sum(axis=1).mean())),
+        outside,
+        None if covariances is None else float(np.median(largest_sigma(covariances))),
+    )
+
+
+def write_outside(bag: Path, outside: Sequence[Stretch]) -> None:
+    """Write the stretches outside what was recorded into a bag's directory."""
+    content = {'outside': [stretch._asdict() for stretch in outside]}
+    write_text(bag / BESIDE, json.dumps(content, indent=1) + '\n')
+
+
+def told_sureness(model: Predictor, got: Written) -> list[str]:
+    """Return in words how sure a prediction is, and where it knows nothing."""
+    if model.posterior is None or got.sigma_m is None:
+        return [
+            'how sure the poses are is not known: the model has no posterior, only a '
+            'diagnosis.json written by this version has'
+        ]
+    out = [
+        f'the tool is where the twin says within {got.sigma_m * 1e3:.3g} mm '
+        '(one standard deviation in the worst direction, median)'
+    ]
+    if got.outside:
+        last = '' if len(got.outside) <= MOST else f'; {len(got.outside) - MOST} more in {BESIDE}'
+        parts = [f'{s.t_start:.2f} to {s.t_end:.2f} s: {s.why}' for s in got.outside[:MOST]]
+        out.append('outside what was recorded, ' + '; '.join(parts) + last)
+    return out

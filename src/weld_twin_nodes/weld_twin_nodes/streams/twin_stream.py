@@ -29,6 +29,11 @@ class Sample(NamedTuple):
     q : array, shape (n,) [rad or m]
     poses : Poses
         One position (3,) and rotation (3, 3).
+    wrench : array, shape (6,), optional [N, N m]
+        In force at the joint state, in ``wrench_frame``.
+    wrench_frame : str
+        'tool' or 'base'.
+    temperature : float, optional [degC]
 
     """
 
@@ -36,6 +41,9 @@ class Sample(NamedTuple):
     pose_stamp: int
     q: Array
     poses: Poses
+    wrench: Array | None = None
+    wrench_frame: str = 'tool'
+    temperature: float | None = None
 
 
 class JointStream:
@@ -112,16 +120,18 @@ class JointStream:
         if self._epoch is None:
             self._epoch = stamp
         n = self.twin.robot.n
-        temperature = self._temperature.at(stamp)
+        wrench, frame = self._wrench.at(stamp), self._intake.wrench_frame.meaning
+        warm = self._temperature.at(stamp)
+        temperature = None if warm is None else float(warm[0])
         joints, poses = self._live.step(
             (stamp - self._epoch) * 1e-9,
             row[:n],
             None if np.isnan(row[n:]).any() else row[n:],
-            self._wrench.at(stamp),
-            None if temperature is None else float(temperature[0]),
-            self._intake.wrench_frame.meaning,
+            wrench,
+            temperature,
+            frame,
         )
-        return Sample(stamp, stamp + self._delay, joints, poses)
+        return Sample(stamp, stamp + self._delay, joints, poses, wrench, frame, temperature)
 
 
 def _keep(signal: HeldSignal, taken: Taken | None) -> None:

@@ -24,19 +24,22 @@ from ...arrays import Array
 from ...recording import Recording
 from ...twin.domain import Domain
 from ...twin.posterior import Directions, Posterior
+from ..algebra.fit import LEAST_TURN, coordinates, design
 from ..algebra.independent_rows import effective_share
-from ..algebra.fit import coordinates, design
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Model, Problem, Scale
 from . import plausible_arm
-from .leftover import Unseen, leftover, posture_blocks
 from .left_open import left_open
+from .leftover import Unseen, leftover, posture_blocks
 
 ROWS = 9000
 """Rows looked at; more show the same directions."""
 FRAME_WIDTHS = (0.05, 0.05)
 """Standard deviation of an aligned frame about the fitted one before the data [m, rad]: a guess at
 a flange or a tripod is good to some centimetres and degrees."""
+LEAST = 1e-6
+"""Least noise of a position per axis [m]: no instrument is better, and a simulated cell without
+noise would leave no digits for what is open."""
 ROUNDS = 12
 TRUST = 4.0
 """So many coordinates' worth of belief in the usual sizes, against what this arm shows."""
@@ -87,6 +90,11 @@ def allowed(
     """
     recordings = problem.recordings
     problem, scale = _thinned(problem, scale)
+    scale = replace(
+        scale,
+        position=max(scale.position, LEAST),
+        orientation=max(scale.orientation, LEAST_TURN * LEAST),
+    )
     effects = plausible_arm.directions(model.robot, model.found)
     frames = tuple(frame for frame in ('base', 'tool') if frame in problem.align)
     what = Directions(frames, len(problem.recordings), effects)
@@ -133,9 +141,7 @@ def _rows(
     return Rows(problem.whitened(parts, scale), residual, share)
 
 
-def _unseen(
-    problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows
-) -> Unseen:
+def _unseen(problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows) -> Unseen:
     own, _ = design(problem, model, scale)
     pull, x = np.zeros(own.shape[0]), np.zeros(own.shape[0])
     if precision.size:
@@ -201,10 +207,18 @@ def learned(rows: Rows, prior: Prior) -> tuple[Array, float]:
 
 def _solved(normal: Array, right: Array, middle: Array, size: Array) -> tuple[Array, Array]:
     """Return mean and variance of coordinates with a prior about ``middle``, shapes (P,)."""
-    factor = cho_factor(normal * np.outer(size, size) + np.eye(size.size))
+    factor = _factor(normal * np.outer(size, size))
     mean = middle + size * cho_solve(factor, size * (right - normal @ middle))
     spread = np.diag(cho_solve(factor, np.eye(size.size))) * size**2
     return mean, spread
+
+
+def _factor(information: Array) -> tuple[Array, bool]:
+    """Return the Cholesky factor of the data's information and a prior of unit width."""
+    # Rounding of the largest entries must not outweigh the prior in open directions.
+    jitter = 1.0 + 1e-14 * float(np.trace(information))
+    factor, lower = cho_factor(information + jitter * np.eye(information.shape[0]))
+    return factor, bool(lower)
 
 
 def conditioned(rows: Rows, prior: Prior, width: Array, noise: float) -> tuple[Array, Array]:
@@ -214,7 +228,7 @@ def conditioned(rows: Rows, prior: Prior, width: Array, noise: float) -> tuple[A
     middle = prior.middle / width
     system = weight * unit @ unit.T
     right = weight * unit @ rows.residual - system @ middle
-    factor = cho_factor(system + np.eye(width.size))
+    factor = _factor(system)
     inverse = cho_solve(factor, np.eye(width.size))
     mean = prior.middle + width * (inverse @ right)
     return mean, 0.5 * (inverse + inverse.T) * np.outer(width, width)

@@ -17,6 +17,7 @@ from scipy.stats import chi2
 
 from ...arrays import Array
 from ..algebra.fit import solve_scaled
+from ..algebra.gram import Index
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem, Scale
 
@@ -100,7 +101,7 @@ def leftover(
     """
     samples = _by_sample(problem)
     errors, moments = _predicted(unseen, given, samples)
-    good = np.concatenate([w for w in scale.weights])
+    good = np.concatenate(list(scale.weights))
     out = []
     for part, unit in ((slice(0, 3), scale.position), (slice(3, 6), scale.orientation)):
         wide = [k for k, index in enumerate(samples) if index.size >= part.stop]
@@ -117,9 +118,10 @@ def leftover(
     return _quiet(problem, out[0], floor), out[1]
 
 
-def _by_sample(problem: Problem) -> list[Array]:
+def _by_sample(problem: Problem) -> list[Index]:
     """Return the row numbers of every sample."""
-    out, at = [], 0
+    out: list[Index] = []
+    at = 0
     for c, m in zip(problem.rows, problem.samples, strict=True):
         out += list(at + np.arange(c * m).reshape(m, c))
         at += c * m
@@ -127,28 +129,26 @@ def _by_sample(problem: Problem) -> list[Array]:
 
 
 def _predicted(
-    unseen: Unseen, given: Given, samples: list[Array]
+    unseen: Unseen, given: Given, samples: list[Index]
 ) -> tuple[list[Array], list[Array]]:
     """Return the error of every sample predicted from other blocks, and its second moment."""
-    errors = np.array(unseen.residual)
+    errors, shifts = np.array(unseen.residual), np.zeros(unseen.residual.size)
     normal = unseen.own @ unseen.own.T + np.diag(unseen.precision)
     right = unseen.own @ unseen.residual - unseen.pull
-    factors = {}
+    covariances: dict[int, Array] = {}
     for b in np.unique(unseen.labels):
         out = unseen.labels == b
         mine = unseen.own[:, out]
         step = solve_scaled(normal - mine @ mine.T, right - mine @ unseen.residual[out], 1e-9)
+        mean, covariances[int(b)] = given(~out)
         errors[out] -= step @ mine
-        mean, covariance = given(~out)
         # The mean is counted from the fit to all rows, the error from the fit to the others.
-        moved = mean @ unseen.columns[:, out] - step @ mine
-        factors[b] = (covariance, dict(zip(np.flatnonzero(out).tolist(), moved, strict=True)))
+        shifts[out] = mean @ unseen.columns[:, out] - step @ mine
     moments = []
     for index in samples:
-        covariance, moved = factors[unseen.labels[index[0]]]
         columns = unseen.columns[:, index]
-        shift = np.array([moved[k] for k in index.tolist()])
-        moments.append(columns.T @ covariance @ columns + np.outer(shift, shift))
+        spread = columns.T @ covariances[int(unseen.labels[index[0]])] @ columns
+        moments.append(spread + np.outer(shifts[index], shifts[index]))
     return [errors[index] for index in samples], moments
 
 

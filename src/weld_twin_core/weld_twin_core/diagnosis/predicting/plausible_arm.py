@@ -99,7 +99,9 @@ def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
     out = [np.zeros(0)]
     for effect in effects:
         if isinstance(effect, TransmissionRipple):
-            out.append(0.0 * effect.coordinates() if effect.joint in dense else -_low(effect, found))
+            out.append(
+                0.0 * effect.coordinates() if effect.joint in dense else -_low(effect, found)
+            )
             continue
         straight = [p.linear for p, _ in effect.components() if p.differentiable]
         out.append(np.where(straight, -effect.coordinates(), 0.0))

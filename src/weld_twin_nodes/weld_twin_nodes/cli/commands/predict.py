@@ -33,13 +33,17 @@ def run(args: argparse.Namespace) -> int:
     """Write the bag; say how far measured and twin are apart where something was measured."""
     from weld_twin_msgs_py.bags import read_recording
 
-    from ...offline.prediction import prediction_twin, write_prediction
+    from ...offline.prediction import predictor, told_sureness, write_prediction
 
     robot = robot_of(args)
     recording = read_recording(args.bag, robot, topics_of(args))
-    twin = prediction_twin(robot, args.model, args.bag, recording, args.setup)
+    model = predictor(robot, args.model, args.bag, recording, args.setup)
     made = {'model': str(args.model)}
-    left = write_prediction(args.out, twin, recording, storage=args.storage, provenance=made)
-    line = f'{args.out}: {recording.joints.t.size} poses with {len(twin.effects)} effects'
-    print(line if left is None else f'{line}; measured minus twin RMS {left * 1e3:.4f} mm')
+    got = write_prediction(args.out, model, recording, storage=args.storage, provenance=made)
+    line = f'{args.out}: {recording.joints.t.size} poses with {len(model.twin.effects)} effects'
+    if got.rms_m is not None:
+        line += f'; measured minus twin RMS {got.rms_m * 1e3:.4f} mm'
+    print(line)
+    for sentence in told_sureness(model, got):
+        print(sentence)
     return 0

@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Covariances of predicted poses: against draws of whole models, and by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.effects import REGISTRY
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.domain import Domain
+from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior, pose_covariances
+from weld_twin_core.twin.twin import Twin
+
+DRAWS = 4000
+
+
+def motion(robot, count=5, seed=1):
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-1.5, 1.5, (count, robot.n))
+    return Recording('m', JointMotion(np.arange(float(count)), q, None, True))
+
+
+def everywhere(robot):
+    full = tuple(((-10.0, 10.0),) for _ in range(robot.n))
+    turns = tuple(not slides for slides in robot.prismatic)
+    return Domain(robot.joint_names, full, (0.02,) * robot.n, turns)
+
+
+def certain(robot):
+    return Discrepancy(0.0, 0.0, np.zeros(robot.n), 0.1)
+
+
+def posterior(robot, what, covariance, mean=None, discrepancy=None):
+    mean = np.zeros(what.count) if mean is None else mean
+    return Posterior(what, mean, covariance, discrepancy or certain(robot), everywhere(robot))
+
+
+def drawn(robot, effects, steps, recording):
+    """Poses of one model after another, each frame and effect moved: nothing is linearised."""
+    out = []
+    for step in steps:
+        base, tool = np.array(robot.T_world_base), np.array(robot.T_flange_tool)
+        base[:3, :3] = Rotation.from_rotvec(step[3:6]).as_matrix() @ base[:3, :3]
+        base[:3, 3] += step[:3]
+        tool[:3, :3] = tool[:3, :3] @ Rotation.from_rotvec(step[9:12]).as_matrix()
+        tool[:3, 3] += step[6:9]
+        moved, at = [], 12
+        for effect in effects:
+            now = effect.coordinates()
+            moved.append(effect.with_coordinates(now + step[at : at + now.size]))
+            at += now.size
+        twin = Twin(robot.with_frames(base=base, tool=tool), tuple(moved))
+        out.append(twin.poses(recording))
+    return out
+
+
+def test_the_covariance_is_that_of_poses_of_drawn_models():
+    robot = load('ur5')
+    joint = robot.joint_names
+    effects = (
+        REGISTRY['joint_offset'](joint[1], 1e-3),
+        REGISTRY['link_twist'](joint[2], -5e-4),
+        REGISTRY['joint_compliance'](joint[1], 2e-5),
+        REGISTRY['transmission_ripple'](joint[0], [3e-4, 1e-4], [1.0, 2.0], [0.3, -1.0]),
+    )
+    what = Directions(('base', 'tool'), 1, effects)
+    rng = np.random.default_rng(0)
+    half = rng.normal(size=(what.count, what.count)) * 3e-4 / np.sqrt(what.count)
+    half[14] *= 0.02  # a compliance is some 1e-5 rad/(N m)
+    mean = 1e-4 * rng.normal(size=what.count)
+    mean[14] *= 0.02
+    recording = motion(robot)
+    got = pose_covariances(
+        posterior(robot, what, half @ half.T, mean),
+        Twin(robot, effects),
+        recording,
+        recording.joints.t,
+    )
+    middle = Twin(robot, effects).poses(recording)
+    steps = mean + rng.normal(size=(DRAWS, what.count)) @ half.T
+    off = []
+    for poses in drawn(robot, effects, steps, recording):
+        turn = Rotation.from_matrix(poses.rotation) * Rotation.from_matrix(middle.rotation).inv()
+        off.append(np.hstack([poses.position - middle.position, turn.as_rotvec()]))
+    off = np.array(off)
+    sampled = np.einsum('dmi,dmj->mij', off, off) / DRAWS
+    for mine, theirs in zip(got, sampled, strict=True):
+        size = np.sqrt(np.diag(theirs))
+        # A correlation of 4,000 draws is sure to 1 / sqrt(4000) = 0.016; five times that.
+        assert np.abs((mine - theirs) / np.outer(size, size)).max() < 0.08
+
+
+def test_turns_are_about_the_fixed_axes_of_the_world():
+    """A tool that lies on its side: its own z axis points along the world's x."""
+    robot = Robot.from_mapping(
+        {
+            'name': 'one',
+            'joints': [{'name': 'j', 'a': 0.0, 'alpha': 0.0, 'd': 0.0}],
+            'tool': {'xyz': [0.5, 0, 0], 'quat_xyzw': [0, np.sqrt(0.5), 0, np.sqrt(0.5)]},
+        }
+    )
+    what = Directions(('tool',), 1, ())
+    covariance = np.zeros((6, 6))
+    covariance[5, 5] = 4e-6  # 2 mrad about the tool's own z axis
+    still = Recording('m', JointMotion(np.zeros(1), np.zeros((1, 1)), None, True))
+    got = pose_covariances(posterior(robot, what, covariance), Twin(robot), still, np.zeros(1))[0]
+    wanted = np.zeros((6, 6))
+    wanted[3, 3] = 4e-6
+    np.testing.assert_allclose(got, wanted, atol=1e-15)
+
+
+def test_a_turn_of_the_base_moves_the_tool_by_its_lever():
+    robot = Robot.from_mapping(
+        {
+            'name': 'one',
+            'joints': [{'name': 'j', 'a': 0.8, 'alpha': 0.0, 'd': 0.0}],
+        }
+    )
+    what = Directions(('base',), 2, ())
+    covariance = np.zeros((12, 12))
+    covariance[11, 11] = 1e-6  # 1 mrad about z, of the second set-up
+    still = Recording('m', JointMotion(np.zeros(1), np.zeros((1, 1)), None, True))
+    known = posterior(robot, what, covariance)
+    got = pose_covariances(known, Twin(robot), still, np.zeros(1), setup=1)[0]
+    wanted = np.zeros((6, 6))
+    wanted[1, 1], wanted[5, 5], wanted[1, 5], wanted[5, 1] = 0.64e-6, 1e-6, 0.8e-6, 0.8e-6
+    np.testing.assert_allclose(got, wanted, atol=1e-15)
+    assert np.abs(pose_covariances(known, Twin(robot), still, np.zeros(1))).max() == 0.0
+    with pytest.raises(ModelError, match='no base frame 2'):
+        pose_covariances(known, Twin(robot), still, np.zeros(1), setup=2)
+
+
+def test_only_the_discrepancy_grows_with_the_distance():
+    robot = load('ur5')
+    narrow = tuple(((-0.5, 0.5),) for _ in range(6))
+    domain = Domain(robot.joint_names, narrow, (0.02,) * 6, (True,) * 6)
+    rest = Discrepancy(2e-5, 3e-5, np.full(6, 1e-4), 0.1)
+    known = Posterior(Directions((), 1, ()), np.zeros(0), np.zeros((0, 0)), rest, domain)
+    q = np.zeros((4, 6))
+    q[:, 0] = [0.0, 0.5, 0.55, 2.0]
+    still = Recording('m', JointMotion(np.arange(4.0), q, None, True))
+    got = pose_covariances(known, Twin(robot), still, still.joints.t)
+    np.testing.assert_allclose(
+        got[0], np.diag(np.repeat([4e-10, 9e-10], 3)), rtol=1e-12, atol=1e-24
+    )
+    np.testing.assert_allclose(got[1], got[0], atol=1e-24)
+    # Half way and beyond the reach: a turn about joint 1, which is the world's z.
+    np.testing.assert_allclose(got[2, 5, 5] - 9e-10, 0.25e-8, rtol=1e-9)
+    np.testing.assert_allclose(got[3, 5, 5] - 9e-10, 1e-8, rtol=1e-9)
+
+
+def test_a_covariance_that_cannot_be_is_refused():
+    robot = load('ur5')
+    what = Directions(('base',), 1, ())
+    with pytest.raises(DataError, match='not symmetric'):
+        posterior(robot, what, np.triu(np.ones((6, 6))))
+    with pytest.raises(DataError, match='negative variance'):
+        _ = posterior(robot, what, np.ones((6, 6)) - 0.5 * np.eye(6)).spread

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How sure the twin is, one joint state at a time, at a cost that a control cycle can bear."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array
+from ..recording import JointMotion, Recording, Signal
+from .features import Features
+from .posterior import Posterior
+from .twin import Twin
+
+EVERY = 0.1
+"""Shortest time between two looks [s]. One takes some milliseconds, so that this costs some
+per cent of a core at any rate of joint states; in between the covariance is held, while a tool at
+1 m/s goes on by 100 mm and its covariance changes by some per cent."""
+MOVED = 0.005
+"""Least motion of a joint [rad or m] that is worth another look."""
+LEAD = np.linspace(-0.5, 0.0, 6)
+"""Motion at constant speed before the sample [s], so that lag and play are as in the middle of a
+motion."""
+
+
+class LivePosterior:
+    """
+    The covariance of the twin's pose while joint states come in.
+
+    Parameters
+    ----------
+    posterior : Posterior
+
+    """
+
+    def __init__(self, posterior: Posterior) -> None:
+        self.posterior = posterior
+        self._time = -np.inf
+        self._q: Array | None = None
+        self._covariance = np.zeros((6, 6))
+        self._outside: tuple[str, ...] = ()
+
+    @property
+    def outside(self) -> tuple[str, ...]:
+        """Return why the latest posture looked at lies outside what was recorded."""
+        return self._outside
+
+    def covariance(
+        self,
+        twin: Twin,
+        t: float,
+        q: Array,
+        wrench: Array | None = None,
+        wrench_frame: str = 'tool',
+        temperature: float | None = None,
+    ) -> Array:
+        """
+        Return the covariance of the true pose, shape (6, 6), held between two looks.
+
+        Parameters
+        ----------
+        twin : Twin
+        t : float [s]
+            Stamp of the joint state.
+        q : array, shape (n,)
+        wrench : array, shape (6,), optional [N, N m]
+        wrench_frame : str
+        temperature : float, optional [degC]
+
+        """
+        since = t - self._time
+        if self._q is None or since < 0.0:
+            self._look(twin, q, np.zeros_like(q), wrench, wrench_frame, temperature)
+        elif since >= EVERY and np.abs(q - self._q).max() > MOVED:
+            speed = (q - self._q) / since
+            self._look(twin, q, speed, wrench, wrench_frame, temperature)
+        else:
+            return self._covariance
+        self._time, self._q = t, np.array(q)
+        return self._covariance
+
+    def _look(
+        self,
+        twin: Twin,
+        q: Array,
+        speed: Array,
+        wrench: Array | None,
+        wrench_frame: str,
+        temperature: float | None,
+    ) -> None:
+        motion = JointMotion(LEAD, q + LEAD[:, None] * speed, np.tile(speed, (LEAD.size, 1)))
+        now = LEAD[-1:]
+        recording = Recording(
+            'live',
+            motion,
+            None,
+            None if wrench is None else Signal(now, wrench[None]),
+            wrench_frame,
+            None if temperature is None else Signal(now, np.array([temperature])),
+        )
+        self._covariance = self.posterior.pose_covariance(Features(twin, recording, now))[0]
+        found = self.posterior.domain.outside(
+            q[None],
+            speed[None],
+            None if wrench is None else wrench[None],
+            None if temperature is None else np.array([temperature]),
+        )
+        self._outside = tuple(item.why for item in found)

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The entry ``posterior`` of a diagnosis file: how sure its model is of a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array, readonly
+from weld_twin_core.effects import effects_from_list
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_core.twin.domain import Domain
+from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior
+
+from .diagnosis_model import read_diagnosis
+
+
+def read_posterior(robot: Robot, path: Path | str) -> Posterior | None:
+    """
+    Return the posterior of a diagnosis file; None where it was written without one.
+
+    Raises
+    ------
+    ModelError
+        The file is no diagnosis, or its posterior cannot be used with the robot.
+
+    """
+    entry = read_diagnosis(path).get('posterior')
+    if entry is None:
+        return None
+    try:
+        return _posterior(robot, entry)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ModelError(f"the posterior of diagnosis '{path}' lacks {error}") from None
+    except (ModelError, DataError) as error:
+        raise ModelError(f"diagnosis '{path}': {error}") from None
+
+
+def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
+    what = Directions(
+        tuple(entry['frames']), int(entry['setups']), effects_from_list(entry['effects'], robot)
+    )
+    rest = entry['discrepancy']
+    discrepancy = Discrepancy(
+        _size(rest['position_m'], 'position_m'),
+        _size(rest['orientation_rad'], 'orientation_rad'),
+        readonly(rest['curves'], (robot.n,), 'posterior.discrepancy.curves'),
+        max(_size(rest['reach'], 'reach'), 1e-9),
+    )
+    return Posterior(
+        what,
+        np.array([float(item['mean']) for item in entry['coordinates']]),
+        _covariance(entry['covariance'], what.count),
+        discrepancy,
+        _domain(robot, entry['recorded']),
+        tuple(str(item) for item in entry.get('left_open', ())),
+    )
+
+
+def _covariance(rows: Any, count: int) -> Array:
+    """Return the whole of a lower triangle."""
+    if len(rows) != count or any(len(row) != k + 1 for k, row in enumerate(rows)):
+        raise DataError(f'posterior.covariance must be a lower triangle of {count} rows')
+    out = np.zeros((count, count))
+    for k, row in enumerate(rows):
+        out[k, : k + 1] = row
+        out[: k + 1, k] = row
+    return out
+
+
+def _domain(robot: Robot, entry: Mapping[str, Any]) -> Domain:
+    joints = entry['joints']
+    names = tuple(str(joint['name']) for joint in joints)
+    if names != tuple(robot.joint_names):
+        raise ModelError(
+            f'it was made for joints {", ".join(names)}; robot {robot.name!r} has '
+            + ', '.join(robot.joint_names)
+        )
+    return Domain(
+        names,
+        tuple(
+            tuple((float(low), float(high)) for low, high in joint['measured']) for joint in joints
+        ),
+        tuple(_size(joint['margin'], 'margin') for joint in joints),
+        tuple(bool(joint['turns']) for joint in joints),
+        None if entry['speeds'] is None else tuple(float(v) for v in entry['speeds']),
+        _pair(entry['load']),
+        _pair(entry['temperature']),
+    )
+
+
+def _pair(value: Any) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    low, high = value
+    return float(low), float(high)
+
+
+def _size(value: Any, name: str) -> float:
+    size = float(value)
+    if not 0.0 <= size < np.inf:
+        raise DataError(f'posterior: {name} must be a size, got {value!r}')
+    return size

@@ -109,7 +109,7 @@ def test_joints_spread_over_publishers_are_put_together_by_equal_stamps():
     for sample in (out[0], out[2]):
         assert sample.qd is None
         np.testing.assert_array_equal(sample.q, Q)
-    assert joints.others == 1
+    assert joints.parts == 1
 
 
 def test_joints_whose_other_half_never_comes_are_refused_and_not_held_over():
@@ -127,7 +127,7 @@ def test_joints_whose_other_half_never_comes_are_refused_and_not_held_over():
 def test_messages_about_other_joints_are_passed_over():
     joints = JointStates(ROBOT)
     assert joints.take(state(['gripper', 'track'], [0.1, 2.0])) is None
-    assert joints.parts == 1
+    assert joints.others == 1
     sample = joints.take(state(['gripper', *NAMES[::-1]], [0.1, *Q[::-1]]))
     np.testing.assert_array_equal(sample.q, Q)
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm import chain
+from weld_twin_core.arm.bulk import bulk_kernel as bulk
+from weld_twin_core.arm.bulk.buffers import aligned
+from weld_twin_core.arm.bulk.bulk_kernel import LENGTHS, BulkKernel, kernel_of
+from weld_twin_core.arm.bulk.half_angle import COSINE, SINE, HalfAngle, sincos
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError
-from weld_twin_core.kernels import bulk
-from weld_twin_core.kernels.buffers import aligned
-from weld_twin_core.kernels.bulk import LENGTHS, BulkKernel, kernel_of
-from weld_twin_core.kernels.half_angle import COSINE, SINE, HalfAngle, sincos
 from weld_twin_core.kernels.single_pose import SinglePose
 
 EXACT = 1e-13

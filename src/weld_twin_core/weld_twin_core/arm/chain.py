@@ -3,10 +3,6 @@
 """
 The kinematic chain: poses, frames and the derivative of the pose by every channel.
 
-A *channel* is one scalar of the chain that an effect may displace: ``('q', i)``,
-``('theta' | 'd' | 'a' | 'alpha' | 'beta', i)``, ``('base' | 'tool' | 'pose', 0..5)`` or
-``('tau', i)``. A *shift* maps channels to displacements that broadcast with the samples.
-
 Inside, vectors are kept components first (see `vectors`); public results have the samples first.
 """
 
@@ -21,16 +17,14 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array
 from ..errors import DataError
+from .bulk import kernel_of
+from .channels import NO_SHIFT, ROW_CHANNELS, Channel, Shift
 from .robot import Robot
 from .rotation import left_jacobian, rotation_matrix, transform
 from .vectors import components, cross, pad, samples_first
 
-Channel = tuple[str, int]
-Shift = Mapping[Channel, Array]
-ROW_CHANNELS = ('theta', 'd', 'a', 'alpha', 'beta')
-NO_SHIFT: Shift = {}
 MANY = 5000
-"""Joint positions from which `forward` leaves the work to `kernels.bulk`..."""
+"""Joint positions from which `forward` leaves the work to `bulk`..."""
 MOST_JOINTS = 8
 """... and joints up to which it does: there the work grows threefold with every other joint."""
 
@@ -223,8 +217,6 @@ def forward(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
     """
     q = positions(robot, q)
     if q.size >= MANY * robot.n and robot.n <= MOST_JOINTS and not shift:
-        from ..kernels.bulk import kernel_of
-
         return kernel_of(robot).poses(q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 4, 4)
     chain = frames(robot, q, shift)
     return transform(chain.rotation, chain.position)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array
-from .chain import NO_SHIFT, Frames, Shift, frames, positions
+from .chain import Frames, frames, positions
+from .channels import NO_SHIFT, Shift
 from .robot import Robot
 from .vectors import components, cross, dot, pad
 

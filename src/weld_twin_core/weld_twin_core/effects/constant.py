@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..arm.chain import Channel, Shift
+from ..arm.channels import Channel, Shift
 from ..arrays import Array
 from .effect import Effect
 from .view import Parameter, Stage, View, single

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arm.chain import Shift
+from ..arm.channels import Shift
 from ..arrays import Array
 from .effect import Effect
 from .registry import register

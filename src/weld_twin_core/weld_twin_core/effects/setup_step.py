@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arm.chain import Channel, Shift
+from ..arm.channels import Channel, Shift
 from ..arrays import Array
 from .effect import Effect
 from .registry import register

@@ -10,7 +10,7 @@ from numbers import Real
 
 import numpy as np
 
-from ..arm.chain import Channel, Shift
+from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError

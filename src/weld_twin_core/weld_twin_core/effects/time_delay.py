@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass
 
-from ..arm.chain import Shift
+from ..arm.channels import Shift
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View, single

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.chain import Shift
+from ..arm.channels import Shift
 from ..arrays import Array
 from .associative_scan import linear
 from .effect import Effect, MemoryEffect

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.chain import Channel, Frames, Shift, frames
+from ..arm.chain import Frames, frames
+from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 

@@ -24,11 +24,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 
-from ..arm.chain import Channel
+from ..arm.bulk import BulkKernel
+from ..arm.channels import Channel
 from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix, transform
 from ..arrays import Array
-from .bulk import BulkKernel
 
 SETTLED = 1e-12
 """Step [m, rad] that ends the iteration."""

@@ -32,11 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
+from ..arm.bulk.buffers import aligned, unbuffered
+from ..arm.bulk.half_angle import sincos
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
-from .buffers import aligned, unbuffered
-from .half_angle import sincos
 
 ROUNDING = 1e-14
 """Remainder of the features, relative to the strongest, that counts as none."""

@@ -14,12 +14,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arm.chain import Channel, Shift, column
+from ..arm.chain import column
+from ..arm.channels import Channel, Shift
 from ..arrays import Array
 from ..effects.effect import Effect, Stage, View
 from ..recording import Recording
 from .resampling import Picker
-from .twin import Evaluation, Twin, load_torque
+from .stages import Evaluation, load_torque
+from .twin import Twin
 
 
 class Features:

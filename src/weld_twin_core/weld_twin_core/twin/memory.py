@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.chain import Shift
+from ..arm.channels import Shift
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect, Stage, View
 from ..recording import JointMotion, backward_rates

@@ -6,21 +6,19 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..arm.chain import Channel, displaced_robot
+from ..arm.chain import displaced_robot
+from ..arm.channels import Channel
 from ..arrays import Array
 from ..effects.effect import View
 from ..errors import DataError
 from ..kernels.single_pose import SinglePose
 from .memory import added, in_series
 from .poses import Poses, posed
-
-if TYPE_CHECKING:
-    from .twin import Twin
-
+from .stages import EffectStages
 
 BESIDE = ('tau', 'pose')
 """Channels that act through the joints and behind the chain, not within it."""
@@ -50,7 +48,7 @@ class LiveTwin:
 
     """
 
-    def __init__(self, twin: Twin) -> None:
+    def __init__(self, twin: EffectStages) -> None:
         self._twin = twin
         self._single = SinglePose(twin.robot)
         self._others: dict[Channel, float] | None = None
@@ -62,12 +60,12 @@ class LiveTwin:
         self._moved = Rate()
 
     @property
-    def twin(self) -> Twin:
+    def twin(self) -> EffectStages:
         """Return the robot with its effects."""
         return self._twin
 
     @twin.setter
-    def twin(self, twin: Twin) -> None:
+    def twin(self, twin: EffectStages) -> None:
         self._twin = twin
         self._others = self._changed = None
 

@@ -4,27 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..arm.chain import Channel, Frames, Shift, column, forward
-from ..arm.dynamics import chain_gravity_torque, wrench_torque
+from ..arm.chain import column, forward
+from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
-from ..effects.effect import Effect, Parameter, Stage, View
-from ..errors import ModelError
+from ..effects.effect import Parameter, Stage, View
 from ..recording import JointMotion, Recording
 from .memory import Tangent, indexed, rates, run_all
-from .poses import Poses, posed
+from .poses import Poses
 from .resampling import Picker
+from .stages import EffectStages, Evaluation
 from .stepping import LiveTwin
 
-__all__ = ['Component', 'Evaluation', 'LiveTwin', 'Poses', 'Twin', 'load_torque']
-
-POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
+__all__ = ['Component', 'LiveTwin', 'Poses', 'Twin']
 
 
 @dataclass(frozen=True)
@@ -37,17 +34,7 @@ class Component:
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
-    """Everything one pass through the stages found out; `Twin` turns it into results."""
-
-    view: View
-    chain: Frames
-    poses: Poses
-    tangents: tuple[Tangent, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Twin:
+class Twin(EffectStages):
     """
     A robot with the effects that are believed to act on it.
 
@@ -78,25 +65,6 @@ class Twin:
     [ 0.192 -0.817  0.   ] mm
 
     """
-
-    robot: Robot
-    effects: tuple[Effect, ...] = ()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, 'effects', tuple(self.effects))
-        for effect in self.effects:
-            effect.check(self.robot)
-        counts = {effect.vector().shape[:-1] for effect in self.effects} - {(), (1,)}
-        if len(counts) > 1:
-            raise ModelError(
-                'the effects carry different numbers of draws: '
-                f'{sorted(count for (count,) in counts)}; give all the same'
-            )
-
-    @property
-    def draws(self) -> tuple[int, ...]:
-        """Return the draw axis of the effects' parameters: (D,), or () for plain numbers."""
-        return np.broadcast_shapes(*(effect.vector().shape[:-1] for effect in self.effects))
 
     # Results ---------------------------------------------------------------------------------
 
@@ -176,11 +144,6 @@ class Twin:
             out[:, k] = self.pose_change(run, shift)
         return poses, np.moveaxis(out, (0, 1), (-2, -1))
 
-    @property
-    def delay(self) -> float:
-        """Return how late the measurement stamps are, in total [s]."""
-        return float(sum(effect.vector()[0] for effect in self._of(Stage.CLOCK)))
-
     def _full(self, run: Evaluation) -> Poses:
         """Return the poses with every draw written out, whether it moves the tool or not."""
         samples = (*self.draws, run.view.t.shape[-1])
@@ -205,12 +168,9 @@ class Twin:
             return [(channel, 1.0)]
         return [
             (('q', channel[1]), effect.number('compliance'))
-            for effect in self._of(Stage.ELASTIC)
+            for effect in self.of_stage(Stage.ELASTIC)
             if self.robot.index(str(effect.site)) == channel[1]
         ]
-
-    def _of(self, stage: Stage) -> list[Effect]:
-        return [effect for effect in self.effects if effect.stage == stage]
 
     # Evaluation ------------------------------------------------------------------------------
 
@@ -237,7 +197,7 @@ class Twin:
             picker = None
         else:
             t = np.asarray(at, dtype=np.float64)
-            for effect in self._of(Stage.CLOCK):
+            for effect in self.of_stage(Stage.CLOCK):
                 t = t - effect.displace(_clock_view(self.robot, motion))[('clock', 0)][..., :1]
             q, qd = motion.at(t)
             picker = Picker(motion, t)
@@ -258,50 +218,9 @@ class Twin:
                 picked += indexed(k, gradient if at is not None else [{}] * len(gradient))
         return view, picked
 
-    def pointwise(self, view: View, tangents: Sequence[Tangent] | None = None) -> Evaluation:
-        """
-        Run the stages without memory.
-
-        ``tangents`` are the derivatives of what came before; left out, none are computed.
-        """
-        view, ordered = self._stages(view, tangents)
-        return Evaluation(view, view.frames, posed(view), ordered)
-
-    def displaced(self, view: View) -> View:
-        """Run the stages without memory and leave the poses to the caller."""
-        return self._stages(view, None)[0]
-
-    def _stages(
-        self, view: View, tangents: Sequence[Tangent] | None
-    ) -> tuple[View, tuple[Tangent, ...]]:
-        slopes: dict[Channel, Any] = {}
-        own: list[Tangent] = []
-        for stage in POINTWISE:
-            effects = [(k, e) for k, e in enumerate(self.effects) if e.stage == stage]
-            if stage == Stage.LOAD and (effects or self._of(Stage.ELASTIC)):
-                view = view.displaced(load_torque(view), keep_frames=True)
-            if tangents is not None:
-                for k, effect in effects:
-                    own += indexed(k, effect.gradient(view))
-                    for key, value in effect.slope(view).items():
-                        slopes[key] = slopes.get(key, 0.0) + value
-            for shift in [effect.displace(view) for _, effect in effects]:
-                view = view.displaced(shift, keep_frames=stage in (Stage.LOAD, Stage.POSE))
-        before = [(k, c, _sloped(shift, slopes)) for k, c, shift in tangents or ()]
-        return view, tuple(sorted(before + own, key=lambda item: item[:2]))
-
     def live(self) -> LiveTwin:
         """Return a stepper that gives the same poses one joint state at a time."""
         return LiveTwin(self)
-
-
-def load_torque(view: View) -> Shift:
-    """Return the load torque of every joint: links, declared payload and tool wrench."""
-    chain = view.frames
-    torque = chain_gravity_torque(view.robot, chain)
-    if view.wrench is not None:
-        torque = torque + wrench_torque(view.robot, chain, view.wrench, view.wrench_frame)
-    return {('tau', i): torque[i] for i in range(view.robot.n)}
 
 
 def _view(robot: Robot, recording: Recording, t: Array, q: Array, qd: Array) -> View:
@@ -320,7 +239,3 @@ def _view(robot: Robot, recording: Recording, t: Array, q: Array, qd: Array) -> 
 
 def _clock_view(robot: Robot, motion: JointMotion) -> View:
     return View(robot, motion.t[:1], motion.t[:1], motion.q[:1], motion.q[:1], motion.static)
-
-
-def _sloped(shift: Shift, slopes: dict[Channel, Any]) -> Shift:
-    return {key: value * (1.0 + slopes.get(key, 0.0)) for key, value in shift.items()}

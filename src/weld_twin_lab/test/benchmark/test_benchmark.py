@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm import chain
+from weld_twin_core.arm.bulk import BulkKernel
 from weld_twin_core.errors import DataError
-from weld_twin_core.kernels.bulk import BulkKernel
 from weld_twin_lab.benchmark.arms import DH_KEYS, calibrated_arm, links, random_positions
 from weld_twin_lab.benchmark.kinematics import OWN, written_out
 from weld_twin_lab.benchmark.peers import find_peers

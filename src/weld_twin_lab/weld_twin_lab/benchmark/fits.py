@@ -10,7 +10,8 @@ import numpy as np
 from scipy.optimize import least_squares, leastsq
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import Channel, forward
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.channels import Channel
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import left_jacobian, rotation_matrix
 from weld_twin_core.arrays import Array

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arm.bulk import BulkKernel
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.kernels.bulk import BulkKernel
 
 from .arms import arm_of, calibrated_arm, random_positions
 from .processes import bag

@@ -10,12 +10,12 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ...arm.bulk import kernel_of
 from ...arm.chain import forward, frames
 from ...arm.robot import Robot
 from ...arm.rotation import rotation_matrix, rotation_vector, transform
 from ...arrays import Array
 from ...errors import ReachError
-from ...kernels.bulk import kernel_of
 from .all_branches import OTHER_POSTURE, gap, past_limit, where, why_not
 from .closed_form import branches, family
 from .continuity import Mask, distances, joined, jumps, reach, travel

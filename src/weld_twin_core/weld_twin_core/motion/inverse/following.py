@@ -21,10 +21,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arm.bulk import BulkKernel, kernel_of
 from ...arm.robot import Robot
 from ...arm.rotation import skew
 from ...arrays import Array
-from ...kernels.bulk import BulkKernel, kernel_of
 from .continuity import LEAP
 
 KNOTS = 16

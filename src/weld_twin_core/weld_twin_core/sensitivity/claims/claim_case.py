@@ -27,7 +27,7 @@ BENT_TORCH = transform(rotation_matrix([0.0, 0.6, 0.0]), np.array([0.1, 0.0, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A robot, a seam and the motions on it; see `measure_case`."""
+    """A robot, a seam and the motions on it; see `every_measure`."""
 
     robot: Robot
     path: Path
@@ -71,33 +71,3 @@ class Case:
 
 
 Measure = Callable[[Case], dict[str, float]]
-
-
-def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
-    """
-    Return everything the claims need to know about a robot on a seam.
-
-    Parameters
-    ----------
-    robot : Robot
-    path : Path
-    seed : int
-        Of the draws that some measures take.
-
-    Returns
-    -------
-    dict of str to float
-        Measures by name; units are in the names of `rules`.
-
-    """
-    from . import combined_measures, geometric_measures, motion_measures
-
-    case = Case(robot, path, seed)
-    out: dict[str, float] = {}
-    for measure in (
-        *geometric_measures.MEASURES,
-        *motion_measures.MEASURES,
-        *combined_measures.MEASURES,
-    ):
-        out |= {key: float(value) for key, value in measure(case).items()}
-    return out

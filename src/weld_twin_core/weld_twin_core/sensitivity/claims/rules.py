@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .judgement import Rule
+from .rule import Rule
 
 _DEGREE_IN_MM = 1e3 * np.pi / 180.0
 _SAME = 1e-3

@@ -8,7 +8,7 @@ from math import prod
 
 import numpy as np
 
-from ..arrays import Array
+from ...arrays import Array
 
 CACHE_LINE = 64
 SHORT = 512

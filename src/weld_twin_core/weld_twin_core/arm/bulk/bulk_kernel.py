@@ -18,10 +18,10 @@ from threading import get_ident
 
 import numpy as np
 
-from ..arm.chain import Channel
-from ..arm.robot import Robot
-from ..arrays import Array
-from ..errors import ModelError
+from ...arrays import Array
+from ...errors import ModelError
+from ..channels import Channel
+from ..robot import Robot
 from .buffers import aligned, unbuffered
 from .half_angle import DEGREE, HalfAngle
 from .regions import ROWS, Division, Region

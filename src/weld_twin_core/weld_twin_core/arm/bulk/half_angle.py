@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array
+from ...arrays import Array
 from .buffers import aligned
 
 SINE = (

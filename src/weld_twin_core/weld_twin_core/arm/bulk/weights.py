@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arm.robot import Robot
-from ..arm.rotation import skew
-from ..arrays import Array
+from ...arrays import Array
+from ..robot import Robot
+from ..rotation import skew
 
 HALF_ANGLE = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0], [0.0, -2.0, 0.0]])
 """(1, c, s) = (1, u, v) @ HALF_ANGLE, with u and v as in `half_angle`."""

@@ -4,7 +4,7 @@
 Where along a chain a DH value acts, which says how little is needed for its screw.
 
 Before the first joint turns, a screw stands still in the world; after the last one, in the tool:
-both follow from the pose by a constant matrix. Up to the cut between the two pieces of `bulk`, a
+both follow from the pose by a constant matrix. Up to the cut between the two pieces of `bulk_kernel`, a
 screw is linear in the features of the near piece. Only the rest has to be carried by it.
 """
 
@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arm.chain import Channel
-from ..arm.robot import Robot
-from ..arrays import Array
-from ..errors import ModelError
+from ...arrays import Array
+from ...errors import ModelError
+from ..channels import Channel
+from ..robot import Robot
 from .weights import Piece, factors, generator
 
 ROWS = 13

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The stages of a twin: what effects without memory do to samples, in bulk and live alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arm.chain import Frames
+from ..arm.channels import Channel, Shift
+from ..arm.dynamics import chain_gravity_torque, wrench_torque
+from ..arm.robot import Robot
+from ..effects.effect import Effect, Stage, View
+from ..errors import ModelError
+from .memory import Tangent, indexed
+from .poses import Poses, posed
+
+POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Everything one pass through the stages found out; `Twin` turns it into results."""
+
+    view: View
+    chain: Frames
+    poses: Poses
+    tangents: tuple[Tangent, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class EffectStages:
+    """
+    A robot with effects that act on it stage by stage.
+
+    Attributes
+    ----------
+    robot : Robot
+    effects : tuple of Effect
+
+    """
+
+    robot: Robot
+    effects: tuple[Effect, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'effects', tuple(self.effects))
+        for effect in self.effects:
+            effect.check(self.robot)
+        counts = {effect.vector().shape[:-1] for effect in self.effects} - {(), (1,)}
+        if len(counts) > 1:
+            raise ModelError(
+                'the effects carry different numbers of draws: '
+                f'{sorted(count for (count,) in counts)}; give all the same'
+            )
+
+    @property
+    def draws(self) -> tuple[int, ...]:
+        """Return the draw axis of the effects' parameters: (D,), or () for plain numbers."""
+        return np.broadcast_shapes(*(effect.vector().shape[:-1] for effect in self.effects))
+
+    @property
+    def delay(self) -> float:
+        """Return how late the measurement stamps are, in total [s]."""
+        return float(sum(effect.vector()[0] for effect in self.of_stage(Stage.CLOCK)))
+
+    def of_stage(self, stage: Stage) -> list[Effect]:
+        """Return the effects of one stage, in the order given."""
+        return [effect for effect in self.effects if effect.stage == stage]
+
+    def pointwise(self, view: View, tangents: Sequence[Tangent] | None = None) -> Evaluation:
+        """
+        Run the stages without memory.
+
+        ``tangents`` are the derivatives of what came before; left out, none are computed.
+        """
+        view, ordered = self._stages(view, tangents)
+        return Evaluation(view, view.frames, posed(view), ordered)
+
+    def displaced(self, view: View) -> View:
+        """Run the stages without memory and leave the poses to the caller."""
+        return self._stages(view, None)[0]
+
+    def _stages(
+        self, view: View, tangents: Sequence[Tangent] | None
+    ) -> tuple[View, tuple[Tangent, ...]]:
+        slopes: dict[Channel, Any] = {}
+        own: list[Tangent] = []
+        for stage in POINTWISE:
+            effects = [(k, e) for k, e in enumerate(self.effects) if e.stage == stage]
+            if stage == Stage.LOAD and (effects or self.of_stage(Stage.ELASTIC)):
+                view = view.displaced(load_torque(view), keep_frames=True)
+            if tangents is not None:
+                for k, effect in effects:
+                    own += indexed(k, effect.gradient(view))
+                    for key, value in effect.slope(view).items():
+                        slopes[key] = slopes.get(key, 0.0) + value
+            for shift in [effect.displace(view) for _, effect in effects]:
+                view = view.displaced(shift, keep_frames=stage in (Stage.LOAD, Stage.POSE))
+        before = [(k, c, _sloped(shift, slopes)) for k, c, shift in tangents or ()]
+        return view, tuple(sorted(before + own, key=lambda item: item[:2]))
+
+
+def load_torque(view: View) -> Shift:
+    """Return the load torque of every joint: links, declared payload and tool wrench."""
+    chain = view.frames
+    torque = chain_gravity_torque(view.robot, chain)
+    if view.wrench is not None:
+        torque = torque + wrench_torque(view.robot, chain, view.wrench, view.wrench_frame)
+    return {('tau', i): torque[i] for i in range(view.robot.n)}
+
+
+def _sloped(shift: Shift, slopes: dict[Channel, Any]) -> Shift:
+    return {key: value * (1.0 + slopes.get(key, 0.0)) for key, value in shift.items()}

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 from ...arm.robot import Robot
 from ...motion.paths import Path
-from . import combined_measures, geometric_measures, motion_measures
 from .claim_case import Case
+from .combined_measures import MEASURES as COMBINED
+from .geometric_measures import MEASURES as GEOMETRIC
+from .motion_measures import MEASURES as MOTION
 
 
 def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
@@ -29,10 +31,6 @@ def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
     """
     case = Case(robot, path, seed)
     out: dict[str, float] = {}
-    for measure in (
-        *geometric_measures.MEASURES,
-        *motion_measures.MEASURES,
-        *combined_measures.MEASURES,
-    ):
+    for measure in (*GEOMETRIC, *MOTION, *COMBINED):
         out |= {key: float(value) for key, value in measure(case).items()}
     return out

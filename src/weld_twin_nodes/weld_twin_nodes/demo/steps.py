@@ -10,10 +10,11 @@ function to report progress with; it leaves its files in ``job.folder`` and its 
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.effects import effects_from_list
@@ -73,8 +74,12 @@ def run_demo(out: Path | str, steps: tuple[Step, ...] = STEPS) -> None:
         with Progress(*columns, console=console) as bars:
             for step in steps:
                 bar = bars.add_task(step.title, total=1.0)
-                step.run(job, lambda part, bar=bar: bars.update(bar, completed=part))
+                step.run(job, partial(_advance, bars, bar))
                 bars.update(bar, completed=1.0)
     for line in job.lines:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     console.print(f'results in {out}', highlight=False)
+
+
+def _advance(bars: Progress, bar: TaskID, part: float) -> None:
+    bars.update(bar, completed=part)

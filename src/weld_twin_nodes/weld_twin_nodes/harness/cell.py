@@ -188,10 +188,12 @@ class Cell:
         """
         tap = Tap(topic)
         row = BY_NAME.get(topic)
-        if row is None and kind is None:
-            raise TwinError(f'{topic!r} is not in the table of topics; say its message class')
+        if kind is None:
+            if row is None:
+                raise TwinError(f'{topic!r} is not in the table of topics; say its message class')
+            kind = row.message_class()
         self.node.create_subscription(
-            kind or row.message_class(),
+            kind,
             topic,
             tap.messages.append,
             DEEP if row is None else replace(row.offered, depth=DEEP).to_rclpy(),
@@ -240,11 +242,8 @@ class Cell:
             if follow:
                 pump.answer(from_messages.stamp_ns(follow.last))
             for k in pump.due(time.monotonic_ns(), BURST):
-                publisher.publish(
-                    self.messages.joint_state(
-                        int(marks[k]), joint_names, motion.q[k], motion.velocity[k]
-                    )
-                )
+                state = int(marks[k]), joint_names, motion.q[k], motion.velocity[k]
+                publisher.publish(self.messages.joint_state(*state))
             return pump.done
 
         self.wait(send, 'the motion to be taken', limit=LIMIT + 0.01 * motion.t.size)

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
 from weld_twin_core.errors import TwinError
@@ -72,6 +73,15 @@ class CellNode(Node):
             ),
             post_callback=self._jumped,
         )
+
+    def get_logger(self) -> RcutilsLogger:
+        """Return the logger of this node."""
+        logger: RcutilsLogger = super().get_logger()  # type: ignore[no-untyped-call]
+        return logger
+
+    def destroy_node(self) -> None:
+        """End the node."""
+        super().destroy_node()  # type: ignore[no-untyped-call]
 
     def setting(self, name: str) -> Any:
         """Return the value of a parameter."""

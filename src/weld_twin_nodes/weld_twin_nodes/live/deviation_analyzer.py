@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, ClassVar
 
 from weld_twin_msgs_py.assembly.frame_names import BASE
 from weld_twin_msgs_py.messages import from_messages
@@ -28,7 +28,7 @@ from .settings import Setting
 class DeviationAnalyzer(CellNode):
     """Publishes the deviation of every measurement it can pair, and counts the others."""
 
-    settings = (
+    settings: ClassVar[tuple[Setting, ...]] = (
         *ROBOT_SETTINGS,
         Setting(
             'path_length', 0.0, 'length of the seam [m]; 0: the way the twin has gone', 0.0, 1e4

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.messages import from_messages
@@ -20,7 +20,7 @@ from .settings import Setting
 class DeviationMarkers(CellNode):
     """Publishes pictures of the deviation for RViz and Foxglove, a few times a second."""
 
-    settings = (
+    settings: ClassVar[tuple[Setting, ...]] = (
         *ROBOT_SETTINGS,
         Setting('magnification', 200.0, 'length of a deviation in the picture [1]', 1.0, 1e6),
         Setting('tolerance', 0.001, 'deviation that is drawn red [m]', 1e-9, 1.0),

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly.frame_names import WORLD
@@ -21,7 +21,7 @@ from .settings import Setting
 class ErrorInjector(ModelNode):
     """Publishes the joint motion and the measured tool pose with the effects in them."""
 
-    settings = (
+    settings: ClassVar[tuple[Setting, ...]] = (
         *ModelNode.settings,
         Setting('seed', 0, 'seed of the measurement noise [1]', 0, 2**31 - 1),
     )

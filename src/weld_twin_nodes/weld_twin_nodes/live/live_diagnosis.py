@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from weld_twin_core.diagnosis.algebra.problem import frames_named
 from weld_twin_msgs_py.assembly import Role
@@ -49,7 +49,7 @@ class LiveDiagnosis(CellNode):
     is told too.
     """
 
-    settings = (
+    settings: ClassVar[tuple[Setting, ...]] = (
         *ROBOT_SETTINGS,
         Setting('model', '', 'what the twin knows: an effects file or diagnosis.json'),
         Setting('align', '', 'frames fitted along: base, tool, or base,tool'),

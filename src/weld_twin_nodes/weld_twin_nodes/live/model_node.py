@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
@@ -35,7 +35,7 @@ MODEL_SETTINGS = (
 class ModelNode(CellNode):
     """Steps a twin with every joint state; its effects may change between two messages."""
 
-    settings = MODEL_SETTINGS
+    settings: ClassVar[tuple[Setting, ...]] = MODEL_SETTINGS
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)

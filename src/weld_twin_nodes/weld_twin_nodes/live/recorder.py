@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters
@@ -39,7 +39,7 @@ class Recorder(CellNode):
     moment of it.
     """
 
-    settings = (
+    settings: ClassVar[tuple[Setting, ...]] = (
         Setting('out', '', 'path of the bag to write; must not exist'),
         Setting('storage', 'mcap', 'mcap or sqlite3'),
         Setting('topics', [topic.name for topic in TOPICS], 'what to record'),

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
 
@@ -53,10 +54,14 @@ def _described(node: CellNode, topic: str) -> str:
     """Return the next text on a topic; the node's health is told meanwhile."""
     texts: list[str] = []
     decode = decoder(ROBOT_DESCRIPTION.type)
+
+    def take(data: Any) -> None:  # bytes, as the subscription is raw
+        texts.append(decode(data).data)
+
     subscription = node.create_subscription(
         ROBOT_DESCRIPTION.message_class(),
         topic,
-        lambda data: texts.append(decode(data).data),
+        take,
         ROBOT_DESCRIPTION.requested.to_rclpy(),
         raw=True,
     )

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from rclpy.duration import Duration
@@ -45,7 +45,7 @@ ACKNOWLEDGED = 3.0
 class TrajectoryGenerator(CellNode):
     """Publishes planned positions and velocities once its subscribers are there."""
 
-    settings = (
+    settings: ClassVar[tuple[Setting, ...]] = (
         *ROBOT_SETTINGS,
         Setting(
             'source',

@@ -191,11 +191,7 @@ def write_prediction(
     twin = model.twin
     poses = twin.poses(recording, recording.joints.t)
     covariances, outside = model.covariances(recording), model.outside(recording)
-    measured = recording.measured
-    deviation = None
-    if measured is not None and measured.t.size:
-        gap = measured.position - twin.poses(recording, measured.t).position
-        deviation = gap @ twin.robot.T_world_base[:3, :3]
+    deviation = _deviation(twin, recording)
     made = {'twin_effects': [effect.to_mapping() for effect in twin.effects]}
     write_recording(
         path,
@@ -214,6 +210,15 @@ def write_prediction(
         outside,
         None if covariances is None else float(np.median(largest_sigma(covariances))),
     )
+
+
+def _deviation(twin: Twin, recording: Recording) -> Array | None:
+    """Return measured minus twin in the base frame, shape (M, 3) [m]; None if none measured."""
+    measured = recording.measured
+    if measured is None or not measured.t.size:
+        return None
+    gap = measured.position - twin.poses(recording, measured.t).position
+    return np.asarray(gap @ twin.robot.T_world_base[:3, :3])
 
 
 def write_outside(bag: Path, outside: Sequence[Stretch]) -> None:

@@ -90,7 +90,9 @@ def plan_through(
 
 def _law(profile: str, speed: float) -> Profile:
     law = named(profile)
-    return replace(law, speed=speed) if speed else law  # type: ignore[call-arg] - all have one
+    if not speed:
+        return law
+    return replace(law, speed=speed)  # type: ignore[type-var]  # all have one
 
 
 def sampled(robot: Robot, motion: JointMotion, rate: float) -> JointMotion:
@@ -132,4 +134,4 @@ def thinned(motion: JointMotion, most: int) -> JointMotion:
 
 def stamps(t: Array, start_ns: int) -> np.ndarray:
     """Return header stamps, int64 [ns], of times (N,) [s] counted from the first sample."""
-    return start_ns + np.round((t - t[0]) * NANOSECONDS).astype(np.int64)
+    return np.asarray(start_ns + np.round((t - t[0]) * NANOSECONDS).astype(np.int64))

@@ -128,7 +128,8 @@ class Simulation:
 
     def _analysis(self, make: Messages) -> Iterator[Entry]:
         """Yield deviations, and metrics now and then and after the last one."""
-        count, told, stamp, metrics = 0, 0, 0, {}
+        count, told, stamp = 0, 0, 0
+        metrics: dict[str, float | int] = {}
         for count, ((stamp, vector), metrics) in enumerate(self.deviations(), start=1):
             yield Entry(stamp, DEVIATION.name, make.vector3(stamp, vector, BASE))
             if count % METRICS_EVERY == 0:
@@ -140,7 +141,7 @@ class Simulation:
 
 def _late(stamps: np.ndarray, twin: Twin) -> list[int]:
     """Return the stamps of measurements, late by the delay of the measurement clock."""
-    return (stamps + round(twin.delay * NANOSECONDS)).tolist()
+    return [int(ns) for ns in stamps + round(twin.delay * NANOSECONDS)]
 
 
 def _poses(make: Messages, topic: str, stamps: list[int], poses: Poses) -> Iterator[Entry]:

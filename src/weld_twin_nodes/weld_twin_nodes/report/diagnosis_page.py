@@ -48,7 +48,18 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
         inputs_section(inputs),
     )
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
-    head = joined(
+    data = tag('script', _embedded(seam_data(diagnosis)), type='application/json', id_='data')
+    whole = tag(
+        'html',
+        tag('head', _head(title)),
+        tag('body', body, data, tag('script', _file('page.js'))),
+        lang='en',
+    )
+    return f'<!doctype html>\n{whole}\n'
+
+
+def _head(title: str) -> Html:
+    return joined(
         [
             tag('meta', charset='utf-8'),
             tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
@@ -58,14 +69,6 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
             tag('style', _file('page.css')),
         ]
     )
-    data = tag('script', _embedded(seam_data(diagnosis)), type='application/json', id_='data')
-    whole = tag(
-        'html',
-        tag('head', head),
-        tag('body', body, data, tag('script', _file('page.js'))),
-        lang='en',
-    )
-    return f'<!doctype html>\n{whole}\n'
 
 
 def _file(name: str) -> Html:

@@ -51,13 +51,10 @@ def make_study(
 
     """
     place = study_directory(out)
-    study = claims = None
-    drawings: list[Drawing] = []
     with Runner(pool, place / TASKS, tell) as runner:
-        if setting is not None:
-            study = run_study(setting, runner)
-        if claims_on:
-            claims = run_claims(runner, claims_on, seams, seed)
+        study = None if setting is None else run_study(setting, runner)
+        claims = run_claims(runner, claims_on, seams, seed) if claims_on else None
+    drawings: list[Drawing] = []
     if setting is not None and study is not None:
         drawings = make_figures(place / 'figures', setting, drawable(setting))
         write_study(place, study, setting.tolerances)

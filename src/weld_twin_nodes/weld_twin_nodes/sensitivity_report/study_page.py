@@ -191,6 +191,17 @@ def _local(motion: dict[str, Any]) -> Html:
 
 
 def _advice(advice: dict[str, Any]) -> Html:
+    return section(
+        'Trajectory advice',
+        tag('h3', 'Time laws on the same seam, over equal arc length'),
+        _time_laws(advice['profiles']),
+        tag('h3', 'Free torch rotation and base placement'),
+        _placements(advice['placement']),
+        id_='advice',
+    )
+
+
+def _time_laws(profiles: list[dict[str, Any]]) -> Html:
     laws = [
         [
             r['profile'],
@@ -199,9 +210,22 @@ def _advice(advice: dict[str, Any]) -> Html:
             f'{1e3 * r["expected_m"]:.3f} mm',
             f'{1e3 * r["same_time_m"]:.3f} mm',
         ]
-        for r in advice['profiles']
+        for r in profiles
     ]
-    given = advice['placement'][0]['expected_m']
+    return table(
+        (
+            'time law',
+            'takes',
+            'expected, geometry and play',
+            'and a lag of every joint',
+            'the same, all as slow as the slowest',
+        ),
+        laws,
+    )
+
+
+def _placements(placements: list[dict[str, Any]]) -> Html:
+    given = placements[0]['expected_m']
     places = [
         [
             r['free'],
@@ -212,27 +236,11 @@ def _advice(advice: dict[str, Any]) -> Html:
             f'{1e3 * r["expected_m"]:.3f} mm',
             f'{100 * (1 - r["expected_m"] / given):.1f} %',
         ]
-        for r in advice['placement']
+        for r in placements
     ]
-    return section(
-        'Trajectory advice',
-        tag('h3', 'Time laws on the same seam, over equal arc length'),
-        table(
-            (
-                'time law',
-                'takes',
-                'expected, geometry and play',
-                'and a lag of every joint',
-                'the same, all as slow as the slowest',
-            ),
-            laws,
-        ),
-        tag('h3', 'Free torch rotation and base placement'),
-        table(
-            ('free', 'torch about the wire', 'base x', 'base y', 'base yaw', 'expected', 'gain'),
-            places,
-        ),
-        id_='advice',
+    return table(
+        ('free', 'torch about the wire', 'base x', 'base y', 'base yaw', 'expected', 'gain'),
+        places,
     )
 
 

@@ -55,6 +55,7 @@ class JointStream:
     """
 
     def __init__(self, twin: Twin) -> None:
+        self._twin = twin
         self._live = twin.live()
         self._delay = round(twin.delay * NANOSECONDS)
         self._intake = Intake(twin.robot)
@@ -65,7 +66,7 @@ class JointStream:
     @property
     def twin(self) -> Twin:
         """Return the robot with its effects."""
-        return self._live.twin
+        return self._twin
 
     @property
     def passed_over(self) -> int:
@@ -79,7 +80,7 @@ class JointStream:
 
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""
-        self._live.twin = twin
+        self._twin = self._live.twin = twin
         self._delay = round(twin.delay * NANOSECONDS)
 
     def reset(self) -> None:

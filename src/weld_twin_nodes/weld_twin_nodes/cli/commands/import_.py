@@ -9,8 +9,13 @@ printed; an option settles what is not. Lists of columns are separated by commas
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from ..options import add_bag_output, add_robot, robot_of
+
+if TYPE_CHECKING:
+    from weld_twin_core.arrays import Array
+    from weld_twin_core.recording import Recording
 
 LISTS = ('joint', 'position', 'target', 'difference', 'rotation', 'sigma')
 """Options that take several columns."""
@@ -87,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write_deviations(args: argparse.Namespace, recording: object, off: object) -> None:
+def _write_deviations(args: argparse.Namespace, recording: Recording, off: Array) -> None:
     from ...offline import station_table
 
     if args.table:

@@ -21,6 +21,7 @@ from ..options import add_robot, add_topics, robot_of, topics_of
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.recording import Recording
+    from weld_twin_core.sensitivity.tolerance import Tolerance
 
     from ...sensitivity_report import Setting
 
@@ -62,6 +63,21 @@ def _add_question(group: argparse._ArgumentGroup) -> None:
         metavar=('X', 'Y', 'Z', 'RX', 'RY', 'RZ'),
         help="tool frame in the flange [m, rotation vector rad], instead of the model's",
     )
+    _add_seam(group)
+    add('--points', type=int, default=200, metavar='N', help='path points (default: 200)')
+    add(
+        '--figure',
+        action='append',
+        default=[],
+        metavar='K',
+        help='draw figure 6 to 14, posture or recorded, and nothing else; may be given again',
+    )
+    add('--claims', action='store_true', help='measure the claims of the paper')
+    add('--claims-robots', nargs='+', metavar='R', help='robots of the claims (default: all)')
+
+
+def _add_seam(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
     add(
         '--across',
         type=float,
@@ -83,16 +99,6 @@ def _add_question(group: argparse._ArgumentGroup) -> None:
         metavar=('X', 'Y', 'Z'),
         help='direction out of the work of a recorded motion; left out, against the wire',
     )
-    add('--points', type=int, default=200, metavar='N', help='path points (default: 200)')
-    add(
-        '--figure',
-        action='append',
-        default=[],
-        metavar='K',
-        help='draw figure 6 to 14, posture or recorded, and nothing else; may be given again',
-    )
-    add('--claims', action='store_true', help='measure the claims of the paper')
-    add('--claims-robots', nargs='+', metavar='R', help='robots of the claims (default: all)')
 
 
 def _add_effort(group: argparse._ArgumentGroup) -> None:
@@ -196,7 +202,7 @@ def _robot(args: argparse.Namespace) -> Robot:
     return robot.with_frames(tool=tool)
 
 
-def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple:
+def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple[Tolerance, ...]:
     from weld_twin_core.errors import ModelError
     from weld_twin_core.sensitivity import default_tolerances, tolerances_from_list
     from weld_twin_msgs_py.files.yaml_file import read_yaml

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from weld_twin_core.arrays import Array
@@ -29,13 +31,13 @@ _FORMS = {'play': 'play', 'reversal': 'written'}
 
 
 def _size(deviations: Array) -> Array:
-    return np.linalg.norm(deviations, axis=-1)
+    return np.asarray(np.linalg.norm(deviations, axis=-1))
 
 
 def _plane(study: Study, positions: Array) -> Array:
     """Return positions (N, 3) along, across and normal of the middle of the seam [m]."""
     middle = study.samples // 2
-    return (positions - study.nominal.position[0]) @ study.axes[middle].T
+    return np.asarray((positions - study.nominal.position[0]) @ study.axes[middle].T)
 
 
 def baseline(setting: Setting) -> Drawing:
@@ -62,10 +64,19 @@ def baseline(setting: Setting) -> Drawing:
     left.set_aspect('equal', adjustable='datalim')
     label(left, 'Path from above', 'along [mm]', 'across [mm]')
     legend(left)
-    floor = np.maximum(off / planned.length, 1e-17)
-    right.semilogy(1e3 * planned.s, floor, color=COLOURS[0])
-    right.axhline(np.finfo(float).eps, color='#999999', lw=1, ls=':')
-    right.annotate(
+    _closure(right, 1e3 * planned.s, off / planned.length)
+    caption = (
+        'Baseline: without errors the twin follows the plan; '
+        f'D_norm = {off.max() / study.length:.1e}.'
+    )
+    return Drawing('figure-06', caption, table, svg(figure))
+
+
+def _closure(axis: Any, s: Array, d_norm: Array) -> None:
+    """Draw what is left of the plan, beside the precision of the numbers."""
+    axis.semilogy(s, np.maximum(d_norm, 1e-17), color=COLOURS[0])
+    axis.axhline(np.finfo(float).eps, color='#999999', lw=1, ls=':')
+    axis.annotate(
         'double precision',
         (0, np.finfo(float).eps),
         xytext=(2, 3),
@@ -73,13 +84,8 @@ def baseline(setting: Setting) -> Drawing:
         color='#666666',
         fontsize=8,
     )
-    right.set_ylim(1e-17, 1e-9)
-    label(right, 'D(t) over path length', 'arc length [mm]', 'D(t) / L')
-    caption = (
-        'Baseline: without errors the twin follows the plan; '
-        f'D_norm = {off.max() / study.length:.1e}.'
-    )
-    return Drawing('figure-06', caption, table, svg(figure))
+    axis.set_ylim(1e-17, 1e-9)
+    label(axis, 'D(t) over path length', 'arc length [mm]', 'D(t) / L')
 
 
 def initialization(setting: Setting) -> Drawing:
@@ -134,7 +140,8 @@ def profiles(setting: Setting) -> Drawing:
     for colour, (name, study) in zip(COLOURS, studies.items(), strict=False):
         off = {k: _size(study.deviations((*setting.known, *e))) for k, e in errors.items()}
         for axis, key in zip(axes, errors, strict=True):
-            style = {'lw': 4.0, 'alpha': 0.35} if name == 'aggressive' and key == 'offset' else {}
+            wide = name == 'aggressive' and key == 'offset'
+            style: dict[str, Any] = {'lw': 4.0, 'alpha': 0.35} if wide else {}
             axis.plot(1e3 * study.s, 1e3 * off[key], color=colour, label=name, **style)
         columns = {
             'motion': np.full(study.samples, name),

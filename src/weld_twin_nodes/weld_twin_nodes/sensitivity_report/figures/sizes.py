@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from weld_twin_core.arrays import Array
@@ -101,7 +103,7 @@ def widths(setting: Setting) -> Drawing:
             'rms': np.sqrt((distance**2 * arc_weights(study.s)).sum(axis=1)),
             'range': spread_of_passes(study, off),
         }
-        style = {'lw': 4.0, 'alpha': 0.35} if name == 'smooth' else {}
+        style: dict[str, Any] = {'lw': 4.0, 'alpha': 0.35} if name == 'smooth' else {}
         for axis, (key, value) in zip(axes, shown.items(), strict=True):
             table[f'{name}_{key}_m'] = value
             axis.plot(values / DEGREE, 1e3 * value, color=colour, label=name, **style)

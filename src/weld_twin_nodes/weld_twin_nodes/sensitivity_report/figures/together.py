@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from weld_twin_core.arrays import Array
@@ -25,7 +27,7 @@ def _scenarios(setting: Setting) -> tuple[Study, dict[str, Array]]:
     return study, found
 
 
-def _style(name: str) -> dict[str, object]:
+def _style(name: str) -> dict[str, Any]:
     if name == 'combined':
         return {'color': '#000000', 'lw': 2.2}
     if name.startswith('sum'):

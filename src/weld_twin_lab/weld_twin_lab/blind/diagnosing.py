@@ -13,7 +13,8 @@ from typing import Any
 
 import weld_twin_core
 from weld_twin_core import __version__
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis import Diagnosis, diagnose
+from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.input_files import hashed
@@ -121,7 +122,8 @@ def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> d
     start = time.perf_counter()
     answer, failure = None, None
     try:
-        answer = _diagnosis(directory, with_holdout)
+        told = diagnosis_of(directory, with_holdout)
+        answer = dict(json.loads(diagnosis_text(told, ())))
     except Exception as error:
         failure = f'{type(error).__name__}: {error}'
     return {
@@ -133,7 +135,22 @@ def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> d
     }
 
 
-def _diagnosis(directory: Path, with_holdout: bool) -> dict[str, Any]:
+def diagnosis_of(
+    directory: Path, with_holdout: bool = True, beliefs: Beliefs | None = None
+) -> Diagnosis:
+    """
+    Return the diagnosis of one case.
+
+    Parameters
+    ----------
+    directory : Path
+        Of the case.
+    with_holdout : bool
+        Give the diagnosis the held-out recording to judge its shrink on.
+    beliefs : Beliefs, optional
+        The usual ones when left out.
+
+    """
     case = layout.read(directory / layout.CASE)
     known = directory / layout.KNOWN if case['known'] else ''
     twin = build_twin(load_robot(str(directory / layout.ROBOT)), known)
@@ -141,12 +158,12 @@ def _diagnosis(directory: Path, with_holdout: bool) -> dict[str, Any]:
     train, *held = (
         read_recording(directory / use, twin.robot) for use in (layout.TRAIN, *holdout)
     )
-    result = diagnose(
+    return diagnose(
         [train],
         twin.robot,
         align=frozenset(case['align']),
         known=twin.effects,
         exclude=case['exclude'],
         holdout=held,
+        beliefs=beliefs,
     )
-    return dict(json.loads(diagnosis_text(result, ())))

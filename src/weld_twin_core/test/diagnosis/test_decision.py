@@ -1,0 +1,417 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The verdict on evidence given by hand, on each side of every boundary.
+
+Expected numbers are worked out here from plain literals, never from the beliefs themselves, so
+that a belief which moves by a quarter makes a test fail.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.many.weighed_families import WeighedFamily
+from weld_twin_core.diagnosis.result import Site
+from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
+from weld_twin_core.diagnosis.verdict.decision import decide
+from weld_twin_core.diagnosis.verdict.evidence import Evidence
+from weld_twin_core.diagnosis.verdict.weighing import Weighed
+
+ELBOW, WRIST = 'elbow_joint', 'wrist_1_joint'
+PLAY, OFFSET = Site('backlash', ELBOW), Site('joint_offset', WRIST)
+GEAR, SPRING, DRIFT = (
+    Site('gear_ratio', WRIST),
+    Site('joint_compliance', ELBOW),
+    Site('drift', None),
+)
+FLOOR = 3.5e-5
+
+
+def slot(*pairs):
+    """Return an effect found with its rivals, from sites and probabilities."""
+    return tuple(Rival(site, 0.0, SimpleNamespace(), probability) for site, probability in pairs)
+
+
+def left_over(gain, sure=9.0, names=('time',)):
+    return Structure(2e-5, gain, sure, names)
+
+
+def evidence(*slots, **changes):
+    """Return evidence of a large gap that is explained down to the floor."""
+    usual = Evidence(
+        slots=slots,
+        structure=left_over(0.0, 0.0, ()),
+        gap=1e-3,
+        after=FLOOR,
+        floor=FLOOR,
+        fitted=FLOOR,
+        independent=True,
+        parts=(1.0 / max(len(slots), 1),) * len(slots),
+        causes=(1,) * len(slots),
+    )
+    return replace(usual, **changes)
+
+
+def remaining(share, *slots, **changes):
+    """Return evidence that leaves a share of the gap above a floor taken from the model."""
+    after = float(np.sqrt(FLOOR**2 + share**2 * (1e-6 - FLOOR**2)))
+    return evidence(*slots, **{'after': after, 'fitted': after, 'independent': False, **changes})
+
+
+def structured(left, *slots, **changes):
+    """Return evidence of which a structure takes that share of the squared gap, floor aside."""
+    return evidence(
+        *slots,
+        **{
+            'structure': left_over(left),
+            'gap': 1e-3,
+            'after': 1e-3,
+            'fitted': 1e-3,
+            'floor': 1e-9,
+            'independent': False,
+            **changes,
+        },
+    )
+
+
+SURE = slot((PLAY, 1.0))
+
+
+# Who is named -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('probability', 'status', 'named'),
+    [(0.86, 'identified', (PLAY,)), (0.84, 'ambiguous', (PLAY, OFFSET))],
+)
+def test_a_leader_is_named_alone_from_85_percent_on(probability, status, named):
+    verdict = decide(evidence(slot((PLAY, probability), (OFFSET, 1.0 - probability))))
+    assert (verdict.status, verdict.sets) == (status, (named,))
+
+
+def test_a_leader_of_exactly_85_percent_is_sure():
+    assert decide(evidence(slot((PLAY, 0.85), (OFFSET, 0.15)))).status == 'identified'
+
+
+@pytest.mark.parametrize(('probability', 'listed'), [(0.031, True), (0.03, True), (0.029, False)])
+def test_a_rival_is_named_beside_an_unsure_leader_from_3_percent_on(probability, listed):
+    verdict = decide(evidence(slot((PLAY, 0.7), (OFFSET, 0.25), (DRIFT, probability))))
+    assert (DRIFT in verdict.sets[0]) is listed
+
+
+def test_what_cannot_be_told_apart_is_said_in_words():
+    verdict = decide(evidence(SURE, slot((OFFSET, 0.5), (GEAR, 0.5))))
+    assert len(verdict.reasons) == 1
+    assert 'joint_offset of wrist_1_joint, gear_ratio of wrist_1_joint' in verdict.reasons[0]
+
+
+def test_where_all_is_told_apart_no_reason_is_given():
+    assert decide(evidence(SURE)).reasons == ()
+
+
+# How sure ---------------------------------------------------------------------------------------
+
+
+def test_nothing_is_believed_beyond_95_percent_for_each_cause():
+    assert decide(evidence(SURE)).confidence == pytest.approx(0.95)
+    two = decide(evidence(SURE, slot((OFFSET, 1.0))))
+    assert two.confidence == pytest.approx(0.95 * 0.95)
+
+
+def test_the_probability_of_all_who_are_named_counts():
+    verdict = decide(evidence(slot((PLAY, 0.6), (OFFSET, 0.38), (DRIFT, 0.02))))
+    assert verdict.confidence == pytest.approx(0.95 * 0.98)
+    assert decide(evidence(slot((PLAY, 0.9)))).confidence == pytest.approx(0.95 * 0.9)
+
+
+@pytest.mark.parametrize('left', [0.035, 0.04, 0.049])
+def test_belief_falls_with_the_cube_of_what_is_left(left):
+    verdict = decide(structured(left, SURE))
+    assert verdict.confidence == pytest.approx(0.95 / (1.0 + (left / 0.05) ** 3), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('after', 'gap', 'halves'),
+    [
+        (1.1, 1.2, 0.1 / 0.2),  # a small gap: the rise above the floor counts
+        (1.25, 1.4, 0.25 / 0.2),
+        (1.25, 12.0, np.sqrt((1.25**2 - 1.0) / (144.0 - 1.0)) / 0.12),  # a large one: the share
+        (1.29, 20.0, np.sqrt((1.29**2 - 1.0) / (400.0 - 1.0)) / 0.12),
+        (0.9, 12.0, 0.0),
+    ],
+)
+def test_belief_falls_with_the_square_of_the_rise_above_the_floor(after, gap, halves):
+    told = evidence(SURE, after=after * FLOOR, gap=gap * FLOOR, fitted=after * FLOOR)
+    assert decide(told).confidence == pytest.approx(0.95 / (1.0 + halves**2), rel=1e-6)
+
+
+def test_a_floor_that_the_model_itself_left_tells_no_rise():
+    told = evidence(SURE, after=1.29 * FLOOR, gap=1.4 * FLOOR, independent=False)
+    assert decide(told).confidence == pytest.approx(0.95)
+
+
+def test_two_effects_that_show_at_rest_on_one_joint_are_believed_less():
+    alike = slot((Site('joint_offset', ELBOW), 1.0))
+    both = decide(evidence(alike, slot((SPRING, 1.0))))
+    assert both.confidence == pytest.approx(0.95**2 * 0.75)
+    apart = decide(evidence(slot((OFFSET, 1.0)), slot((SPRING, 1.0))))
+    assert apart.confidence == pytest.approx(0.95**2)
+
+
+def test_an_effect_of_motion_and_one_at_rest_may_share_a_joint():
+    verdict = decide(evidence(SURE, slot((SPRING, 1.0))))
+    assert verdict.confidence == pytest.approx(0.95**2)
+
+
+def test_effects_of_the_robot_as_a_whole_share_no_joint():
+    base, tool = slot((Site('base_pose', None), 1.0)), slot((Site('tool_pose', None), 1.0))
+    assert decide(evidence(base, tool)).confidence == pytest.approx(0.95**2)
+
+
+def test_a_wave_seen_over_less_than_a_period_is_believed_less():
+    verdict = decide(evidence(slot((GEAR, 1.0)), glimpsed=(WRIST,)))
+    assert verdict.status == 'identified'
+    assert verdict.confidence == pytest.approx(0.95 * 0.6)
+
+
+# Why not to believe what fits -------------------------------------------------------------------
+
+
+def doubted(verdict, word):
+    assert (verdict.status, verdict.sets) == ('unknown', ())
+    assert verdict.confidence == pytest.approx(0.75)
+    assert len(verdict.reasons) == 1
+    assert word in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(('total', 'cancels'), [(5.1, True), (5.0, False), (4.9, False)])
+def test_effects_whose_squares_sum_to_five_times_that_of_their_sum_cancel(total, cancels):
+    slots = (SURE, slot((OFFSET, 1.0)))
+    verdict = decide(evidence(*slots, parts=(total / 2.0, total / 2.0)))
+    if cancels:
+        doubted(verdict, 'cancel')
+    else:
+        assert verdict.status == 'identified'
+
+
+def test_one_effect_cannot_cancel_itself():
+    assert decide(evidence(SURE, parts=(9.0,))).status == 'identified'
+
+
+@pytest.mark.parametrize(('causes', 'crowded'), [((1, 2), False), ((2, 2), True)])
+def test_more_than_three_causes_at_once_are_a_crowd(causes, crowded):
+    verdict = decide(evidence(SURE, slot((OFFSET, 1.0)), causes=causes))
+    if crowded:
+        doubted(verdict, '4 separate effects')
+    else:
+        assert verdict.status == 'identified'
+
+
+def test_a_wave_hardly_seen_beside_another_effect_of_its_joint_is_anything():
+    pair = (slot((GEAR, 1.0)), slot((OFFSET, 1.0)))
+    doubted(decide(evidence(*pair, glimpsed=(WRIST,))), 'less than a period')
+    assert decide(evidence(*pair)).status == 'identified'
+    assert decide(evidence(*pair, glimpsed=(ELBOW,))).status == 'identified'
+
+
+@pytest.mark.parametrize(('times', 'carries'), [(1.29, True), (1.31, False)])
+def test_a_model_may_leave_30_percent_more_on_another_motion(times, carries):
+    told = remaining(0.15, SURE)
+    verdict = decide(replace(told, fitted=told.after / times))
+    if carries:
+        assert verdict.status == 'identified'
+    else:
+        doubted(verdict, f'{times:.1f} times as much')
+
+
+@pytest.mark.parametrize(('share', 'carries'), [(0.099, True), (0.101, False)])
+def test_a_tenth_of_the_gap_may_be_left_on_any_motion(share, carries):
+    verdict = decide(remaining(share, SURE, fitted=1e-6))
+    assert (verdict.status == 'identified') is carries
+
+
+@pytest.mark.parametrize(('times', 'carries'), [(1.29, True), (1.31, False)])
+def test_what_is_no_more_than_the_floor_carries_over(times, carries):
+    told = evidence(SURE, gap=2.0 * FLOOR, after=times * FLOOR, fitted=1e-6, independent=False)
+    assert (decide(told).status == 'identified') is carries
+
+
+# What is left -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('gain', 'sure', 'counts'),
+    [
+        (0.031, 9.0, True),
+        (0.029, 9.0, False),
+        (0.1, 3.1, True),
+        (0.1, 2.9, False),
+        (0.16, 2.0, True),
+        (0.14, 2.0, False),
+        (0.5, 1.6, True),
+        (0.5, 1.4, False),
+    ],
+)
+def test_a_structure_counts_that_is_sure_or_so_large_that_it_need_not_be(gain, sure, counts):
+    case = Weighed(evidence(structure=left_over(gain, sure)), Beliefs())
+    assert case.structured is counts
+    assert case.above_noise is counts
+
+
+@pytest.mark.parametrize(
+    ('times', 'independent', 'high'),
+    [(1.31, True, True), (1.29, True, False), (1.31, False, False)],
+)
+def test_what_remains_must_exceed_an_independent_floor_by_30_percent(times, independent, high):
+    case = Weighed(evidence(after=times * FLOOR, independent=independent), Beliefs())
+    assert case.above_noise is high
+
+
+def test_what_is_left_is_a_share_of_the_squared_gap_above_the_floor():
+    over = evidence(after=2.0, floor=1.0, gap=4.0)
+    assert Weighed(over, Beliefs()).left == pytest.approx(3.0 / 15.0)
+    found = evidence(structure=left_over(0.1), after=2.0, floor=1.0, gap=4.0, independent=False)
+    assert Weighed(found, Beliefs()).left == pytest.approx(0.4 / 15.0)
+    both = evidence(structure=left_over(0.9), after=2.0, floor=1.0, gap=4.0)
+    assert Weighed(both, Beliefs()).left == pytest.approx(3.6 / 15.0)
+    assert Weighed(evidence(after=9.0, floor=1.0, gap=4.0), Beliefs()).left == 1.0
+
+
+def test_a_gap_within_the_floor_counts_as_a_twentieth_of_it():
+    told = evidence(structure=left_over(0.1), after=0.2, floor=1.0, gap=1.0)
+    assert Weighed(told, Beliefs()).left == pytest.approx(0.1 * 0.04 / 0.05)
+
+
+def test_without_gap_and_floor_a_nanometre_is_divided_by():
+    told = evidence(after=0.5e-9, floor=0.0, gap=0.0, independent=False)
+    assert Weighed(told, Beliefs()).share == pytest.approx(0.5)
+    found = replace(told, structure=left_over(0.2))
+    assert Weighed(found, Beliefs()).left == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(('left', 'status'), [(0.049, 'identified'), (0.051, 'unknown')])
+def test_a_twentieth_may_stay_unexplained(left, status):
+    assert decide(structured(left, SURE)).status == status
+    assert decide(structured(left)).status == ('none' if status == 'identified' else 'unknown')
+
+
+@pytest.mark.parametrize(('left', 'sure'), [(0.06, 0.76), (0.2, 0.9), (0.3, 0.95), (0.9, 0.95)])
+def test_the_more_is_left_the_surer_it_is_unknown(left, sure):
+    for told in (structured(left, SURE, parts=(0.01,)), structured(left)):
+        verdict = decide(told)
+        assert verdict.status == 'unknown'
+        assert verdict.confidence == pytest.approx(sure)
+        assert verdict.reasons == (
+            'what remains depends on time, and no effect in the library explains it',
+        )
+
+
+def test_what_depends_on_nothing_looked_at_is_said_so():
+    told = evidence(gap=2.0 * FLOOR, after=2.0 * FLOOR)
+    assert 'something not looked at' in decide(told).reasons[0]
+
+
+def test_effects_that_stand_out_beside_what_is_left_keep_their_names():
+    slots = (SURE, slot((OFFSET, 1.0)))
+    assert decide(structured(0.2, *slots, parts=(0.21, 0.19))).sets == ((PLAY,),)
+    pair = slot((OFFSET, 0.5), (GEAR, 0.5))
+    assert decide(structured(0.2, SURE, pair, parts=(0.5, 0.5))).sets == ((PLAY,),)
+
+
+def test_an_effect_on_whose_joint_something_is_left_loses_its_name():
+    left = left_over(0.2, names=(f'the angle of {ELBOW}',))
+    slots = (SURE, slot((OFFSET, 1.0)))
+    assert decide(structured(0.2, *slots, structure=left)).sets == ((OFFSET,),)
+
+
+# Nothing found ----------------------------------------------------------------------------------
+
+
+def test_nothing_found_and_nothing_left_is_none():
+    verdict = decide(evidence(gap=FLOOR))
+    assert (verdict.status, verdict.sets) == ('none', ())
+    assert verdict.confidence == pytest.approx(0.95)
+    assert verdict.reasons == ('the gap does not rise above the noise',)
+
+
+@pytest.mark.parametrize(('times', 'status'), [(1.31, 'unknown'), (1.29, 'none')])
+def test_a_gap_above_an_independent_floor_is_unknown(times, status):
+    assert decide(evidence(gap=times * FLOOR, after=times * FLOOR)).status == status
+
+
+@pytest.mark.parametrize(('times', 'sure'), [(1.31, 0.6), (1.29, 0.95)])
+def test_where_nothing_shows_the_noise_none_is_believed_less(times, sure):
+    told = evidence(gap=times * FLOOR, after=times * FLOOR, independent=False)
+    verdict = decide(told)
+    assert verdict.status == 'none'
+    assert verdict.confidence == pytest.approx(sure)
+    assert ('repeat some poses' in verdict.reasons[0]) is (sure < 0.9)
+
+
+# Many small errors ------------------------------------------------------------------------------
+
+
+def family(effect, fall, error=1e-12, size=1e-4):
+    return WeighedFamily(effect, fall, error, 1e-8, ((Site(effect, ELBOW), size),))
+
+
+def of_families(*families, **changes):
+    return decide(structured(0.0, families=families, **changes))
+
+
+@pytest.mark.parametrize(
+    ('fall', 'error', 'named'),
+    [
+        (3.1e-10, 1e-12, True),
+        (2.9e-10, 1e-12, False),
+        (1e-9, 0.49e-9, True),
+        (1e-9, 0.51e-9, False),
+    ],
+)
+def test_a_family_is_named_that_earns_3_percent_and_two_standard_errors(fall, error, named):
+    verdict = of_families(family('link_length', fall, error))
+    assert verdict.families[0].named is named
+    assert verdict.sets == (((Site('link_length', ELBOW),),) if named else ())
+
+
+@pytest.mark.parametrize(('size', 'count'), [(1.1e-6, 1), (0.9e-6, 0)])
+def test_a_member_that_moves_the_tool_by_less_than_a_micrometre_is_nobodys_concern(size, count):
+    assert len(of_families(family('link_length', 1e-9, size=size)).families) == count
+
+
+def test_families_are_told_largest_first_and_what_they_account_for():
+    verdict = of_families(family('link_twist', 4e-10), family('link_length', 9e-10))
+    assert [f.effect for f in verdict.families] == ['link_length', 'link_twist']
+    assert verdict.families[0].rms_m == pytest.approx(3e-5)
+    assert of_families(family('link_twist', -1e-10)).families[0].rms_m == 0.0
+
+
+@pytest.mark.parametrize(('left', 'status'), [(0.049, 'identified'), (0.051, 'unknown')])
+def test_families_are_no_explanation_while_structure_remains(left, status):
+    verdict = of_families(family('link_length', 1e-9), structure=left_over(left))
+    assert verdict.status == status
+    assert verdict.confidence == pytest.approx(0.75 / (1.0 + (left / 0.05) ** 3), rel=1e-6)
+    assert 'only their sum is certain' in verdict.reasons[0]
+
+
+def test_families_that_leave_nothing_are_believed_three_in_four():
+    assert of_families(family('link_length', 1e-9)).confidence == pytest.approx(0.75)
+
+
+# The beliefs themselves -------------------------------------------------------------------------
+
+
+def test_other_beliefs_draw_another_verdict_from_the_same_evidence():
+    told = evidence(slot((PLAY, 0.8), (OFFSET, 0.2)))
+    assert decide(told).status == 'ambiguous'
+    assert decide(told, Beliefs(sure=0.75)).status == 'identified'
+
+
+def test_beliefs_cannot_be_changed_by_accident():
+    with pytest.raises(AttributeError):
+        Beliefs().sure = 0.5

@@ -22,9 +22,11 @@ from .base_pose import BasePose
 from .cartesian_compliance import CartesianCompliance
 from .drift import Drift
 from .effect import Effect, MemoryEffect
+from .frame_curve import FrameCurve
 from .gear_ratio import GearRatio
 from .joint_compliance import JointCompliance
 from .joint_coupling import JointCoupling
+from .joint_curve import JointCurve
 from .joint_offset import JointOffset
 from .link_length import LinkLength
 from .link_offset import LinkOffset
@@ -52,9 +54,11 @@ __all__ = [
     'CartesianCompliance',
     'Drift',
     'Effect',
+    'FrameCurve',
     'GearRatio',
     'JointCompliance',
     'JointCoupling',
+    'JointCurve',
     'JointOffset',
     'LinkLength',
     'LinkOffset',

@@ -46,6 +46,7 @@ class Backlash(MemoryEffect):
     form: str = 'play'
 
     name = 'backlash'
+    depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY
     regime = 'reversal'

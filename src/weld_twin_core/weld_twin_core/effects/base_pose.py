@@ -18,4 +18,6 @@ class BasePose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'base_pose'
+    depends_on = 'constant'
+    place = 'base'
     channel = 'base'

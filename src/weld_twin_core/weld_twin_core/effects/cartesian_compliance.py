@@ -23,6 +23,8 @@ class CartesianCompliance(Effect):
     compliance: Value = (0.0, 0.0, 0.0)
 
     name = 'cartesian_compliance'
+    depends_on = 'load'
+    place = 'tool'
     of = 'robot'
     stage = Stage.POSE
     regime = 'load'

@@ -18,6 +18,8 @@ class Drift(Effect):
     xyz_rate: Value = (0.0, 0.0, 0.0)
 
     name = 'drift'
+    depends_on = 'time'
+    place = 'base'
     of = 'robot'
     stage = Stage.POSE
     regime = 'time'

@@ -74,6 +74,12 @@ class Effect(Parametric, ABC):
     """What brings it out: 'static', 'reversal', 'speed', 'acceleration', 'load', 'temperature' or
     'time'."""
 
+    depends_on: ClassVar[str] = 'constant'
+    """What it depends on: 'constant', 'angle', 'direction', 'speed', 'acceleration', 'load',
+    'temperature', 'time' or 'place' (in the workspace)."""
+    place: ClassVar[str] = 'joint'
+    """Where it sits: at its 'joint', or at 'base', 'tool', 'instrument', 'clock' or 'load'."""
+
     @abstractmethod
     def displace(self, view: View) -> Shift:
         """Return the displaced channels, each shape (..., N)."""
@@ -158,6 +164,16 @@ class Effect(Parametric, ABC):
     def site(self) -> str | None:
         """Return the joint the effect sits on, or None for the robot as a whole."""
         return getattr(self, 'joint', None)
+
+    @property
+    def at(self) -> str:
+        """Return where it sits: the name of its joint, or its `place`."""
+        return str(self.site) if self.place == 'joint' else self.place
+
+    @property
+    def on(self) -> str:
+        """Return what it depends on."""
+        return self.depends_on
 
     @property
     def key(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ class GearRatio(Effect):
     scale: Value = 0.0
 
     name = 'gear_ratio'
+    depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
     parameters = (Parameter('scale', '-', typical=3e-4),)

@@ -19,6 +19,7 @@ class JointCompliance(Effect):
     compliance: Value = 0.0
 
     name = 'joint_compliance'
+    depends_on = 'load'
     of = 'joint'
     stage = Stage.ELASTIC
     regime = 'load'

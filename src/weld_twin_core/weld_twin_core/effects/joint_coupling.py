@@ -26,6 +26,7 @@ class JointCoupling(Effect):
     ratio: Value = 0.0
 
     name = 'joint_coupling'
+    depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
     parameters = (Parameter('ratio', '-', typical=3e-4),)

@@ -24,6 +24,8 @@ class MeasurementNoise(Effect):
     sigma: Value = 0.0
 
     name = 'measurement_noise'
+    depends_on = 'constant'
+    place = 'instrument'
     of = 'robot'
     stage = Stage.NOISE
     cause = False

@@ -18,6 +18,8 @@ class MeasurementScale(Effect):
     scale: Value = 0.0
 
     name = 'measurement_scale'
+    depends_on = 'place'
+    place = 'instrument'
     of = 'robot'
     stage = Stage.POSE
     parameters = (Parameter('scale', '-', typical=5e-5),)

@@ -25,6 +25,8 @@ class Payload(Effect):
     com: Value = (0.0, 0.0, 0.0)
 
     name = 'payload'
+    depends_on = 'load'
+    place = 'load'
     of = 'robot'
     stage = Stage.LOAD
     regime = 'load'

@@ -33,6 +33,7 @@ class Quantization(Effect):
     step: Value = 0.0
 
     name = 'quantization'
+    depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
     parameters = (

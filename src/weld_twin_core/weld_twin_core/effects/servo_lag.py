@@ -26,6 +26,7 @@ class ServoLag(MemoryEffect):
     time_constant: Value = 0.0
 
     name = 'servo_lag'
+    depends_on = 'speed'
     of = 'joint'
     stage = Stage.SERVO
     regime = 'speed'

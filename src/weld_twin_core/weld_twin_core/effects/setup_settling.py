@@ -32,6 +32,8 @@ class SetupSettling(Effect):
     start: float = 0.0
 
     name = 'setup_settling'
+    depends_on = 'time'
+    place = 'base'
     of = 'robot'
     stage = Stage.LINK
     cause = False

@@ -32,6 +32,8 @@ class SetupStep(Effect):
     time: float = 0.0
 
     name = 'setup_step'
+    depends_on = 'time'
+    place = 'base'
     of = 'robot'
     stage = Stage.LINK
     cause = False

@@ -35,6 +35,7 @@ class ThermalGrowth(Effect):
     warmup: Sequence[float] | None = None
 
     name = 'thermal_growth'
+    depends_on = 'temperature'
     of = 'links'
     stage = Stage.LINK
     regime = 'temperature'
@@ -56,6 +57,16 @@ class ThermalGrowth(Effect):
                 'thermal_growth: warmup must be [rise in K, time constant in s above zero], '
                 f'got {self.warmup!r}'
             )
+
+    @property
+    def at(self) -> str:
+        """Return the one link that grows, or the base where several do."""
+        return self.links[0] if self.links is not None and len(self.links) == 1 else 'base'
+
+    @property
+    def on(self) -> str:
+        """Return temperature, or time where a warm-up curve stands in for it."""
+        return 'temperature' if self.warmup is None else 'time'
 
     def rise(self, view: View) -> Array:
         """

@@ -18,6 +18,8 @@ class TimeDelay(Effect):
     delay: Value = 0.0
 
     name = 'time_delay'
+    depends_on = 'speed'
+    place = 'clock'
     of = 'robot'
     stage = Stage.CLOCK
     regime = 'speed'

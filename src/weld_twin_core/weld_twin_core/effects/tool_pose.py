@@ -18,4 +18,6 @@ class ToolPose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'tool_pose'
+    depends_on = 'constant'
+    place = 'tool'
     channel = 'tool'

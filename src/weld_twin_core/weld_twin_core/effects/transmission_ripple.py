@@ -36,6 +36,7 @@ class TransmissionRipple(Effect):
     phase: Value = 0.0
 
     name = 'transmission_ripple'
+    depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
     parameters = (

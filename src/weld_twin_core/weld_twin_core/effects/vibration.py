@@ -41,6 +41,7 @@ class Vibration(MemoryEffect):
     gain: Value = 0.0
 
     name = 'vibration'
+    depends_on = 'acceleration'
     of = 'joint'
     stage = Stage.SERVO
     regime = 'acceleration'

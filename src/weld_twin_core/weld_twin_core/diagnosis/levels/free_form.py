@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What explains the gap when no name does: places, dependences, and the curves between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.effect import Effect
+from ..algebra.fit import Fit, design
+from ..algebra.problem import Problem, Scale
+from .groups import Group, all_groups
+from .regions import posture_regions
+from .sparse_groups import choosing, chosen, rival_weights
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """
+    One group that helps to explain the gap.
+
+    Attributes
+    ----------
+    group : Group
+    ridge : float
+    rivals : tuple of (Group, float)
+        Each group that could stand in its place and its weight, itself included.
+
+    """
+
+    group: Group
+    ridge: float
+    rivals: tuple[tuple[Group, float], ...]
+
+    def weight_of(self, kind: str) -> dict[str, float]:
+        """Return the weight of every place ('at') or dependence ('on'), largest first."""
+        out: dict[str, float] = {}
+        for group, weight in self.rivals:
+            name = str(getattr(group, kind))
+            out[name] = out.get(name, 0.0) + weight
+        return dict(sorted(out.items(), key=lambda item: -item[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class FreeForm:
+    """
+    The free-form explanation.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+        In the order in which they were found.
+
+    """
+
+    parts: tuple[Part, ...]
+
+    @property
+    def curves(self) -> tuple[Effect, ...]:
+        """Return the curves to fit, their values zero."""
+        return tuple(curve for part in self.parts for curve in part.group.curves)
+
+    @property
+    def precision(self) -> Array:
+        """Return the prior precision of the curves' values, in units of noise, shape (K,)."""
+        held = [p.ridge * p.group.scales**2 for p in self.parts if p.group.curves]
+        return np.concatenate([np.zeros(0), *held])
+
+
+def free_form(problem: Problem, scale: Scale, bare: Fit, precision: Array) -> FreeForm:
+    """
+    Return the few groups that explain what a fit leaves, each with its rivals.
+
+    Parameters
+    ----------
+    problem : Problem
+    scale : Scale
+    bare : Fit
+        Frames and the effects that are named beyond doubt.
+    precision : array, shape (K,)
+        Prior precision of those effects' coordinates.
+
+    """
+    columns, _ = design(problem, bare.model, scale)
+    held = np.zeros(columns.shape[0])
+    if precision.size:
+        held[-precision.size :] = precision
+    groups = all_groups(problem, bare.model, scale)
+    work = choosing(problem, groups, columns, held, bare.residual, posture_regions(problem))
+    members = chosen(work)
+    parts = []
+    for k, member in enumerate(members):
+        weights = rival_weights(work, members, k)
+        rivals = tuple((groups[g], w) for g, w in weights if w > 0.0)
+        parts.append(Part(groups[member.group], member.ridge, rivals))
+    return FreeForm(tuple(parts))

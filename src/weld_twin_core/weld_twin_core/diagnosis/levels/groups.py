@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Every place that could be at fault, and everything the fault could depend on, without a formula.
+
+A group is a place and a dependence, spanned by curves (`JointCurve`, `FrameCurve`) or, where no
+curve can be carried over to another motion, by plain columns. Groups compete as wholes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.curve import QUANTITIES
+from ...effects.effect import Effect
+from ...effects.frame_curve import FrameCurve
+from ...effects.joint_curve import JointCurve
+from ...twin.features import Features
+from ..algebra.problem import Model, Problem, Scale
+
+KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}
+"""Knots of a curve: enough for two waves of an angle, and few enough for a minute of motion."""
+LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
+"""Span below which a quantity did not vary: angle [rad], speed [rad/s], torque [N m],
+temperature [K]. Curves over less are straight lines, and told from nothing."""
+OFF_AXIS = ('d', 'a', 'alpha', 'beta')
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """
+    One place with one dependence.
+
+    Attributes
+    ----------
+    at, on : str
+        Place and dependence.
+    curves : tuple of Effect
+        What spans it, all values zero; empty where it is spanned by plain columns.
+    columns : array, shape (E, rows)
+        Whitened, together of unit mean square.
+    scales : array, shape (E,)
+        What the columns were divided by, noise per unit of a curve's value.
+
+    """
+
+    at: str
+    on: str
+    curves: tuple[Effect, ...]
+    columns: Array
+    scales: Array
+
+    def __str__(self) -> str:
+        """Return it as people read it."""
+        return f'{self.at}, depending on {self.on}' if self.on != 'constant' else self.at
+
+
+def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
+    """Return the groups that these data can show at all."""
+    features = problem.features(model)
+    out = []
+    for at, on, curves in _curved(features, model):
+        parts = [problem.effect_columns(features, curve, atoms=False) for curve in curves]
+        joined = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)]
+        out.append(_group(problem, scale, at, on, tuple(curves), joined))
+    for at, on, blocks in _plain(problem, features, model):
+        out.append(_group(problem, scale, at, on, (), blocks))
+    return [group for group in out if group.columns.size]
+
+
+def _group(
+    problem: Problem,
+    scale: Scale,
+    at: str,
+    on: str,
+    curves: tuple[Effect, ...],
+    parts: list[Array],
+) -> Group:
+    columns = problem.whitened(parts, scale)
+    size = np.sqrt((columns**2).mean(axis=1))
+    if not curves:
+        columns, size = columns[size > 1e-12], size[size > 1e-12]
+    if size.max(initial=0.0) <= 1e-12:
+        return Group(at, on, curves, np.zeros((0, columns.shape[1])), size)
+    # Knots that little was recorded at keep their small columns, or a ridge would free them.
+    size = np.maximum(size, 0.2 * size.max())
+    return Group(at, on, curves, columns / size[:, None], size)
+
+
+def _curved(features: list[Features], model: Model) -> Iterator[tuple[str, str, list[Effect]]]:
+    static = features[0].run.view.static
+    for index, joint in enumerate(model.robot.joint_names):
+        fixed = [
+            JointCurve(joint, (0.0,), (0.0,), 'constant', channel) for channel in ('q', *OFF_AXIS)
+        ]
+        yield joint, 'constant', list(fixed)
+        for on in ('angle', 'direction', 'speed', 'load', 'temperature', 'time'):
+            knots = _knots(features, index, on)
+            if knots is None or (static and on in ('direction', 'speed')):
+                continue
+            zero = (0.0,) * len(knots)
+            yield joint, on, [JointCurve(joint, zero, knots, on)]
+            if on in ('angle', 'temperature'):
+                few = tuple(np.linspace(knots[0], knots[-1], min(len(knots), 4)))
+                zero = (0.0,) * len(few)
+                off = [JointCurve(joint, zero, few, on, channel) for channel in OFF_AXIS]
+                yield joint, on, list(off)
+    for frame in ('base', 'tool'):
+        for on in ('temperature', 'time'):
+            knots = _knots(features, 0, on)
+            if knots is not None:
+                few = tuple(np.linspace(knots[0], knots[-1], min(len(knots), 4)))
+                zero = (0.0,) * (3 * len(few))
+                yield frame, on, [FrameCurve(zero, zero, few, on, frame)]
+
+
+def _knots(features: list[Features], index: int, on: str) -> tuple[float, ...] | None:
+    """Return knots over what was recorded, or None where it did not vary."""
+    if on == 'direction':
+        spread = [float(np.ptp(QUANTITIES[on](m.view, index))) for m in features]
+        return (-1.0, 1.0) if max(spread) > LEAST[on] else None
+    if on == 'temperature' and any(m.view.temperature is None for m in features):
+        return None
+    values = [QUANTITIES[on](m.view, index) for m in features]
+    low = min(float(v.min()) for v in values)
+    high = max(float(v.max()) for v in values)
+    if high - low <= LEAST.get(on, 0.0):
+        return None
+    return tuple(float(k) for k in np.linspace(low, high, KNOTS[on]))
+
+
+def _plain(
+    problem: Problem, features: list[Features], model: Model
+) -> Iterator[tuple[str, str, list[Array]]]:
+    """Yield groups that no curve stands for: columns (E, c, M) per recording."""
+    moving = not features[0].run.view.static
+    for index, joint in enumerate(model.robot.joint_names):
+        if moving and min(m.at.size for m in features) > 8:
+            parts = []
+            for k, maker in enumerate(features):
+                push = np.gradient(maker.view.qd[:, index], maker.view.t)
+                parts.append(maker.column(('q', index))[None, : problem.rows[k]] * push)
+            yield joint, 'acceleration', parts
+    if moving:
+        yield 'clock', 'speed', [_velocity(problem, k, m) for k, m in enumerate(features)]
+    yield 'instrument', 'place', [_place(problem, k, m) for k, m in enumerate(features)]
+    if all(m.view.wrench is not None for m in features):
+        yield 'tool', 'load', [_yielding(problem, k, m) for k, m in enumerate(features)]
+
+
+def _velocity(problem: Problem, k: int, maker: Features) -> Array:
+    """Return the tool's twist, shape (1, c, M): what a late clock shows."""
+    joints = range(maker.twin.robot.n)
+    total = sum(maker.column(('q', i)) * maker.view.qd[:, i] for i in joints)
+    return np.asarray(total)[None, : problem.rows[k]]
+
+
+def _place(problem: Problem, k: int, maker: Features) -> Array:
+    """Return every coordinate of the position over the place, up to its squares, (27, c, M)."""
+    p = maker.run.poses.position
+    x = ((p - p.mean(axis=0)) / np.maximum(p.std(axis=0), 1e-9)).T
+    shapes = [*x, *(x[a] * x[b] for a in range(3) for b in range(a, 3))]
+    out = np.zeros((3, len(shapes), problem.rows[k], x.shape[1]))
+    for axis in range(3):
+        out[axis, :, axis] = shapes
+    return out.reshape(-1, problem.rows[k], x.shape[1])
+
+
+def _yielding(problem: Problem, k: int, maker: Features) -> Array:
+    """Return the tool pushed along its axes by the force on it, shape (3, c, M)."""
+    rotation, wrench = maker.run.poses.rotation, maker.view.wrench
+    assert wrench is not None
+    out = np.zeros((3, problem.rows[k], wrench.shape[0]))
+    force = wrench[:, :3]
+    if maker.view.wrench_frame != 'tool':
+        force = np.einsum('mji,mj->mi', rotation, force)
+    for axis in range(3):
+        out[axis, :3] = (rotation[:, :, axis] * force[:, axis, None]).T
+    return out

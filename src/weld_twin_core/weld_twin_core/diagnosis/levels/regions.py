@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Regions of posture: what was measured with the arm in one part of its joint space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from ..algebra.problem import Problem
+
+
+def posture_regions(problem: Problem, halvings: int = 3) -> Array:
+    """
+    Return the region of posture of every row, int, shape (rows,).
+
+    The measurements are halved at the median of the joint that spreads most among them, and the
+    halves again, so that every region holds as many and lies in one part of the joint space.
+
+    Parameters
+    ----------
+    problem : Problem
+    halvings : int
+        2 to this power is the number of regions.
+
+    """
+    postures = np.concatenate(
+        [r.joints.at(r.measured.t)[0] for r in problem.recordings if r.measured is not None]
+    )
+    labels = np.zeros(postures.shape[0], dtype=int)
+    for _ in range(halvings):
+        after = labels * 2
+        for name in np.unique(labels):
+            here = np.flatnonzero(labels == name)
+            spread = np.ptp(postures[here], axis=0)
+            order = np.argsort(postures[here, int(np.argmax(spread))], kind='stable')
+            after[here[order[here.size // 2 :]]] += 1
+        labels = after
+    rows, at = [], 0
+    for c, m in zip(problem.rows, problem.samples, strict=True):
+        rows.append(np.repeat(labels[at : at + m], c))
+        at += m
+    return np.concatenate(rows)

@@ -1,0 +1,224 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Few groups that together predict what was not fitted: a sparse additive model, chosen forward.
+
+Groups enter whole, each with the ridge that serves it best, and all are fitted together; what
+counts is the squared error on stretches of time, and on regions of posture, that took no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ...arrays import Array
+from ..algebra.gram import Index
+from ..algebra.problem import Problem
+from .groups import Group
+
+RIDGES = (1e-1, 1e1, 1e3)
+"""Prior precision of the columns of a group in units of noise: from free to hardly there."""
+MOST = 4
+"""More groups than this at once say that nothing simple is at work."""
+STEADY = 2.0
+"""The fall of the squared error over its standard error between stretches."""
+WORTH = 0.02
+"""Share of the squared error at the start that a group must take away."""
+STRETCHES = 10
+ROWS = 200.0
+"""Independent rows that two groups are told apart by, however many there are: beyond some hundreds
+the difference of real physics from every group decides, and no longer the noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A group in the model, and the ridge that holds it."""
+
+    group: int
+    ridge: float
+
+
+@dataclass(frozen=True, eq=False)
+class Folds:
+    """
+    Normal equations of every fold of one way to divide the rows.
+
+    Attributes
+    ----------
+    normals : array, shape (B, P, P);  rights : array, shape (B, P);  squares : array, shape (B,)
+
+    """
+
+    normals: Array
+    rights: Array
+    squares: Array
+
+    @classmethod
+    def of(cls, columns: Array, target: Array, labels: Array) -> Folds:
+        """Multiply out every fold."""
+        names = np.unique(labels)
+        parts = [(columns[:, labels == n], target[labels == n]) for n in names]
+        return cls(
+            np.stack([c @ c.T for c, _ in parts]),
+            np.stack([c @ t for c, t in parts]),
+            np.array([t @ t for _, t in parts]),
+        )
+
+    def errors(self, index: Index, precision: Array) -> Array:
+        """Return the squared error on every fold of the columns fitted on the others, (B,)."""
+        if not index.size:
+            return self.squares
+        at = np.ix_(index, index)
+        total = self.normals.sum(axis=0)[at] + np.diag(precision)
+        right = self.rights.sum(axis=0)[index]
+        out = np.empty(self.squares.size)
+        for b, square in enumerate(self.squares):
+            here, pull = self.normals[b][at], self.rights[b][index]
+            x = cho_solve(cho_factor(total - here), right - pull)
+            out[b] = square - 2.0 * x @ pull + x @ here @ x
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Choosing:
+    """
+    What a choice of groups is made on.
+
+    Attributes
+    ----------
+    groups : list of Group
+    fixed : array of int
+        Columns of nuisance frames and named effects, always fitted.
+    places : list of array of int
+        Columns of every group.
+    ways : tuple of Folds
+        Stretches of time, and regions of posture.
+
+    """
+
+    groups: list[Group]
+    fixed: Index
+    fixed_precision: Array
+    places: list[Index]
+    ways: tuple[Folds, ...]
+
+    def errors(self, members: Sequence[Member]) -> list[Array]:
+        """Return the squared error of a model on every fold, for each way to divide."""
+        index = np.concatenate([self.fixed, *(self.places[m.group] for m in members)])
+        held = [np.full(self.places[m.group].size, m.ridge) for m in members]
+        precision = np.concatenate([self.fixed_precision, *held])
+        return [way.errors(index.astype(int), precision) for way in self.ways]
+
+
+def choosing(
+    problem: Problem,
+    groups: list[Group],
+    fixed: Array,
+    fixed_precision: Array,
+    target: Array,
+    regions: Array,
+) -> Choosing:
+    """
+    Return what groups are chosen on.
+
+    Parameters
+    ----------
+    problem : Problem
+    groups : list of Group
+    fixed : array, shape (F, rows)
+        Whitened columns always fitted.
+    fixed_precision : array, shape (F,)
+    target : array, shape (rows,)
+        What is to be explained: the whitened residual without any group.
+    regions : array of int, shape (rows,)
+        Region of posture of every row.
+
+    """
+    size = np.sqrt(np.maximum((fixed**2).mean(axis=1), 1e-300))
+    columns = np.concatenate([fixed / size[:, None], *(g.columns for g in groups)])
+    at, places = fixed.shape[0], []
+    for group in groups:
+        places.append(np.arange(at, at + group.columns.shape[0]))
+        at += group.columns.shape[0]
+    stretches = problem.block_labels(STRETCHES)
+    ways = [Folds.of(columns, target, labels) for labels in (stretches, regions)]
+    # Frames that the data hardly show move freely; a trace of ridge keeps the algebra whole.
+    held = np.maximum(fixed_precision / size**2, 1e-6 * target.size)
+    return Choosing(groups, np.arange(fixed.shape[0]), held, places, tuple(ways))
+
+
+def chosen(work: Choosing) -> list[Member]:
+    """Return the few groups that predict best together; none where none is worth it."""
+    members: list[Member] = []
+    start = now = work.errors(members)
+    while len(members) < MOST:
+        tried = [(_worst_gain(now, errors), m, errors) for m, errors in _entrants(work, members)]
+        if not tried:
+            break
+        gain, member, errors = max(tried, key=lambda item: item[0])
+        steady = min(steadiness(a, b) for a, b in zip(now, errors, strict=True))
+        if gain * now[0].sum() < WORTH * start[0].sum() or steady < STEADY:
+            break
+        members.append(member)
+        now = errors
+    return _pruned(work, members, start)
+
+
+def _entrants(work: Choosing, members: list[Member]) -> list[tuple[Member, list[Array]]]:
+    """Return every group not in the model yet at its best ridge, and the errors with it."""
+    taken = {m.group for m in members}
+    out = []
+    for k in range(len(work.groups)):
+        if k not in taken:
+            tries = [Member(k, ridge) for ridge in RIDGES]
+            pairs = [(m, work.errors([*members, m])) for m in tries]
+            out.append(min(pairs, key=lambda pair: max(e.sum() for e in pair[1])))
+    return out
+
+
+def _worst_gain(before: list[Array], after: list[Array]) -> float:
+    """Return the share of the squared error that falls, by the way that shows least."""
+    return min(
+        1.0 - float(b.sum() / max(a.sum(), 1e-300)) for a, b in zip(before, after, strict=True)
+    )
+
+
+def steadiness(before: Array, after: Array) -> float:
+    """Return the mean fall over the folds in its standard errors."""
+    fall = before - after
+    error = float(fall.std(ddof=1) / np.sqrt(fall.size)) if fall.size > 1 else np.inf
+    return float(fall.mean() / max(error, 1e-300))
+
+
+def _pruned(work: Choosing, members: list[Member], start: list[Array]) -> list[Member]:
+    """Return the members without those that the others have made needless."""
+    while len(members) > 1:
+        now = work.errors(members)
+        less = [work.errors(members[:k] + members[k + 1 :]) for k in range(len(members))]
+        losses = [_worst_gain(errors, now) * errors[0].sum() for errors in less]
+        weakest = int(np.argmin(losses))
+        if losses[weakest] >= WORTH * start[0].sum():
+            break
+        members = members[:weakest] + members[weakest + 1 :]
+    return members
+
+
+def rival_weights(work: Choosing, members: list[Member], k: int) -> list[tuple[int, float]]:
+    """
+    Return each group with its weight in the place of member k, the weights adding up to one.
+
+    A group that leaves as much on unseen folds weighs as much; one that leaves r times the squared
+    error weighs r to the power of -`ROWS` / 4: the likelihood of `ROWS` independent rows, softened
+    by two because real physics is a little richer than any group.
+    """
+    rest = members[:k] + members[k + 1 :]
+    own = (members[k], work.errors(members))
+    tried = [own, *(pair for pair in _entrants(work, rest) if pair[0].group != own[0].group)]
+    totals = np.array([max(float(e.sum()) for e in errors) for _, errors in tried])
+    weights = (totals / max(totals.min(), 1e-300)) ** (-ROWS / 4.0)
+    weights /= weights.sum()
+    return [(m.group, float(w)) for (m, _), w in zip(tried, weights, strict=True)]

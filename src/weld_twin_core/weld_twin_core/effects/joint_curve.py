@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint curve: one value of a joint's row bent by a curve that was measured, not derived."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arm.chain import ROW_CHANNELS, Shift
+from ..arm.robot import Robot
+from ..arrays import Array
+from ..errors import ModelError
+from .curve import QUANTITIES, basis, basis_slope, check_knots
+from .effect import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class JointCurve(Effect):
+    """
+    A spline over ``over``, through ``values`` at ``knots``, added to ``channel`` of a joint.
+
+    ``over`` is 'angle', 'direction', 'speed', 'load', 'temperature', 'time', or 'constant' with a
+    single knot; ``channel`` is 'q', the joint's position, or a value of its row ('theta', 'd', 'a',
+    'alpha', 'beta'), whose unit the values have. It stands for causes that nobody has a formula
+    for.
+    """
+
+    joint: str
+    values: Value = (0.0, 0.0)
+    knots: Sequence[float] = (-1.0, 1.0)
+    over: str = 'angle'
+    channel: str = 'q'
+
+    name = 'joint_curve'
+    of = 'joint'
+    stage = Stage.LINK
+    cause = False
+    parameters = (Parameter('values', 'rad', size=0, typical=2e-4),)
+    options = ('knots', 'over', 'channel')
+
+    def check(self, robot: Robot) -> None:
+        """Refuse an unknown joint, quantity or channel, and knots that do not increase."""
+        super().check(robot)
+        check_knots(self.name, self.over, self.knots, np.shape(self.values)[-1])
+        if self.channel not in ('q', *ROW_CHANNELS):
+            raise ModelError(
+                f'{self.name}: channel must be one of q, {", ".join(ROW_CHANNELS)}, '
+                f'got {self.channel!r}'
+            )
+
+    @property
+    def on(self) -> str:
+        """Return what the curve runs over."""
+        return self.over
+
+    def _basis(self, view: View) -> Array:
+        index = view.robot.index(self.joint)
+        return basis(self.knots, QUANTITIES[self.over](view, index))
+
+    def _site(self, view: View) -> tuple[str, int]:
+        return self.channel, view.robot.index(self.joint)
+
+    def displace(self, view: View) -> Shift:
+        """Return the curve on the channel."""
+        values = np.asarray(self.values, dtype=np.float64)
+        return {self._site(view): np.tensordot(values, self._basis(view), axes=(-1, 0))}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return how much the value at each knot counts."""
+        return [{self._site(view): row} for row in self._basis(view)]
+
+    def slope(self, view: View) -> Shift:
+        """Return the slope of a curve over the angle that bends the joint itself."""
+        if (self.over, self.channel) != ('angle', 'q'):
+            return {}
+        index = view.robot.index(self.joint)
+        rise = basis_slope(self.knots, view.joint(index))
+        values = np.asarray(self.values, dtype=np.float64)
+        return {self._site(view): np.tensordot(values, rise, axes=(-1, 0))}
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the entry of an effects file that makes this curve."""
+        return super().to_mapping() | {'knots': [float(knot) for knot in self.knots]}

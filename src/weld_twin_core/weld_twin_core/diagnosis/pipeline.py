@@ -14,6 +14,9 @@ from .answer.answer import answer
 from .beliefs import Beliefs
 from .frames.aligned import aligned
 from .hypotheses.search import search
+from .levels.carried import carried
+from .levels.curved import curved
+from .levels.held_against import held_against
 from .many.fitted_together import fitted_together
 from .predicting.allowed import allowed
 from .result import Diagnosis
@@ -106,6 +109,10 @@ def diagnose(
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
     evidence = gathered(found, unseen, leftover, shrink, noise, beliefs)
     verdict = decide(evidence, beliefs)
+    rival = curved(found, verdict)
+    verdict = held_against(verdict, unseen, rival)
+    progress('held against curves without a formula')
+    found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, noise)
     progress('weighed what the data leave open')
     return answer(
@@ -118,4 +125,5 @@ def diagnose(
         checks=checks,
         beliefs=beliefs,
         posterior=posterior,
+        rival=rival,
     )

@@ -119,6 +119,52 @@ class Family:
 
 
 @dataclass(frozen=True)
+class Cause:
+    """
+    What is certain of one cause, level by level, most probable first.
+
+    Attributes
+    ----------
+    place : tuple of (str, float)
+        A joint's name, 'base', 'tool', 'instrument', 'clock' or 'load', and its probability.
+    dependence : tuple of (str, float)
+        What it depends on; several may be certain at once.
+    name : tuple of (Site, float)
+        Effects of the library, or curves.
+    share : float
+        Of the squared gap.
+    share_ci90 : (float, float)
+
+    """
+
+    place: tuple[tuple[str, float], ...]
+    dependence: tuple[tuple[str, float], ...]
+    name: tuple[tuple[Site, float], ...]
+    share: float
+    share_ci90: tuple[float, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of ``verdict.causes``."""
+        return {
+            'place': [{'at': at, 'probability': p} for at, p in self.place],
+            'dependence': [{'on': on, 'probability': p} for on, p in self.dependence],
+            'name': [
+                {'effect': s.effect, 'joint': s.joint, 'probability': p} for s, p in self.name
+            ],
+            'share': self.share,
+            'share_ci90': list(self.share_ci90),
+        }
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What of the squared gap no cause explains, and what is noise."""
+
+    unexplained: float
+    noise: float
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A hypothesis for the leading effect, with its probability and what it would bring."""
 
@@ -239,6 +285,9 @@ class Diagnosis:
     """What the verdict was drawn from, `verdict.evidence.Evidence`, to draw it anew."""
     posterior: Posterior | None = None
     """The models that the recordings allow: what makes a prediction certain or not."""
+    causes: tuple[Cause, ...] = ()
+    """What is certain of each cause, largest share of the squared gap first."""
+    shares: Shares = Shares(0.0, 0.0)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
@@ -257,6 +306,7 @@ class Diagnosis:
                 'reasons': list(self.reasons),
                 'families': [family.as_dict() for family in self.families],
                 'actions': list(self.actions),
+                'causes': [cause.as_dict() for cause in self.causes],
             },
             'candidates': [
                 {
@@ -286,6 +336,8 @@ class Diagnosis:
                 'rms_m': self.unexplained.rms_m,
                 'above_noise': self.unexplained.above_noise,
                 'structure': list(self.unexplained.structure),
+                'share': self.shares.unexplained,
+                'noise_share': self.shares.noise,
             },
             'next_experiment': self.next_experiment,
             'checks': [dict(vars(check)) for check in self.checks],

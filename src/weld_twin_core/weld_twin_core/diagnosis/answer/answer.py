@@ -10,6 +10,8 @@ from ..advice.next_step import next_step
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
+from ..levels.causes import causes
+from ..levels.curved import Curved
 from ..result import Check, Diagnosis, Shrink
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
@@ -31,6 +33,7 @@ def answer(
     checks: tuple[Check, ...],
     beliefs: Beliefs,
     posterior: Posterior,
+    rival: Curved | None = None,
 ) -> Diagnosis:
     """
     Return the diagnosis.
@@ -49,8 +52,11 @@ def answer(
     beliefs : Beliefs
     posterior : Posterior
         The models that the recordings allow.
+    rival : Curved or None
+        What explains the gap without a formula.
 
     """
+    told, shares = causes(found, unseen, verdict, rival, noise.rms_m)
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
         gap=gap(found, noise.rms_m),
@@ -62,7 +68,9 @@ def answer(
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,
-        unexplained=unexplained(evidence, beliefs),
+        unexplained=unexplained(
+            evidence, beliefs, shrink.rms_after_m, rival if verdict.status == 'unknown' else None
+        ),
         next_experiment=next_step(found, verdict),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         checks=checks,
@@ -73,4 +81,6 @@ def answer(
         families=verdict.families,
         evidence=evidence,
         posterior=posterior,
+        causes=told,
+        shares=shares,
     )

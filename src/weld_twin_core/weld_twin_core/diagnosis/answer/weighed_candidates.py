@@ -9,6 +9,7 @@ import numpy as np
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
+from ..levels.curved import Curved
 from ..result import Candidate, Unexplained
 from ..verdict.evidence import Evidence
 from ..verdict.weighing import Weighed
@@ -37,8 +38,12 @@ def _position_rms(found: Search, rival: Rival) -> float:
     return found.work.scale.position * float(np.sqrt(total / max(count, 1)))
 
 
-def unexplained(evidence: Evidence, beliefs: Beliefs) -> Unexplained:
-    """Return what remains after the verdict, and what it depends on."""
+def unexplained(
+    evidence: Evidence, beliefs: Beliefs, after: float, rival: Curved | None
+) -> Unexplained:
+    """Return what remains after the verdict, and what that or the gap itself depends on."""
     case = Weighed(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
-    return Unexplained(evidence.after, case.above_noise, names)
+    if not names and rival is not None:
+        names = tuple(str(part.group) for part in rival.form.parts)
+    return Unexplained(after, case.above_noise, names)

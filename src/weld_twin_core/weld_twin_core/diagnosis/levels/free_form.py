@@ -61,12 +61,12 @@ class FreeForm:
     @property
     def curves(self) -> tuple[Effect, ...]:
         """Return the curves to fit, their values zero."""
-        return tuple(curve for part in self.parts for curve in part.group.curves)
+        return tuple(curve for part in self.parts for curve in part.group.carried)
 
     @property
     def precision(self) -> Array:
         """Return the prior precision of the curves' values, in units of noise, shape (K,)."""
-        held = [p.ridge * p.group.scales**2 for p in self.parts if p.group.curves]
+        held = [part.group.held(part.ridge) for part in self.parts if part.group.carried]
         return np.concatenate([np.zeros(0), *held])
 
 

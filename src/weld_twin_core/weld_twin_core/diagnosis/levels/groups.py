@@ -10,7 +10,7 @@ curve can be carried over to another motion, by plain columns. Groups compete as
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,8 @@ KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 't
 LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
 """Span below which a quantity did not vary: angle [rad], speed [rad/s], torque [N m],
 temperature [K]. Curves over less are straight lines, and told from nothing."""
+LOOSE = 100.0
+"""Carriers may be so many times their typical size: their group has been found by its columns."""
 OFF_AXIS = ('d', 'a', 'alpha', 'beta')
 
 
@@ -45,6 +47,8 @@ class Group:
         Whitened, together of unit mean square.
     scales : array, shape (E,)
         What the columns were divided by, noise per unit of a curve's value.
+    carriers : tuple of Effect
+        Curves that do on any motion what plain columns do on this one.
 
     """
 
@@ -53,6 +57,19 @@ class Group:
     curves: tuple[Effect, ...]
     columns: Array
     scales: Array
+    carriers: tuple[Effect, ...] = ()
+
+    @property
+    def carried(self) -> tuple[Effect, ...]:
+        """Return the curves that take the group along to another motion; none for a few kinds."""
+        return self.curves or self.carriers
+
+    def held(self, ridge: float) -> Array:
+        """Return the prior precision of the carried curves' values, in units of noise."""
+        if self.curves:
+            return ridge * self.scales**2
+        sizes = [curve.coordinate_scales() for curve in self.carriers]
+        return np.concatenate([np.zeros(0), *(1.0 / (LOOSE * size) ** 2 for size in sizes)])
 
     def __str__(self) -> str:
         """Return it as people read it."""
@@ -68,7 +85,8 @@ def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
         joined = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)]
         out.append(_group(problem, scale, at, on, tuple(curves), joined))
     for at, on, blocks in _plain(problem, features, model):
-        out.append(_group(problem, scale, at, on, (), blocks))
+        group = _group(problem, scale, at, on, (), blocks)
+        out.append(replace(group, carriers=_late(features, model) if at == 'clock' else ()))
     return [group for group in out if group.columns.size]
 
 
@@ -150,6 +168,16 @@ def _plain(
     yield 'instrument', 'place', [_place(problem, k, m) for k, m in enumerate(features)]
     if all(m.view.wrench is not None for m in features):
         yield 'tool', 'load', [_yielding(problem, k, m) for k, m in enumerate(features)]
+
+
+def _late(features: list[Features], model: Model) -> tuple[Effect, ...]:
+    """Return what a late clock does to every joint: behind in proportion to its speed."""
+    out = []
+    for index, joint in enumerate(model.robot.joint_names):
+        fastest = max(float(np.abs(m.view.qd[:, index]).max()) for m in features)
+        if fastest > LEAST['speed']:
+            out.append(JointCurve(joint, (0.0, 0.0), (-fastest, fastest), 'speed'))
+    return tuple(out)
 
 
 def _velocity(problem: Problem, k: int, maker: Features) -> Array:

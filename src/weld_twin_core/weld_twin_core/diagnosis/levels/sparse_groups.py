@@ -22,12 +22,15 @@ from .groups import Group
 
 RIDGES = (1e-1, 1e1, 1e3)
 """Prior precision of the columns of a group in units of noise: from free to hardly there."""
-MOST = 4
+MOST = 6
 """More groups than this at once say that nothing simple is at work."""
+SHORTLIST = 12
+"""Groups tried on unseen folds at every step, those that fit best in sample; the right one has
+not been seen below the fourth."""
 STEADY = 2.0
 """The fall of the squared error over its standard error between stretches."""
-WORTH = 0.02
-"""Share of the squared error at the start that a group must take away."""
+WORTH = 0.05
+"""Share of the squared error so far that a group must take away on unseen folds."""
 STRETCHES = 10
 ROWS = 200.0
 """Independent rows that two groups are told apart by, however many there are: beyond some hundreds
@@ -106,12 +109,33 @@ class Choosing:
     places: list[Index]
     ways: tuple[Folds, ...]
 
-    def errors(self, members: Sequence[Member]) -> list[Array]:
-        """Return the squared error of a model on every fold, for each way to divide."""
+    def shortlist(self, members: Sequence[Member]) -> list[int]:
+        """Return the groups that would fit best in sample beside the members, best first."""
+        index, precision = self._columns_of(members)
+        folds = self.ways[0]
+        normal, right = folds.normals.sum(axis=0), folds.rights.sum(axis=0)
+        own = cho_factor(normal[np.ix_(index, index)] + np.diag(precision))
+        rest = right - normal[:, index] @ cho_solve(own, right[index])
+        taken = {m.group for m in members}
+        falls = {}
+        for k, place in enumerate(self.places):
+            if k in taken:
+                continue
+            cross = normal[np.ix_(index, place)]
+            left = normal[np.ix_(place, place)] - cross.T @ cho_solve(own, cross)
+            left[np.diag_indices_from(left)] += RIDGES[1]
+            falls[k] = float(rest[place] @ cho_solve(cho_factor(left), rest[place]))
+        return sorted(falls, key=lambda k: -falls[k])[:SHORTLIST]
+
+    def _columns_of(self, members: Sequence[Member]) -> tuple[Index, Array]:
         index = np.concatenate([self.fixed, *(self.places[m.group] for m in members)])
         held = [np.full(self.places[m.group].size, m.ridge) for m in members]
-        precision = np.concatenate([self.fixed_precision, *held])
-        return [way.errors(index.astype(int), precision) for way in self.ways]
+        return index.astype(int), np.concatenate([self.fixed_precision, *held])
+
+    def errors(self, members: Sequence[Member]) -> list[Array]:
+        """Return the squared error of a model on every fold, for each way to divide."""
+        index, precision = self._columns_of(members)
+        return [way.errors(index, precision) for way in self.ways]
 
 
 def choosing(
@@ -154,29 +178,27 @@ def choosing(
 def chosen(work: Choosing) -> list[Member]:
     """Return the few groups that predict best together; none where none is worth it."""
     members: list[Member] = []
-    start = now = work.errors(members)
+    now = work.errors(members)
     while len(members) < MOST:
         tried = [(_worst_gain(now, errors), m, errors) for m, errors in _entrants(work, members)]
         if not tried:
             break
         gain, member, errors = max(tried, key=lambda item: item[0])
         steady = min(steadiness(a, b) for a, b in zip(now, errors, strict=True))
-        if gain * now[0].sum() < WORTH * start[0].sum() or steady < STEADY:
+        if gain < WORTH or steady < STEADY:
             break
         members.append(member)
         now = errors
-    return _pruned(work, members, start)
+    return _pruned(work, members)
 
 
 def _entrants(work: Choosing, members: list[Member]) -> list[tuple[Member, list[Array]]]:
-    """Return every group not in the model yet at its best ridge, and the errors with it."""
-    taken = {m.group for m in members}
+    """Return the groups that fit best beside the members, at their best ridge, and the errors."""
     out = []
-    for k in range(len(work.groups)):
-        if k not in taken:
-            tries = [Member(k, ridge) for ridge in RIDGES]
-            pairs = [(m, work.errors([*members, m])) for m in tries]
-            out.append(min(pairs, key=lambda pair: max(e.sum() for e in pair[1])))
+    for k in work.shortlist(members):
+        tries = [Member(k, ridge) for ridge in RIDGES]
+        pairs = [(m, work.errors([*members, m])) for m in tries]
+        out.append(min(pairs, key=lambda pair: max(e.sum() for e in pair[1])))
     return out
 
 
@@ -194,14 +216,14 @@ def steadiness(before: Array, after: Array) -> float:
     return float(fall.mean() / max(error, 1e-300))
 
 
-def _pruned(work: Choosing, members: list[Member], start: list[Array]) -> list[Member]:
+def _pruned(work: Choosing, members: list[Member]) -> list[Member]:
     """Return the members without those that the others have made needless."""
     while len(members) > 1:
         now = work.errors(members)
         less = [work.errors(members[:k] + members[k + 1 :]) for k in range(len(members))]
-        losses = [_worst_gain(errors, now) * errors[0].sum() for errors in less]
+        losses = [_worst_gain(errors, now) for errors in less]
         weakest = int(np.argmin(losses))
-        if losses[weakest] >= WORTH * start[0].sum():
+        if losses[weakest] >= WORTH:
             break
         members = members[:weakest] + members[weakest + 1 :]
     return members

@@ -1,0 +1,248 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Each cause level by level, with its share of the squared gap.
+
+Shares are what every cause takes off the squared gap on stretches that were not fitted, in
+proportion to how far it moves the tool along with all of them together; with the noise and with
+what is left they add up to one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...effects.registry import REGISTRY
+from ..hypotheses.rivals import Rival
+from ..hypotheses.search import Search
+from ..result import Cause, Shares, Site
+from ..unseen.unseen_stretches import Unseen
+from ..verdict.decision import Verdict
+from .curved import Curved
+from .free_form import Part
+
+AGREED, ALONE = 0.98, 0.8
+"""Belief in place and dependence of a name where the free form finds the same, and where it does
+not: of eight cases with causes outside the library it found both right in eight."""
+FREE = 0.95
+"""Belief in the place of a curve that no other group comes near; no list of places is whole."""
+LISTED = 0.02
+"""A place, dependence or name less probable than this is not listed."""
+STUDENT = 1.86
+"""Student's t for 90 % and the 8 stretches that take turns."""
+
+
+SHARED = 0.7
+"""Belief that what several joints do alike has one cause, and not one each; a judgement."""
+Places = list[tuple[Part, tuple[int, ...]]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Claim:
+    """One cause before its share: members of the model, and what is believed of it."""
+
+    members: tuple[int, ...]
+    place: dict[str, float]
+    dependence: dict[str, float]
+    name: dict[Site, float]
+
+
+def causes(
+    found: Search, unseen: Unseen, verdict: Verdict, rival: Curved | None, floor: float
+) -> tuple[tuple[Cause, ...], Shares]:
+    """
+    Return the causes, largest share first, and what of the squared gap is left and is noise.
+
+    Parameters
+    ----------
+    found : Search
+    unseen : Unseen
+        Of its final model.
+    verdict : Verdict
+    rival : Curved or None
+        The free-form explanation; it is the model itself where the verdict is 'unknown'.
+    floor : float
+        RMS of the noise alone [m].
+
+    """
+    if rival is not None and verdict.status == 'unknown':
+        found, unseen = rival.found, rival.unseen
+    claims = _claims(found, verdict, rival)
+    squares = (
+        unseen.squares(unseen.predict([])),
+        unseen.squares(unseen.predict(range(len(unseen.parts)))),
+    )
+    parts = _contributions(unseen)
+    labels = unseen.trusted_labels()
+    whole = _shares(squares, parts, claims, np.ones(labels.size, dtype=bool))
+    spread = _spread(squares, parts, claims, labels)
+    out = [
+        Cause(
+            place=_listed(claim.place),
+            dependence=_listed(claim.dependence),
+            name=tuple((s, p) for s, p in claim.name.items() if p >= LISTED),
+            share=float(share),
+            share_ci90=(
+                float(max(share - STUDENT * error, 0.0)),
+                float(min(share + STUDENT * error, 1.0)),
+            ),
+        )
+        for claim, share, error in zip(claims, whole, spread, strict=True)
+    ]
+    out.sort(key=lambda cause: -cause.share)
+    noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
+    rest = max(1.0 - float(whole.sum()) - noise, 0.0)
+    return tuple(out), Shares(unexplained=rest, noise=max(noise, 0.0))
+
+
+def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    ordered = sorted(beliefs.items(), key=lambda item: -item[1])
+    return tuple((name, belief) for name, belief in ordered if belief >= LISTED)
+
+
+def _claims(found: Search, verdict: Verdict, rival: Curved | None) -> list[_Claim]:
+    model = found.final.model.found
+    if rival is not None and verdict.status == 'unknown':
+        return _curve_claims(model, rival)
+    named = {site for group in verdict.sets for site in group}
+    if found.dense:
+        return _crowd_claims(model, named, verdict.confidence)
+    out = []
+    each = verdict.confidence ** (1.0 / max(len(verdict.sets), 1))
+    for k, effect in enumerate(model):
+        if Site(effect.name, effect.site) not in named or k >= len(found.slots):
+            continue
+        out.append(_named_claim(k, found.slots[k], each, rival))
+    return out
+
+
+def _named_claim(k: int, slot: tuple[Rival, ...], belief: float, rival: Curved | None) -> _Claim:
+    """Return what is believed of an effect found one by one, from its rivals."""
+    place: dict[str, float] = {}
+    dependence: dict[str, float] = {}
+    name: dict[Site, float] = {}
+    for other in slot:
+        effect = _effect_of(other)
+        at = effect.at if effect is not None else str(other.site.joint)
+        on = effect.on if effect is not None else REGISTRY[other.site.effect].depends_on
+        place[at] = place.get(at, 0.0) + other.probability
+        dependence[on] = dependence.get(on, 0.0) + other.probability
+        name[other.site] = other.probability * belief
+    seen = rival.form.parts if rival is not None else ()
+    return _Claim(
+        (k,),
+        {at: p * _agreement(seen, 'at', at) for at, p in place.items()},
+        {on: p * _agreement(seen, 'on', on) for on, p in dependence.items()},
+        name,
+    )
+
+
+def _agreement(parts: Sequence[Part], kind: str, value: str) -> float:
+    return AGREED if any(part.weight_of(kind).get(value, 0.0) > 0.1 for part in parts) else ALONE
+
+
+def _effect_of(rival: Rival) -> Effect | None:
+    for effect in rival.fit.model.found:
+        if (effect.name, effect.site) == (rival.site.effect, rival.site.joint):
+            return effect
+    return None
+
+
+def _curve_claims(model: tuple[Effect, ...], rival: Curved) -> list[_Claim]:
+    """Return a claim for every effect that stayed, and for every place that curves bend."""
+    out = [
+        _Claim((k,), {e.at: FREE}, {e.on: FREE}, {Site(e.name, e.site): FREE})
+        for k, e in enumerate(rival.kept)
+    ]
+    at = len(rival.kept)
+    by_place: dict[str, Places] = {}
+    for part in rival.form.parts:
+        members = tuple(range(at, at + len(part.group.carried)))
+        at += len(members)
+        by_place.setdefault(part.group.at, []).append((part, members))
+    for place, parts in _merged(by_place).items():
+        held = tuple(k for _, members in parts for k in members)
+        believed = {a: w * FREE for a, w in parts[0][0].weight_of('at').items()}
+        if place not in believed:
+            believed = {place: SHARED, **{a: w * (FREE - SHARED) for a, w in believed.items()}}
+        on: dict[str, float] = {}
+        for part, _ in parts:
+            for name, weight in part.weight_of('on').items():
+                on[name] = max(on.get(name, 0.0), weight * FREE)
+        curves = {Site(model[k].name, model[k].site): FREE for k in held}
+        out.append(_Claim(held, believed, on, curves))
+    return out
+
+
+def _merged(by_place: dict[str, Places]) -> dict[str, Places]:
+    """Return the places, with joints that all depend on the load, or lag, put under one cause."""
+    out = dict(by_place)
+    for on, together, least in (('load', 'load', 2), ('speed', 'clock', 3)):
+        joints = [
+            place for place, parts in out.items() if all(part.group.on == on for part, _ in parts)
+        ]
+        if len(joints) >= least:
+            out[together] = [item for place in joints for item in out.pop(place)]
+    return out
+
+
+def _crowd_claims(model: tuple[Effect, ...], named: set[Site], confidence: float) -> list[_Claim]:
+    """Return a claim for every place and dependence of many small errors together."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for k, effect in enumerate(model):
+        if Site(effect.name, effect.site) in named:
+            groups.setdefault((effect.at, effect.on), []).append(k)
+    return [
+        _Claim(
+            tuple(members),
+            {at: confidence},
+            {on: confidence},
+            {Site(model[k].name, model[k].site): confidence for k in members},
+        )
+        for (at, on), members in groups.items()
+    ]
+
+
+def _contributions(unseen: Unseen) -> Array:
+    """Return how much each effect moves the tool along with all of them, (K, samples) [m^2]."""
+    total = unseen.targets[1:].sum(axis=0) if len(unseen.parts) else np.zeros(0)
+    # A product of two fields is a difference of two squares.
+    return np.array(
+        [
+            0.25 * (unseen.squares(total + t) - unseen.squares(total - t))
+            for t in unseen.targets[1:]
+        ]
+    )
+
+
+def _shares(
+    squares: tuple[Array, Array],
+    parts: Array,
+    claims: Sequence[_Claim],
+    keep: np.ndarray,
+) -> Array:
+    """Return the share of every claim over some of the samples."""
+    before, after = (float(s[keep].mean()) for s in squares)
+    explained = max(1.0 - after / max(before, 1e-300), 0.0)
+    if not claims or not len(parts):
+        return np.zeros(len(claims))
+    sizes = np.maximum(parts[:, keep].mean(axis=1), 0.0)
+    total = max(float(sizes.sum()), 1e-300)
+    return np.array([explained * sizes[list(c.members)].sum() / total for c in claims])
+
+
+def _spread(
+    squares: tuple[Array, Array], parts: Array, claims: Sequence[_Claim], labels: np.ndarray
+) -> Array:
+    """Return the standard error of every share, by leaving out one stretch at a time."""
+    names = np.unique(labels)
+    if names.size < 3 or not claims:
+        return np.full(len(claims), 0.5)
+    tries = np.array([_shares(squares, parts, claims, labels != n) for n in names])
+    count = names.size
+    return np.asarray(np.sqrt((count - 1) / count * ((tries - tries.mean(axis=0)) ** 2).sum(0)))

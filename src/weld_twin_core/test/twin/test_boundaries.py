@@ -247,6 +247,8 @@ def test_an_effect_survives_its_file(name, arm):
     for parameter in kind.parameters:
         values = [0.1, 0.2, 0.3] if parameter.size == 3 else [0.5, 0.6]
         entry[parameter.name] = values if parameter.size != 1 else 0.25
+        if name == 'frame_curve':  # two knots for each of three axes
+            entry[parameter.name] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     (first,) = effects_from_list([entry], arm)
     text = yaml.safe_dump([first.to_mapping()])
     (again,) = effects_from_list(yaml.safe_load(text), arm)

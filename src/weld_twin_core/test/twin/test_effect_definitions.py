@@ -73,6 +73,25 @@ def gear_ratio(cell):
     cell.q[1] *= 1.0 + 4e-3
 
 
+def joint_curve(cell):
+    """A natural spline of three knots: its one moment follows from the jump of the slopes."""
+    x, (y0, y1, y2) = np.clip(cell.q[1], -2.0, 2.5), (1e-3, -2e-3, 4e-3)
+    left, right = 2.5, 2.0
+    moment = 6.0 * ((y2 - y1) / right - (y1 - y0) / left) / (2.0 * (left + right))
+    if x < 0.5:
+        h, a, b, u, v = left, y0, y1, x + 2.0, 0.5 - x
+    else:
+        h, a, b, u, v = right, y2, y1, 2.5 - x, x - 0.5
+    bend = moment * u**3 / (6.0 * h) + (b / h - moment * h / 6.0) * u + a / h * v
+    cell.q[1] += bend
+
+
+def frame_curve(cell):
+    share = np.clip(cell.elapsed / 4.0, 0.0, 1.0)
+    turn = share * TURN
+    cell.tool = cell.textbook.frame(cell.robot.T_flange_tool, SMALL, turn, 'right')
+
+
 def transmission_ripple(cell):
     theta = cell.q[1]
     cell.q[1] += 1e-3 * np.sin(3 * theta + 0.3) + 2e-3 * np.sin(50 * theta - 0.2)
@@ -148,6 +167,19 @@ DEFINITIONS = {
     ),
     'setup_step': ({'xyz': SMALL, 'rotvec': TURN, 'time': 2.0}, setup_step),
     'tool_pose': ({'xyz': SMALL, 'rotvec': TURN}, tool_pose),
+    'joint_curve': (
+        {'joint': 'j1', 'values': [1e-3, -2e-3, 4e-3], 'knots': [-2.0, 0.5, 2.5]},
+        joint_curve,
+    ),
+    'frame_curve': (
+        {
+            'xyz': np.repeat(SMALL, 2),
+            'rotvec': np.stack([0.0 * TURN, TURN], axis=1).ravel(),
+            'knots': [0.0, 4.0],
+            'frame': 'tool',
+        },
+        frame_curve,
+    ),
     'gear_ratio': ({'joint': 'j1', 'scale': 4e-3}, gear_ratio),
     'transmission_ripple': (
         {'joint': 'j1', 'amplitude': [1e-3, 2e-3], 'order': [3, 50], 'phase': [0.3, -0.2]},

@@ -138,6 +138,8 @@ DRAWN = {
     'setup_settling': {'xyz': [1e-3, 2e-3, 3e-3], 'rotvec': [0.1, 0.2, 0.3], 'time_constant': 2.0},
     'setup_step': {'xyz': [1e-3, 2e-3, 3e-3], 'rotvec': [0.1, 0.2, 0.3], 'time': 1.0},
     'gear_ratio': {'joint': 'j1', 'scale': 1e-3},
+    'joint_curve': {'joint': 'j1', 'values': [1e-3, -2e-3, 4e-3], 'knots': [-1.0, 0.2, 1.5]},
+    'frame_curve': {'xyz': [1e-3] * 6, 'rotvec': [0.0, 1e-2] * 3, 'knots': [0.0, 4.0]},
     'transmission_ripple': {'joint': 'j1', 'amplitude': 1e-3, 'order': 3.0, 'phase': 0.3},
     'joint_coupling': {'joint': 'j1', 'source': 'j2', 'ratio': 1e-3},
     'backlash': {'joint': 'j1', 'width': 1e-2},

@@ -21,6 +21,12 @@ ENTRIES = {
     'setup_settling': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time_constant': 2.0},
     'setup_step': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
     'gear_ratio': {'joint': 'j1', 'scale': 1e-3},
+    'joint_curve': {
+        'joint': 'j1',
+        'values': [1e-4, -2e-4, 4e-4],
+        'knots': [-1.0, 0.2, 1.5],
+    },
+    'frame_curve': {'xyz': [0.0, 1e-6] * 3, 'rotvec': [0.0, 1e-6] * 3, 'knots': [0.0, 4.0]},
     'transmission_ripple': {
         'joint': 'j1',
         'amplitude': [1e-4, 2e-4],

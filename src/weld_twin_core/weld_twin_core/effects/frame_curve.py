@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -89,7 +88,3 @@ class FrameCurve(Effect):
         """Return how much the value at each knot counts, for every axis."""
         weights = basis(self.knots, QUANTITIES[self.over](view, 0))
         return [{(self.frame, axis): row} for axis in range(6) for row in weights]
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the entry of an effects file that makes this curve."""
-        return super().to_mapping() | {'knots': [float(knot) for knot in self.knots]}

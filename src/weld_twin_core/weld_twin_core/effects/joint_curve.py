@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -84,7 +83,3 @@ class JointCurve(Effect):
         rise = basis_slope(self.knots, view.joint(index))
         values = np.asarray(self.values, dtype=np.float64)
         return {self._site(view): np.tensordot(values, rise, axes=(-1, 0))}
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the entry of an effects file that makes this curve."""
-        return super().to_mapping() | {'knots': [float(knot) for knot in self.knots]}

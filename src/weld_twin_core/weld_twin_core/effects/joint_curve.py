@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arm.chain import ROW_CHANNELS, Shift
+from ..arm.channels import ROW_CHANNELS, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError

@@ -13,6 +13,7 @@ from .result import (
     Site,
     Traces,
     Unexplained,
+    Unsound,
     Where,
 )
 
@@ -26,6 +27,7 @@ __all__ = [
     'Site',
     'Traces',
     'Unexplained',
+    'Unsound',
     'Where',
     'diagnose',
 ]

@@ -10,9 +10,10 @@ from ..arm.robot import Robot
 from ..effects.effect import Effect
 from ..recording import Recording
 from .algebra.noise_floor import noise_floor
+from .algebra.problem import frames_named
 from .answer.answer import answer
+from .answer.refusal import refusal
 from .beliefs import Beliefs
-from .frames.aligned import aligned
 from .hypotheses.search import search
 from .levels.carried import carried
 from .levels.curved import curved
@@ -20,7 +21,7 @@ from .levels.held_against import held_against
 from .many.fitted_together import fitted_together
 from .predicting.allowed import allowed
 from .result import Diagnosis
-from .soundness import check
+from .soundness import Given, examine, refuse_reused
 from .unseen.held_out_shrink import held_out_shrink
 from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
@@ -39,6 +40,7 @@ def diagnose(
     exclude: Sequence[str] = (),
     holdout: Sequence[Recording] = (),
     beliefs: Beliefs | None = None,
+    apply: bool = False,
     progress: Progress = lambda text: None,
 ) -> Diagnosis:
     """
@@ -62,14 +64,17 @@ def diagnose(
         Never fitted; judge the shrink. Left out, stretches of the recordings take their turn.
     beliefs : Beliefs, optional
         The numbers that decide the verdict; the usual ones when left out.
+    apply : bool
+        Where data or set-up are wrong in a way that can be undone: undo it and go on. Otherwise
+        the answer is then 'unsound' and says what is wrong.
     progress : callable
         Told in a few words what has been done.
 
     Returns
     -------
     Diagnosis
-        ``status`` is 'identified', 'ambiguous', 'unknown' or 'none'; ``effects`` holds what was
-        found, with standard errors; ``traces`` holds the residuals as arrays.
+        ``status`` is 'identified', 'ambiguous', 'unknown', 'none' or 'unsound'; ``effects`` holds
+        what was found, with standard errors; ``traces`` holds the residuals as arrays.
 
     Raises
     ------
@@ -97,16 +102,20 @@ def diagnose(
 
     """
     beliefs = beliefs or Beliefs()
-    problem, start = aligned(recordings, robot, align, known)
-    checks = check(problem, start)
+    recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    refuse_reused(recordings, holdout)
+    given = Given(recordings, robot, frames_named(align))
+    examined = examine(given, known, apply=apply)
     progress('data checked')
-    found = search(problem, start, exclude, beliefs, progress)
+    if examined.posed is None:
+        return refusal(examined)
+    found = search(*examined.posed, exclude, beliefs, progress)
     found = fitted_together(found, exclude, beliefs, progress)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     leftover = structure(unseen, found.final.model, beliefs)
     progress('looked for what is left')
     noise = noise_floor(found.problem, found.problem.residuals(found.final.model))
-    shrink = held_out_shrink(found, unseen, holdout, beliefs)
+    shrink = held_out_shrink(found, unseen, examined.mended(holdout), beliefs)
     evidence = gathered(found, unseen, leftover, shrink, noise, beliefs)
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict)
@@ -122,7 +131,7 @@ def diagnose(
         verdict=verdict,
         noise=noise,
         shrink=shrink,
-        checks=checks,
+        examined=examined,
         beliefs=beliefs,
         posterior=posterior,
         rival=rival,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arm.fingerprint import fingerprint
 from ..arrays import Array
 from ..effects.effect import Effect
 from ..recording import Recording
@@ -16,7 +17,24 @@ from ..twin.posterior import Posterior, as_dict
 from .algebra.problem import Model
 
 SCHEMA = 'weld_twin/diagnosis/1'
-STATUSES = ('identified', 'ambiguous', 'unknown', 'none')
+STATUSES = ('identified', 'ambiguous', 'unknown', 'none', 'unsound')
+MISTAKES = (
+    'units',
+    'joints_swapped',
+    'sign',
+    'constant_angle',
+    'coupled_axes',
+    'base_turned',
+    'other_robot',
+    'reflector_jumped',
+    'joint_slipped',
+    'instrument_knocked',
+    'joints_stuck',
+    'zero_velocities',
+    'clock',
+    'other',
+)
+"""Kinds of mistakes in data and set-up; docs/unsound.md describes each."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +55,37 @@ class Check:
 
     name: str
     level: str
-    """'ok', 'note', 'warning'."""
+    """'ok', 'note', 'warning', 'unsound'."""
     sentence: str
+
+
+@dataclass(frozen=True)
+class Unsound:
+    """
+    A mistake in data or set-up that no cause in the arm can be told from.
+
+    Attributes
+    ----------
+    kind : str
+        One of `MISTAKES`.
+    at : tuple of str
+        Joints by name, 'base', 'tool', 'instrument', 'clock' or 'robot'.
+    sentence, remedy : str
+        What is wrong, and what to do about it.
+    applied : bool
+        Whether the remedy was made and the diagnosis went on with mended data.
+
+    """
+
+    kind: str
+    at: tuple[str, ...]
+    sentence: str
+    remedy: str
+    applied: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of ``unsound``."""
+        return {**vars(self), 'at': list(self.at)}
 
 
 @dataclass(frozen=True)
@@ -219,6 +266,8 @@ class Diagnosis:
     """
     The whole answer of `diagnose`.
 
+    With status 'unsound' there is none: no effects, and every figure is not a number.
+
     Attributes
     ----------
     gap : Gap
@@ -226,7 +275,7 @@ class Diagnosis:
     where : Where
         On which joints, in which regimes, where on the path and in which direction it lies.
     status : str
-        'identified', 'ambiguous', 'unknown' or 'none'.
+        'identified', 'ambiguous', 'unknown', 'none' or 'unsound'.
     effects : tuple of Found
         The effects named, with standard errors, those that move the tool most first.
     confidence : float
@@ -288,69 +337,77 @@ class Diagnosis:
     causes: tuple[Cause, ...] = ()
     """What is certain of each cause, largest share of the squared gap first."""
     shares: Shares = Shares(0.0, 0.0)
+    unsound: tuple[Unsound, ...] = ()
+    """Mistakes found in data and set-up; all of them undone unless the status is 'unsound'."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
+        sound = self.status != 'unsound'
         return {
             'schema': SCHEMA,
-            'gap': dict(vars(self.gap)),
-            'where': self._where(),
-            'verdict': {
-                'status': self.status,
-                'effects': [found.as_dict() for found in self.effects],
-                'confidence': self.confidence,
-                'indistinguishable': [
-                    [{'effect': s.effect, 'joint': s.joint} for s in group]
-                    for group in self.indistinguishable
-                ],
-                'reasons': list(self.reasons),
-                'families': [family.as_dict() for family in self.families],
-                'actions': list(self.actions),
-                'causes': [cause.as_dict() for cause in self.causes],
-            },
-            'candidates': [
-                {
-                    'effect': c.site.effect,
-                    'joint': c.site.joint,
-                    'probability': c.probability,
-                    'rms_after_m': c.rms_after_m,
-                    'shrink': c.shrink,
-                }
-                for c in self.candidates
-            ],
-            'shrink': {
-                'rms_before_m': self.shrink.rms_before_m,
-                'rms_after_m': self.shrink.rms_after_m,
-                'ratio': self.shrink.ratio,
-                'ci95': list(self.shrink.ci95),
-                'held_out': self.shrink.held_out,
-                'steps': [{'added': n, 'rms_m': v} for n, v in self.shrink.steps],
-                'alone': [{'mended': n, 'rms_m': v} for n, v in self.shrink.alone],
-                'orientation_rms_rad': self.shrink.orientation_rad
-                and {
-                    'before': self.shrink.orientation_rad[0],
-                    'after': self.shrink.orientation_rad[1],
-                },
-            },
-            'unexplained': {
-                'rms_m': self.unexplained.rms_m,
-                'above_noise': self.unexplained.above_noise,
-                'structure': list(self.unexplained.structure),
-                'share': self.shares.unexplained,
-                'noise_share': self.shares.noise,
-            },
+            'unsound': [item.as_dict() for item in self.unsound],
+            'gap': dict(vars(self.gap)) if sound else None,
+            'where': self._where() if sound else None,
+            'verdict': self._verdict(),
+            'candidates': [_candidate(item) for item in self.candidates] if sound else None,
+            'shrink': self._shrink() if sound else None,
+            'unexplained': self._unexplained() if sound else None,
             'next_experiment': self.next_experiment,
             'checks': [dict(vars(check)) for check in self.checks],
             'not_considered': dict(self.absent),
-            'model': {
-                'tool': _frame(self.model.robot.T_flange_tool),
-                'bases': [_frame(base) for base in self.model.bases],
-                'epochs_ns': [r.epoch_ns for r in self.recordings],
-                'spans_ns': [list(r.span_ns) for r in self.recordings],
-                'known': [effect.to_mapping() for effect in self.model.known],
-                'found': [effect.to_mapping() for effect in self.model.found],
-            },
+            'model': self._model() if sound else None,
             'posterior': None if self.posterior is None else as_dict(self.posterior),
+        }
+
+    def _verdict(self) -> dict[str, Any]:
+        return {
+            'status': self.status,
+            'effects': [found.as_dict() for found in self.effects],
+            'confidence': None if self.status == 'unsound' else self.confidence,
+            'indistinguishable': [
+                [{'effect': s.effect, 'joint': s.joint} for s in group]
+                for group in self.indistinguishable
+            ],
+            'reasons': list(self.reasons),
+            'families': [family.as_dict() for family in self.families],
+            'actions': list(self.actions),
+            'causes': [cause.as_dict() for cause in self.causes],
+        }
+
+    def _shrink(self) -> dict[str, Any]:
+        shrink, turned = self.shrink, self.shrink.orientation_rad
+        return {
+            'rms_before_m': shrink.rms_before_m,
+            'rms_after_m': shrink.rms_after_m,
+            'ratio': shrink.ratio,
+            'ci95': list(shrink.ci95),
+            'held_out': shrink.held_out,
+            'steps': [{'added': n, 'rms_m': v} for n, v in shrink.steps],
+            'alone': [{'mended': n, 'rms_m': v} for n, v in shrink.alone],
+            'orientation_rms_rad': turned and {'before': turned[0], 'after': turned[1]},
+        }
+
+    def _unexplained(self) -> dict[str, Any]:
+        left = self.unexplained
+        return {
+            'rms_m': left.rms_m,
+            'above_noise': left.above_noise,
+            'structure': list(left.structure),
+            'share': self.shares.unexplained,
+            'noise_share': self.shares.noise,
+        }
+
+    def _model(self) -> dict[str, Any]:
+        robot = self.model.robot
+        return {
+            'robot': robot.name,
+            'kinematics': fingerprint(robot),
+            'tool': _frame(robot.T_flange_tool),
+            'bases': [_frame(base) for base in self.model.bases],
+            'epochs_ns': [r.epoch_ns for r in self.recordings],
+            'spans_ns': [list(r.span_ns) for r in self.recordings],
+            'known': [effect.to_mapping() for effect in self.model.known],
+            'found': [effect.to_mapping() for effect in self.model.found],
         }
 
     def _where(self) -> dict[str, Any]:
@@ -368,6 +425,16 @@ class Diagnosis:
                 'shares': [list(row) for row in where.map_shares],
             },
         }
+
+
+def _candidate(item: Candidate) -> dict[str, Any]:
+    return {
+        'effect': item.site.effect,
+        'joint': item.site.joint,
+        'probability': item.probability,
+        'rms_after_m': item.rms_after_m,
+        'shrink': item.shrink,
+    }
 
 
 def _frame(matrix: Array) -> list[list[float]]:

@@ -110,7 +110,7 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
         _in_words(truth['sites']),
         _said(groups),
         status,
-        float(verdict.get('confidence', 0.0)),
+        float(verdict.get('confidence') or 0.0),
         float(min(truth['ratios'], default=0.0)),
         _set(exact, matched, groups),
         whole and bool(answer) and status != 'error',

@@ -282,18 +282,24 @@ def test_a_missing_table_is_named(tmp_path, ur5):
         read_table(tmp_path / 'nowhere.csv', ur5)
 
 
-def test_positions_of_another_robot_are_refused(tmp_path, ur5):
+def test_positions_of_another_robot_are_told_and_left_to_diagnose(tmp_path, ur5):
+    q, T = poses(load_robot('abb_irb1600'), 40)
+    path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3])
+    said = ' '.join(read_table(path, ur5).assumptions)
+    assert 'wrong robot, joint columns, or units' in said and 'weld-twin diagnose' in said
+
+
+def test_positions_of_another_robot_are_refused_where_the_user_said_how_to_read(tmp_path, ur5):
     q, T = poses(load_robot('abb_irb1600'), 40)
     path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3])
     with pytest.raises(DataError, match='wrong robot, joint columns, or units'):
-        read_table(path, ur5)
+        read_table(path, ur5, TableOptions(length_unit='m'))
 
 
-def test_a_length_that_is_neither_metres_nor_millimetres_is_refused(tmp_path, ur5):
+def test_a_length_that_is_neither_metres_nor_millimetres_is_told(tmp_path, ur5):
     q, T = poses(ur5, 40)
     path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3] * 39.37)
-    with pytest.raises(DataError, match='--length-unit decides'):
-        read_table(path, ur5)
+    assert '--length-unit decides' in ' '.join(read_table(path, ur5).assumptions)
 
 
 def test_angles_no_convention_explains_are_refused(tmp_path, ur5):

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arm.fingerprint import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.diagnosis.algebra.problem import Model
@@ -65,9 +66,11 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         The file is no diagnosis, holds no model, or its effects do not fit the robot.
 
     """
-    model = read_diagnosis(path).get('model')
+    content = read_diagnosis(path)
+    model = content.get('model')
     if not isinstance(model, dict):
-        raise ModelError(f"diagnosis '{path}' holds no model; make it anew with diagnose")
+        raise ModelError(_without_model(path, content))
+    _refuse_other_robot(robot, path, model)
     try:
         tool = _frame(model['tool'], 'model.tool')
         bases = tuple(_frame(base, 'model.bases') for base in model['bases'])
@@ -79,7 +82,40 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         raise ModelError(f"diagnosis '{path}': {error}") from None
     if not bases:
         raise ModelError(f"the model of diagnosis '{path}' has no base frame")
-    return Model(robot.with_frames(tool=tool), bases, known, found)
+    return Model(robot.with_frames(tool=tool), bases, known, found, _mended(content))
+
+
+def _without_model(path: Path | str, content: dict[str, Any]) -> str:
+    wrong = content.get('unsound')
+    if isinstance(wrong, list) and wrong and isinstance(wrong[0], dict):
+        told = str(wrong[0].get('sentence', '')).rstrip('.')
+        return f"diagnosis '{path}' holds no model, for its data were unsound: {told}"
+    return f"diagnosis '{path}' holds no model; make it anew with diagnose"
+
+
+def _refuse_other_robot(robot: Robot, path: Path | str, model: dict[str, Any]) -> None:
+    """Refuse the model of another robot; old files say nothing of theirs."""
+    name, kinematics = model.get('robot'), model.get('kinematics')
+    if kinematics is None or kinematics == fingerprint(robot):
+        return
+    other = (
+        f'of another arm than the {robot.name!r} given: their kinematics differ'
+        if name == robot.name
+        else f'of the robot {name!r}, not of {robot.name!r}'
+    )
+    raise ModelError(f"diagnosis '{path}' is {other}; give the robot it was made for")
+
+
+def _mended(content: dict[str, Any]) -> tuple[str, ...]:
+    """Return what was wrong with the data of a diagnosis and was undone."""
+    items = content.get('unsound') or []
+    if not isinstance(items, list):
+        return ()
+    return tuple(
+        str(item.get('sentence'))
+        for item in items
+        if isinstance(item, dict) and item.get('applied')
+    )
 
 
 def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:

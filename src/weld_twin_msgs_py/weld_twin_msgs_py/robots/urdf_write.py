@@ -23,9 +23,19 @@ _NOTE = (
 )
 
 
-def write_urdf(path: Path | str, robot: Robot, *, overwrite: bool = False) -> None:
+def write_urdf(
+    path: Path | str, robot: Robot, *, overwrite: bool = False, remark: str = ''
+) -> None:
     """
     Write a URDF from the measuring frame (link ``world``) to the tool (link ``tool``).
+
+    Parameters
+    ----------
+    path : Path or str
+    robot : Robot
+    overwrite : bool
+    remark : str
+        A comment at the top.
 
     Raises
     ------
@@ -36,6 +46,8 @@ def write_urdf(path: Path | str, robot: Robot, *, overwrite: bool = False) -> No
     root = Element('robot', {'name': robot.name})
     gravity = ' '.join(f'{value:g}' for value in robot.gravity)
     root.append(Comment(_NOTE.format(name=robot.name.replace('--', '-'), gravity=gravity)))
+    if remark:
+        root.append(Comment(f' {remark.replace("--", "-")} '))
     SubElement(root, 'link', {'name': 'world'})
     parent, ahead = 'world', robot.T_world_base
     for k, name in enumerate(robot.joint_names):

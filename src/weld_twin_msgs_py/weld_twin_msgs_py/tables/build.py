@@ -29,7 +29,7 @@ _FAR = 10.0
 _FARTHEST = 1e9
 """A coordinate beyond this is a slip in any unit, and its square may be no number."""
 _WRONG = 0.05
-"""A typical misfit beyond this share of the arm's reach means the table is misread."""
+"""A typical misfit beyond this share of the arm's reach means that the table is wrong or misread."""
 
 
 class Table(NamedTuple):
@@ -82,7 +82,7 @@ def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) ->
     position, scale = _position(cells, robot, q, columns, options, said)
     rotation = _rotation(cells, robot, q, columns, options, said) if columns.rotation else None
     sigma = _sigma(cells, columns, scale, said) if columns.sigma else None
-    _check(cells, robot, q, position, said)
+    _check(cells, robot, q, position, options, said)
     t, sentence = stamps(cells, columns.time, columns.unit((columns.time or '',)))
     said.append(sentence)
     if t is None:
@@ -233,8 +233,20 @@ def _sigma(cells: Cells, columns: Columns, scale: float, said: list[str]) -> Arr
     return np.asarray(np.sqrt((values**2).mean(axis=1)))
 
 
-def _check(cells: Cells, robot: Robot, q: Array, position: Array, said: list[str]) -> None:
-    """Say how far the positions are from the nominal arm, and which rows stand out."""
+def _check(
+    cells: Cells,
+    robot: Robot,
+    q: Array,
+    position: Array,
+    options: TableOptions,
+    said: list[str],
+) -> None:
+    """
+    Say how far the positions are from the nominal arm, and which rows stand out.
+
+    A table that does not fit is refused where the user said how to read it. Read by its own
+    header it stays as it is: `diagnose` finds out which mistake was made in it.
+    """
     if len(q) < 8:
         said.append('too few rows to check the positions against the arm')
         return
@@ -246,11 +258,15 @@ def _check(cells: Cells, robot: Robot, q: Array, position: Array, said: list[str
         'nominal arm'
     )
     if typical > _WRONG * reach:
-        raise DataError(
+        sentence = (
             f'positions are {typical * 1e3:.3g} mm from where robot {robot.name!r} would be, with '
             'base and tool fitted: wrong robot, joint columns, or units; --joint-columns, '
             '--angle-unit or --length-unit decide'
         )
+        if options.joint_columns or options.angle_unit or options.length_unit:
+            raise DataError(sentence)
+        said.append(f'{sentence}, and weld-twin diagnose says what is wrong')
+        return
     far = np.flatnonzero(off > _FAR * typical)
     if far.size:
         worst = int(far[off[far].argmax()])

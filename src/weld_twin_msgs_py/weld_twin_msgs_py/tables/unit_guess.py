@@ -9,10 +9,11 @@ import numpy as np
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.errors import DataError
 
 METRES = {'m': 1.0, 'mm': 1e-3}
 RADIANS = {'rad': 1.0, 'deg': np.pi / 180.0}
+_WIDEST = 20.0
+"""Spread [m] of measured positions beyond that of any cell with one robot."""
 _DOUBT = 6.0
 """The spread of the measurements may differ from the arm's own by this factor."""
 
@@ -32,13 +33,8 @@ def length_unit(position: Array, robot: Robot, q: Array, given: str | None) -> t
     Return the unit of the measured positions and the sentence that says how it was found.
 
     The spread of the measurements must be that of the poses the joints give, whatever frame the
-    instrument has.
-
-    Raises
-    ------
-    DataError
-        Neither metres nor millimetres fit.
-
+    instrument has. Where neither unit fits, columns are mixed up: what no cell spans in metres is
+    then taken for millimetres.
     """
     if given is not None:
         return given, ''
@@ -47,9 +43,11 @@ def length_unit(position: Array, robot: Robot, q: Array, given: str | None) -> t
     for unit, factor in METRES.items():
         if own / _DOUBT < theirs * factor < own * _DOUBT:
             return unit, f'positions are in {unit} (they spread as far as the arm moves)'
-    raise DataError(
+    unit = 'mm' if theirs > _WIDEST else 'm'
+    return unit, (
         f'positions spread over {theirs:.4g}, the arm moves over {own:.4g} m: neither metres nor '
-        'millimetres fit; --length-unit decides, or the joint columns are not what they seem'
+        f'millimetres fit, {unit} is taken; --length-unit decides, or the columns are not what '
+        'they seem'
     )
 
 

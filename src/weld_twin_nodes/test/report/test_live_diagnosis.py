@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POINT
 from weld_twin_nodes.live.diagnosis_window import LONGEST, Window
-from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker
+from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker, find
 
 START = 1_700_000_000_000_000_000
 ONE_JOINT = Robot.from_mapping(
@@ -140,6 +141,34 @@ def test_the_node_is_quiet_until_it_has_evidence_and_then_tells_its_end_too(tmp_
         cell.wait(lambda: len(said) == 2, 'two verdicts')
         assert [m.status[0].level for m in said.messages] == [b'\x01', b'\x00']
         assert [m.status[0].message for m in said.messages] == ['A gap.', 'No gap.']
+
+
+def test_unsound_data_are_an_error_on_both_topics_until_they_are_mended(tmp_path):
+    pytest.importorskip('rclpy', reason='needs ROS 2')
+    from weld_twin_nodes.harness import Cell
+    from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
+
+    window = filled()
+    recording = window.recording(least=3.0)
+    q = np.array(recording.joints.q)
+    q[:, [3, 5]] = q[:, [5, 3]]
+    swapped = replace(recording, joints=replace(recording.joints, q=q))
+    unsound = find(Job(swapped, load('ur5')))
+    assert unsound.status == 'unsound' and 'swapped' in unsound.values['unsound: joints_swapped']
+    with Cell(tmp_path / 'cell') as cell:
+        node = cell.add(LiveDiagnosis)
+        said, health = cell.collect('/diagnosis'), cell.collect('/diagnostics')
+        cell.wait(lambda: node._verdict.get_subscription_count() > 0, 'a listener')
+
+        def own():
+            return [s for m in health.messages for s in m.status if s.name == 'live_diagnosis']
+
+        node._tell(unsound)
+        cell.wait(lambda: len(said) == 1, 'a verdict')
+        assert said.last.status[0].level == b'\x02' and 'swapped' in said.last.status[0].message
+        cell.wait(lambda: any(s.level == b'\x02' and 'swapped' in s.message for s in own()), 'it')
+        node._tell(Finding(START + 1, 'none', 'No gap.', {}))
+        cell.wait(lambda: own()[-1].level != b'\x02', 'that it is over')
 
 
 @pytest.mark.slow

@@ -28,7 +28,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 on success, 2 on a usage or input error, 130 when interrupted.
+        0 on success, 2 on a usage or input error, 3 where a diagnosis found data or set-up
+        wrong, 130 when interrupted.
 
     """
     if argv is None:  # as a program: what it started ends with it

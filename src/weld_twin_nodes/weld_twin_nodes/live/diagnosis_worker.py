@@ -123,6 +123,8 @@ def find(job: Job) -> Finding:
         'rms_after_m': shrink.rms_after_m,
         'shrink_ratio': shrink.ratio,
     }
+    for item in diagnosis.unsound:
+        values[f'unsound: {item.kind}'] = item.sentence
     for found in diagnosis.effects:
         entry = found.effect.to_mapping()
         values[found_name(found)] = {

@@ -93,6 +93,8 @@ class Health:
         self.inputs: dict[str, Input] = {}
         self.lasting: dict[str, str] = {}
         self.remarks: list[str] = []
+        self.fault = ''
+        """What makes the work of the node worthless as long as it lasts; empty for nothing."""
         self._said: list[str] = []
         self._said_in_all = 0
 
@@ -109,10 +111,10 @@ class Health:
     def statuses(self) -> list[Status]:
         """Return the node itself and each of its inputs, since the last call."""
         now = time.monotonic()
-        told = [*self.lasting.values(), *self._said[-3:]]
+        told = [*filter(None, [self.fault]), *self.lasting.values(), *self._said[-3:]]
         own = Status(
             self._node,
-            WARN if told else OK,
+            ERROR if self.fault else WARN if told else OK,
             '; '.join(told) or 'running',
             {
                 'inputs': len(self.inputs),

@@ -29,8 +29,8 @@ from .run_node import run
 from .settings import Setting
 
 LOOK_EVERY = 0.2
-LEVELS = {'none': 0, 'identified': 1, 'ambiguous': 1, 'unknown': 1}
-"""Of the diagnostic message: ok, or a warning."""
+LEVELS = {'none': 0, 'identified': 1, 'ambiguous': 1, 'unknown': 1, 'unsound': 2}
+"""Of the diagnostic message: ok, a warning, or an error where data or set-up are wrong."""
 INPUTS = {
     TOOL_WRENCH: Role.WRENCH,
     TEMPERATURE: Role.TEMPERATURE,
@@ -102,6 +102,7 @@ class LiveDiagnosis(CellNode):
             self.refuse('window', result)
         elif result is not None and (self._speaking or result.status != 'none'):
             self._speaking = True
+            self.health.fault = result.sentence if result.status == 'unsound' else ''
             self._verdict.publish(
                 self.messages.diagnostics(
                     result.stamp,

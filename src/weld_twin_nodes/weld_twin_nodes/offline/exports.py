@@ -27,14 +27,14 @@ def write_yaml(path: Path, model: Model) -> None:
 
 def write_model_urdf(path: Path, model: Model) -> None:
     """Write the corrected robot as a URDF."""
-    write_urdf(path, _corrected(model)[0], overwrite=True)
+    write_urdf(path, _corrected(model)[0], overwrite=True, remark=' '.join(model.mended))
 
 
 def write_offsets(path: Path, model: Model) -> None:
     """Write how much further each joint really stands than its reading [rad, or m]."""
     robot = model.robot
     offsets = joint_offsets(robot, _causes(model))
-    rows = ['joint,offset,unit']
+    rows = [*_mended(model), 'joint,offset,unit']
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         rows.append(f'{name},{float(offset)!r},{"m" if slides else "rad"}')
     write_text(path, '\n'.join(rows) + '\n', overwrite=True)
@@ -42,12 +42,12 @@ def write_offsets(path: Path, model: Model) -> None:
 
 def write_effects(path: Path, model: Model) -> None:
     """Write every effect, known and found, for use with the nominal robot."""
-    _write_effects(path, _EVERYTHING, _causes(model))
+    _write_effects(path, _EVERYTHING, model, _causes(model))
 
 
 def write_left_over(path: Path, model: Model) -> None:
     """Write the effects that the corrected robot cannot hold."""
-    _write_effects(path, _LEFT_OVER, _corrected(model)[1])
+    _write_effects(path, _LEFT_OVER, model, _corrected(model)[1])
 
 
 FORMATS: dict[str, tuple[str, Callable[[Path, Model], None]]] = {
@@ -70,6 +70,8 @@ def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     based = model.robot.with_frames(base=model.bases[0])
     robot, left = corrected(based, _causes(model))
     source = f'{robot.source}; corrected by a diagnosis' if robot.source else 'diagnosis'
+    if model.mended:
+        source += f' of mended data: {" ".join(model.mended)}'
     return replace(robot, source=source), left
 
 
@@ -78,6 +80,12 @@ def _causes(model: Model) -> tuple[Effect, ...]:
     return tuple(effect for effect in model.known + model.found if effect.cause)
 
 
-def _write_effects(path: Path, comment: str, effects: Sequence[Effect]) -> None:
+def _write_effects(path: Path, comment: str, model: Model, effects: Sequence[Effect]) -> None:
     entries = [effect.to_mapping() for effect in effects]
-    write_text(path, comment + yaml_text(entries), overwrite=True)
+    told = ''.join(f'{line}\n' for line in _mended(model))
+    write_text(path, comment + told + yaml_text(entries), overwrite=True)
+
+
+def _mended(model: Model) -> list[str]:
+    """Return what was wrong with the data that the model comes from, as lines of a comment."""
+    return [f'# Mended before the diagnosis: {sentence}' for sentence in model.mended]

@@ -29,13 +29,18 @@ NEXT = 'next_experiment.yaml'
 
 
 def write_results(directory: Path, diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> None:
-    """Write diagnosis.json, the page, the model in every form, and what to measure next."""
+    """
+    Write diagnosis.json, the page, the model in every form, and what to measure next.
+
+    Where the data are unsound there is no model: the page and diagnosis.json say what is wrong.
+    """
     wanted = diagnosis.next_experiment
     if wanted is not None and wanted.get('motion') is not None:
         write_joint_motion(directory / NEXT, wanted['motion'], wanted['sentence'])
         diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': NEXT})
     write_text(directory / PAGE, report_page(diagnosis, inputs))
-    write_all(directory, diagnosis.model)
+    if diagnosis.status != 'unsound':
+        write_all(directory, diagnosis.model)
     write_text(directory / RESULT, diagnosis_text(diagnosis, inputs))
 
 

@@ -35,15 +35,12 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
         What it was made from, as the page lists it.
 
     """
+    causes = () if diagnosis.status == 'unsound' else _causes(diagnosis)
     body = tag(
         'main',
         header(diagnosis),
         opening(diagnosis),
-        seam_section(diagnosis),
-        where_section(diagnosis),
-        causes_section(diagnosis),
-        shrink_section(diagnosis),
-        next_section(diagnosis),
+        *causes,
         checks_section(diagnosis),
         inputs_section(inputs),
     )
@@ -68,6 +65,17 @@ def _head(title: str) -> Html:
             tag('title', title),
             tag('style', _file('page.css')),
         ]
+    )
+
+
+def _causes(diagnosis: Diagnosis) -> tuple[Html, ...]:
+    """Return where the gap lies, what causes it, what that brings, and what to measure next."""
+    return (
+        seam_section(diagnosis),
+        where_section(diagnosis),
+        causes_section(diagnosis),
+        shrink_section(diagnosis),
+        next_section(diagnosis),
     )
 
 

@@ -16,7 +16,7 @@ from .words import in_words
 
 _APART = ('kind', 'motion', 'cost', 'expected_separation_sigma')
 """What programs need of a measurement, or the page says in words."""
-_ORDER = {'warning': 0, 'note': 1, 'ok': 2}
+_ORDER = {'unsound': 0, 'warning': 1, 'note': 2, 'ok': 3}
 
 
 def next_section(diagnosis: Diagnosis) -> Html:
@@ -81,7 +81,7 @@ def _plain(value: Any) -> str:
 
 def checks_section(diagnosis: Diagnosis) -> Html:
     """Return the checks of the data, those that need attention first."""
-    ordered = sorted(diagnosis.checks, key=lambda check: _ORDER.get(check.level, 0))
+    ordered = sorted(diagnosis.checks, key=lambda check: _ORDER.get(check.level, 1))
     items = [
         tag(
             'li',

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from .family_table import worth_doing
 from .html import Html, tag
 from .quantities import interval, millimetres, milliradians, odds, percent, turns_only
-from .words import STATUS, found_name, listed, verdict
+from .words import STATUS, found_name, listed, mended, verdict
 
 _SURE_OF = {
     'identified': 'that the causes named are right',
@@ -46,14 +46,27 @@ def _date(diagnosis: Diagnosis) -> str:
 def opening(diagnosis: Diagnosis) -> Html:
     """Return status, verdict, figures and actions."""
     first, second = verdict(diagnosis)
+    sound = diagnosis.status != 'unsound'
     return tag(
         'section',
         tag('p', STATUS[diagnosis.status], class_=f'status {diagnosis.status}'),
         tag('h1', first),
         tag('p', second, class_='second'),
-        _figures(diagnosis),
-        _actions(diagnosis),
+        _mended(diagnosis),
+        _figures(diagnosis) if sound else None,
+        _actions(diagnosis) if sound else None,
         id_='verdict',
+    )
+
+
+def _mended(diagnosis: Diagnosis) -> Html | None:
+    """Return what was wrong with the data and undone; all that follows stands on it."""
+    sentences = mended(diagnosis)
+    if not sentences:
+        return None
+    items = [tag('li', sentence) for sentence in sentences]
+    return tag(
+        'div', tag('h3', 'Mended before the diagnosis'), tag('ul', *items), class_='actions mended'
     )
 
 

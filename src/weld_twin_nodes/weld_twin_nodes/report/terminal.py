@@ -13,9 +13,15 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows, worth_doing
 from .quantities import change, millimetres, odds, parameter_rows
-from .words import STATUS, found_name, listed, site_name, verdict
+from .words import STATUS, found_name, listed, mended, site_name, verdict
 
-_COLOURS = {'identified': 'green', 'ambiguous': 'yellow', 'unknown': 'red', 'none': 'cyan'}
+_COLOURS = {
+    'identified': 'green',
+    'ambiguous': 'yellow',
+    'unknown': 'red',
+    'none': 'cyan',
+    'unsound': 'red',
+}
 _MOST = 8
 
 
@@ -25,6 +31,10 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     colour = _COLOURS[diagnosis.status]
     console.print(f'[bold {colour}]{STATUS[diagnosis.status]}[/]  {escape(first)}')
     console.print(Padding(escape(second), (0, 0, 1, 0)))
+    for sentence in mended(diagnosis):
+        console.print(f'[bold yellow]mended before the diagnosis:[/] {escape(sentence)}')
+    if diagnosis.status == 'unsound':
+        return
     if diagnosis.families:
         _print_families(diagnosis, console)
     elif diagnosis.effects:

@@ -41,6 +41,7 @@ STATUS = {
     'ambiguous': 'Ambiguous',
     'unknown': 'Unknown cause',
     'none': 'No gap',
+    'unsound': 'Unsound data',
 }
 REGIMES = {
     'static': 'at rest',
@@ -91,6 +92,7 @@ def verdict(diagnosis: Diagnosis) -> tuple[str, str]:
         'ambiguous': _ambiguous,
         'unknown': _unknown,
         'none': _none,
+        'unsound': _unsound,
     }[diagnosis.status](diagnosis)
 
 
@@ -179,6 +181,18 @@ def _none(diagnosis: Diagnosis) -> tuple[str, str]:
         'is noise.'
     )
     return first, 'As far as these data reach, the twin is the robot.'
+
+
+def _unsound(diagnosis: Diagnosis) -> tuple[str, str]:
+    """Return what is wrong with data or set-up, and that nothing else is said."""
+    wrong = ' '.join(item.sentence for item in diagnosis.unsound)
+    remedies = list(dict.fromkeys(item.remedy for item in diagnosis.unsound))
+    return wrong, f'{"; ".join(remedies)}. No cause is looked for in such data.'
+
+
+def mended(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Return what was wrong with the data and undone before anything was looked for."""
+    return tuple(item.sentence for item in diagnosis.unsound if item.applied)
 
 
 def _size(diagnosis: Diagnosis) -> str:

@@ -69,6 +69,8 @@ class Model:
     bases : tuple of array, shape (4, 4)
     known, found : tuple of Effect
         Effects given by the user, and those this diagnosis put in.
+    mended : tuple of str
+        What was wrong with the data it stands on, and was undone.
 
     """
 
@@ -76,6 +78,7 @@ class Model:
     bases: tuple[Array, ...]
     known: tuple[Effect, ...] = ()
     found: tuple[Effect, ...] = ()
+    mended: tuple[str, ...] = ()
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""

@@ -12,7 +12,8 @@ from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..levels.causes import causes
 from ..levels.curved import Curved
-from ..result import Check, Diagnosis, Shrink
+from ..result import Diagnosis, Shrink
+from ..soundness import Examined
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict
@@ -30,7 +31,7 @@ def answer(
     verdict: Verdict,
     noise: NoiseFloor,
     shrink: Shrink,
-    checks: tuple[Check, ...],
+    examined: Examined,
     beliefs: Beliefs,
     posterior: Posterior,
     rival: Curved | None = None,
@@ -47,8 +48,8 @@ def answer(
     verdict : Verdict
     noise : NoiseFloor
     shrink : Shrink
-    checks : tuple of Check
-        Whether the data are sound.
+    examined : Examined
+        Whether the data are sound, and what was mended.
     beliefs : Beliefs
     posterior : Posterior
         The models that the recordings allow.
@@ -73,7 +74,7 @@ def answer(
         ),
         next_experiment=next_step(found, verdict),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
-        checks=checks,
+        checks=examined.checks,
         model=found.final.model,
         traces=traces(found),
         absent=found.library.absent,
@@ -83,4 +84,5 @@ def answer(
         posterior=posterior,
         causes=told,
         shares=shares,
+        unsound=examined.unsound,
     )

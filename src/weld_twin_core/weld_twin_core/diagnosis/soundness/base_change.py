@@ -24,6 +24,8 @@ from ..algebra.problem import Model, Problem, Scale
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
 WIDE = 0.9
+DEAD = 1e-18
+"""Share of the largest squared column below which a column is rounding."""
 LOOSE = (3e-3, 1e-2)
 """Prior spread of the arm's own errors [m, rad]."""
 
@@ -253,6 +255,8 @@ def _after(terms: Array) -> Array:
 
 
 def _solve(normal: Array, right: Array) -> Array:
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    # A direction that nothing moves in (an axis with exact zeros across) stays at zero.
+    mass = np.diag(normal)
+    size = np.where(mass > DEAD * mass.max(), np.sqrt(np.maximum(mass, 0.0)), np.inf)
     scaled = normal / np.outer(size, size) + 1e-6 * np.eye(len(size))
     return np.asarray(np.linalg.solve(scaled, right / size) / size)

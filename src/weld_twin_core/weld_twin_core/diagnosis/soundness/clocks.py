@@ -5,46 +5,56 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from ...recording import Recording
-from .evidence import Case, Finding
+from .evidence import Case, Finding, Mistake
 from .lag import Lag
+from .limits import LATE, RATE
+from .mending import stamps_as
 from .snapshot import measured
 
 FEW = 3.0
 """A lag of fewer samples is left to the fit."""
-LATE = 0.1
-"""A lag [s] from which it is a warning."""
 
 
 def clocks(case: Case) -> Sequence[Finding]:
     """Return how late the measurements of a moving arm are, where that explains the gap."""
     out: list[Finding] = []
-    for recording, late in zip(case.recordings, case.lags, strict=True):
+    for k, late in enumerate(case.lags):
         if late is not None:
-            out += _recording(recording, late)
+            out += _recording(case.recordings[k], late, k)
     return out
 
 
-def _recording(recording: Recording, lag: Lag) -> Iterator[Finding]:
+def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:
     t = measured(recording).t
     step = max(float(np.median(np.diff(s))) for s in (t, recording.joints.t))
     start, end = (float(lag.at(edge)) for edge in (t[0], t[-1]))
+    mend = partial(stamps_as, k=k, late=lag.late, rate=lag.rate, middle=lag.middle)
     if abs(end - start) > step:
-        yield Finding(
-            'warning',
+        sentence = (
             f'The clocks of {recording.name} run apart by {lag.rate * 1e6:.0f} ppm: the '
-            f'measurements are {_late(start)} at the start and {_late(end)} at the end.',
+            f'measurements are {_late(start)} at the start and {_late(end)} at the end.'
         )
+        wrong = abs(lag.rate) > RATE
+        remedy = 'Stamp both streams with one clock, or synchronise the two (PTP, NTP)'
     elif abs(lag.late) > FEW * step:
         cause = ', or commanded joints were recorded and the arm lags behind'
-        yield Finding(
-            'warning' if abs(lag.late) > LATE else 'note',
+        sentence = (
             f'The measurements of {recording.name} are {_late(lag.late)} against the joint states:'
-            f' the clocks are not synchronised{cause if lag.late > 0.0 else ""}.',
+            f' the clocks are not synchronised{cause if lag.late > 0.0 else ""}.'
         )
+        wrong = abs(lag.late) > LATE
+        remedy = 'Synchronise the two clocks (PTP, NTP), or stamp both streams on one computer'
+    else:
+        return
+    if wrong:
+        yield Finding.of(Mistake('clock', ('clock',), sentence, remedy, mend, of_all=False))
+    else:
+        yield Finding('note', sentence)
 
 
 def _late(seconds: float) -> str:

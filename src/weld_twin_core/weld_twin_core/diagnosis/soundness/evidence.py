@@ -16,10 +16,9 @@ from ...recording import Recording
 from ..algebra.problem import Model, Problem
 from ..frames.alignment import refined
 from .lag import Lag, lag
+from .mending import Mend
 from .snapshot import Snapshot, measured, snapshot
 
-LARGE = 5e-3
-"""Median gap [m] above which the data may be mixed up; what wears in an arm is smaller."""
 ENOUGH = 30
 """Joint states from which a motion has a shape in time."""
 HINT = 0.8
@@ -28,11 +27,33 @@ EXPLAINED = 0.35
 """for it to be believed once the frames are fitted with it."""
 
 
+class Mistake(NamedTuple):
+    """
+    A mistake in data or set-up; see `weld_twin_core.diagnosis.result.Unsound`.
+
+    ``mend`` undoes it, None where nothing can; ``of_all`` tells that other recordings of the cell
+    have it too.
+    """
+
+    kind: str
+    at: tuple[str, ...]
+    sentence: str
+    remedy: str
+    mend: Mend | None
+    of_all: bool = True
+
+
 class Finding(NamedTuple):
-    """What a check found: 'note' or 'warning', and a sentence for people."""
+    """What a check found: 'note', 'warning' or 'unsound', and a sentence for people."""
 
     level: str
     sentence: str
+    mistake: Mistake | None = None
+
+    @classmethod
+    def of(cls, mistake: Mistake) -> Finding:
+        """Return the finding that a mistake is."""
+        return cls('unsound', mistake.sentence, mistake)
 
 
 @dataclass(frozen=True, eq=False)

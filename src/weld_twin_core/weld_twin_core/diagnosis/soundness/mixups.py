@@ -1,117 +1,186 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Is a large gap a mix-up of units, signs, joints, robots or frames?"""
+"""Is a gap that no plausible arm leaves a mix-up of units, signs, joints, robots or frames?"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from ...arrays import Array
+from ...effects.joint_offset import JointOffset
+from ..algebra.problem import Model
 from ..frames.alignment import initial_frames, refined
-from .evidence import LARGE, Case, Finding, length
-from .snapshot import Snapshot, gap
+from .evidence import Case, Finding, Mistake, length, listed
+from .limits import (
+    BESIDE,
+    EXPLAINED,
+    FAR,
+    LARGE,
+    MOST,
+    SHORTLIST,
+    TURNED,
+    UNEXPLAINED,
+    WORTH,
+)
+from .mending import base_turned, frames_fitted
+from .snapshot import Arm, Snapshot, gap
 from .suspicions import Suspicion, doubles, suspicions
-
-EXPLAINED = 5.0
-"""The gap must fall by this factor for a mix-up to be named."""
-UNEXPLAINED = 0.01
-"""Median gap [m] from which it is worth a warning that nothing explains it."""
-SMALL_TURN = 0.09
-"""Joint offsets [rad] up to which a large gap is bad mastering and not a mix-up."""
-MOST = 3
-"""So many mix-ups at once are looked for."""
-WORTH = 0.7
-"""A further mix-up must bring the gap below this share of what it was."""
-ENOUGH = 1e-3
-"""A gap [m] this small after a rough fit needs no further trials."""
-SHORTLIST = 5
-FAR = 0.05
-"""A gap [m] from which wrong frames are an instrument's own, not an error of set-up."""
 
 
 def mixups(case: Case) -> Sequence[Finding]:
-    """Return what a gap of centimetres and more comes from, if not from the arm."""
+    """Return what a gap comes from that no plausible arm leaves, if not from the arm."""
     if case.gap < LARGE:
         return ()
     shot = case.snapshot
-    model = shot.framed()
-    left = gap(shot.problem, model)
-    given = gap(shot.problem, shot.model)
-    if left < LARGE or left < given / EXPLAINED:
-        return _frames(case, given) if given > FAR else ()
-    offset = shot.offset()
-    turns = [abs(float(effect.vector()[0])) for effect in offset.found]
-    if max(turns) < SMALL_TURN and gap(shot.problem, offset) < left / EXPLAINED:
-        return ()
-    found, rest = _unravelled(shot, left)
-    if not found:
-        return (Finding('warning', _unexplained(case, left)),) if left > UNEXPLAINED else ()
-    words = '; '.join(s.words for s in found)
-    words += f' (undone, the gap falls from {length(left)} to {length(rest)}'
-    words += '; something else is wrong too)' if rest > LARGE else ')'
-    return (Finding('warning', f'{words[0].upper()}{words[1:]}.'),)
+    arm = shot.arm()
+    if arm.off < 1.0:
+        return _frames(case, gap(shot.problem, shot.model))
+    found, rest = _unravelled(shot, arm)
+    if found:
+        return [Finding.of(_undone(each, arm, rest)) for each in found]
+    return _beyond(case, arm) or _frames(case, gap(shot.problem, shot.model))
 
 
-def _frames(case: Case, before: float) -> Sequence[Finding]:
-    """The given frames alone are to blame; name those that were not to be fitted."""
-    given = case.problem.align
-    for more in ({'base'}, {'tool'}, {'base', 'tool'}):
-        if not more - given:
-            continue
-        problem = replace(case.snapshot.problem, align=given | more)
-        left = gap(problem, refined(problem, initial_frames(problem, case.snapshot.model)))
-        if left < max(LARGE, before / EXPLAINED):
-            names = ' and '.join(sorted(more - given))
-            return (
-                Finding(
-                    'warning',
-                    f'The gap of {length(before)} is almost only one of frames: with the '
-                    f'{names} fitted {length(left)} remain; have the {names} aligned if the '
-                    'instrument stands anywhere, or the tool centre point was never measured.',
-                ),
-            )
-    return ()
+# Mix-ups ---------------------------------------------------------------------------------------
 
 
-def _unexplained(case: Case, left: float) -> str:
-    return (
-        f'No base and tool frame brings the gap below {length(left)} (median), and no mix-up of '
-        'units, signs, joint order, zero positions or bundled robots explains it; check that '
-        f'{case.model.robot.name!r} is the robot that was measured.'
-    )
+def _undone(suspicion: Suspicion, before: Arm, after: Arm) -> Mistake:
+    words = f'{suspicion.words[0].upper()}{suspicion.words[1:]}'
+    if after.gap < before.gap:
+        words += f'; undone, the gap falls from {length(before.gap)} to {length(after.gap)}'
+    return Mistake(suspicion.kind, suspicion.at, f'{words}.', suspicion.remedy, suspicion.mend)
 
 
-def _unravelled(shot: Snapshot, start: float) -> tuple[list[Suspicion], float]:
-    """Return the fewest mix-ups that explain the gap, and the gap without them."""
+def _unravelled(shot: Snapshot, start: Arm) -> tuple[list[Suspicion], Arm]:
+    """Return the fewest mix-ups that explain the gap, and the arm without them."""
     for first in (suspicions, doubles):
         found: list[Suspicion] = []
-        left, trial, look = start, shot, first
-        while left > LARGE and len(found) < MOST:
-            best, undone, rest = _best(trial, look(trial))
-            if best is None or rest > WORTH * left:
+        arm, trial, look = start, shot, first
+        while arm.off > 1.0 and len(found) < MOST:
+            best, undone, rest = _best(trial, look(trial.robot))
+            if best is None or rest.off > WORTH * arm.off:
                 break
             found.append(best)
-            trial, left, look = undone, rest, suspicions
-        if left < start / EXPLAINED:
-            return found, left
+            trial, arm, look = undone, rest, suspicions
+        if arm.off < start.off / EXPLAINED:
+            return found, arm
     return [], start
 
 
-def _best(shot: Snapshot, tries: Iterable[Suspicion]) -> tuple[Suspicion | None, Snapshot, float]:
+def _best(shot: Snapshot, tries: Iterable[Suspicion]) -> tuple[Suspicion | None, Snapshot, Arm]:
     """Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best."""
-    tried, rough = [], []
-    for suspicion in tries:
-        trial = suspicion.undo(shot)
-        tried.append((suspicion, trial))
-        rough.append(trial.rough_gap())
-        if rough[-1] < ENOUGH:
-            return suspicion, trial, gap(trial.problem, trial.framed())
-    best: tuple[Suspicion | None, Snapshot, float] = (None, shot, np.inf)
+    tried = [(suspicion, shot.mended(suspicion.mend)) for suspicion in tries]
+    rough = [trial.rough_gap() for _, trial in tried]
+    best: tuple[Suspicion | None, Snapshot, Arm] | None = None
     for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
         suspicion, trial = tried[k]
-        left = gap(trial.problem, trial.framed())
-        if left < WORTH * best[2]:
-            best = (suspicion, trial, left)
-    return best
+        arm = trial.arm()
+        if best is None or arm.off < WORTH * best[2].off:
+            best = (suspicion, trial, arm)
+    return best or (None, shot, shot.arm())
+
+
+# Frames ----------------------------------------------------------------------------------------
+
+
+def _frames(case: Case, before: float) -> Sequence[Finding]:
+    """Frames that were not to be fitted may be to blame; name them."""
+    if before < FAR:
+        return ()
+    given = case.problem.align
+    shot = case.snapshot
+    for more in ({'base'}, {'tool'}, {'base', 'tool'}):
+        if not more - given:
+            continue
+        problem = replace(shot.problem, align=given | more)
+        model = refined(problem, initial_frames(problem, shot.model))
+        left = gap(problem, model)
+        if left < max(UNEXPLAINED, before / EXPLAINED):
+            return [Finding.of(_framed(shot, model, frozenset(more - given), before, left))]
+    return ()
+
+
+def _framed(
+    shot: Snapshot, model: Model, more: frozenset[str], before: float, left: float
+) -> Mistake:
+    turn = None
+    if more == {'base'}:
+        turn = _quarter_turn(shot.robot.T_world_base, model.bases[0])
+    falls = f'the gap falls from {length(before)} to {length(left)}'
+    if turn is not None:
+        angle, matrix = turn
+        return Mistake(
+            'base_turned',
+            ('base',),
+            f'The base of the robot stands turned by {angle} degrees about its z axis against '
+            f'the frame that was given; turned back, {falls}.',
+            'Use the axes of the robot base that the controller counts in (for a UR: base or '
+            'base_link), or add the half turn to the base frame; a joint 1 whose zero is off by '
+            'as much would look the same',
+            partial(base_turned, turn=matrix),
+        )
+    names = listed(sorted(more))
+    return Mistake(
+        'other',
+        tuple(sorted(more)),
+        f'The gap of {length(before)} is almost only one of frames: with the {names} fitted '
+        f'{length(left)} remain.',
+        f'Have the {names} aligned (--align) if the instrument stands anywhere, or the tool '
+        'centre point was never measured',
+        partial(frames_fitted, frames=more),
+    )
+
+
+def _quarter_turn(given: Array, fitted: Array) -> tuple[int, Array] | None:
+    """Return by how many degrees about its z axis a base is turned, if by quarters and nearby."""
+    off = np.linalg.inv(given) @ fitted
+    if np.linalg.norm(off[:3, 3]) > BESIDE:
+        return None
+    for angle, c, s in ((180, -1.0, 0.0), (90, 0.0, 1.0), (-90, 0.0, -1.0)):
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        cosine = 0.5 * (np.trace(turn.T @ off[:3, :3]) - 1.0)
+        if np.arccos(np.clip(cosine, -1.0, 1.0)) < TURNED:
+            return angle, turn
+    return None
+
+
+# Nothing known ---------------------------------------------------------------------------------
+
+
+def _beyond(case: Case, arm: Arm) -> Sequence[Finding]:
+    """No mix-up explains it: another robot, a zero that is far off, or something else."""
+    if arm.gap > UNEXPLAINED:
+        words = (
+            f'No base and tool frame and no plausible arm brings the gap below '
+            f'{length(arm.gap)} (median), and no mix-up of units, signs, joint order, zero '
+            'positions or bundled robots explains it.'
+        )
+        remedy = (
+            f'Check that {case.model.robot.name!r} is the robot that was measured, and that '
+            'measurements and joint positions of one row belong together'
+        )
+        return [Finding.of(Mistake('other', (), words, remedy, None))]
+    if arm.gap > LARGE:
+        return ()
+    worst = int(arm.strain.argmax())
+    effect = arm.model.found[worst]
+    joint, value = str(effect.site), float(effect.vector()[0])
+    if isinstance(effect, JointOffset):
+        words = (
+            f'The zero of joint {joint!r} lies {np.degrees(value):+.1f} degrees from that of the '
+            'model, which no mastering leaves.'
+        )
+        remedy = f'Master {joint} again, or correct its theta_offset'
+        return [Finding.of(Mistake('constant_angle', (joint,), words, remedy, None))]
+    what = {'link_length': 'a', 'link_offset': 'd', 'link_twist': 'alpha'}[effect.name]
+    size = f'{np.degrees(value):+.1f} degrees' if what == 'alpha' else f'{value * 1e3:+.1f} mm'
+    words = (
+        f'The links are those of another robot than {case.model.robot.name!r}: {what} of '
+        f'{joint!r} differs by {size}, which no arm is off by.'
+    )
+    remedy = 'Give the model of the arm that was measured; its siblings differ by as much'
+    return [Finding.of(Mistake('other_robot', ('robot',), words, remedy, None))]

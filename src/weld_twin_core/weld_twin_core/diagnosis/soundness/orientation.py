@@ -5,13 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from ...arm.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ...arrays import Array
 from ..algebra.problem import Model
-from .evidence import LARGE, Case, Finding
+from .evidence import Case, Finding, Mistake
+from .limits import UNEXPLAINED
+from .mending import turns_as
 from .snapshot import Snapshot, gap
 
 WRONG = 0.05
@@ -29,12 +32,16 @@ def orientation(case: Case) -> Sequence[Finding]:
     shot = case.snapshot
     turned = _turn(shot, shot.framed())
     points = shot.with_turns([None] * len(shot.recordings))
-    if turned < WRONG or gap(points.problem, points.framed()) > LARGE:
+    if turned < WRONG or gap(points.problem, points.framed()) > UNEXPLAINED:
         return ()
     for words, undo in _ways().items():
         trial = shot.with_turns(_changed(shot, undo))
         if _turn(trial, trial.framed()) < 0.2 * turned:
-            return (Finding('warning', f'{words}; undone, they agree with the joints.'),)
+            sentence = f'{words}; undone, they agree with the joints.'
+            remedy = 'Mend the convention where the orientations are exported'
+            mend = partial(turns_as, undo=undo)
+            mistake = Mistake('other', ('instrument',), sentence, remedy, mend)
+            return (Finding.of(mistake),)
     return (
         Finding(
             'warning',

@@ -10,11 +10,42 @@ from itertools import combinations
 import numpy as np
 
 from ...arrays import Array
+from ...errors import DataError
+from ...recording import Recording
 from .evidence import Case, Finding
 from .snapshot import measured
 
+REUSED = 0.2
+"""
+Share of a held-out recording that may be in another one to the last digit.
+
+Two measurements of a laser tracker, 15 um apart in noise, are never equal; coarse instruments
+repeat some of their readings.
+"""
 FROZEN = 0.02
 """Share of measurements that repeat the one before, from which it is said."""
+
+
+def refuse_reused(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> None:
+    """
+    Refuse to judge on measurements that are fitted as well.
+
+    Raises
+    ------
+    DataError
+        A held-out recording holds measurements of another, whatever its name.
+
+    """
+    for held in holdout:
+        for recording in recordings:
+            first, second = measured(recording).position, measured(held).position
+            same = _common(first, second)
+            if same > REUSED * len(second):
+                raise DataError(
+                    f'{held.name}, given to judge on, holds {same} of its {len(second)} '
+                    f'measurements in common with {recording.name}, which is fitted; hold out a '
+                    'recording of its own'
+                )
 
 
 def repeats(case: Case) -> Sequence[Finding]:

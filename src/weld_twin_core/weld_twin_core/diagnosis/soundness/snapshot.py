@@ -5,19 +5,36 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.joint_offset import JointOffset
-from ...errors import DataError
-from ...recording import JointMotion, Measurements, Recording
+from ...effects.link_length import LinkLength
+from ...effects.link_offset import LinkOffset
+from ...effects.link_twist import LinkTwist
+from ...recording import JointMotion, Recording
 from ..algebra.fit import fit, robust_scale
-from ..algebra.problem import Model, Problem
+from ..algebra.problem import Model, Problem, Scale
 from ..frames.alignment import refined, rough_frames
+from .limits import (
+    LARGE,
+    LINK_MOST,
+    LINK_SPREAD,
+    OFFSET_MOST,
+    OFFSET_SPREAD,
+    SOFT,
+    TWIST_MOST,
+    TWIST_SPREAD,
+)
+from .mending import Given, Mend, measured
+
+__all__ = ['Arm', 'Snapshot', 'gap', 'measured', 'snapshot']
 
 SAMPLES = 60
+"""Samples of a snapshot in all: enough for every error of an arm, few enough for fits at once."""
 FRAMES = frozenset({'base', 'tool'})
 
 
@@ -38,36 +55,17 @@ class Snapshot:
         """Return the robot compared with."""
         return self.model.robot
 
-    def with_joints(self, matrix: Array, offset: Array) -> Snapshot:
-        """Return the snapshot with other joint positions: q matrix' + offset."""
-        out = []
-        for r in self.recordings:
-            q = r.joints.q @ matrix.T + offset
-            out.append(replace(r, joints=replace(r.joints, q=q, qd=None)))
-        return replace(self, recordings=tuple(out))
-
-    def with_measured(self, *, scale: float = 1.0, mirror: bool = False) -> Snapshot:
-        """Return the snapshot with scaled or mirrored positions; a mirror drops orientation."""
-        factor = scale * np.array([1.0, -1.0 if mirror else 1.0, 1.0])
-        out = []
-        for r in self.recordings:
-            seen = measured(r)
-            turn = None if mirror else seen.rotation
-            out.append(
-                r.with_measured(replace(seen, position=seen.position * factor, rotation=turn))
-            )
-        return replace(self, recordings=tuple(out))
+    def mended(self, mend: Mend) -> Snapshot:
+        """Return the snapshot after a correction."""
+        out = mend(Given(self.recordings, self.robot, FRAMES))
+        known = self.model.known if out.robot.joint_names == self.robot.joint_names else ()
+        return Snapshot(out.recordings, replace(self.model, robot=out.robot, known=known))
 
     def with_turns(self, turns: list[Array | None]) -> Snapshot:
         """Return the snapshot with other measured rotations, or none."""
         pairs = zip(self.recordings, turns, strict=True)
         out = [r.with_measured(replace(measured(r), rotation=turn)) for r, turn in pairs]
         return replace(self, recordings=tuple(out))
-
-    def with_robot(self, robot: Robot) -> Snapshot:
-        """Return the snapshot compared with another robot that carries the same tool."""
-        tooled = robot.with_frames(tool=self.robot.T_flange_tool)
-        return replace(self, model=replace(self.model, robot=tooled))
 
     def rough_gap(self) -> float:
         """Return the median gap [m] after a quick fit of both frames."""
@@ -79,16 +77,55 @@ class Snapshot:
         trials = [refined(self.problem, start) for start in starts]
         return min(trials, key=lambda model: gap(self.problem, model))
 
-    def offset(self) -> Model:
-        """Return the model with both frames and a constant offset of every joint fitted."""
-        model = self.framed()
-        joints = tuple(JointOffset(name) for name in self.robot.joint_names)
-        trial = model.with_found(joints)
-        precision = np.ones(len(joints))
+    def arm(self) -> Arm:
+        """Return the frames and a plausible arm that fit best, and how far off they leave it."""
+        kinds = [
+            (JointOffset, OFFSET_SPREAD, OFFSET_MOST),
+            (LinkLength, LINK_SPREAD, LINK_MOST),
+            (LinkOffset, LINK_SPREAD, LINK_MOST),
+            (LinkTwist, TWIST_SPREAD, TWIST_MOST),
+        ]
+        errors, spread, most = [], [], []
+        for kind, usual, bound in kinds:
+            for name, slides in zip(self.robot.joint_names, self.robot.prismatic, strict=True):
+                straight = bool(slides) and kind is JointOffset
+                errors.append(kind(name))
+                spread.append(LINK_SPREAD if straight else usual)
+                most.append(LINK_MOST if straight else bound)
+        trial = self.framed().with_found(tuple(errors))
+        precision = np.array(spread) ** -2.0
         for _ in range(3):
-            scale = robust_scale(self.problem, self.problem.residuals(trial))
-            trial = fit(self.problem, trial, scale, precision, iterations=8).model
-        return trial
+            scale = robust_scale(self.problem, self.problem.residuals(trial), self._soft())
+            trial = fit(self.problem, trial, scale, precision, iterations=6).model
+        strain = np.abs([float(e.vector()[0]) for e in trial.found]) / np.array(most)
+        return Arm(trial, gap(self.problem, trial), strain)
+
+    def _soft(self) -> Scale:
+        return Scale(*SOFT, self.problem.unit_scale().weights)
+
+
+class Arm(NamedTuple):
+    """
+    A plausible arm fitted to a snapshot.
+
+    Attributes
+    ----------
+    model : Model
+    gap : float [m]
+        Median distance that it leaves.
+    strain : array, shape (K,)
+        Every error of the arm in units of the most that an arm can have.
+
+    """
+
+    model: Model
+    gap: float
+    strain: Array
+
+    @property
+    def off(self) -> float:
+        """Return how much is wrong: the gap or the strain in units of their limits, the worse."""
+        return max(self.gap / LARGE, float(self.strain.max()))
 
 
 def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
@@ -107,18 +144,3 @@ def gap(problem: Problem, model: Model) -> float:
     """Return the median distance between measured and twin [m]."""
     parts = problem.residuals(model)
     return float(np.median(np.concatenate([np.linalg.norm(p[:3], axis=0) for p in parts])))
-
-
-def measured(recording: Recording) -> Measurements:
-    """
-    Return what was measured.
-
-    Raises
-    ------
-    DataError
-        Nothing was.
-
-    """
-    if recording.measured is None:
-        raise DataError(f'{recording.name} holds no measured poses or points')
-    return recording.measured

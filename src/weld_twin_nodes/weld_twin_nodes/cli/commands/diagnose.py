@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Say where the gap lies, which effect causes it, and how far it shrinks.
 
-Writes diagnosis.json, a page to read (report.html) and the corrected model to the directory.
+Writes diagnosis.json, a page to read (report.html) and the corrected model to the directory. Ends
+with 3 where data or set-up are wrong (units, joints swapped, another robot): page and
+diagnosis.json then say what, and no model is written.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from weld_twin_core.recording import Recording
     from weld_twin_msgs_py.files.input_files import InputFile
 
+UNSOUND = 3
+"""Exit code where data or set-up are wrong."""
 MEASUREMENTS = 40_000
 """Diagnosed together; eleven minutes at 60 Hz."""
 JOINT_STATES = 150_000
@@ -60,6 +64,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME',
         help='families left out of the library',
     )
+    parser.add_argument(
+        '--apply',
+        action='store_true',
+        help='where data or set-up are wrong and one correction explains it: make it and go on',
+    )
     parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
     add_topics(parser)
 
@@ -78,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(highlight=False)
     print_summary(diagnosis, console)
     console.print(f'report: {Path(args.out) / PAGE}', markup=False)
-    return 0
+    return UNSOUND if diagnosis.status == 'unsound' else 0
 
 
 def _diagnosis(args: argparse.Namespace) -> Diagnosis:
@@ -104,6 +113,7 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             known=twin.effects,
             exclude=excluded,
             holdout=_bounded(recordings[count:]),
+            apply=args.apply,
             progress=tell,
         )
 

@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every check of the data by name, in the order in which they are made."""
+
+from __future__ import annotations
+
+from .clocks import clocks
+from .evidence import Checker
+from .mixups import mixups
+from .orientation import orientation
+from .outliers import outliers
+from .quantity import quantity
+from .repeats import repeats
+from .richness import motion
+from .setup_change import setup
+from .source import source
+from .stamp_regularity import stamps
+
+CHECKS: dict[str, tuple[Checker, str]] = {
+    'quantity': (quantity, 'There is enough to work on.'),
+    'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
+    'orientation': (orientation, 'Orientations turn as the joints say.'),
+    'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),
+    'stamps': (stamps, 'Stamps come regularly and without gaps.'),
+    'repeats': (repeats, 'Nothing was recorded twice.'),
+    'source of the joints': (source, 'Joint positions are not plainly those of a command.'),
+    'motion': (motion, 'Every joint moves, both ways, and the frames can be told apart.'),
+    'outliers': (outliers, 'No measurement lies far off the rest.'),
+    'set-up': (setup, 'The set-up did not move while it was measured.'),
+}
+"""Every check by name: the function, and what it says when it finds nothing."""

@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The gate before any cause: what is wrong with data and set-up, and what is left once it is undone.
+
+A mistake that is found is undone here on trial, so that the next one shows; only with ``apply``
+does a diagnosis go on with the data so mended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ...effects.effect import Effect
+from ...recording import Recording
+from ..algebra.problem import Model, Problem
+from ..frames.aligned import aligned
+from ..frames.alignment import refined
+from ..result import Check, Unsound
+from .checks import CHECKS
+from .evidence import Case, Mistake
+from .mending import Given
+from .streams import streams, velocities_checked
+
+ROUNDS = 4
+"""So often the checks are made anew after a mistake was undone; each finds what the last hid."""
+FIT_ROWS = 6000
+"""Rows on which the frames are fitted that the checks start from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """
+    What the gate found.
+
+    Attributes
+    ----------
+    given : Given
+        As it came, or mended where mistakes were undone.
+    posed : Problem and Model, or None
+        To be diagnosed; None where something is wrong that was not undone.
+    checks : tuple of Check
+    unsound : tuple of Unsound
+    mistakes : tuple of Mistake
+        Those that were undone.
+
+    """
+
+    given: Given
+    posed: tuple[Problem, Model] | None
+    checks: tuple[Check, ...]
+    unsound: tuple[Unsound, ...]
+    mistakes: tuple[Mistake, ...]
+
+    def mended(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+        """Return other recordings of the same cell after the same corrections."""
+        out = Given(tuple(recordings), self.given.robot, self.given.align)
+        for mistake in self.mistakes:
+            if mistake.mend is not None and mistake.of_all:
+                out = mistake.mend(out)
+        return tuple(velocities_checked(recording) for recording in out.recordings)
+
+
+def examine(given: Given, known: Sequence[Effect] = (), *, apply: bool = False) -> Examined:
+    """
+    Return what is wrong with data and set-up.
+
+    Parameters
+    ----------
+    given : Given
+    known : sequence of Effect
+        In the twin from the start.
+    apply : bool
+        Go on with mended data where every mistake can be undone.
+
+    Raises
+    ------
+    DataError
+        There is nothing to work on.
+
+    """
+    trial, mistakes, checks = given, list[Mistake](), list[Check]()
+    posed: tuple[Problem, Model] | None = None
+    for _ in range(ROUNDS):
+        found = streams(trial)
+        posed = None
+        if not found:
+            posed = aligned(trial.recordings, trial.robot, trial.align, _kept(known, given, trial))
+            checks, found = _checked(*posed)
+        told = {mistake.sentence for mistake in mistakes}
+        fresh = [mistake for mistake in found if mistake.sentence not in told]
+        mistakes += fresh
+        if not fresh or any(mistake.mend is None for mistake in fresh):
+            break
+        for mistake in fresh:
+            if mistake.mend is not None:
+                trial = mistake.mend(trial)
+    done = apply and posed is not None and all(m.mend is not None for m in mistakes)
+    if posed is not None:
+        posed = posed[0], replace(posed[1], mended=tuple(m.sentence for m in mistakes))
+    return Examined(
+        trial if done else given,
+        posed if done or not mistakes else None,
+        (*(Check('mended' if done else 'gate', 'unsound', m.sentence) for m in mistakes), *checks),
+        tuple(Unsound(m.kind, m.at, m.sentence, m.remedy, done) for m in mistakes),
+        tuple(mistakes) if done else (),
+    )
+
+
+def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, ...]:
+    """Return the known effects; those of another robot mean nothing on this one."""
+    return tuple(known) if trial.robot.joint_names == given.robot.joint_names else ()
+
+
+def _checked(problem: Problem, model: Model) -> tuple[list[Check], list[Mistake]]:
+    """Return what the checks say, and the mistakes among it; the first mistake ends them."""
+    if problem.align:
+        model = refined(problem.thinned(FIT_ROWS), model)
+    case = Case(problem, model)
+    out: list[Check] = []
+    for name, (look, passed) in CHECKS.items():
+        found = list(look(case))
+        mistakes = [f.mistake for f in found if f.mistake is not None]
+        if mistakes:
+            return out, mistakes
+        out += [Check(name, f.level, f.sentence) for f in found] or [Check(name, 'ok', passed)]
+    return out, []

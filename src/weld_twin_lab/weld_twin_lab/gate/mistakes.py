@@ -1,0 +1,335 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every kind of mistake, made in a sound recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.recording import Measurements, Recording
+
+from .sound import Sound, seen_from
+
+Made = tuple[Robot, Recording, str]
+"""The robot as told, the recording with the mistake, and what was done."""
+VISIBLE = 0.05
+"""Range [rad, m] from which a joint's reading is worth swapping or turning round."""
+MOVING_ONLY = frozenset({'zero_velocities', 'clock'})
+"""Kinds that stations in a table cannot have."""
+
+
+class Hidden(Exception):
+    """The mistake would not show in this recording."""
+
+
+def _seen(recording: Recording) -> Measurements:
+    assert recording.measured is not None
+    return recording.measured
+
+
+def _with_q(recording: Recording, q: Array, qd: Array | None = None) -> Recording:
+    return replace(recording, joints=replace(recording.joints, q=q, qd=qd))
+
+
+def _matrix(sound: Sound, matrix: Array) -> Recording:
+    joints = sound.recording.joints
+    qd = None if joints.qd is None else joints.qd @ matrix.T
+    return _with_q(sound.recording, joints.q @ matrix.T, qd)
+
+
+def _range(sound: Sound) -> Array:
+    return np.asarray(np.ptp(sound.recording.joints.q, axis=0))
+
+
+def _inner(sound: Sound, rng: np.random.Generator) -> int:
+    """Return a joint that moves and that no fitted frame can stand in for."""
+    n = sound.robot.n
+    low = 1 if 'base' in sound.align else 0
+    high = n - 1 if 'tool' in sound.align or _seen(sound.recording).rotation is None else n
+    inner = [i for i in range(low, high) if _range(sound)[i] > VISIBLE]
+    if not inner:
+        raise Hidden('no joint moves')
+    return int(rng.choice(inner))
+
+
+def units(sound: Sound, rng: np.random.Generator) -> Made:
+    """
+    Make degrees of radians, or millimetres of metres, of all numbers or of one column.
+
+    The unit of a whole table is read from the table itself, and is no mistake there.
+    """
+    whole = [] if sound.recording.joints.static else ['degrees', 'millimetres']
+    what = str(rng.choice([*whole, 'one joint', 'one axis']))
+    recording, n = sound.recording, sound.robot.n
+    if what == 'degrees':
+        return sound.robot, _matrix(sound, np.degrees(1.0) * np.eye(n)), what
+    if what == 'one joint':
+        i = _inner(sound, rng)
+        matrix = np.eye(n)
+        matrix[i, i] = np.degrees(1.0)
+        return sound.robot, _matrix(sound, matrix), f'{what}: {sound.robot.joint_names[i]}'
+    factor = np.full(3, 1e3)
+    if what == 'one axis':
+        factor = np.ones(3)
+        factor[int(rng.integers(3))] = 1e3
+    seen = _seen(recording)
+    return (
+        sound.robot,
+        recording.with_measured(replace(seen, position=seen.position * factor)),
+        what,
+    )
+
+
+def joints_swapped(sound: Sound, rng: np.random.Generator) -> Made:
+    """Swap two joints that move."""
+    moving = np.flatnonzero(_range(sound) > VISIBLE)
+    if moving.size < 2:
+        raise Hidden('fewer than two joints move')
+    i, j = (int(k) for k in rng.choice(moving, 2, replace=False))
+    order = list(range(sound.robot.n))
+    order[i], order[j] = j, i
+    names = sound.robot.joint_names
+    return sound.robot, _matrix(sound, np.eye(len(order))[order]), f'{names[i]}, {names[j]}'
+
+
+def sign(sound: Sound, rng: np.random.Generator) -> Made:
+    """Turn the sign of a joint, or of an axis of the positions."""
+    if rng.random() < 0.25:
+        factor = np.ones(3)
+        factor[int(rng.integers(3))] = -1.0
+        seen = _seen(sound.recording)
+        made = replace(seen, position=seen.position * factor, rotation=None)
+        return sound.robot, sound.recording.with_measured(made), 'mirror'
+    i = _inner(sound, rng)
+    matrix = np.eye(sound.robot.n)
+    matrix[i, i] = -1.0
+    return sound.robot, _matrix(sound, matrix), sound.robot.joint_names[i]
+
+
+def constant_angle(sound: Sound, rng: np.random.Generator) -> Made:
+    """Count a joint from another zero, by a quarter or half turn."""
+    i = _inner(sound, rng)
+    if i == 0:
+        raise Hidden('the zero of joint 1 is the turn of the base')
+    turn = np.zeros(sound.robot.n)
+    turn[i] = np.radians(float(rng.choice([90.0, -90.0, 180.0])))
+    joints = sound.recording.joints
+    made = _with_q(sound.recording, joints.q + turn, joints.qd)
+    return sound.robot, made, f'{sound.robot.joint_names[i]} {np.degrees(turn[i]):+.0f}'
+
+
+def coupled_axes(sound: Sound, rng: np.random.Generator) -> Made:
+    """Count joint 3 against the ground."""
+    if _range(sound)[1] < VISIBLE:
+        raise Hidden('joint 2 does not move')
+    matrix = np.eye(sound.robot.n)
+    matrix[2, 1] = float(rng.choice([1.0, -1.0]))
+    return sound.robot, _matrix(sound, matrix), f'{matrix[2, 1]:+.0f}'
+
+
+def base_turned(sound: Sound, rng: np.random.Generator) -> Made:
+    """Measure in a base frame turned by a half turn."""
+    if 'base' in sound.align:
+        raise Hidden('the base is fitted')
+    T = np.eye(4)
+    T[0, 0] = T[1, 1] = -1.0
+    base = sound.robot.T_world_base
+    return sound.robot, seen_from(sound.recording, base @ T @ np.linalg.inv(base)), 'half a turn'
+
+
+def other_robot(sound: Sound, rng: np.random.Generator) -> Made:
+    """Tell of a sibling whose links differ, so that the tool is off by 5 to 30 mm."""
+    robot, wanted = sound.robot, float(rng.uniform(5e-3, 30e-3))
+    q = sound.recording.joints.q[:: max(len(sound.recording.joints.q) // 60, 1)]
+    off = rng.standard_normal((2, robot.n)) * (np.stack([robot.a, robot.d]) != 0.0)
+    for _ in range(20):
+        told = replace(robot, a=robot.a + off[0], d=robot.d + off[1], name='sibling')
+        size = _unaligned(sound, forward(robot, q), forward(told, q))
+        if abs(size - wanted) < 0.02 * wanted:
+            return told, sound.recording, f'{size * 1e3:.1f} mm'
+        off = off * wanted / max(size, 1e-9)
+        if np.abs(off).max() > 0.2:
+            raise Hidden('the frames take up every difference')
+    raise Hidden('no sibling differs by as much')
+
+
+def _unaligned(sound: Sound, real: Array, told: Array) -> float:
+    """Return the RMS distance of poses (M, 4, 4) once the fitted frames have done their part."""
+    left = told[:, :3, 3] - real[:, :3, 3]
+    columns = []
+    if 'base' in sound.align:
+        columns += list(np.eye(3)[:, None] * np.ones((len(left), 1)))
+        columns += [np.cross(axis, real[:, :3, 3]) for axis in np.eye(3)]
+    if 'tool' in sound.align:
+        columns += [real[:, :3, k] for k in range(3)]
+    if columns:
+        design = np.stack([column.ravel() for column in columns], axis=1)
+        left = left.ravel() - design @ np.linalg.lstsq(design, left.ravel(), rcond=None)[0]
+        left = left.reshape(-1, 3)
+    return float(np.sqrt((left**2).sum(axis=1).mean()))
+
+
+def _middle(sound: Sound, rng: np.random.Generator) -> Array:
+    """Return which measurements come after an instant drawn from the middle, bool (M,)."""
+    count = _seen(sound.recording).t.size
+    return np.asarray(np.arange(count) >= int(count * rng.uniform(0.3, 0.7)))
+
+
+def _moved(frame: Array, after: Array, way: Array, turn: Array) -> Array:
+    out = np.array(frame)
+    out[after, :3, 3] += way
+    out[after, :3, :3] = Rotation.from_rotvec(turn).as_matrix() @ out[after, :3, :3]
+    return out
+
+
+def reflector_jumped(sound: Sound, rng: np.random.Generator) -> Made:
+    """Have the reflector sit elsewhere in its nest from some instant on."""
+    after, size = _middle(sound, rng), float(rng.uniform(5e-4, 5e-3))
+    way = _direction(rng) * size
+    seen = _seen(sound.recording)
+    q = sound.recording.joints.at(seen.t)[0]
+    turns = forward(sound.robot, q)[:, :3, :3] @ sound.robot.T_flange_tool[:3, :3]
+    turns = _frame_of(sound, seen, q) @ turns
+    position = seen.position + np.where(after[:, None], turns @ way, 0.0)
+    made = sound.recording.with_measured(replace(seen, position=position))
+    return sound.robot, made, f'{size * 1e3:.2f} mm'
+
+
+def _frame_of(sound: Sound, seen: Measurements, q: Array) -> Array:
+    """Return how the measuring frame is turned against the base, (3, 3)."""
+    there = forward(sound.robot, q)[:, :3, 3]
+    u, _, vt = np.linalg.svd(
+        (seen.position - seen.position.mean(axis=0)).T @ (there - there.mean(axis=0))
+    )
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
+
+
+def joint_slipped(sound: Sound, rng: np.random.Generator) -> Made:
+    """Have a joint slip, so that the tool is off by 0.5 to 5 mm from some instant on."""
+    i, after = _inner(sound, rng), _middle(sound, rng)
+    seen, robot = _seen(sound.recording), sound.robot
+    q = sound.recording.joints.at(seen.t)[0]
+    slip = np.zeros(robot.n)
+    slip[i] = 1e-3
+    lever = (
+        float(np.median(np.linalg.norm((_tip(robot, q + slip) - _tip(robot, q)), axis=1))) / 1e-3
+    )
+    if lever < 0.02:
+        raise Hidden('the joint does not move the tool')
+    slip[i] = float(rng.uniform(5e-4, 5e-3)) / lever * float(rng.choice([-1.0, 1.0]))
+    turn = _frame_of(sound, seen, q)
+    moved = np.where(after[:, None], (_tip(robot, q + slip) - _tip(robot, q)) @ turn.T, 0.0)
+    rotation = seen.rotation
+    if rotation is not None:
+        before, then = (forward(robot, p)[:, :3, :3] for p in (q, q + slip))
+        rotated = turn @ then @ np.swapaxes(before, 1, 2) @ turn.T @ rotation
+        rotation = np.where(after[:, None, None], rotated, rotation)
+    made = replace(seen, position=seen.position + moved, rotation=rotation)
+    said = f'{robot.joint_names[i]} {slip[i] * 1e3:+.2f} mrad'
+    return robot, sound.recording.with_measured(made), said
+
+
+def _tip(robot: Robot, q: Array) -> Array:
+    return np.asarray((forward(robot, q) @ robot.T_flange_tool)[:, :3, 3])
+
+
+def instrument_knocked(sound: Sound, rng: np.random.Generator) -> Made:
+    """Knock the instrument by 0.5 to 5 mm, and turn it a little, at some instant."""
+    after, size = _middle(sound, rng), float(rng.uniform(5e-4, 5e-3))
+    way, turn = _direction(rng) * size, _direction(rng) * float(rng.uniform(0.0, 1e-3))
+    seen = _seen(sound.recording)
+    R = Rotation.from_rotvec(turn).as_matrix()
+    centre = seen.position.mean(axis=0)
+    moved = (seen.position - centre) @ R.T + centre + way
+    position = np.where(after[:, None], moved, seen.position)
+    rotation = seen.rotation
+    if rotation is not None:
+        rotation = np.where(after[:, None, None], R @ rotation, rotation)
+    made = replace(seen, position=position, rotation=rotation)
+    return sound.robot, sound.recording.with_measured(made), f'{size * 1e3:.2f} mm'
+
+
+def joints_stuck(sound: Sound, rng: np.random.Generator) -> Made:
+    """Have the reading of one joint, or of all, stand still for a stretch while the arm moves."""
+    joints, n = sound.recording.joints, sound.robot.n
+    count = len(joints.q)
+    start = int(count * rng.uniform(0.2, 0.5))
+    end = start + int(count * rng.uniform(0.15, 0.4))
+    stuck = [_inner(sound, rng)] if rng.random() < 0.6 else list(range(n))
+    q = joints.q.copy()
+    q[start:end, stuck] = q[start, stuck]
+    if np.abs(q - joints.q).max() < VISIBLE:
+        raise Hidden('nothing moves while it is stuck')
+    qd = None if joints.qd is None else joints.qd.copy()
+    if qd is not None:
+        qd[start:end, stuck] = 0.0
+    said = 'all' if len(stuck) == n else sound.robot.joint_names[stuck[0]]
+    return sound.robot, _with_q(sound.recording, q, qd), said
+
+
+def zero_velocities(sound: Sound, rng: np.random.Generator) -> Made:
+    """Publish velocity zero beside moving positions."""
+    joints = sound.recording.joints
+    if _range(sound).max() < VISIBLE:
+        raise Hidden('nothing moves')
+    return sound.robot, _with_q(sound.recording, joints.q, np.zeros_like(joints.q)), 'all'
+
+
+def clock(sound: Sound, rng: np.random.Generator) -> Made:
+    """Stamp the measurements by another clock: late, early, faster, or of another epoch."""
+    seen, what = _seen(sound.recording), str(rng.choice(['off', 'off', 'rate', 'epoch']))
+    if what == 'off':
+        late = float(rng.uniform(0.2, 3.0) * rng.choice([-1.0, 1.0]))
+        t, said = seen.t + late, f'{late:+.2f} s'
+    elif what == 'rate':
+        rate = float(rng.uniform(2e-3, 2e-2))
+        t, said = seen.t[0] + (seen.t - seen.t[0]) * (1.0 + rate), f'{rate:.2%}'
+    else:
+        t, said = seen.t + float(rng.uniform(1e3, 1e6)), 'another epoch'
+    return sound.robot, sound.recording.with_measured(replace(seen, t=t)), said
+
+
+def other(sound: Sound, rng: np.random.Generator) -> Made:
+    """Pair measurements with the wrong rows, or write quaternions in another order."""
+    seen = _seen(sound.recording)
+    if seen.rotation is not None and rng.random() < 0.5:
+        made = replace(seen, rotation=np.swapaxes(seen.rotation, 1, 2))
+        return sound.robot, sound.recording.with_measured(made), 'orientations inverted'
+    shift = int(seen.t.size * rng.uniform(0.2, 0.8))
+    position = np.roll(seen.position, shift, axis=0)
+    made = replace(seen, position=position, rotation=None)
+    return sound.robot, sound.recording.with_measured(made), f'rows shifted by {shift}'
+
+
+def _direction(rng: np.random.Generator) -> Array:
+    way = rng.standard_normal(3)
+    return np.asarray(way / np.linalg.norm(way))
+
+
+KINDS: dict[str, Callable[[Sound, np.random.Generator], Made]] = {
+    kind.__name__: kind
+    for kind in (
+        units,
+        joints_swapped,
+        sign,
+        constant_angle,
+        coupled_axes,
+        base_turned,
+        other_robot,
+        reflector_jumped,
+        joint_slipped,
+        instrument_knocked,
+        joints_stuck,
+        zero_velocities,
+        clock,
+        other,
+    )
+}
+"""How each kind is made; raises `Hidden` where the recording would not show it."""

@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the trials of the gate came to, as plain values and as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from weld_twin_msgs_py.files import markdown
+
+from .mistakes import KINDS
+
+GOAL_NAMED = 0.95
+"""Least share of the mistakes of every kind that must be named."""
+
+
+def result(
+    mistakes: Sequence[Mapping[str, Any]], sound: Sequence[Mapping[str, Any]], seed: int
+) -> dict[str, Any]:
+    """Return shares named by kind, complaints, what went wrong, and whether the goals are met."""
+    named = {kind: _share([m for m in mistakes if m['kind'] == kind]) for kind in KINDS}
+    complaints = [s for s in sound if not s['right']]
+    goals = [n['named'] >= GOAL_NAMED * n['trials'] for n in named.values()]
+    return {
+        'seed': seed,
+        'named': named,
+        'sound': {'trials': len(sound), 'complaints': len(complaints)},
+        'missed': [dict(m) for m in mistakes if not m['right']],
+        'complaints': [dict(s) for s in complaints],
+        'passed': all(goals) and not complaints,
+    }
+
+
+def _share(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        'trials': len(trials),
+        'named': sum(bool(t['right']) for t in trials),
+    }
+    for way in sorted({str(t['way']) for t in trials}):
+        mine = [t for t in trials if t['way'] == way]
+        out[way] = {'trials': len(mine), 'named': sum(bool(t['right']) for t in mine)}
+    return out
+
+
+def table(content: Mapping[str, Any]) -> str:
+    """Return the result as a Markdown table."""
+    rows = [
+        [kind, *(_cell(found.get(way)) for way in ('bag', 'table')), _cell(found)]
+        for kind, found in content['named'].items()
+    ]
+    sound = content['sound']
+    made = markdown.table(('mistake', 'bags', 'tables', 'named'), *rows)
+    return f'{made}\nsound recordings: {sound["complaints"]} complaints on {sound["trials"]}\n'
+
+
+def _cell(found: Mapping[str, Any] | None) -> str:
+    return '-' if not found else f'{found["named"]} of {found["trials"]}'

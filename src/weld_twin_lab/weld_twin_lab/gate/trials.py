@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One trial of the gate: a mistake to be named, or a sound recording not to complain about."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.diagnosis.soundness import Given, examine
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import Recording
+
+from .mistakes import KINDS, Hidden, Made
+from .sound import Sound, draw
+from .through_files import as_bag, as_table
+
+WAYS = {'bag': as_bag, 'table': as_table}
+TRIES = 200
+
+
+def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> dict[str, Any]:
+    """
+    Return whether the gate named a mistake of a kind, drawn by number, in a bag or a table.
+
+    ``engine`` only tells the results of one version of the core from those of another.
+    """
+    drawn = [seed, list(KINDS).index(kind), list(WAYS).index(way), number]
+    rng = np.random.default_rng(drawn)
+    sound, (robot, recording, said) = _made(kind, way, rng)
+    found = _looked(recording, robot, sound.align, way)
+    return {
+        'kind': kind,
+        'way': way,
+        'number': number,
+        'what': said,
+        **_plain(sound),
+        **found,
+        'right': kind in found['kinds'],
+    }
+
+
+def _made(kind: str, way: str, rng: np.random.Generator) -> tuple[Sound, Made]:
+    """Return a recording in which the mistake shows, and the same with it."""
+    for _ in range(TRIES):
+        sound = draw(rng, rich=True)
+        if (way == 'table') != sound.recording.joints.static:
+            continue
+        with suppress(Hidden):
+            return sound, KINDS[kind](sound, rng)
+    raise DataError(f'no recording shows a mistake of kind {kind}')
+
+
+def complaint(seed: int, number: int, engine: str = '') -> dict[str, Any]:
+    """
+    Return whether the gate was silent about a sound recording, drawn by number.
+
+    ``engine`` only tells the results of one version of the core from those of another.
+    """
+    rng = np.random.default_rng([seed, 1000, number])
+    sound = draw(rng)
+    static = sound.recording.joints.static
+    way = 'table' if static and rng.random() < 0.5 else 'bag'
+    found = _looked(sound.recording, sound.robot, sound.align, way)
+    return {'number': number, 'way': way, **_plain(sound), **found, 'right': not found['kinds']}
+
+
+def _plain(sound: Sound) -> dict[str, Any]:
+    causes = sound.told['causes']
+    assert isinstance(causes, list)
+    return {**sound.told, 'align': list(sound.align), 'causes': [dict(c) for c in causes]}
+
+
+def _looked(
+    recording: Recording, robot: Robot, align: tuple[str, ...], way: str
+) -> dict[str, Any]:
+    begin = time.perf_counter()
+    with TemporaryDirectory() as folder:
+        try:
+            read = WAYS[way](recording, robot, Path(folder))
+            examined = examine(Given((read,), robot, frozenset(align)))
+        except DataError as error:
+            return {'kinds': ['refused'], 'sentences': [str(error)], 'seconds': 0.0}
+    return {
+        'kinds': sorted({item.kind for item in examined.unsound}),
+        'sentences': [item.sentence for item in examined.unsound],
+        'seconds': time.perf_counter() - begin,
+    }

@@ -36,7 +36,7 @@ def readonly(
 
     """
     try:
-        array = np.array(value, dtype=np.float64)
+        array = np.array(value, dtype=np.float64, order='C')  # messages are rows of bytes
     except (TypeError, ValueError, OverflowError):
         raise DataError(f'{name} must be numbers, got {_short(value)}') from None
     if array.ndim != len(shape) or any(

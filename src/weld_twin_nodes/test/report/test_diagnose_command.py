@@ -159,7 +159,7 @@ def test_an_excluded_family_is_never_named(cell, tmp_path):
 @pytest.mark.parametrize(
     ('words', 'reason'),
     [
-        (['--align', 'bas'], 'align takes base, tool or base,tool'),
+        (['--align', 'bas'], '--align takes base, tool or base,tool'),
         (['--exclude-effect', 'rust'], "no effect 'rust'"),
         (['--holdout', 'nowhere'], "no bag at 'nowhere'"),
         (['--effects-known', 'nowhere.json'], 'cannot be read'),

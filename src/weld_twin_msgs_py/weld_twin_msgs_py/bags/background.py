@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from weld_twin_core.errors import TwinError
 
 from .growing import GrowingBag
+from .segment import Channel
 
 BATCH = 500
 """Messages written between two looks at the time."""
@@ -83,6 +84,10 @@ class BackgroundBag:
             if len(self._queue) == 1:
                 self._changed.notify()
         return True
+
+    def announce(self, channel: Channel) -> None:
+        """Say more of a topic than the table of topics does; before its first message."""
+        self._bag.announce(channel)
 
     def note(self, key: str, value: Any) -> None:
         """Add to the provenance, or change it."""

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..messages.topics import (
+    BY_NAME,
     JOINT_STATES,
     MEASURED_POINT,
     MEASURED_SIGMA,
@@ -19,11 +20,9 @@ from ..messages.topics import (
     TOOL_WRENCH,
     TopicNames,
 )
+from .ends import GAP, Ends, never_recorded, uneven_ends
 from .from_bag import POSE_TYPES
 from .reader import BagReader
-
-GAP = 4.0
-"""A step longer than so many median steps is a gap."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +41,8 @@ class TopicInfo:
     longest_gap_s : float [s]
     unordered, repeated, unstamped : int
         Messages that go back in time, repeat the stamp before, or have none.
+    header : bool
+        The stamps are those of headers, not of the recorder's clock.
     use : str
         What a diagnosis takes it for; empty for a topic it does not know.
 
@@ -59,6 +60,7 @@ class TopicInfo:
     unordered: int = 0
     repeated: int = 0
     unstamped: int = 0
+    header: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ class BagInfo:
         What keeps it from being usable, a sentence each.
     notes : tuple of str
         What a diagnosis will do without or work around.
+    incomplete : tuple of str
+        What of the messages sent is not in it, and which streams begin late or end early.
     provenance : dict
 
     """
@@ -87,6 +91,7 @@ class BagInfo:
     missing: tuple[str, ...]
     notes: tuple[str, ...]
     provenance: dict[str, Any]
+    incomplete: tuple[str, ...] = ()
 
     @property
     def usable(self) -> bool:
@@ -107,14 +112,20 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
     names = TopicNames() if topics is None else topics
     stamps: dict[str, array[int]] = {}
     unstamped: dict[str, int] = {}
+    headers: set[str] = set()
     with BagReader(path) as bag:
         for topic, ns, header in bag.stamps():
+            if header:
+                headers.add(topic)
             if header and ns == 0:
                 unstamped[topic] = unstamped.get(topic, 0) + 1
             else:
                 stamps.setdefault(topic, array('q')).append(ns)
         found = [
-            _describe(name, kind, stamps.get(name, array('q')), unstamped.get(name, 0), names)
+            replace(
+                _describe(name, kind, stamps.get(name, array('q')), unstamped.get(name, 0), names),
+                header=name in headers,
+            )
             for name, (kind, _) in sorted(bag.topics.items())
         ]
         made = bag.provenance
@@ -123,7 +134,31 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
     start = min((t.start_ns for t in timed if t.start_ns is not None), default=0)
     end = max((t.end_ns for t in timed if t.end_ns is not None), default=0)
     missing, notes = _judge(names, {t.use: t for t in used}, found)
-    return BagInfo(Path(path), tuple(found), start, (end - start) * 1e-9, missing, notes, made)
+    lacking = (*never_recorded(made), *(uneven_ends(_ends(found)) if not missing else ()))
+    return BagInfo(
+        Path(path),
+        tuple(found),
+        start,
+        (end - start) * 1e-9,
+        missing,
+        (*lacking, *notes),
+        made,
+        lacking,
+    )
+
+
+def _ends(found: list[TopicInfo]) -> dict[str, Ends]:
+    """Return the ends of the streams that beat, on the clock of the headers."""
+    rare = {row.name for row in BY_NAME.values() if not row.steady}
+    return {
+        t.name: Ends(t.start_ns, t.end_ns, round(1e9 / t.rate_hz))
+        for t in found
+        if t.name not in rare
+        and t.header
+        and t.rate_hz
+        and t.start_ns is not None
+        and t.end_ns is not None
+    }
 
 
 def _uses(names: TopicNames) -> dict[str, tuple[str, tuple[str, ...]]]:

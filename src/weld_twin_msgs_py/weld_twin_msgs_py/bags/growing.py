@@ -62,6 +62,7 @@ class GrowingBag:
         self._split_ns = split_ns
         self._provenance = dict(provenance or {})
         self._segments: Segments | None = None
+        self._channels: dict[tuple[str, str], Channel] = {}
         self._lock = -1
 
     def open(self) -> GrowingBag:
@@ -97,6 +98,10 @@ class GrowingBag:
         with self._clear_errors():
             self._write_notes()
 
+    def announce(self, channel: Channel) -> None:
+        """Say more of a topic than the table of topics does; before its first message."""
+        self._channels[channel.topic, channel.type] = channel
+
     def write_cdr(self, topic: str, kind: str, data: bytes, log_ns: int) -> None:
         """
         Write a serialised message, as a raw subscription receives it.
@@ -111,7 +116,8 @@ class GrowingBag:
         with self._clear_errors():
             if self._full(segments, log_ns):
                 segments.split()
-            segments.write(Channel(topic, kind), data, log_ns)
+            channel = self._channels.get((topic, kind)) or Channel(topic, kind)
+            segments.write(channel, data, log_ns)
 
     def flush(self) -> None:
         """

@@ -142,7 +142,7 @@ class BagReader:
         """
         with clear_errors(self.path):
             for reader in self._readers:
-                stamped = {c.id: _has_header(c.msgtype) for c in reader.connections}
+                stamped = {c.id: has_header(c.msgtype) for c in reader.connections}
                 for connection, log_ns, data in reader.messages():
                     if stamped[connection.id]:
                         whole = unzstd(data) if self._packed else data
@@ -179,7 +179,7 @@ def _provenance(custom: Mapping[Any, Any]) -> dict[str, Any]:
     }
 
 
-def _has_header(kind: str) -> bool:
+def has_header(kind: str) -> bool:
     """Return whether messages of a type start with a std_msgs/Header."""
     if kind not in TYPES.fielddefs:
         return False

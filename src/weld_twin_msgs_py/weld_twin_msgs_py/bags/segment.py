@@ -15,6 +15,7 @@ import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
@@ -29,6 +30,8 @@ from rosbags.interfaces import (
     QosTime,
 )
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2.storage_mcap import Channel as McapChannel
+from rosbags.rosbag2.storage_mcap import McapWriter, write_channel, write_string
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 
 from weld_twin_core.errors import DataError
@@ -43,6 +46,8 @@ CHUNK = 512 * 1024
 """Bytes of messages in a chunk; less than rosbags waits for before it closes one by itself."""
 OVERHEAD = 32
 """Bytes either storage adds to a message, about."""
+OFFERED, TYPE_HASH = 'offered_qos_profiles', 'topic_type_hash'
+"""Keys under which rosbag2 keeps these in a channel of an mcap."""
 _CRC_AT = 1 + 8 + 8 + 8 + 8
 """Where in a chunk record its checksum is: after opcode, length, two times and a size."""
 _NEVER = QosTime(9223372036, 854775807)
@@ -55,8 +60,32 @@ class _Sqlite3Writer(Sqlite3Writer):
     SQLITE_SCHEMA = f'PRAGMA journal_mode = WAL; BEGIN; {Sqlite3Writer.SQLITE_SCHEMA} COMMIT;'
 
 
+class _McapWriter(McapWriter):
+    """Writes the hash of the type beside the quality of service, as rosbag2 does."""
+
+    def add_connection(self, connection: Connection, offered_qos_profiles: str) -> None:
+        """Add a connection."""
+        metadata = BytesIO()
+        for text in (OFFERED, offered_qos_profiles, TYPE_HASH, connection.digest):
+            write_string(metadata, text)
+        channel = McapChannel(
+            connection.id,
+            connection.msgtype,
+            connection.topic,
+            'cdr',
+            metadata.getvalue(),
+        )
+        self.channels.append(channel)
+        self.channel_stats[connection.id] = 0
+        write_channel(self.chunk.bio, channel, self.schemas)
+
+
 class _Writer(Writer):
-    STORAGE_PLUGINS = {**Writer.STORAGE_PLUGINS, StoragePlugin.SQLITE3: _Sqlite3Writer}
+    STORAGE_PLUGINS = {
+        **Writer.STORAGE_PLUGINS,
+        StoragePlugin.SQLITE3: _Sqlite3Writer,
+        StoragePlugin.MCAP: _McapWriter,
+    }
 
 
 class Channel(NamedTuple):

@@ -48,6 +48,10 @@ class Qos:
         )
 
 
+_UNSTAMPED = ('std_msgs/msg/String', 'visualization_msgs/msg/MarkerArray')
+"""Types of the table that begin with something else than a header."""
+
+
 @dataclass(frozen=True)
 class Topic:
     """One row of the table."""
@@ -59,6 +63,11 @@ class Topic:
     meaning: str
     steady: bool = True
     """Messages come on a beat, so that silence means something."""
+
+    @property
+    def stamped(self) -> bool:
+        """Return whether its messages begin with a header."""
+        return self.type not in _UNSTAMPED
 
     def message_class(self) -> Any:
         """Return the rclpy message class; needs a ROS installation."""

@@ -51,7 +51,7 @@ BAD_STARTS = {
     'out of range': ('trajectory_generator', {'rate': -5.0}, 'rate'),
     'wrong type': ('error_injector', {'seed': 1.5}, 'seed'),
     'no bag': ('recorder', {}, "needs the parameter 'out'"),
-    'unknown topic': ('recorder', {'out': 'x', 'topics': ['/chatter']}, "'/chatter'"),
+    'no storage': ('recorder', {'out': 'x', 'storage': 'tape'}, "got 'tape'"),
 }
 
 

@@ -169,9 +169,9 @@ class Cell:
             self._services[service] = self.node.create_client(Trigger, service)
         client = self._services[service]
         self.wait(client.service_is_ready, service)
-        future = client.call_async(Trigger.Request())
-        self.wait(future.done, f'{service} to answer')
-        return future.result()
+        asked = _Asked(client, Trigger.Request())
+        self.wait(asked.answered, f'{service} to answer')
+        return asked.answer()
 
     # Streams ---------------------------------------------------------------------------------
 
@@ -268,20 +268,53 @@ class Cell:
         whole = (int(marks[-1]) - int(marks[0])) * 1e-9 / speed if messages else 0.0
         self.wait(send, f"'{bag}' to be played", limit=LIMIT + whole)
 
-    def wait_recorded(self, counts: Mapping[str, int]) -> None:
-        """Wait until the recorder holds at least so many messages of each topic."""
+    def wait_recorded(self, counts: Mapping[str, int], recorder: str = '/recorder') -> None:
+        """
+        Wait until the recorder holds at least so many messages of each topic.
+
+        Raises
+        ------
+        CellTimeout
+            It has taken in nothing more for `LIMIT` seconds; the message says what is missing.
+
+        """
+        held: dict[str, int] = {}
+
+        def lacking() -> str:
+            short = [
+                f'{held.get(topic, 0)} of {count} on {topic}'
+                for topic, count in counts.items()
+                if held.get(topic, 0) < count
+            ]
+            return f'the recorder, which holds {", ".join(short)}'
 
         def all_there() -> bool:
-            held = json.loads(self.trigger('/recorder/counts').message)
-            return all(held[topic] >= count for topic, count in counts.items())
+            held.update(json.loads(self.trigger(f'{recorder}/counts').message))
+            return all(held.get(topic, 0) >= count for topic, count in counts.items())
 
-        self.wait(all_there, f'the recorder to hold {dict(counts)}')
+        self.wait(all_there, lacking, progress=lambda: str(held))
 
     # Waiting ---------------------------------------------------------------------------------
 
-    def wait(self, condition: Callable[[], bool], what: str, limit: float = LIMIT) -> None:
+    def wait(
+        self,
+        condition: Callable[[], bool],
+        what: str | Callable[[], str],
+        limit: float = LIMIT,
+        progress: Callable[[], object] | None = None,
+    ) -> None:
         """
         Serve the nodes of this process until a condition is true.
+
+        Parameters
+        ----------
+        condition : callable
+        what : str or callable
+            What is waited for, in words.
+        limit : float [s]
+            Longest wait; with ``progress`` longest time in which that stays the same.
+        progress : callable, optional
+            How far it is.
 
         Raises
         ------
@@ -289,12 +322,15 @@ class Cell:
             It is not true in time, or a process has died of an error meanwhile.
 
         """
-        end = time.monotonic() + limit
+        end, so_far = time.monotonic() + limit, None
         while not condition():
+            told = what if isinstance(what, str) else what()
             if any(process.code for process in self.processes):
-                raise CellTimeout(f'a node died before {what}' + ''.join(self._logs()))
+                raise CellTimeout(f'a node died before {told}' + ''.join(self._logs()))
+            if progress is not None and (now := progress()) != so_far:
+                end, so_far = time.monotonic() + limit, now
             if time.monotonic() > end:
-                raise CellTimeout(f'waited {limit:g} s for {what}' + ''.join(self._logs()))
+                raise CellTimeout(f'waited {limit:g} s for {told}' + ''.join(self._logs()))
             self._executor.spin_once(timeout_sec=0.02)
 
     def meet(self) -> None:
@@ -310,23 +346,10 @@ class Cell:
                 continue
             client = self.node.create_client(GetParameters, f'/{process.name}/get_parameters')
             self.wait(client.service_is_ready, f'the parameters of {process.name}')
-            self.wait(self._asking(client), f'{process.name} to answer')
+            self.wait(
+                _Asked(client, GetParameters.Request()).answered, f'{process.name} to answer'
+            )
             self.node.destroy_client(client)
-
-    @staticmethod
-    def _asking(client: Client) -> Callable[[], bool]:
-        """Return whether a service has answered, asking again: one that was killed seems ready."""
-        answers = [client.call_async(GetParameters.Request())]
-        due = time.monotonic() + AGAIN
-
-        def answered() -> bool:
-            nonlocal due
-            if time.monotonic() > due:
-                answers.append(client.call_async(GetParameters.Request()))
-                due = time.monotonic() + AGAIN
-            return any(answer.done() for answer in answers)
-
-        return answered
 
     def _logs(self) -> Iterator[str]:
         for process in self.processes:
@@ -342,3 +365,27 @@ class Cell:
             process.interrupt()
         for process in self.processes:
             process.stop()
+
+
+class _Asked:
+    """
+    A question put to a service again and again.
+
+    A server may not know yet who asks, and its answer is lost; one that was killed seems ready.
+    """
+
+    def __init__(self, client: Client, question: Any) -> None:
+        self._client, self._question = client, question
+        self._answers: list[Any] = []
+        self._due = time.monotonic()
+
+    def answered(self) -> bool:
+        """Return whether there is an answer; ask anew where it stays out."""
+        if time.monotonic() >= self._due:
+            self._answers.append(self._client.call_async(self._question))
+            self._due = time.monotonic() + AGAIN
+        return any(answer.done() for answer in self._answers)
+
+    def answer(self) -> Any:
+        """Return the answer."""
+        return next(answer for answer in self._answers if answer.done()).result()

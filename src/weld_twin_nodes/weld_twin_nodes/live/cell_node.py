@@ -18,10 +18,11 @@ from rclpy.node import Node
 from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.messages.cdr_read import checked, decoder
 from weld_twin_msgs_py.messages.to_messages import ros_messages
-from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, Topic
+from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, VOLATILE, Topic
 
 from . import qos_events
 from .health import Health, Input
+from .outputs import Output
 from .settings import Setting
 
 WARN_EVERY = 5.0
@@ -30,6 +31,16 @@ READY_EVERY = 0.02
 """Seconds between two looks at whether the listeners are there."""
 HEALTH_EVERY = 1.0
 """Seconds between two health messages."""
+LAST_WORDS = 4.0
+"""
+Seconds an ending node waits in all until its subscribers have everything. Acknowledgements take
+milliseconds; what was lost on the way is sent again within the 3 s of Fast DDS's heartbeat.
+"""
+KNOWN = 2.0
+"""
+Seconds for the middleware to match the subscriptions that the graph tells of. Discovery takes
+0.1 s, on a crowded machine a second; one that never matches asks for another quality of service.
+"""
 
 SHARED = (
     Setting(
@@ -60,11 +71,13 @@ class CellNode(Node):
         self.finished = False
         self.failure: TwinError | None = None
         self._warned: dict[str, float] = {}
-        self._outputs: list[Any] = []
+        self._outputs: list[Output] = []
+        self._awaited: list[Output] = []
         self._waiting: list[Callable[[], None]] = []
         for item in (*SHARED, *self.settings):
             self.declare_parameter(item.name, item.default, item.descriptor())
         self.health = Health(name, self.setting('stale_after'))
+        self.health.full_name = self.get_fully_qualified_name()
         self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
         self.every(HEALTH_EVERY, self._tell_health)
         self._jumps = self.get_clock().create_jump_callback(
@@ -79,8 +92,18 @@ class CellNode(Node):
         logger: RcutilsLogger = super().get_logger()  # type: ignore[no-untyped-call]
         return logger
 
+    def end(self) -> None:
+        """Come to an end as by Ctrl-C: at once, unless there is something to complete."""
+        self.finished = True
+
     def destroy_node(self) -> None:
-        """End the node."""
+        """Tell what was sent in all, and stay until everybody has it."""
+        if self.context.ok():
+            self._tell_health()
+            latest = time.monotonic() + LAST_WORDS
+            for output in self._outputs:
+                left = max(latest - time.monotonic(), 0.0)
+                output.wait_for_all_acked(Duration(seconds=left))
         super().destroy_node()  # type: ignore[no-untyped-call]
 
     def setting(self, name: str) -> Any:
@@ -103,19 +126,23 @@ class CellNode(Node):
         if self.context.ok():
             raise
 
-    def offer(self, topic: Topic, *, awaited: bool = True) -> Any:
+    def offer(self, topic: Topic, *, awaited: bool = True) -> Output:
         """Return a publisher of a topic of the table; ``wait_for_subscribers`` is for awaited."""
         publisher = self.create_publisher(
             topic.message_class(),
             topic.name,
             topic.offered.to_rclpy(),
             event_callbacks=qos_events.of_publisher(
-                topic.name, topic.offered, partial(self._mismatch, topic.name)
+                topic.name, topic.offered, partial(self.mismatch, topic.name)
             ),
         )
+        output = Output(publisher, stamped=topic.stamped)
         if awaited:
-            self._outputs.append(publisher)
-        return publisher
+            self._awaited.append(output)
+        if topic.offered.durability == VOLATILE and topic is not DIAGNOSTICS:
+            self.health.outputs.append(output)
+        self._outputs.append(output)
+        return output
 
     def listen(
         self,
@@ -163,7 +190,7 @@ class CellNode(Node):
                 wanted.to_rclpy(),
                 raw=True,
                 event_callbacks=qos_events.of_subscription(
-                    topic.name, wanted, partial(self._mismatch, topic.name)
+                    topic.name, wanted, partial(self.mismatch, topic.name)
                 ),
             )
 
@@ -203,19 +230,48 @@ class CellNode(Node):
             action()
             return
         if not self._waiting:
+            self._counted_at = time.monotonic()
             self._ready_timer = self.every(READY_EVERY, self._look)
+            if self.lacking():
+                self.get_logger().info(f'waiting for {", ".join(self.lacking())}')
         self._waiting.append(action)
 
-    def _look(self) -> None:
+    def lacking(self) -> list[str]:
+        """Return what the outputs still wait for, a few words each."""
         wanted = self.setting('wait_for_subscribers')
-        if any(output.get_subscription_count() < wanted for output in self._outputs):
+        return [
+            f'{output.get_subscription_count()} of {wanted} subscribers of {output.topic}'
+            for output in self._awaited
+            if output.get_subscription_count() < wanted
+        ]
+
+    def listeners(self) -> dict[str, int]:
+        """Return how many subscriptions each main output reaches."""
+        return {output.topic: output.get_subscription_count() for output in self._awaited}
+
+    def unmatched(self) -> list[str]:
+        """Return the topics that somebody subscribes to whom the middleware does not reach yet."""
+        return [
+            output.topic
+            for output in self._outputs
+            if output.get_subscription_count() < self.count_subscribers(output.topic)
+        ]
+
+    def _look(self) -> None:
+        now = time.monotonic()
+        if self.lacking():
+            self._counted_at = now
+            self.health.lasting['waiting'] = f'waiting for {", ".join(self.lacking())}'
+            return
+        if self.unmatched() and now - self._counted_at < KNOWN:
             return
         self._ready_timer.cancel()
+        self.health.lasting.pop('waiting', None)
         waiting, self._waiting = self._waiting, []
         for action in waiting:
             action()
 
-    def _mismatch(self, topic: str, sentence: str) -> None:
+    def mismatch(self, topic: str, sentence: str) -> None:
         """Tell of a partner that gets or gives nothing, as long as there are partners."""
         self.get_logger().warning(sentence)
         self.health.lasting[topic] = sentence

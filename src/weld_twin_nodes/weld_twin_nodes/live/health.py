@@ -10,6 +10,9 @@ from math import inf, isfinite
 
 from weld_twin_msgs_py.messages.to_messages import Status
 
+from .outputs import NODE, RUN, SENT, Output
+from .outputs import told as sent_so_far
+
 OK, WARN, ERROR, STALE = range(4)
 """Levels of diagnostic_msgs/DiagnosticStatus."""
 RATE_CHANGE = 3.0
@@ -91,10 +94,13 @@ class Health:
         self._node = node
         self._patience = patience
         self.inputs: dict[str, Input] = {}
+        self.outputs: list[Output] = []
         self.lasting: dict[str, str] = {}
         self.remarks: list[str] = []
         self.fault = ''
         """What makes the work of the node worthless as long as it lasts; empty for nothing."""
+        self._run = time.time_ns()
+        self.full_name = node
         self._said: list[str] = []
         self._said_in_all = 0
 
@@ -120,6 +126,9 @@ class Health:
                 'inputs': len(self.inputs),
                 'told': self._said_in_all,
                 **{f'remark_{k}': sentence for k, sentence in enumerate(self.remarks)},
+                SENT: sent_so_far(self.outputs),
+                RUN: self._run,
+                NODE: self.full_name,
             },
         )
         self._said.clear()

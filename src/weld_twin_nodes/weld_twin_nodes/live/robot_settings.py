@@ -44,10 +44,16 @@ def robot_of(node: CellNode) -> Robot:
     """
     name = node.setting('robot')
     base, tip = node.setting('base_link') or None, node.setting('tip_link') or None
-    topic = ROBOT_DESCRIPTION.name if name == 'topic' else name
-    if topic.startswith('/') and not Path(topic).suffix and not Path(topic).is_file():
+    if told_by_topic(name):
+        topic = ROBOT_DESCRIPTION.name if name == 'topic' else name
         return parse_urdf(_described(node, topic), topic, base, tip)
     return load_robot(name, base, tip)
+
+
+def told_by_topic(name: str) -> bool:
+    """Return whether a robot's name means a topic with its URDF: 'topic', or a topic's name."""
+    absolute = name.startswith('/') and not Path(name).suffix and not Path(name).is_file()
+    return name == 'topic' or absolute
 
 
 def _described(node: CellNode, topic: str) -> str:

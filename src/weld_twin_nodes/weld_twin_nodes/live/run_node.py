@@ -16,6 +16,7 @@ from rclpy.exceptions import (
     ROSInterruptException,
 )
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from weld_twin_core.errors import TwinError
@@ -36,7 +37,27 @@ def executor() -> Executor:
     return EventsExecutor()
 
 
-def spin(node: CellNode) -> None:
+class Stop:
+    """
+    Ctrl-C and SIGTERM as a wish that the node meets in its own time.
+
+    rclpy would close ROS under the node, and what has reached the process but not the node would
+    be lost. Before there is a node the wish ends the program at once.
+    """
+
+    def __init__(self) -> None:
+        self.wished = False
+        self.node: CellNode | None = None
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._take)
+
+    def _take(self, *_: object) -> None:
+        first, self.wished = not self.wished, True
+        if first and self.node is None:
+            raise KeyboardInterrupt
+
+
+def spin(node: CellNode, stop: Stop) -> None:
     """
     Serve callbacks until the node is finished or ROS shuts down.
 
@@ -45,24 +66,27 @@ def spin(node: CellNode) -> None:
     """
     runner = executor()
     runner.add_node(node)
+    ending = False
     try:
         while rclpy.ok() and not node.finished:
-            runner.spin_until_future_complete(Future(), timeout_sec=LOOP)
+            if stop.wished and not ending:
+                ending = True
+                node.end()
+            else:
+                runner.spin_until_future_complete(Future(), timeout_sec=LOOP)
     finally:
         runner.shutdown()
 
 
 def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     """Run a node until it is done or stopped; return the exit code, 2 for unusable settings."""
-    # rclpy ends the loop at Ctrl-C by itself; Python's exception on top of it would come anywhere,
-    # and a second one would cut the bag short that is being completed.
-    signal.signal(signal.SIGINT, lambda *_: None)
-    rclpy.init(args=args)
+    stop = Stop()
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
-        node = make()
+        node = stop.node = make()
         gc.freeze()  # what has been loaded stays; looking through it again is a pause of the node
-        spin(node)
+        spin(node, stop)
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass
     except (
@@ -75,7 +99,7 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     except Exception:
         if rclpy.ok():
             raise
-        # A callback was publishing when the signal closed ROS under it.
+        # A callback was publishing when something closed ROS under it.
     finally:
         if node is not None:
             node.destroy_node()

@@ -26,6 +26,7 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.seam_motion import backward, joint_motion, plan_through, sampled, stamps, thinned
 from .cell_node import CellNode
+from .meeting import Meeting
 from .pacing import Pump
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run
@@ -75,6 +76,13 @@ class TrajectoryGenerator(CellNode):
         ),
         Setting('window', 100, 'joint states that may be under way [1]', 1, 100_000),
         Setting('start_stamp_ns', 0, 'stamp of the first sample [ns]; 0: now', 0, 2**62),
+        Setting(
+            'meet_within',
+            30.0,
+            'longest wait for the subscribers before the first sample [s]',
+            0.0,
+            3600.0,
+        ),
         Setting('exit_when_done', False, 'end the node after the last sample'),
     )
 
@@ -89,6 +97,8 @@ class TrajectoryGenerator(CellNode):
         self._seam = self.offer(PLANNED_PATH, awaited=False)
         self._stamps = np.zeros(0, dtype=np.int64)
         self._pump: Pump | None = None
+        self._meeting: Meeting | None = None
+        self._given = False
         self._follow()
         self._take_source()
 
@@ -118,7 +128,7 @@ class TrajectoryGenerator(CellNode):
         self._run(plan_through(self._robot, from_messages.path_points(message), *self._law).motion)
 
     def _refuse_busy(self) -> None:
-        if self._pump is not None and not self.done:
+        if self._given and not self.done:
             raise DataError('the motion before is still under way; send the next one after it')
 
     def _follow(self) -> None:
@@ -139,6 +149,7 @@ class TrajectoryGenerator(CellNode):
     def _run(self, motion: JointMotion) -> None:
         """Tell of a motion, and run it when the subscribers are there."""
         self._motion, self._rounds = motion, self.setting('repeat') - 1
+        self._given, self._pump = True, None
         now = self.get_clock().now().nanoseconds
         shown = thinned(motion, SHOWN)
         self._planned.publish(self.messages.joint_trajectory(now, self._robot.joint_names, shown))
@@ -146,9 +157,13 @@ class TrajectoryGenerator(CellNode):
         self.get_logger().info(
             f'{motion.t.size} joint states in {motion.t[-1] - motion.t[0]:.1f} s'
         )
-        self.when_ready(self._begin)
+        if self._meeting is None:
+            self._meeting = Meeting(self, self.setting('meet_within'), self._begin)
+        else:
+            self._begin()
 
     def _begin(self) -> None:
+        self.get_logger().info(f'beginning: {_listened(self.listeners())}')
         self._timer = self.every(TICK, self._begin_in_time)
         self._begin_in_time()
 
@@ -191,6 +206,10 @@ class TrajectoryGenerator(CellNode):
         self._rounds -= 1
         self._motion = backward(self._motion)
         self._stamp(2 * int(self._stamps[-1]) - int(self._stamps[-2]))
+
+
+def _listened(listeners: dict[str, int]) -> str:
+    return ', '.join(f'{count} subscribers of {topic}' for topic, count in listeners.items())
 
 
 def main(args: list[str] | None = None) -> int:

@@ -46,11 +46,17 @@ def run(args: argparse.Namespace) -> int:
 
 def _sentences(info: object) -> list[str]:
     from weld_twin_msgs_py.bags import BagInfo
+    from weld_twin_msgs_py.bags.ends import COMPLETENESS
 
     assert isinstance(info, BagInfo)
     out = [f'missing: {text}' for text in info.missing]
     out += [f'note: {text}' for text in info.notes]
     for key, value in info.provenance.items():
+        if key == COMPLETENESS:
+            if not any(row['missing'] for row in value.values()):
+                total = sum(row['sent'] for row in value.values())
+                out.append(f'complete: all {total:,} messages that were sent are here')
+            continue
         shown = value.get('name', '') if isinstance(value, dict) else value
         out.append(f'{key}: {shown}')
     out.append('usable for a diagnosis' if info.usable else 'not usable for a diagnosis')

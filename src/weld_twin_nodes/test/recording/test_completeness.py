@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A recording is whole, or says what is missing: on the terminal, in the bag, in its health."""
+
+from __future__ import annotations
+
+import signal
+import time
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Float64MultiArray, String
+
+from weld_twin_core.arm import catalog
+from weld_twin_msgs_py.bags import BagReader, bag_info, provenance
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import JOINT_STATES
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.live.cell_node import CellNode
+from weld_twin_nodes.live.recorded_topic import message_class
+
+ROBOT = catalog.load('ur5')
+FIRST = 1_000_000_000
+
+
+class Speaker(CellNode):
+    """A node of the project that sends numbered joint states when it is told to."""
+
+    def __init__(self, **kwargs):
+        super().__init__('speaker', **kwargs)
+        self._joints = self.offer(JOINT_STATES)
+        self.number = 0
+
+    def speak(self, count):
+        for _ in range(count):
+            stamp = FIRST + 1_000_000 * self.number
+            q = np.full(ROBOT.n, self.number * 1e-3)
+            self._joints.publish(self.messages.joint_state(stamp, ROBOT.joint_names, q))
+            self.number += 1
+
+
+@pytest.fixture
+def cell(tmp_path):
+    with Cell(tmp_path / 'cell') as cell:
+        yield cell
+
+
+def recorder(cell, tmp_path, **parameters):
+    process = cell.start('recorder', out=str(tmp_path / 'bag'), **parameters)
+    cell.trigger('/recorder/counts')
+    return process
+
+
+def listened(cell, topic, count=1):
+    cell.wait(lambda: cell.node.count_subscribers(topic) >= count, f'a listener of {topic}')
+    cell.meet()
+
+
+def heard_of(cell, recorder_process):
+    """Wait until every node has told of itself to the recorder at least once."""
+    assert recorder_process.code is None
+    begin = time.monotonic()
+    cell.wait(lambda: time.monotonic() > begin + 1.5, 'the health of the nodes')
+
+
+def finish(cell, process):
+    """End the recorder; the nodes of this process are served meanwhile, as if they lived on."""
+    process.interrupt()
+    cell.wait(lambda: process.code is not None, 'the recorder to end')
+    return process.code
+
+
+def numbers(bag):
+    with BagReader(bag) as reader:
+        found = reader.messages([JOINT_STATES.name])
+        return [(from_messages.stamp_ns(m.message) - FIRST) // 1_000_000 for m in found]
+
+
+def test_what_reached_a_recorder_that_stood_still_is_in_the_bag(cell, tmp_path):
+    speaker = cell.add(Speaker)
+    process = recorder(cell, tmp_path)
+    listened(cell, JOINT_STATES.name)
+    speaker.speak(10)
+    cell.wait_recorded({JOINT_STATES.name: 10})
+    process.signal(signal.SIGSTOP)
+    speaker.speak(900)
+    process.signal(signal.SIGINT)
+    process.signal(signal.SIGCONT)
+    assert finish(cell, process) == 0
+    assert numbers(tmp_path / 'bag') == list(range(910))
+    told = provenance(tmp_path / 'bag')['completeness'][JOINT_STATES.name]
+    assert told == {'sent': 910, 'recorded': 910, 'missing': 0}
+    assert bag_info(tmp_path / 'bag').incomplete == ()
+    assert 'that were sent are in the bag' in process.log
+
+
+def test_what_was_sent_before_the_recorder_came_is_missing_at_the_start(cell, tmp_path):
+    speaker = cell.add(Speaker)
+    speaker.speak(40)
+    health = HealthListener(cell.node)
+    process = recorder(cell, tmp_path)
+    listened(cell, JOINT_STATES.name)
+    speaker.speak(60)
+    cell.wait_recorded({JOINT_STATES.name: 60})
+    heard_of(cell, process)
+    assert finish(cell, process) == 0
+    sentence = (
+        "'/joint_states' is incomplete: 60 of 100 messages sent are in the bag, "
+        '40 are missing at the start'
+    )
+    assert sentence in process.log
+    told = provenance(tmp_path / 'bag')['completeness'][JOINT_STATES.name]
+    assert told == {'sent': 100, 'recorded': 60, 'missing': 40, 'where': 'at the start'}
+    assert "'/joint_states' lacks 40 of the 100 messages sent, at the start" in (
+        bag_info(tmp_path / 'bag').incomplete
+    )
+    cell.wait(lambda: any(sentence in text for _, text in health.of('recorder')), 'its health')
+
+
+def test_a_publisher_that_ended_before_has_told_what_it_sent(cell, tmp_path):
+    process = recorder(cell, tmp_path)
+    speaker = cell.add(Speaker)
+    listened(cell, JOINT_STATES.name)
+    cell.wait(lambda: speaker.listeners()[JOINT_STATES.name] > 0, 'the recorder')
+    speaker.speak(700)
+    cell.remove(speaker)
+    assert finish(cell, process) == 0
+    assert numbers(tmp_path / 'bag') == list(range(700))
+    assert provenance(tmp_path / 'bag')['completeness'][JOINT_STATES.name]['sent'] == 700
+
+
+def test_a_node_that_starts_again_counts_anew(cell, tmp_path):
+    process = recorder(cell, tmp_path)
+    for _ in range(2):
+        speaker = cell.add(Speaker)
+        cell.wait(lambda s=speaker: s.listeners()[JOINT_STATES.name] > 0, 'the recorder')
+        speaker.speak(50)
+        cell.remove(speaker)
+    assert finish(cell, process) == 0
+    told = provenance(tmp_path / 'bag')['completeness'][JOINT_STATES.name]
+    assert told == {'sent': 100, 'recorded': 100, 'missing': 0}
+
+
+def test_the_generator_meets_a_recorder_that_is_started_with_it(cell, tmp_path):
+    generator = cell.start(
+        'trajectory_generator', profile='aggressive', playback=20.0, exit_when_done=True
+    )
+    process = cell.start('recorder', out=str(tmp_path / 'bag'))
+    assert cell.wait(lambda: generator.code is not None, 'the motion to end') is None
+    assert finish(cell, process) == 0
+    told = provenance(tmp_path / 'bag')['completeness'][JOINT_STATES.name]
+    assert told['missing'] == 0
+    assert told['sent'] > 100
+    assert 'beginning: 1 subscribers of /joint_states' in generator.log
+
+
+def test_a_generator_that_nobody_listens_to_says_so_and_begins(cell):
+    generator = cell.start(
+        'trajectory_generator', meet_within=0.5, playback=100.0, exit_when_done=True
+    )
+    assert generator.end() == 0
+    said = 'waited 0.5 s for somebody to listen to /joint_states; beginning without'
+    assert said in generator.log
+
+
+def test_topics_of_any_type_and_best_effort_are_recorded_with_what_they_are(cell, tmp_path):
+    process = recorder(cell, tmp_path, topics=['joint_states', '/chatter', '/gauge', '/nothing'])
+    fast = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    chatter = cell.node.create_publisher(String, '/chatter', 10)
+    gauge = cell.node.create_publisher(Float64MultiArray, '/gauge', fast)
+    joints = cell.node.create_publisher(JOINT_STATES.message_class(), '/joint_states', fast)
+    for publisher in (chatter, gauge, joints):
+        cell.wait(lambda p=publisher: p.get_subscription_count() > 0, publisher.topic_name)
+    cell.meet()
+    for k in range(5):
+        chatter.publish(String(data=f'{k}'))
+        gauge.publish(Float64MultiArray(data=[float(k)]))
+        joints.publish(cell.messages.joint_state(FIRST + k, ROBOT.joint_names, np.zeros(6)))
+    cell.wait_recorded({'/chatter': 5, '/gauge': 5, '/joint_states': 5})
+    hashes = {
+        info.topic_type: str(info.topic_type_hash)
+        for topic in ('/chatter', '/gauge', '/joint_states')
+        for info in cell.node.get_publishers_info_by_topic(topic)
+    }
+    assert finish(cell, process) == 0
+    assert '/nothing: nobody published this topic' in process.log
+    with next((tmp_path / 'bag').glob('*.mcap')).open('rb') as stream:
+        summary = make_reader(stream).get_summary()
+    for channel in summary.channels.values():
+        kind = summary.schemas[channel.schema_id].name
+        assert channel.metadata['topic_type_hash'] == hashes[kind]
+        best_effort = channel.topic != '/chatter'
+        asked = channel.metadata['offered_qos_profiles']
+        assert ('reliability: best_effort' in asked or 'reliability: 2' in asked) == best_effort
+
+
+def test_a_type_that_is_not_installed_is_named_with_its_package():
+    with pytest.raises(ImportError, match='their_msgs/msg/Arc is not installed here; install'):
+        message_class('their_msgs/msg/Arc')
+
+
+def test_a_recorder_in_a_namespace_records_its_own_cell(cell, tmp_path):
+    left = cell.node.create_publisher(JOINT_STATES.message_class(), '/left/joint_states', 10)
+    names = ['--ros-args', '-r', '__ns:=/left', '-r', 'measured/tool_pose:=/tracker/pose']
+    from weld_twin_nodes.live.recorder import Recorder
+
+    node = cell.add(Recorder, cli_args=names, out=str(tmp_path / 'bag'))
+    cell.wait(lambda: left.get_subscription_count() > 0, 'the recorder')
+    listened(cell, '/tracker/pose')
+    for k in range(3):
+        left.publish(cell.messages.joint_state(FIRST + k, ROBOT.joint_names, np.zeros(6)))
+    counts = '/left/recorder/counts'
+    cell.wait(lambda: '"/left/joint_states": 3' in cell.trigger(counts).message, 'three')
+    cell.remove(node)
+    with BagReader(tmp_path / 'bag') as reader:
+        assert reader.topics['/left/joint_states'][1] == 3

@@ -39,9 +39,11 @@ EXAMPLES = {
     'base_pose': {'xyz': [1e-3, 2e-3, -1e-3], 'rotvec': [1e-3, 0.0, 2e-3]},
     'cartesian_compliance': {'compliance': [1e-6, 2e-6, 3e-6]},
     'drift': {'xyz_rate': [1e-4, 0.0, -2e-4]},
+    'frame_curve': {'xyz': [1e-3, 0, 0, 2e-3, 0, -1e-3], 'knots': [0.0, 2.0]},
     'gear_ratio': {**ELBOW, 'scale': 1e-3},
     'joint_compliance': {**ELBOW, 'compliance': 1e-5},
     'joint_coupling': {**ELBOW, 'source': 'wrist_1_joint', 'ratio': 1e-3},
+    'joint_curve': {**ELBOW, 'values': [1e-3, -2e-3], 'over': 'speed'},
     'joint_offset': {**ELBOW, 'offset': 1e-3},
     'link_length': {**ELBOW, 'da': 1e-3},
     'link_offset': {**ELBOW, 'dd': 1e-3},
@@ -123,12 +125,12 @@ def compare(path, entries, effects, robot=ARM, at_least=200):
     place = {stamp: k for k, stamp in enumerate(stamps)}
     live = played(path, twin)
     assert at_least <= len(live) <= len(stamps)
-    for stamp, pose_stamp, _, poses in live:
-        k = place[stamp]
+    for sample in live:
+        k, poses = place[sample.stamp], sample.poses
         np.testing.assert_allclose(poses.position, offline.position[k], rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(poses.rotation, offline.rotation[k], rtol=0.0, atol=1e-12)
-        assert pose_stamp == stamp + round(twin.delay * 1e9)
-    return recording, {stamp for stamp, *_ in live} - set(stamps)
+        assert sample.pose_stamp == sample.stamp + round(twin.delay * 1e9)
+    return recording, {sample.stamp for sample in live} - set(stamps)
 
 
 def played(path, twin):
@@ -166,6 +168,13 @@ def test_velocities_are_those_told_else_the_step_since_the_sample_before(tmp_pat
     recording, _ = compare(tmp_path / 'bag', in_order(sides(), joints(qd)), effects)
     nothing = Twin(ARM, (LAG,)).poses(recording).position
     assert np.abs(nothing - Twin(ARM, effects).poses(recording).position).max() > 1e-3
+
+
+@pytest.mark.parametrize('over', ['angle', 'direction', 'speed', 'load', 'temperature', 'time'])
+def test_curves_without_a_formula_are_the_same_over_every_quantity(tmp_path, over):
+    knots = {'load': [-50.0, 50.0], 'temperature': [20.0, 60.0]}.get(over, [-1.0, 1.0])
+    entry = {**EXAMPLES['joint_curve'], 'effect': 'joint_curve', 'over': over, 'knots': knots}
+    compare(tmp_path / 'bag', in_order(sides(), joints('some')), (LAG, effect_from_mapping(entry)))
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,11 @@ LEAST = 1e-6
 """Least noise of a position per axis [m]: no instrument is better, and a simulated cell without
 noise would leave no digits for what is open."""
 ROUNDS = 12
+USUAL_NOISE = 3e-5
+"""What an arm and an instrument leave of a position per axis [m] before anything is known of
+them: arms repeat within 0.02 to 0.1 mm, trackers measure within 0.02 mm."""
+NOISE_TRUST = 8.0
+"""So many rows' worth of belief in that."""
 TRUST = 4.0
 """So many coordinates' worth of belief in the usual sizes, against what this arm shows."""
 
@@ -101,17 +106,17 @@ def allowed(
     knots = plausible_arm.fine_knots([_joints(r) for r in problem.recordings])
     rows = _rows(problem, model, scale, what, knots)
     prior = _prior(what, model, sum(k.size for k in knots))
-    width, noise = learned(rows, prior)
+    width, noise = learned(rows, prior, (USUAL_NOISE / scale.position) ** 2)
     mean, covariance = conditioned(rows, prior, width, noise)
     count = what.count
-    unseen = _unseen(problem, model, scale, precision, rows)
-    position, orientation = leftover(
-        problem,
-        scale,
-        unseen,
-        lambda keep: conditioned(rows.kept(keep), prior, width, noise),
-        floor,
-    )
+    unseen = _unseen(problem, model, scale, precision, rows, count)
+
+    def given(keep: Array) -> tuple[Array, Array]:
+        # The fine curves stay where they were seen: between postures they are left over.
+        middle, spread = conditioned(rows.kept(keep), prior, width, noise)
+        return middle[:count], spread[:count, :count]
+
+    position, orientation = leftover(problem, scale, unseen, given, floor)
     curve = width[-1] if width.size > count else 0.0
     rest = plausible_arm.discrepancy(model.robot, position, orientation, curve)
     return Posterior(
@@ -141,12 +146,16 @@ def _rows(
     return Rows(problem.whitened(parts, scale), residual, share)
 
 
-def _unseen(problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows) -> Unseen:
+def _unseen(
+    problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows, count: int
+) -> Unseen:
     own, _ = design(problem, model, scale)
     pull, x = np.zeros(own.shape[0]), np.zeros(own.shape[0])
     if precision.size:
         pull[-precision.size :], x[-precision.size :] = precision, coordinates(model)
-    return Unseen(own, pull, pull * x, rows.columns, rows.residual, posture_blocks(problem))
+    return Unseen(
+        own, pull, pull * x, rows.columns[:count], rows.residual, posture_blocks(problem)
+    )
 
 
 def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:
@@ -173,7 +182,7 @@ def _prior(what: Directions, model: Model, fine: int) -> Prior:
         np.concatenate(
             [
                 np.tile(np.repeat(FRAME_WIDTHS, 3), frames // 6),
-                plausible_arm.widths(effects),
+                plausible_arm.widths(model.robot, effects),
                 np.full(fine, plausible_arm.FINE),
             ]
         ),
@@ -183,8 +192,17 @@ def _prior(what: Directions, model: Model, fine: int) -> Prior:
     )
 
 
-def learned(rows: Rows, prior: Prior) -> tuple[Array, float]:
-    """Return the width of every coordinate as this arm shows it, shape (P,), and the noise."""
+def learned(rows: Rows, prior: Prior, usual: float = 1.0) -> tuple[Array, float]:
+    """
+    Return the width of every coordinate as this arm shows it, shape (P,), and the noise.
+
+    Parameters
+    ----------
+    rows, prior : Rows, Prior
+    usual : float
+        Variance of a row before anything is known; the noise returned is a variance too.
+
+    """
     unit = rows.columns * prior.width[:, None]
     normal, right = rows.share * unit @ unit.T, rows.share * unit @ rows.residual
     rss = rows.share * float(rows.residual @ rows.residual)
@@ -196,7 +214,8 @@ def learned(rows: Rows, prior: Prior) -> tuple[Array, float]:
         step, spread = _solved(normal / noise, right / noise, middle, size)
         known = np.clip(1.0 - spread / size**2, 0.0, 1.0)
         left = rss - 2.0 * right @ step + step @ normal @ step
-        noise = max(left / max(count - known.sum(), 1.0), 1e-6)
+        free = max(count - float(known.sum()), 0.0)
+        noise = (max(left, 0.0) + NOISE_TRUST * usual) / (free + NOISE_TRUST)
         for k in range(grown.size):
             mine = prior.group == k
             shown = float(((step - middle)[mine] ** 2).sum())

@@ -11,6 +11,7 @@ import numpy as np
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
 from ...effects.transmission_ripple import TransmissionRipple
 from ...twin.features import Features
@@ -29,17 +30,12 @@ EVERYWHERE = (
 ORDERS = np.arange(1.0, 5.0)
 """Ripple orders [1/rev] that bend a joint's whole range; finer ones are part of what is left over,
 for they are as large inside as outside what was recorded."""
-WIDTH = 2.0
-"""Standard deviation of a coordinate in units of its typical size (`Parameter.typical`); only the
-start, the size of this arm's own errors is learned family by family."""
 SPACING = 0.1
 """Distance of the knots of a joint's fine curve [rad or m]: shorter than the orders above bend."""
 KNOTS = 30
 """Most knots per joint."""
 FINE = 1e-4
 """Usual height of the fine curve [rad]: ripple of the orders above four."""
-RIPPLE = 0.5
-"""Low orders of a good gear, in units of the typical ripple at any order."""
 MOST = 24
 """Coordinates of one ripple effect; more of them are high orders, part of what is left over."""
 
@@ -127,15 +123,14 @@ def groups(effects: Sequence[Effect]) -> Array:
     return np.repeat([names.index(effect.name) for effect in effects], sizes).astype(int)
 
 
-def widths(effects: Sequence[Effect]) -> Array:
+def widths(robot: Robot, effects: Sequence[Effect]) -> Array:
     """Return the standard deviation of every coordinate before the data, shape (K,)."""
     sizes = [np.zeros(0)]
     for effect in effects:
-        size = WIDTH * effect.coordinate_scales()
-        if isinstance(effect, TransmissionRipple):
-            # Eccentric gears: an order's amplitude falls with its number.
-            size = RIPPLE * size / np.repeat(np.sqrt(np.atleast_1d(effect.order)), 2)
-        sizes.append(size)
+        size = spreads(robot, effect)
+        # What the table knows nothing of is as far from the fit as that is from nothing.
+        unknown = np.maximum(np.abs(effect.coordinates()), effect.coordinate_scales())
+        sizes.append(np.where(np.isfinite(size), size, unknown))
     return np.concatenate(sizes)
 
 

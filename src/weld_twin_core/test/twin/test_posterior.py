@@ -33,7 +33,7 @@ def everywhere(robot):
 
 
 def certain(robot):
-    return Discrepancy(0.0, 0.0, np.zeros(robot.n), 0.1)
+    return Discrepancy(0.0, 0.0, np.zeros(robot.n), np.zeros(robot.n), 0.1)
 
 
 def posterior(robot, what, covariance, mean=None, discrepancy=None):
@@ -140,7 +140,7 @@ def test_only_the_discrepancy_grows_with_the_distance():
     robot = load('ur5')
     narrow = tuple(((-0.5, 0.5),) for _ in range(6))
     domain = Domain(robot.joint_names, narrow, (0.02,) * 6, (True,) * 6)
-    rest = Discrepancy(2e-5, 3e-5, np.full(6, 1e-4), 0.1)
+    rest = Discrepancy(2e-5, 3e-5, np.zeros(6), np.full(6, 1e-4), 0.1)
     known = Posterior(Directions((), 1, ()), np.zeros(0), np.zeros((0, 0)), rest, domain)
     q = np.zeros((4, 6))
     q[:, 0] = [0.0, 0.5, 0.55, 2.0]

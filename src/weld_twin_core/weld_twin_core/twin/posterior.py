@@ -114,13 +114,15 @@ class Discrepancy:
     Attributes
     ----------
     position : float [m]
-        Standard deviation per axis where it was recorded: what the model leaves on postures
-        that it was not fitted on, the instrument's noise taken off.
+        Standard deviation per axis of what is left over at the tool, alike everywhere.
     orientation : float [rad]
         The same about each axis.
+    gears : array, shape (n,) [rad or m]
+        What is left over in every joint where it was recorded; it reaches the tool by the
+        joint's lever.
     curves : array, shape (n,) [rad or m]
-        How far every joint may be off its reading where it was never seen, beyond what the
-        parameters say: gear errors too fine to be carried over.
+        How far every joint may be off its reading, on top of that, where it was never seen: gear
+        errors too fine to be carried over.
     reach : float [rad or m]
         Distance beyond what was recorded at which a curve counts in full.
 
@@ -128,10 +130,12 @@ class Discrepancy:
 
     position: float
     orientation: float
+    gears: Array
     curves: Array
     reach: float
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, 'gears', readonly(self.gears, (None,), 'gears'))
         object.__setattr__(self, 'curves', readonly(self.curves, (None,), 'curves'))
 
     def covariance(self, joint_columns: Array, beyond: Array) -> Array:
@@ -146,7 +150,8 @@ class Discrepancy:
             How far every joint is from where it was recorded.
 
         """
-        size = self.curves[:, None] * np.minimum(beyond.T / self.reach, 1.0)
+        apart = np.minimum(beyond.T / self.reach, 1.0)
+        size = np.hypot(self.gears[:, None], self.curves[:, None] * apart)
         moved = joint_columns * size[:, None]
         out = np.einsum('nim,njm->mij', moved, moved)
         own = np.repeat([self.position, self.orientation], 3) ** 2
@@ -290,6 +295,7 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
         'discrepancy': {
             'position_m': rest.position,
             'orientation_rad': rest.orientation,
+            'gears': [float(v) for v in rest.gears],
             'curves': [float(v) for v in rest.curves],
             'reach': rest.reach,
         },

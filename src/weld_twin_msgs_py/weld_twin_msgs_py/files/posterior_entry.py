@@ -49,6 +49,7 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
     discrepancy = Discrepancy(
         _size(rest['position_m'], 'position_m'),
         _size(rest['orientation_rad'], 'orientation_rad'),
+        readonly(rest['gears'], (robot.n,), 'posterior.discrepancy.gears'),
         readonly(rest['curves'], (robot.n,), 'posterior.discrepancy.curves'),
         max(_size(rest['reach'], 'reach'), 1e-9),
     )

@@ -116,9 +116,9 @@ def allowed(
         middle, spread = conditioned(rows.kept(keep), prior, width, noise)
         return middle[:count], spread[:count, :count]
 
-    position, orientation = leftover(problem, scale, unseen, given, floor)
+    left = leftover(problem, scale, unseen, given, floor)
     curve = width[-1] if width.size > count else 0.0
-    rest = plausible_arm.discrepancy(model.robot, position, orientation, curve)
+    rest = plausible_arm.discrepancy(model.robot, left, curve)
     return Posterior(
         what,
         mean[:count],
@@ -154,8 +154,24 @@ def _unseen(
     if precision.size:
         pull[-precision.size :], x[-precision.size :] = precision, coordinates(model)
     return Unseen(
-        own, pull, pull * x, rows.columns[:count], rows.residual, posture_blocks(problem)
+        own,
+        pull,
+        pull * x,
+        rows.columns[:count],
+        _turns(problem, model, scale),
+        rows.residual,
+        posture_blocks(problem),
     )
+
+
+def _turns(problem: Problem, model: Model, scale: Scale) -> Array:
+    """Return the whitened columns of turning joints, shape (n, rows)."""
+    joints = np.flatnonzero(~np.asarray(model.robot.prismatic))
+    parts = []
+    for k, maker in enumerate(problem.features(model)):
+        columns = [maker.column(('q', int(i)))[: problem.rows[k]] for i in joints]
+        parts.append(np.reshape(columns, (joints.size, problem.rows[k], -1)))
+    return problem.whitened(parts, scale)
 
 
 def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
@@ -25,6 +26,8 @@ HALVINGS = 3
 """Eight blocks: each leaves out an eighth, few enough for the others to stand for the fit."""
 HOLD = 0.9
 """Share of unseen postures that their regions shall hold."""
+SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
+"""Shares of what is left over that may come from the gears; never all, for tools shake too."""
 STEPS = 60
 """Halvings of the bracket in which the size is sought; far below rounding."""
 
@@ -45,6 +48,8 @@ class Unseen:
         Of the fit's prior, and how hard it pulls from where the fit is.
     columns : array, shape (P, rows)
         Those of the coordinates that are uncertain.
+    turns : array, shape (n, rows)
+        Those of the joints that turn.
     residual : array, shape (rows,)
     labels : array, shape (rows,)
         Block of like posture of every row.
@@ -55,6 +60,7 @@ class Unseen:
     precision: Array
     pull: Array
     columns: Array
+    turns: Array
     residual: Array
     labels: Array
 
@@ -83,11 +89,19 @@ def posture_blocks(problem: Problem) -> Array:
     return np.repeat(labels, rows)
 
 
+class Rest(NamedTuple):
+    """What is left over: per axis at the tool [m], about each axis [rad], in every gear [rad]."""
+
+    position: float
+    orientation: float
+    gear: float
+
+
 def leftover(
     problem: Problem, scale: Scale, unseen: Unseen, given: Given, floor: NoiseFloor
-) -> tuple[float, float]:
+) -> Rest:
     """
-    Return the standard deviation per axis of what is left over, position [m] and turn [rad].
+    Return the standard deviations of what is left over.
 
     Parameters
     ----------
@@ -101,21 +115,42 @@ def leftover(
     """
     samples = _by_sample(problem)
     errors, moments = _predicted(unseen, given, samples)
-    good = np.concatenate(list(scale.weights))
-    out = []
-    for part, unit in ((slice(0, 3), scale.position), (slice(3, 6), scale.orientation)):
-        wide = [k for k, index in enumerate(samples) if index.size >= part.stop]
-        if not wide:
-            out.append(0.0)
-            continue
-        weight = np.sqrt(good[wide])[:, None]
-        e = np.array([errors[k][part] for k in wide]) * unit / weight
-        v = np.array([moments[k][part, part] for k in wide]) * unit**2 / weight[:, None] ** 2
-        out.append(_size(e, v))
-    if not out[1]:
-        # Without measured turns the tool turns as much as it shifts on an arm of a metre.
-        out[1] = out[0]
-    return _quiet(problem, out[0], floor), out[1]
+    levers = [unseen.turns[:, index].T @ unseen.turns[:, index] for index in samples]
+    weight = np.concatenate(scale.weights)
+    units = (scale.position, scale.orientation)
+
+    def part(axes: slice) -> tuple[Array, Array, Array]:
+        """Return errors, moments and levers on three axes of the samples that have them."""
+        wide = [k for k, index in enumerate(samples) if index.size >= axes.stop]
+        unit = units[axes.start // 3] / np.sqrt(weight[wide])
+        return (
+            np.array([errors[k][axes] for k in wide]).reshape(-1, 3) * unit[:, None],
+            np.array([moments[k][axes, axes] for k in wide]).reshape(-1, 3, 3)
+            * unit[:, None, None] ** 2,
+            np.array([levers[k][axes, axes] for k in wide]).reshape(-1, 3, 3)
+            * unit[:, None, None] ** 2,
+        )
+
+    position, gear = _shared(*part(slice(0, 3)))
+    e, v, levered = part(slice(3, 6))
+    # Without measured turns the tool turns as much as it shifts on an arm of a metre.
+    turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position
+    return Rest(_quiet(problem, position, floor), turn, gear)
+
+
+def _shared(errors: Array, moments: Array, levers: Array) -> tuple[float, float]:
+    """Return what is left over per axis [m] and per gear [rad]: the likeliest mixture."""
+    lever = float(np.trace(levers, axis1=1, axis2=2).mean()) / 3.0
+    best = (-np.inf, 0.0, 0.0)
+    for share in SHARES if lever > 0.0 else SHARES[:1]:
+        shape = (1.0 - share) * np.eye(3) + share * levers / max(lever, 1e-300)
+        size = _size(errors, moments, shape)
+        whole = moments + (size**2 + 1e-18) * shape + 1e-18 * np.eye(3)
+        solved = np.linalg.solve(whole, errors[..., None])[..., 0]
+        likely = -0.5 * float(((errors * solved).sum(axis=1) + np.linalg.slogdet(whole)[1]).sum())
+        gear = size * np.sqrt(share / max(lever, 1e-300))
+        best = max(best, (likely, size * np.sqrt(1.0 - share), float(gear)))
+    return best[1], best[2]
 
 
 def _by_sample(problem: Problem) -> list[Index]:
@@ -152,21 +187,23 @@ def _predicted(
     return [errors[index] for index in samples], moments
 
 
-def _size(errors: Array, moments: Array) -> float:
-    """Return the deviation per axis that makes regions hold as many errors as they shall."""
+def _size(errors: Array, moments: Array, shape: Array) -> float:
+    """Return the factor of a shape's root that makes regions hold as many errors as they shall."""
     limit = float(chi2.ppf(HOLD, 3))
-    eye = np.eye(3)
+    # Of few errors the largest say more of those to come than their count: conformal level.
+    wanted = min(HOLD * (1.0 + 1.0 / len(errors)), 1.0)
 
     def held(variance: float) -> float:
-        solved = np.linalg.solve(moments + (variance + 1e-18) * eye, errors[..., None])[..., 0]
+        whole = moments + variance * shape + 1e-18 * np.eye(3)
+        solved = np.linalg.solve(whole, errors[..., None])[..., 0]
         return float(np.mean((errors * solved).sum(axis=1) <= limit))
 
-    low, high = 0.0, float((errors**2).sum(axis=1).max()) + 1e-18
-    if held(low) >= HOLD:
+    low, high = 0.0, 100.0 * float((errors**2).sum(axis=1).max()) + 1e-18
+    if held(low) >= wanted:
         return 0.0
     for _ in range(STEPS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if held(middle) >= HOLD else (middle, high)
+        low, high = (low, middle) if held(middle) >= wanted else (middle, high)
     return float(np.sqrt(high))
 
 

@@ -16,6 +16,7 @@ from ...effects.registry import REGISTRY
 from ...effects.transmission_ripple import TransmissionRipple
 from ...twin.features import Features
 from ...twin.posterior import Discrepancy
+from .leftover import Rest
 
 EVERYWHERE = (
     'joint_offset',
@@ -155,7 +156,9 @@ def fine_columns(features: Features, knots: Sequence[Array]) -> Array:
     return np.concatenate(out)
 
 
-def discrepancy(robot: Robot, position: float, orientation: float, fine: float) -> Discrepancy:
+def discrepancy(robot: Robot, rest: Rest, fine: float) -> Discrepancy:
     """Return what no parameter explains, with gears as uneven where they were not seen."""
-    curves = np.where(robot.prismatic, 0.0, fine)
-    return Discrepancy(position, orientation, curves, SPACING)
+    turning = np.where(robot.prismatic, 0.0, 1.0)
+    return Discrepancy(
+        rest.position, rest.orientation, rest.gear * turning, fine * turning, SPACING
+    )

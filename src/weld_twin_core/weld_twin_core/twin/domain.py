@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arm.robot import Robot
 from ..arrays import Array
@@ -16,9 +17,16 @@ from ..recording import Recording
 
 LEAST_MARGIN = 0.02
 """A joint this near [rad or m] to where it was recorded counts as recorded there: one degree."""
+MOST_MARGIN = 0.5
+"""Never farther than this [rad or m], however few stations there are."""
+LEFT_OUT = 0.95
+"""Share of the measurements, each left out in turn, that shall lie inside what the others show."""
+WIDER = 1.5
+"""The margin in units of what that takes: with six joints and few stations the next one lies
+outside more often than the last one did."""
 SPACINGS = 3.0
-"""Stations stand so many mean distances apart that a further one of the same kind lies closer than
-that to one of them, or beyond the last, in 95 of 100 cases."""
+"""At least so many mean distances between neighbours: of stations drawn evenly a further one lies
+nearer than that to one of them, joint by joint, in 95 of 100 cases."""
 SPEED_MARGIN = (1.25, 0.05)
 """Faster than recorded from this factor and this much [rad/s or m/s] on: velocity is differentiated
 and rings."""
@@ -45,7 +53,8 @@ class Domain:
     ----------
     joints : tuple of str
     ranges : tuple of tuple of (float, float)
-        For every joint, where it was measured: separate intervals, in order [rad or m].
+        For every joint, where it was measured: separate intervals, in order [rad or m]; angles
+        within half a turn of their median.
     margins : tuple of float
         How far beyond an interval a joint still counts as recorded there [rad or m].
     turns : tuple of bool
@@ -71,20 +80,20 @@ class Domain:
     def of(cls, recordings: Sequence[Recording], robot: Robot) -> Domain:
         """Return what measurements of some recordings have shown."""
         pairs = [_measured(r) for r in recordings]
-        q = np.concatenate([pair[0] for pair in pairs])
+        turns = ~np.asarray(robot.prismatic)
+        q = _near_the_middle(np.concatenate([pair[0] for pair in pairs]), turns)
         moving = [
             pair[1] for r, pair in zip(recordings, pairs, strict=True) if not r.joints.static
         ]
-        margins = _margins(q, not moving)
-        ranges = tuple(_intervals(q[:, i], margin) for i, margin in enumerate(margins))
+        gaps = _gaps(q)
         speeds = None
         if moving:
             speeds = tuple(float(v) for v in np.abs(np.concatenate(moving)).max(axis=0))
         return cls(
             robot.joint_names,
-            ranges,
-            tuple(float(m) for m in margins),
-            tuple(not slides for slides in robot.prismatic),
+            tuple(_intervals(q[:, i], gap) for i, gap in enumerate(gaps)),
+            tuple(float(m) for m in np.minimum(gaps, MOST_MARGIN)),
+            tuple(bool(turn) for turn in turns),
             speeds,
             _load(recordings),
             _temperature(recordings),
@@ -243,16 +252,35 @@ def _measured(recording: Recording) -> tuple[Array, Array]:
     return recording.joints.at(recording.joints.t if measured is None else measured.t)
 
 
-def _margins(q: Array, stations: bool) -> Array:
-    span = np.ptp(q, axis=0)
-    share = SPACINGS / max(q.shape[0] - 1, 1) if stations else 0.0
+def _gaps(q: Array) -> Array:
+    """
+    Return how far a joint may be from where it was and still count as recorded there, (n,).
+
+    From each measurement left out in turn: how far its joints are from the nearest of the others.
+    """
+    span = np.maximum(np.ptp(q, axis=0), 1e-9)
+    order = np.argsort(q, axis=0)
+    steps = np.diff(np.take_along_axis(q, order, axis=0), axis=0)
+    edge = np.full((1, q.shape[1]), np.inf)
+    nearest = np.minimum(np.concatenate([edge, steps]), np.concatenate([steps, edge]))
+    apart = np.empty_like(nearest)
+    np.put_along_axis(apart, order, nearest, axis=0)
+    worst = np.sort((np.where(np.isfinite(apart), apart, 0.0) / span).max(axis=1))
+    at = min(int(np.ceil(LEFT_OUT * (worst.size + 1))), worst.size) - 1
+    share = max(WIDER * worst[at], SPACINGS / max(worst.size - 1, 1))
     return np.asarray(np.maximum(LEAST_MARGIN, share * span))
 
 
-def _intervals(values: Array, margin: float) -> tuple[tuple[float, float], ...]:
-    """Return where a joint was, gaps of less than two margins closed."""
+def _near_the_middle(q: Array, turns: NDArray[np.bool_]) -> Array:
+    """Return angles within half a turn of their median; what slides stays."""
+    off = q - np.median(q, axis=0)
+    return np.asarray(q - np.where(turns, 2.0 * np.pi * np.round(off / (2.0 * np.pi)), 0.0))
+
+
+def _intervals(values: Array, gap: float) -> tuple[tuple[float, float], ...]:
+    """Return where a joint was, holes of less than two gaps closed."""
     ordered = np.sort(values)
-    cuts = np.flatnonzero(np.diff(ordered) > 2.0 * margin)
+    cuts = np.flatnonzero(np.diff(ordered) > 2.0 * gap)
     lows = ordered[np.concatenate([[0], cuts + 1])]
     highs = ordered[np.concatenate([cuts, [ordered.size - 1]])]
     return tuple((float(a), float(b)) for a, b in zip(lows, highs, strict=True))

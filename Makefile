@@ -1,15 +1,20 @@
 # make demo   set up what is missing, then run the whole job on an embedded example
 # make test   set up what is missing, then lint, type check and test
+# make docs   set up what is missing, then build the documentation in build/site; warnings are errors
 SHELL := /bin/bash
 RUN := tools/in_env
 
-.PHONY: demo test lint setup setup-test clean
+.PHONY: demo test docs lint setup setup-test setup-docs clean
 
 demo: setup
 	@$(RUN) weld-twin demo --out out
 
 test: lint
 	@$(RUN) python -m pytest
+
+docs: setup-docs
+	@$(RUN) python -m sphinx -q -W --keep-going -c docs . build/site
+	@echo 'open build/site/index.html'
 
 lint: setup-test
 	@$(RUN) ruff check .
@@ -18,6 +23,7 @@ lint: setup-test
 
 setup: .venv/ready
 setup-test: .venv/ready-test
+setup-docs: .venv/ready-docs
 
 .venv/ready: pyproject.toml tools/setup
 	@tools/setup
@@ -25,5 +31,8 @@ setup-test: .venv/ready-test
 .venv/ready-test: .venv/ready
 	@tools/setup test bench
 
+.venv/ready-docs: .venv/ready
+	@tools/setup docs
+
 clean:
-	rm -rf .venv out
+	rm -rf .venv out build

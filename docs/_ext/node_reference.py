@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``{weld-twin-nodes}`` and ``{weld-twin-topics}``: parameters of the nodes, and the topics."""
+
+from __future__ import annotations
+
+from docutils import nodes
+from docutils.parsers.rst import Directive
+from page_table import page_table
+from sphinx.application import Sphinx
+
+from weld_twin_msgs_py.messages.topics import TOPICS, VOLATILE, Qos
+from weld_twin_nodes.live.cell_node import SHARED, CellNode
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
+from weld_twin_nodes.live.deviation_markers import DeviationMarkers
+from weld_twin_nodes.live.error_injector import ErrorInjector
+from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
+from weld_twin_nodes.live.recorder import Recorder
+from weld_twin_nodes.live.settings import Setting
+from weld_twin_nodes.live.trajectory_generator import TrajectoryGenerator
+
+NODES: dict[str, type[CellNode]] = {
+    'trajectory_generator': TrajectoryGenerator,
+    'error_injector': ErrorInjector,
+    'forward_kinematics_twin': ForwardKinematicsTwin,
+    'deviation_analyzer': DeviationAnalyzer,
+    'deviation_markers': DeviationMarkers,
+    'live_diagnosis': LiveDiagnosis,
+    'recorder': Recorder,
+}
+
+
+class Nodes(Directive):
+    """One section for every node, with its parameters."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return the sections."""
+        out = [_section(name, node.__doc__ or '', node.settings) for name, node in NODES.items()]
+        return [*out, _section('Every node', 'Parameters that all of them have.', SHARED)]
+
+
+class Topics(Directive):
+    """The table of topics."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return the table."""
+        rows = [
+            (t.name, t.meaning, t.type.replace('/msg', ''), _quality(t.requested)) for t in TOPICS
+        ]
+        return [page_table(('topic', 'meaning', 'type', 'requested as'), rows)]
+
+
+def _quality(qos: Qos) -> str:
+    latched = '' if qos.durability == VOLATILE else ', for latecomers too'
+    return f'{qos.reliability.replace("_", " ")}, last {qos.depth}{latched}'
+
+
+def _section(name: str, text: str, settings: tuple[Setting, ...]) -> nodes.section:
+    section = nodes.section(ids=[f'node-{name.replace(" ", "-").lower()}'], names=[name])
+    section += nodes.title(text=name)
+    section += nodes.paragraph(text=text.strip().partition('\n\n')[0])
+    section += page_table(
+        ('parameter', 'default', 'meaning', 'range', 'while running'),
+        [
+            (
+                s.name,
+                repr(s.default),
+                s.description,
+                '' if s.low is None else f'{s.low:g} to {s.high:g}',
+                'may change' if s.live else '',
+            )
+            for s in settings
+        ],
+    )
+    return section
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Add the directives."""
+    app.add_directive('weld-twin-nodes', Nodes)
+    app.add_directive('weld-twin-topics', Topics)
+    return {'parallel_read_safe': True}

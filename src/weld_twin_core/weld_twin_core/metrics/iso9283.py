@@ -28,7 +28,11 @@ from ..arrays import Array, readonly
 from ..errors import DataError
 
 POSE_CYCLES = 30
+"""Cycles of one pose that the standard asks for (clause 7.2)."""
 PATH_CYCLES = 10
+"""Cycles of one path that the standard asks for (clause 8)."""
+DRIFT_CYCLES = 10
+"""Cycles to a group whose accuracy is compared over time (clause 7.6)."""
 
 
 @dataclass(frozen=True)
@@ -188,12 +192,36 @@ def path_performance(
             for k, path in enumerate(attained)
         ]
     )
-    off = np.linalg.norm(crossed.mean(axis=0) - goal, axis=-1)
-    spread = _repeatability(crossed)
+    return crossing_performance(crossed, goal)
+
+
+def crossing_performance(crossed: Array, command: Array) -> PathPerformance:
+    """
+    Return accuracy and repeatability of a path from where each cycle passed its points.
+
+    Parameters
+    ----------
+    crossed : array, shape (cycles, m, 3) [m]
+        As `normal_plane_crossings` gives them.
+    command : array, shape (m, 3) [m]
+
+    """
+    off, spread = along_path(crossed, command)
     worst, loosest = int(off.argmax()), int(spread.argmax())
-    return PathPerformance(
-        len(attained), float(off[worst]), float(spread[loosest]), worst, loosest
-    )
+    return PathPerformance(len(crossed), float(off[worst]), float(spread[loosest]), worst, loosest)
+
+
+def along_path(crossed: Array, command: Array) -> tuple[Array, Array]:
+    """
+    Return accuracy and repeatability [m] at every point of a path, shape (m,) each.
+
+    Parameters
+    ----------
+    crossed : array, shape (cycles, m, 3) [m]
+    command : array, shape (m, 3) [m]
+
+    """
+    return np.linalg.norm(crossed.mean(axis=0) - command, axis=-1), _repeatability(crossed)
 
 
 def normal_plane_crossings(
@@ -225,18 +253,41 @@ def normal_plane_crossings(
     direction = readonly(tangent, goal.shape, 'tangents of the command path')
     out = np.empty_like(goal)
     for i, (centre, normal) in enumerate(zip(goal, direction, strict=True)):
-        height = (points - centre) @ normal
-        before = np.flatnonzero((height[:-1] <= 0.0) & (height[1:] >= 0.0))
-        if before.size == 0:
+        passed = nearest_pass(points, centre, normal)
+        if passed is None:
             raise DataError(
                 f'{name} does not pass command point {i}; leave out the ends of the command path '
                 'that not every cycle covers'
             )
-        rise = height[before + 1] - height[before]
-        part = np.where(rise > 0.0, -height[before] / np.where(rise > 0.0, rise, 1.0), 0.0)
-        pass_at = points[before] + part[:, None] * (points[before + 1] - points[before])
-        out[i] = pass_at[np.linalg.norm(pass_at - centre, axis=1).argmin()]
+        out[i] = passed
     return out
+
+
+def nearest_pass(points: Array, centre: Array, normal: Array) -> Array | None:
+    """
+    Return where a path passes a plane in the direction of its normal, nearest to its centre.
+
+    Parameters
+    ----------
+    points : array, shape (K, 3) [m]
+        Rows that are not numbers are gaps, over which nothing passes.
+    centre, normal : array, shape (3,)
+        Of the plane; the length of the normal does not matter.
+
+    Returns
+    -------
+    array, shape (3,) [m], or None where the path does not pass it
+
+    """
+    height = (points - centre) @ normal
+    before = np.flatnonzero((height[:-1] <= 0.0) & (height[1:] >= 0.0))
+    if before.size == 0:
+        return None
+    rise = height[before + 1] - height[before]
+    part = np.where(rise > 0.0, -height[before] / np.where(rise > 0.0, rise, 1.0), 0.0)
+    passed = points[before] + part[:, None] * (points[before + 1] - points[before])
+    nearest: Array = passed[np.linalg.norm(passed - centre, axis=1).argmin()]
+    return nearest
 
 
 def drift(groups: Sequence[ArrayLike], command: ArrayLike) -> DriftPerformance:

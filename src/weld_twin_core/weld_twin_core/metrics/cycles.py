@@ -1,0 +1,224 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Repetitions of one commanded pose, found in a recording.
+
+A *stop* is a station at rest: a row of a static recording, or a stretch of a moving one in which
+the arm stands. Stops at the same joint positions are cycles of one commanded pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arm.chain import forward
+from ..arm.robot import Robot
+from ..arrays import Array
+from ..errors import DataError
+from ..recording import JointMotion, Measurements, Recording
+
+SAME_POSE = 1e-3
+"""
+Two stops are of one pose where no joint differs by more [rad or m]; a joint stream repeats within
+1e-4, and poses that are meant to differ are degrees apart. What differs is taken off again.
+"""
+AT_REST = 2e-3
+"""Speed [rad/s or m/s] of the fastest joint below which the arm stands; 2 mm/s a metre away."""
+DWELL = 0.5
+"""Seconds an arm stands at least, so that it has settled when the second half begins."""
+LOOK = 0.05
+"""Spacing [s] at which motion is looked at for stops; ten looks to the shortest."""
+END = 0.1
+"""Share of a stop left out at its end, where clocks that differ would see the arm leave."""
+
+
+class Stop(NamedTuple):
+    """
+    What was measured while the arm stood.
+
+    Attributes
+    ----------
+    t : float [s]
+    q : array, shape (n,)
+        Where the joints were commanded to be.
+    position : array, shape (3,) [m]
+    rotation : array, shape (3, 3), or None
+
+    """
+
+    t: float
+    q: Array
+    position: Array
+    rotation: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class PoseCycles:
+    """
+    The stops at one commanded pose.
+
+    Attributes
+    ----------
+    q : array, shape (n,)
+        The commanded joint positions of the first of them.
+    command : array, shape (4, 4)
+        The pose the robot should then have.
+    t : array, shape (cycles,) [s]
+    attained : array, shape (cycles, 3) [m]
+        Measured positions, each less what its own command differs from that of the first.
+    rotation : array, shape (cycles, 3, 3), or None
+    came_from : tuple of int
+        Number of the pose that the arm stood at before; -1 for the first stop of all.
+
+    """
+
+    q: Array
+    command: Array
+    t: Array
+    attained: Array
+    rotation: Array | None
+    came_from: tuple[int, ...]
+
+
+def measured_of(recording: Recording) -> Measurements:
+    """
+    Return the measurements of a recording.
+
+    Raises
+    ------
+    DataError
+        It has none.
+
+    """
+    if recording.measured is None or recording.measured.t.size == 0:
+        raise DataError(f'{recording.name} holds no measured poses or points')
+    return recording.measured
+
+
+def stops(recording: Recording) -> list[Stop]:
+    """
+    Return where the arm stood and was measured, in order of time.
+
+    Parameters
+    ----------
+    recording : Recording
+        Static, or of a motion in which the arm stands now and then.
+
+    Raises
+    ------
+    DataError
+        Nothing was measured.
+
+    """
+    measured, joints = measured_of(recording), recording.joints
+    if joints.static:
+        rows = joints.nearest(measured.t)
+        turns = measured.rotation
+        return [
+            Stop(
+                float(measured.t[k]),
+                joints.q[row],
+                measured.position[k],
+                None if turns is None else turns[k],
+            )
+            for k, row in enumerate(rows)
+        ]
+    return [
+        found
+        for start, end in rests(joints)
+        if (found := _mean_stop(joints, measured, start, end)) is not None
+    ]
+
+
+def rests(joints: JointMotion) -> list[tuple[float, float]]:
+    """
+    Return start and end [s] of the stretches in which the arm stands for `DWELL` or longer.
+
+    Parameters
+    ----------
+    joints : JointMotion
+        Of a motion.
+
+    """
+    t = np.arange(joints.t[0], joints.t[-1], LOOK)
+    if t.size < 2:
+        return []
+    speed = np.abs(np.diff(joints.at(t)[0], axis=0)).max(axis=1) / LOOK
+    still = np.concatenate([[False], speed < AT_REST, [False]]).astype(int)
+    begins, ends = np.flatnonzero(np.diff(still) > 0), np.flatnonzero(np.diff(still) < 0)
+    return [
+        (float(t[a]), float(t[b]))
+        for a, b in zip(begins, ends, strict=True)
+        if t[b] - t[a] >= DWELL
+    ]
+
+
+def _mean_stop(
+    joints: JointMotion, measured: Measurements, start: float, end: float
+) -> Stop | None:
+    """Return the mean of the later half of a stop, without its last moments."""
+    late = start + 0.5 * (end - start)
+    rows = (measured.t >= late) & (measured.t <= end - END * (end - start))
+    if not rows.any():
+        return None
+    rotation = None
+    if measured.rotation is not None:
+        u, _, vt = np.linalg.svd(measured.rotation[rows].mean(axis=0))
+        rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return Stop(late, joints.at(np.array(late))[0], measured.position[rows].mean(axis=0), rotation)
+
+
+def pose_cycles(found: list[Stop], robot: Robot) -> list[PoseCycles]:
+    """
+    Return the stops by commanded pose, in the order in which the poses first came.
+
+    Parameters
+    ----------
+    found : list of Stop
+    robot : Robot
+        Tells where a commanded joint position should have brought the tool.
+
+    """
+    if not found:
+        return []
+    q = np.stack([stop.q for stop in found])
+    labels = _labels(q)
+    commands = forward(robot, q)
+    before = [-1, *labels[:-1]]
+    return [
+        _cycles([found[k] for k in rows], commands[rows], tuple(int(before[k]) for k in rows))
+        for rows in (np.flatnonzero(labels == label) for label in range(max(labels) + 1))
+    ]
+
+
+def _labels(q: Array) -> np.ndarray:
+    """Return the number of the pose of each stop, counted as they first come."""
+    labels = np.full(len(q), -1)
+    count = 0
+    for k in range(len(q)):
+        if labels[k] < 0:
+            alike = np.abs(q - q[k]).max(axis=1) < SAME_POSE
+            labels[alike & (labels < 0)] = count
+            count += 1
+    return labels
+
+
+def _cycles(found: list[Stop], commands: Array, came_from: tuple[int, ...]) -> PoseCycles:
+    first = commands[0]
+    position = np.stack([stop.position for stop in found])
+    turns = [stop.rotation for stop in found if stop.rotation is not None]
+    rotation = None
+    if len(turns) == len(found):
+        off = np.stack(turns) @ np.swapaxes(commands[:, :3, :3], -1, -2)
+        rotation = off @ first[:3, :3]
+    return PoseCycles(
+        found[0].q,
+        first,
+        np.array([stop.t for stop in found]),
+        position - (commands[:, :3, 3] - first[:3, 3]),
+        rotation,
+        came_from,
+    )

@@ -152,7 +152,7 @@ def _within(joints: JointMotion, span: Span) -> tuple[Array, Array]:
 def _when(way: Array, t: Array, wanted: Array) -> Array:
     """Return the time at which a way that only grows had reached each length."""
     moving = np.concatenate([[True], np.diff(way) > 0.0])
-    return np.interp(wanted, way[moving], t[moving])
+    return np.asarray(np.interp(wanted, way[moving], t[moving]))
 
 
 def _crossings(

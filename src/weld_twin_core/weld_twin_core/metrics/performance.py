@@ -85,7 +85,7 @@ class PathTest:
     arc, at, rt : array, shape (m,) [m]
         Length of the path to each point, and accuracy and repeatability there.
     seconds : float
-        Duration of a cycle, the median of them.
+        From leaving the start of a cycle to being back near it, the median of them.
 
     """
 

@@ -8,14 +8,13 @@ from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from typing import Any
 
-from weld_twin_nodes.report.html import Html, joined, section, table, tag
+from weld_twin_nodes.report.html import Html, document, section, table, tag
 
 from .judging import Judged
 from .measures import Measure
 from .score_plots import error_plot, outcome_plot, reliability_plot, shrink_plot
 from .scoring import Score
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 _COUNTED = frozenset(
     {
         'brier',
@@ -43,20 +42,8 @@ def score_page(score: Score) -> str:
         _failures(score),
         _costs(score),
     )
-    style = (files('weld_twin_nodes.report') / 'page.css').read_text(encoding='utf-8')
     own = (files(__package__) / 'page.css').read_text(encoding='utf-8')
-    head = joined(
-        [
-            tag('meta', charset='utf-8'),
-            tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
-            tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
-            tag('meta', name_='color-scheme', content='light dark'),
-            tag('title', 'blind check'),
-            tag('style', Html(style + own)),
-        ]
-    )
-    whole = tag('html', tag('head', head), tag('body', body), lang='en')
-    return f'<!doctype html>\n{whole}\n'
+    return document('blind check', body, style=own)
 
 
 def _opening(score: Score) -> Html:

@@ -6,14 +6,13 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Sequence
-from importlib.resources import files
 
 from weld_twin_core import __version__
 from weld_twin_nodes.report.cause_list import causes_section
 from weld_twin_nodes.report.footing import checks_section
 from weld_twin_nodes.report.gap_location import where_section
 from weld_twin_nodes.report.headline import opening
-from weld_twin_nodes.report.html import Child, Html, joined, section, table, tag
+from weld_twin_nodes.report.html import Child, Html, document, section, table, tag
 from weld_twin_nodes.report.quantities import millimetres, milliradians, percent
 from weld_twin_nodes.report.shrinking import shrink_section
 
@@ -22,7 +21,6 @@ from .figures import ripple_over_range, ripple_spectrum, workspace
 from .judged_split import Judged
 from .owner_advice import blind_spots, owner_advice
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 _STYLE = 'figure { margin: 0 0 1.5rem; } figure img { width: 100%; background: #fff; }'
 _HEADS = (
     'Fitted on; judged on',
@@ -64,18 +62,8 @@ def robot_page(robot: str, sources: Sequence[Source], judged: Sequence[Judged]) 
         checks_section(diagnosis),
         _recipe(sources),
     )
-    css = (files('weld_twin_nodes.report') / 'page.css').read_text(encoding='utf-8')
-    head = joined(
-        [
-            tag('meta', charset='utf-8'),
-            tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
-            tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
-            tag('meta', name_='color-scheme', content='light dark'),
-            tag('title', f'{robot.upper()}: positional accuracy'),
-            tag('style', Html(css + _STYLE)),
-        ]
-    )
-    return f'<!doctype html>\n{tag("html", tag("head", head), tag("body", body), lang="en")}\n'
+    title = f'{robot.upper()}: positional accuracy'
+    return document(title, body, allowed='img-src data:', style=_STYLE)
 
 
 def _held_out(judged: Sequence[Judged]) -> Html:

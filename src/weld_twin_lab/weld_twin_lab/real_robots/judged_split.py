@@ -11,9 +11,10 @@ from time import perf_counter
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
+from weld_twin_core.diagnosis.frames.frames_only import frames_only
 
 from .data import Split
-from .unseen_stations import ALIGN, Errors, errors, frames_only, inside, residual
+from .unseen_stations import ALIGN, Errors, errors, inside, residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,6 @@ def judge(split: Split, tell: Callable[[str], None] = lambda text: None) -> Judg
     start = perf_counter()
     diagnosis = diagnose([split.train], nominal, align=ALIGN, progress=tell)
     seconds = perf_counter() - start
-    before = residual(frames_only(split.train, nominal), split.train, split.test)
+    before = residual(frames_only(split.train, nominal, ALIGN), split.train, split.test)
     after = residual(diagnosis.model, split.train, split.test)
     return Judged(split, diagnosis, errors(before), errors(after), before, after, seconds)

@@ -9,11 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
-from weld_twin_core.diagnosis.frames.alignment import initial_frames
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.effects.setup_motion import seen_from
 from weld_twin_core.recording import Recording
@@ -34,13 +31,6 @@ class Errors:
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of the results file."""
         return asdict(self)
-
-
-def frames_only(train: Recording, robot: Robot) -> Model:
-    """Return the nominal robot with base and tool fitted, and nothing else."""
-    problem = Problem((usable(train),), ALIGN)
-    start = initial_frames(problem, Model(robot, (robot.T_world_base,)))
-    return fit(problem, start, problem.unit_scale()).model
 
 
 def residual(model: Model, train: Recording, other: Recording) -> Array:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from importlib.resources import files
 from typing import Any
 
 from weld_twin_core.diagnosis.result import Diagnosis
@@ -16,12 +15,10 @@ from .cause_list import causes_section
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
 from .headline import header, opening
-from .html import Html, joined, tag
+from .html import Html, document, own_file, tag
 from .seam_view import seam_data, seam_section
 from .shrinking import shrink_section
 from .words import STATUS
-
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
 
 def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
@@ -46,26 +43,8 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
     )
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
     data = tag('script', _embedded(seam_data(diagnosis)), type='application/json', id_='data')
-    whole = tag(
-        'html',
-        tag('head', _head(title)),
-        tag('body', body, data, tag('script', _file('page.js'))),
-        lang='en',
-    )
-    return f'<!doctype html>\n{whole}\n'
-
-
-def _head(title: str) -> Html:
-    return joined(
-        [
-            tag('meta', charset='utf-8'),
-            tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
-            tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
-            tag('meta', name_='color-scheme', content='light dark'),
-            tag('title', title),
-            tag('style', _file('page.css')),
-        ]
-    )
+    script = tag('script', own_file('page.js'))
+    return document(title, body, data, script, allowed="script-src 'unsafe-inline'")
 
 
 def _causes(diagnosis: Diagnosis) -> tuple[Html, ...]:
@@ -77,10 +56,6 @@ def _causes(diagnosis: Diagnosis) -> tuple[Html, ...]:
         shrink_section(diagnosis),
         next_section(diagnosis),
     )
-
-
-def _file(name: str) -> Html:
-    return Html((files(__package__) / name).read_text(encoding='utf-8'))
 
 
 def _embedded(data: dict[str, Any]) -> Html:

@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime, timezone
 
 from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.recording import Recording
 
 from .family_table import worth_doing
 from .html import Html, tag
@@ -27,7 +29,7 @@ def header(diagnosis: Diagnosis) -> Html:
     """Return what was diagnosed."""
     robot = diagnosis.model.robot
     names = ', '.join(recording.name for recording in diagnosis.recordings)
-    parts = [robot.name, names, _date(diagnosis)]
+    parts = [robot.name, names, recorded_at(diagnosis.recordings)]
     return tag(
         'header',
         tag('p', 'Positional accuracy ', tag('b', 'diagnosis'), class_='kind'),
@@ -35,8 +37,9 @@ def header(diagnosis: Diagnosis) -> Html:
     )
 
 
-def _date(diagnosis: Diagnosis) -> str:
-    stamps = [r.epoch_ns for r in diagnosis.recordings if r.epoch_ns > _FIRST_REAL_STAMP]
+def recorded_at(recordings: Sequence[Recording]) -> str:
+    """Return when the first of the recordings was made; nothing where the stamps do not tell."""
+    stamps = [r.epoch_ns for r in recordings if r.epoch_ns > _FIRST_REAL_STAMP]
     if not stamps:
         return ''
     when = datetime.fromtimestamp(min(stamps) * 1e-9, tz=timezone.utc)

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from html import escape
+from importlib.resources import files
 
 _EMPTY = frozenset({'br', 'meta', 'input'})
 
@@ -78,3 +80,43 @@ def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:
             )
         )
     return tag('ul', *out, class_=f'bars {class_}'.strip())
+
+
+POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+"""What a page may load: nothing but its own style; a page that needs more says so."""
+
+
+@cache
+def own_file(name: str) -> Html:
+    """Return a style or script that lies beside this module."""
+    return Html((files(__package__) / name).read_text(encoding='utf-8'))
+
+
+def document(title: str, *body: Child, allowed: str = '', style: str = '') -> str:
+    """
+    Return a whole page that needs no other file and no network.
+
+    Parameters
+    ----------
+    title : str
+    *body : str or None
+        What stands in the body.
+    allowed : str
+        What the page may load besides its own style, in the words of a content security policy.
+    style : str
+        CSS after that of all pages.
+
+    """
+    policy = '; '.join(filter(None, [POLICY, allowed]))
+    head = joined(
+        [
+            tag('meta', charset='utf-8'),
+            tag('meta', http_equiv='Content-Security-Policy', content=policy),
+            tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
+            tag('meta', name_='color-scheme', content='light dark'),
+            tag('title', title),
+            tag('style', Html(own_file('page.css') + style)),
+        ]
+    )
+    whole = tag('html', tag('head', head), tag('body', *body), lang='en')
+    return f'<!doctype html>\n{whole}\n'

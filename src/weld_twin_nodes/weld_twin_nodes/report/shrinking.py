@@ -6,19 +6,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.result import Diagnosis
 
 from .cause_list import leftover
 from .html import Html, section, tag
+from .line_chart import line_chart
 from .quantities import interval, millimetres, milliradians, percent, turns_only
 from .seam_view import at_rest, trusted
 from .words import cause
 
 _STEPS = 12
-_COLUMNS = 500
 _RECORDINGS = 6
-_HEIGHT, _WIDTH = 100.0, 1000.0
 
 
 def shrink_section(diagnosis: Diagnosis) -> Html:
@@ -129,49 +127,11 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     x = (np.arange(good.size, dtype=float) if static else traces.t[k])[good]
     # a single outlier must not flatten the rest
     top = 1.15 * max(float(np.percentile(np.concatenate(sizes), 99.5)), 1e-7)
-    lines = [
-        _line(x, size, top, name) for size, name in zip(sizes, ('before', 'after'), strict=True)
-    ]
-    level = f'{_HEIGHT * (1.0 - min(diagnosis.gap.noise_floor_m / top, 1.0)):.2f}'
-    floor = tag('line', x1='0', x2=f'{_WIDTH:.0f}', y1=level, y2=level, class_='floor')
-    picture = tag(
-        'svg',
-        *lines,
-        floor,
-        viewBox=f'0 0 {_WIDTH:.0f} {_HEIGHT:.0f}',
-        preserveAspectRatio='none',
-        role='img',
-        aria_label='Deviation before and after',
-    )
-    unit = ('station 1', f'station {good.size}') if static else (f'{x[0]:.1f} s', f'{x[-1]:.1f} s')
+    ends = ('station 1', f'station {good.size}') if static else (f'{x[0]:.1f} s', f'{x[-1]:.1f} s')
     title = recording.name if recording is not None else f'recording {k + 1}'
     outliers = int((~good).sum())
     if outliers:
         title += f' ({outliers} outlier{"s"[: outliers > 1]} not drawn)'
-    return tag(
-        'figure',
-        tag('figcaption', title),
-        tag('div', tag('span', millimetres(top)), tag('span', '0'), class_='y'),
-        picture,
-        tag('div', tag('span', unit[0]), tag('span', unit[1]), class_='x'),
-        class_='time',
-    )
-
-
-def _line(x: Array, y: Array, top: float, name: str) -> Html:
-    """Return a line, or the band between least and most where samples are denser than pixels."""
-    span = max(float(x[-1] - x[0]), 1e-12)
-    across = _WIDTH * (x - x[0]) / span
-    down = _HEIGHT * (1.0 - np.minimum(y / top, 1.0))
-    if x.size <= 2 * _COLUMNS:
-        return tag('path', d=_drawn(across, down), class_=name)
-    bins = np.array_split(np.arange(x.size), _COLUMNS)
-    middle = np.array([across[b].mean() for b in bins])
-    low = np.array([down[b].min() for b in bins])
-    high = np.array([down[b].max() for b in bins])
-    outline = _drawn(np.append(middle, middle[::-1]), np.append(low, high[::-1]))
-    return tag('path', d=f'{outline}Z', class_=f'{name} band')
-
-
-def _drawn(x: Array, y: Array) -> str:
-    return 'M' + 'L'.join(f'{a:.1f},{b:.2f}' for a, b in zip(x, y, strict=True))
+    lines = dict(zip(('before', 'after'), sizes, strict=True))
+    label = 'Deviation before and after'
+    return line_chart(title, label, x, lines, ends, top, floor=diagnosis.gap.noise_floor_m)

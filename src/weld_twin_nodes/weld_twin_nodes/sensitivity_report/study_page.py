@@ -6,15 +6,14 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Sequence
-from importlib.resources import files
 from typing import Any
 
 from weld_twin_core import __version__
 
-from ..report.html import Html, bars, joined, section, table, tag
+from ..report.html import Html, bars, document, section, table, tag
 from .figures import Drawing
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+_ALLOWED = 'img-src data:'
 _STYLE = """
 figure { margin: 0 0 1.5rem; } figure img { width: 100%; height: auto; background: #fff; }
 .claims td:nth-child(4) { font-weight: 600; min-width: 9rem; }
@@ -39,19 +38,9 @@ def study_page(
         if study is None
         else (f'Sensitivity of {study["setting"]["robot"]} on {study["setting"]["seam"]}')
     )
-    css = (files('weld_twin_nodes.report') / 'page.css').read_text(encoding='utf-8')
-    head = joined(
-        [
-            tag('meta', charset='utf-8'),
-            tag('meta', http_equiv='Content-Security-Policy', content=_POLICY),
-            tag('meta', name_='viewport', content='width=device-width, initial-scale=1'),
-            tag('title', title),
-            tag('style', Html(css + _STYLE)),
-        ]
-    )
     foot = tag('p', f'weld_twin {__version__}', class_='note')
-    body = tag('body', tag('main', tag('h1', title), *parts, foot))
-    return f'<!doctype html>\n{tag("html", tag("head", head), body, lang="en")}\n'
+    main = tag('main', tag('h1', title), *parts, foot)
+    return document(title, main, allowed=_ALLOWED, style=_STYLE)
 
 
 def _study(study: dict[str, Any]) -> list[Html]:

@@ -49,7 +49,6 @@ class Backlash(MemoryEffect):
     depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY
-    regime = 'reversal'
     parameters = (Parameter('width', 'rad', typical=5e-4, lower=0.0, linear=False),)
     options = ('form',)
     needs = frozenset({'order'})

@@ -27,7 +27,6 @@ class CartesianCompliance(Effect):
     place = 'tool'
     of = 'robot'
     stage = Stage.POSE
-    regime = 'load'
     parameters = (Parameter('compliance', 'm/N', size=3, typical=1e-6),)
     needs = frozenset({'wrench'})
 

@@ -22,7 +22,6 @@ class Drift(Effect):
     place = 'base'
     of = 'robot'
     stage = Stage.POSE
-    regime = 'time'
     parameters = (Parameter('xyz_rate', 'm/s', size=3, typical=1e-6),)
     needs = frozenset({'time'})
 

@@ -70,9 +70,6 @@ class Effect(Parametric, ABC):
     """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
     cause: ClassVar[bool] = True
     """Whether a diagnosis may name it; noise and the set-up's own motion are nuisance."""
-    regime: ClassVar[str] = 'static'
-    """What brings it out: 'static', 'reversal', 'speed', 'acceleration', 'load', 'temperature' or
-    'time'."""
 
     depends_on: ClassVar[str] = 'constant'
     """What it depends on: 'constant', 'angle', 'direction', 'speed', 'acceleration', 'load',

@@ -43,7 +43,6 @@ class FrameCurve(Effect):
     of = 'robot'
     stage = Stage.LINK
     cause = False
-    regime = 'time'
     parameters = (
         Parameter('xyz', 'm', size=0, typical=1e-4),
         Parameter('rotvec', 'rad', size=0, typical=1e-4),

@@ -22,7 +22,6 @@ class JointCompliance(Effect):
     depends_on = 'load'
     of = 'joint'
     stage = Stage.ELASTIC
-    regime = 'load'
     parameters = (Parameter('compliance', 'rad/(N m)', typical=1e-5),)
     needs = frozenset({'load'})
 

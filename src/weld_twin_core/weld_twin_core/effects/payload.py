@@ -29,7 +29,6 @@ class Payload(Effect):
     place = 'load'
     of = 'robot'
     stage = Stage.LOAD
-    regime = 'load'
     parameters = (
         Parameter('mass', 'kg', typical=1.0),
         Parameter('com', 'm', size=3, typical=0.05, linear=False),

@@ -29,7 +29,6 @@ class ServoLag(MemoryEffect):
     depends_on = 'speed'
     of = 'joint'
     stage = Stage.SERVO
-    regime = 'speed'
     parameters = (Parameter('time_constant', 's', typical=5e-3, lower=0.0, linear=False),)
     needs = frozenset({'velocity', 'time'})
 

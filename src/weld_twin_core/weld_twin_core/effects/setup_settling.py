@@ -37,7 +37,6 @@ class SetupSettling(Effect):
     of = 'robot'
     stage = Stage.LINK
     cause = False
-    regime = 'time'
     parameters = (
         Parameter('xyz', 'm', size=3, typical=1e-4),
         Parameter('rotvec', 'rad', size=3, typical=1e-4),

@@ -38,7 +38,6 @@ class ThermalGrowth(Effect):
     depends_on = 'temperature'
     of = 'links'
     stage = Stage.LINK
-    regime = 'temperature'
     parameters = (Parameter('coefficient', '1/K', typical=1.2e-5),)
     options = ('reference', 'links', 'warmup')
     needs = frozenset({'temperature'})

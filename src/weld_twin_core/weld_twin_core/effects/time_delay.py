@@ -22,7 +22,6 @@ class TimeDelay(Effect):
     place = 'clock'
     of = 'robot'
     stage = Stage.CLOCK
-    regime = 'speed'
     parameters = (Parameter('delay', 's', typical=5e-3),)
     needs = frozenset({'velocity', 'time'})
 

@@ -44,7 +44,6 @@ class Vibration(MemoryEffect):
     depends_on = 'acceleration'
     of = 'joint'
     stage = Stage.SERVO
-    regime = 'acceleration'
     parameters = (
         Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False, idealised=0.015),
         Parameter(

@@ -11,11 +11,15 @@ from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Found, Site
 from .family_table import families_table
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, change, millimetres, odds, parameter_rows
-from .words import found_name, in_words, listed, site_name
+from .words import carries_curves, found_name, in_words, listed, site_name
 
 _CANDIDATES = 6
 """Hypotheses shown for a cause."""
 _SLOTS = 6
+_INSTEAD = (
+    'No effect is named. These come nearest; the twin carries the curves shown above in their '
+    'place.'
+)
 _STAND_IN = (
     'No effect is named. These imitate the unknown cause together; figures and pictures that say '
     'after are with them.'
@@ -71,7 +75,8 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
     more = len(diagnosis.candidates) - sum(len(s[:_CANDIDATES]) for s in slots[:_SLOTS])
     note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
     if not diagnosis.effects:
-        title, lead = 'What fits best, though no cause is named', _STAND_IN
+        title = 'What fits best, though no cause is named'
+        lead = _INSTEAD if carries_curves(diagnosis) else _STAND_IN
     else:
         title = 'Candidates and their probabilities'
         lead = 'A group for every cause: what was found, and what else it could be.'

@@ -11,6 +11,7 @@ from typing import Any
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_msgs_py.files.input_files import InputFile
 
+from .cause_levels import levels_section
 from .cause_list import causes_section
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
@@ -47,10 +48,11 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
     return document(title, body, data, script, allowed="script-src 'unsafe-inline'")
 
 
-def _causes(diagnosis: Diagnosis) -> tuple[Html, ...]:
+def _causes(diagnosis: Diagnosis) -> tuple[Html | None, ...]:
     """Return where the gap lies, what causes it, what that brings, and what to measure next."""
     return (
         seam_section(diagnosis),
+        levels_section(diagnosis),
         where_section(diagnosis),
         causes_section(diagnosis),
         shrink_section(diagnosis),

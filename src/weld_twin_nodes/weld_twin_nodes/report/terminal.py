@@ -11,6 +11,7 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
+from .cause_levels import LEVEL_HEADS, level_row
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows, worth_doing
 from .quantities import change, millimetres, odds, parameter_rows
 from .words import STATUS, found_name, listed, mended, site_name, verdict
@@ -39,7 +40,9 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
         _print_families(diagnosis, console)
     elif diagnosis.effects:
         console.print(_effects(diagnosis))
-    if len(diagnosis.candidates) > 1:
+    if diagnosis.status == 'unknown' and diagnosis.causes:
+        console.print(_levels(diagnosis))
+    elif len(diagnosis.candidates) > 1:
         console.print(_candidates(diagnosis))
     _print_sets(diagnosis, console)
     for check in diagnosis.checks:
@@ -77,6 +80,16 @@ def _effects(diagnosis: Diagnosis) -> Table:
     more = len(diagnosis.effects) - _MOST
     if more > 0:
         table.add_row(f'and {more} more in effects.yaml')
+    return table
+
+
+def _levels(diagnosis: Diagnosis) -> Table:
+    """Return what is certain of each cause although it has no name."""
+    table = Table(box=None, title='what is certain', title_justify='left', pad_edge=False)
+    for head in LEVEL_HEADS:
+        table.add_column(head.lower(), header_style='dim', overflow='fold')
+    for cause in diagnosis.causes[:_MOST]:
+        table.add_row(*(escape(cell) for cell in level_row(cause)))
     return table
 
 

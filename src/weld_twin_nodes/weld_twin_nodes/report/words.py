@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
+from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
 
-from .quantities import millimetres, milliradians, odds, turns_only
+from .quantities import millimetres, milliradians, odds, percent, turns_only
 
 CAUSES = {
     'joint_offset': 'zero offset',
@@ -35,6 +35,8 @@ CAUSES = {
     'measurement_scale': 'scale error of the instrument',
     'setup_step': 'moved set-up',
     'setup_settling': 'settling set-up',
+    'joint_curve': 'curve without a name',
+    'frame_curve': 'motion without a name',
 }
 STATUS = {
     'identified': 'Identified',
@@ -51,6 +53,24 @@ REGIMES = {
     'load': 'with load',
     'temperature': 'with temperature',
     'time': 'with time',
+}
+PLACES = {
+    'base': 'the base',
+    'tool': 'the tool',
+    'instrument': 'the instrument',
+    'clock': 'the clocks',
+    'load': 'the load',
+}
+DEPENDENCES = {
+    'constant': 'nothing: it is constant',
+    'angle': 'the angle',
+    'direction': 'the direction of motion',
+    'speed': 'the speed',
+    'acceleration': 'the acceleration',
+    'load': 'the load',
+    'temperature': 'the temperature',
+    'time': 'the time',
+    'place': 'the place in the workspace',
 }
 _NAMED = 3
 
@@ -78,11 +98,25 @@ def in_words(reason: str, sites: Iterable[Site]) -> str:
     return f'{reason[:1].upper()}{reason[1:].rstrip(".")}.'
 
 
+def place_name(at: str) -> str:
+    """Return a place as people say it."""
+    return PLACES.get(at, at)
+
+
 def listed(names: Sequence[str], word: str = 'and') -> str:
     """Return 'a, b and c'."""
     if len(names) < 2:
         return ''.join(names)
     return f'{", ".join(names[:-1])} {word} {names[-1]}'
+
+
+def cause_words(cause: Cause) -> str:
+    """Return place and dependence as a part of a sentence."""
+    where = place_name(cause.place[0][0]) if cause.place else 'a place not found'
+    on = [name for name, p in cause.dependence if p > 0.5][:2]
+    if not on or on == ['constant']:
+        return f'{where}, and is constant there' if on else where
+    return f'{where}, depending on {listed([DEPENDENCES.get(o, o) for o in on])}'
 
 
 def verdict(diagnosis: Diagnosis) -> tuple[str, str]:
@@ -157,6 +191,8 @@ def _settled(diagnosis: Diagnosis) -> list[str]:
 
 
 def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
+    if diagnosis.causes and carries_curves(diagnosis):
+        return _placed(diagnosis)
     size, left = millimetres(diagnosis.gap.rms_m), millimetres(diagnosis.unexplained.rms_m)
     if diagnosis.effects:
         names = listed([found_name(found) for found in diagnosis.effects[:_NAMED]])
@@ -172,6 +208,28 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
             return first, in_words(diagnosis.reasons[0], ())
         return first, 'What remains is above the noise, but shows no simple dependence.'
     return first, f'What remains depends on {listed(structure[:_NAMED])}.'
+
+
+def carries_curves(diagnosis: Diagnosis) -> bool:
+    """Return whether the twin carries curves in place of effects with a name."""
+    return any(e.name in ('joint_curve', 'frame_curve') for e in diagnosis.model.found)
+
+
+def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
+    """Return where an unknown cause sits and what its curve brings."""
+    cause = diagnosis.causes[0]
+    shrink = diagnosis.shrink
+    first = (
+        f'The gap of {millimetres(diagnosis.gap.rms_m)} comes mostly from '
+        f'{cause_words(cause)} ({percent(cause.share)} of it); no effect in the library explains '
+        'it.'
+    )
+    second = (
+        f'With its curve in the twin, {millimetres(shrink.rms_before_m)} shrinks to '
+        f'{millimetres(shrink.rms_after_m)} on data not used for fitting; the noise floor is '
+        f'{millimetres(diagnosis.gap.noise_floor_m)}.'
+    )
+    return first, second
 
 
 def _none(diagnosis: Diagnosis) -> tuple[str, str]:

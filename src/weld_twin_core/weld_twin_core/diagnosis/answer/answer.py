@@ -57,7 +57,7 @@ def answer(
         What explains the gap without a formula.
 
     """
-    told, shares = causes(found, unseen, verdict, rival, noise.rms_m)
+    told, shares = causes(found, unseen, verdict, rival, noise.rms_m, beliefs)
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
         gap=gap(found, noise.rms_m),

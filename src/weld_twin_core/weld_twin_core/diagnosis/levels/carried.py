@@ -15,10 +15,6 @@ from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
 
-ROOM = 1.05
-"""Curves are carried although what imitates the cause leaves this much less on unseen stretches:
-they say where it is and carry no parameter of an effect that is not there."""
-
 
 def carried(
     found: Search,
@@ -46,6 +42,6 @@ def carried(
     if rival is None or verdict.status != 'unknown':
         return found, unseen, shrink
     named = unseen.rms(unseen.predict(range(len(unseen.parts))))
-    if rival.rms_m > ROOM * named:
+    if rival.rms_m > beliefs.curve_room * named:
         return found, unseen, shrink
     return rival.found, rival.unseen, held_out_shrink(rival.found, rival.unseen, holdout, beliefs)

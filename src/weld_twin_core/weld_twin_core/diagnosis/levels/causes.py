@@ -18,6 +18,7 @@ import numpy as np
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
+from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..result import Cause, Shares, Site
@@ -26,19 +27,14 @@ from ..verdict.decision import Verdict
 from .curved import Curved
 from .free_form import Part
 
-AGREED, ALONE = 0.98, 0.8
-"""Belief in place and dependence of a name where the free form finds the same, and where it does
-not: of eight cases with causes outside the library it found both right in eight."""
-FREE = 0.95
-"""Belief in the place of a curve that no other group comes near; no list of places is whole."""
 LISTED = 0.02
 """A place, dependence or name less probable than this is not listed."""
+LIKELY = 0.1
+"""Weight from which a place or dependence of the free form counts as found."""
 STUDENT = 1.86
 """Student's t for 90 % and the 8 stretches that take turns."""
 
 
-SHARED = 0.7
-"""Belief that what several joints do alike has one cause, and not one each; a judgement."""
 Places = list[tuple[Part, tuple[int, ...]]]
 
 
@@ -53,7 +49,12 @@ class _Claim:
 
 
 def causes(
-    found: Search, unseen: Unseen, verdict: Verdict, rival: Curved | None, floor: float
+    found: Search,
+    unseen: Unseen,
+    verdict: Verdict,
+    rival: Curved | None,
+    floor: float,
+    beliefs: Beliefs,
 ) -> tuple[tuple[Cause, ...], Shares]:
     """
     Return the causes, largest share first, and what of the squared gap is left and is noise.
@@ -68,11 +69,12 @@ def causes(
         The free-form explanation; it is the model itself where the verdict is 'unknown'.
     floor : float
         RMS of the noise alone [m].
+    beliefs : Beliefs
 
     """
     if rival is not None and verdict.status == 'unknown':
         found, unseen = rival.found, rival.unseen
-    claims = _claims(found, verdict, rival)
+    claims = _claims(found, verdict, rival, beliefs)
     squares = (
         unseen.squares(unseen.predict([])),
         unseen.squares(unseen.predict(range(len(unseen.parts)))),
@@ -105,10 +107,12 @@ def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple((name, belief) for name, belief in ordered if belief >= LISTED)
 
 
-def _claims(found: Search, verdict: Verdict, rival: Curved | None) -> list[_Claim]:
+def _claims(
+    found: Search, verdict: Verdict, rival: Curved | None, beliefs: Beliefs
+) -> list[_Claim]:
     model = found.final.model.found
     if rival is not None and verdict.status == 'unknown':
-        return _curve_claims(model, rival)
+        return _curve_claims(model, rival, beliefs)
     named = {site for group in verdict.sets for site in group}
     if found.dense:
         return _crowd_claims(model, named, verdict.confidence)
@@ -117,11 +121,13 @@ def _claims(found: Search, verdict: Verdict, rival: Curved | None) -> list[_Clai
     for k, effect in enumerate(model):
         if Site(effect.name, effect.site) not in named or k >= len(found.slots):
             continue
-        out.append(_named_claim(k, found.slots[k], each, rival))
+        out.append(_named_claim(k, found.slots[k], each, rival, beliefs))
     return out
 
 
-def _named_claim(k: int, slot: tuple[Rival, ...], belief: float, rival: Curved | None) -> _Claim:
+def _named_claim(
+    k: int, slot: tuple[Rival, ...], belief: float, rival: Curved | None, beliefs: Beliefs
+) -> _Claim:
     """Return what is believed of an effect found one by one, from its rivals."""
     place: dict[str, float] = {}
     dependence: dict[str, float] = {}
@@ -136,14 +142,15 @@ def _named_claim(k: int, slot: tuple[Rival, ...], belief: float, rival: Curved |
     seen = rival.form.parts if rival is not None else ()
     return _Claim(
         (k,),
-        {at: p * _agreement(seen, 'at', at) for at, p in place.items()},
-        {on: p * _agreement(seen, 'on', on) for on, p in dependence.items()},
+        {at: p * _agreement(seen, 'at', at, beliefs) for at, p in place.items()},
+        {on: p * _agreement(seen, 'on', on, beliefs) for on, p in dependence.items()},
         name,
     )
 
 
-def _agreement(parts: Sequence[Part], kind: str, value: str) -> float:
-    return AGREED if any(part.weight_of(kind).get(value, 0.0) > 0.1 for part in parts) else ALONE
+def _agreement(parts: Sequence[Part], kind: str, value: str, beliefs: Beliefs) -> float:
+    same = any(part.weight_of(kind).get(value, 0.0) > LIKELY for part in parts)
+    return beliefs.level_agreed if same else beliefs.level_alone
 
 
 def _effect_of(rival: Rival) -> Effect | None:
@@ -153,10 +160,15 @@ def _effect_of(rival: Rival) -> Effect | None:
     return None
 
 
-def _curve_claims(model: tuple[Effect, ...], rival: Curved) -> list[_Claim]:
+def _curve_claims(model: tuple[Effect, ...], rival: Curved, beliefs: Beliefs) -> list[_Claim]:
     """Return a claim for every effect that stayed, and for every place that curves bend."""
     out = [
-        _Claim((k,), {e.at: FREE}, {e.on: FREE}, {Site(e.name, e.site): FREE})
+        _Claim(
+            (k,),
+            {e.at: beliefs.level_free},
+            {e.on: beliefs.level_free},
+            {Site(e.name, e.site): beliefs.level_free},
+        )
         for k, e in enumerate(rival.kept)
     ]
     at = len(rival.kept)
@@ -167,14 +179,19 @@ def _curve_claims(model: tuple[Effect, ...], rival: Curved) -> list[_Claim]:
         by_place.setdefault(part.group.at, []).append((part, members))
     for place, parts in _merged(by_place).items():
         held = tuple(k for _, members in parts for k in members)
-        believed = {a: w * FREE for a, w in parts[0][0].weight_of('at').items()}
+        believed = {a: w * beliefs.level_free for a, w in parts[0][0].weight_of('at').items()}
         if place not in believed:
-            believed = {place: SHARED, **{a: w * (FREE - SHARED) for a, w in believed.items()}}
+            believed = {
+                place: beliefs.level_shared,
+                **{
+                    a: w * (beliefs.level_free - beliefs.level_shared) for a, w in believed.items()
+                },
+            }
         on: dict[str, float] = {}
         for part, _ in parts:
             for name, weight in part.weight_of('on').items():
-                on[name] = max(on.get(name, 0.0), weight * FREE)
-        curves = {Site(model[k].name, model[k].site): FREE for k in held}
+                on[name] = max(on.get(name, 0.0), weight * beliefs.level_free)
+        curves = {Site(model[k].name, model[k].site): beliefs.level_free for k in held}
         out.append(_Claim(held, believed, on, curves))
     return out
 

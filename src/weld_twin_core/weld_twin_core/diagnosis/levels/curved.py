@@ -10,6 +10,7 @@ import numpy as np
 
 from ...effects.effect import Effect
 from ..algebra.fit import fit, robust_fit, robust_scale
+from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Site
 from ..unseen.unseen_stretches import Unseen
@@ -48,7 +49,7 @@ class Curved:
         return self.unseen.rms(self.unseen.predict(range(len(self.unseen.parts))))
 
 
-def curved(found: Search, verdict: Verdict) -> Curved | None:
+def curved(found: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     """
     Return the free-form explanation of the gap; None where there is none, or nothing to explain.
 
@@ -57,6 +58,7 @@ def curved(found: Search, verdict: Verdict) -> Curved | None:
     found : Search
     verdict : Verdict
         Effects that an 'unknown' names beyond doubt stay, and so does the set-up's own motion.
+    beliefs : Beliefs
 
     """
     if verdict.status == 'none' or found.dense:
@@ -71,7 +73,7 @@ def curved(found: Search, verdict: Verdict) -> Curved | None:
     small = found.problem.thinned(ROWS)
     start = found.baseline.model.with_found(tuple(kept))
     bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
-    form = free_form(small, scale, bare, np.zeros(0))
+    form = free_form(small, scale, bare, np.zeros(0), beliefs)
     if not form.parts:
         return None
     model = bare.model.with_found((*bare.model.found, *form.curves))

@@ -12,6 +12,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
+from ..beliefs import Beliefs
 from .groups import Group, all_groups
 from .regions import posture_regions
 from .sparse_groups import choosing, chosen, rival_weights
@@ -70,7 +71,9 @@ class FreeForm:
         return np.concatenate([np.zeros(0), *held])
 
 
-def free_form(problem: Problem, scale: Scale, bare: Fit, precision: Array) -> FreeForm:
+def free_form(
+    problem: Problem, scale: Scale, bare: Fit, precision: Array, beliefs: Beliefs
+) -> FreeForm:
     """
     Return the few groups that explain what a fit leaves, each with its rivals.
 
@@ -82,6 +85,7 @@ def free_form(problem: Problem, scale: Scale, bare: Fit, precision: Array) -> Fr
         Frames and the effects that are named beyond doubt.
     precision : array, shape (K,)
         Prior precision of those effects' coordinates.
+    beliefs : Beliefs
 
     """
     columns, _ = design(problem, bare.model, scale)
@@ -90,10 +94,10 @@ def free_form(problem: Problem, scale: Scale, bare: Fit, precision: Array) -> Fr
         held[-precision.size :] = precision
     groups = all_groups(problem, bare.model, scale)
     work = choosing(problem, groups, columns, held, bare.residual, posture_regions(problem))
-    members = chosen(work)
+    members = chosen(work, beliefs)
     parts = []
     for k, member in enumerate(members):
-        weights = rival_weights(work, members, k)
+        weights = rival_weights(work, members, k, beliefs)
         rivals = tuple((groups[g], w) for g, w in weights if w > 0.0)
         parts.append(Part(groups[member.group], member.ridge, rivals))
     return FreeForm(tuple(parts))

@@ -18,6 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...arrays import Array
 from ..algebra.gram import Index
 from ..algebra.problem import Problem
+from ..beliefs import Beliefs
 from .groups import Group
 
 RIDGES = (1e-1, 1e1, 1e3)
@@ -27,14 +28,7 @@ MOST = 6
 SHORTLIST = 12
 """Groups tried on unseen folds at every step, those that fit best in sample; the right one has
 not been seen below the fourth."""
-STEADY = 2.0
-"""The fall of the squared error over its standard error between stretches."""
-WORTH = 0.05
-"""Share of the squared error so far that a group must take away on unseen folds."""
 STRETCHES = 10
-ROWS = 200.0
-"""Independent rows that two groups are told apart by, however many there are: beyond some hundreds
-the difference of real physics from every group decides, and no longer the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +169,7 @@ def choosing(
     return Choosing(groups, np.arange(fixed.shape[0]), held, places, tuple(ways))
 
 
-def chosen(work: Choosing) -> list[Member]:
+def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
     """Return the few groups that predict best together; none where none is worth it."""
     members: list[Member] = []
     now = work.errors(members)
@@ -185,11 +179,11 @@ def chosen(work: Choosing) -> list[Member]:
             break
         gain, member, errors = max(tried, key=lambda item: item[0])
         steady = min(steadiness(a, b) for a, b in zip(now, errors, strict=True))
-        if gain < WORTH or steady < STEADY:
+        if gain < beliefs.group_share or steady < beliefs.group_steady:
             break
         members.append(member)
         now = errors
-    return _pruned(work, members)
+    return _pruned(work, members, beliefs)
 
 
 def _entrants(work: Choosing, members: list[Member]) -> list[tuple[Member, list[Array]]]:
@@ -216,31 +210,33 @@ def steadiness(before: Array, after: Array) -> float:
     return float(fall.mean() / max(error, 1e-300))
 
 
-def _pruned(work: Choosing, members: list[Member]) -> list[Member]:
+def _pruned(work: Choosing, members: list[Member], beliefs: Beliefs) -> list[Member]:
     """Return the members without those that the others have made needless."""
     while len(members) > 1:
         now = work.errors(members)
         less = [work.errors(members[:k] + members[k + 1 :]) for k in range(len(members))]
         losses = [_worst_gain(errors, now) for errors in less]
         weakest = int(np.argmin(losses))
-        if losses[weakest] >= WORTH:
+        if losses[weakest] >= beliefs.group_share:
             break
         members = members[:weakest] + members[weakest + 1 :]
     return members
 
 
-def rival_weights(work: Choosing, members: list[Member], k: int) -> list[tuple[int, float]]:
+def rival_weights(
+    work: Choosing, members: list[Member], k: int, beliefs: Beliefs
+) -> list[tuple[int, float]]:
     """
     Return each group with its weight in the place of member k, the weights adding up to one.
 
     A group that leaves as much on unseen folds weighs as much; one that leaves r times the squared
-    error weighs r to the power of -`ROWS` / 4: the likelihood of `ROWS` independent rows, softened
+    error weighs r to the power of -rows / 4: the likelihood of so many independent rows, softened
     by two because real physics is a little richer than any group.
     """
     rest = members[:k] + members[k + 1 :]
     own = (members[k], work.errors(members))
     tried = [own, *(pair for pair in _entrants(work, rest) if pair[0].group != own[0].group)]
     totals = np.array([max(float(e.sum()) for e in errors) for _, errors in tried])
-    weights = (totals / max(totals.min(), 1e-300)) ** (-ROWS / 4.0)
+    weights = (totals / max(totals.min(), 1e-300)) ** (-beliefs.group_rows / 4.0)
     weights /= weights.sum()
     return [(m.group, float(w)) for (m, _), w in zip(tried, weights, strict=True)]

@@ -25,6 +25,14 @@ REGRESSORS = (
     'time',
 )
 REGIMES = ('static', 'reversal', 'speed', 'acceleration', 'load', 'temperature', 'time')
+REGIME_OF = {
+    'constant': 'static',
+    'angle': 'static',
+    'place': 'static',
+    'direction': 'reversal',
+    **{name: name for name in REGIMES[2:]},
+}
+"""The regime in which each dependence shows."""
 STRETCHES = 12
 
 
@@ -78,7 +86,9 @@ def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str,
         name: [k for k in everything if found.found[k].site == name]
         for name in found.robot.joint_names
     }
-    under = {name: [k for k in everything if found.found[k].regime == name] for name in REGIMES}
+    under = {
+        name: [k for k in everything if REGIME_OF[found.found[k].on] == name] for name in REGIMES
+    }
     free = [k for k in everything if found.found[k].site is None]
     return (
         _shares({name: fall(members) for name, members in at.items()}, fall(free), total, after),

@@ -16,6 +16,9 @@ from ..result import Family, Site
 from .evidence import Evidence
 from .weighing import Weighed
 
+AT_REST = ('constant', 'angle', 'place', 'load')
+"""Dependences that show without any motion."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -161,9 +164,7 @@ def _joints_at_rest(evidence: Evidence) -> list[str]:
 def _at_rest(sites: Iterable[Site]) -> list[str]:
     """Return the joints of the effects that show at rest."""
     return [
-        site.joint
-        for site in sites
-        if site.joint and REGISTRY[site.effect].regime in ('static', 'load')
+        site.joint for site in sites if site.joint and REGISTRY[site.effect].depends_on in AT_REST
     ]
 
 

@@ -70,8 +70,13 @@ def places(tree: ast.Module, beliefs: bool) -> Iterator[tuple[ast.AST, str]]:
             yield node, 'always'
         elif isinstance(node, ast.BoolOp):
             yield node, 'and or'
-        elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        elif isinstance(node, ast.Constant) and movable(node.value):
             yield from ((node, how) for how in ('less', 'more'))
+
+
+def movable(value: object) -> bool:
+    """Return whether a constant is a number that can be moved; 25 % of 0.0 is nothing."""
+    return type(value) is int or (type(value) is float and value != 0.0)
 
 
 def broken(tree: ast.Module, number: int, beliefs: bool) -> tuple[ast.Module, str]:

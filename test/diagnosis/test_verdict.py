@@ -19,7 +19,7 @@ from weld_twin_core.diagnosis.unseen.leftover_structure import Structure, struct
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import decide
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
-from weld_twin_core.diagnosis.verdict.partial_ripple import glimpsed
+from weld_twin_core.diagnosis.verdict.partial_waves import glimpsed
 from weld_twin_core.recording import Measurements
 
 PLAY, OFFSET = Site('backlash', 'elbow_joint'), Site('joint_offset', 'wrist_1_joint')

@@ -168,6 +168,15 @@ def test_an_effect_of_motion_and_one_at_rest_may_share_a_joint():
     assert verdict.confidence == pytest.approx(0.95**2)
 
 
+def test_the_leaders_of_each_slot_say_which_joint_is_shared():
+    leading = slot((Site('joint_offset', ELBOW), 0.9), (DRIFT, 0.1))
+    other = slot((SPRING, 0.9), (Site('tool_pose', None), 0.1))
+    assert decide(evidence(leading, other)).confidence == pytest.approx((0.9 * 0.95) ** 2 * 0.75)
+    doubted(decide(evidence(leading, other, glimpsed=(ELBOW,))), 'less than a period')
+    tied = slot((Site('joint_offset', ELBOW), 0.5), (DRIFT, 0.5))
+    assert decide(evidence(tied, other)).confidence == pytest.approx(0.9 * 0.95**2 * 0.75)
+
+
 def test_effects_of_the_robot_as_a_whole_share_no_joint():
     base, tool = slot((Site('base_pose', None), 1.0)), slot((Site('tool_pose', None), 1.0))
     assert decide(evidence(base, tool)).confidence == pytest.approx(0.95**2)
@@ -273,18 +282,23 @@ def test_what_remains_must_exceed_an_independent_floor_by_30_percent(times, inde
 
 
 def test_what_is_left_is_a_share_of_the_squared_gap_above_the_floor():
-    over = evidence(after=2.0, floor=1.0, gap=4.0)
-    assert Weighed(over, Beliefs()).left == pytest.approx(3.0 / 15.0)
-    found = evidence(structure=left_over(0.1), after=2.0, floor=1.0, gap=4.0, independent=False)
-    assert Weighed(found, Beliefs()).left == pytest.approx(0.4 / 15.0)
-    both = evidence(structure=left_over(0.9), after=2.0, floor=1.0, gap=4.0)
-    assert Weighed(both, Beliefs()).left == pytest.approx(3.6 / 15.0)
-    assert Weighed(evidence(after=9.0, floor=1.0, gap=4.0), Beliefs()).left == 1.0
+    sizes = {'after': 4.0, 'floor': 2.0, 'gap': 8.0}
+    assert Weighed(evidence(**sizes), Beliefs()).left == pytest.approx(12.0 / 60.0)
+    found = evidence(structure=left_over(0.1), **{**sizes, 'independent': False})
+    assert Weighed(found, Beliefs()).left == pytest.approx(1.6 / 60.0)
+    both = evidence(structure=left_over(0.9), **sizes)
+    assert Weighed(both, Beliefs()).left == pytest.approx(14.4 / 60.0)
+    assert Weighed(evidence(after=9.0, floor=2.0, gap=8.0), Beliefs()).left == 1.0
+
+
+def test_a_structure_that_does_not_count_leaves_nothing():
+    chance = evidence(structure=left_over(0.1, 1.0), after=4.0, floor=3.5, gap=8.0)
+    assert Weighed(chance, Beliefs()).left == 0.0
 
 
 def test_a_gap_within_the_floor_counts_as_a_twentieth_of_it():
-    told = evidence(structure=left_over(0.1), after=0.2, floor=1.0, gap=1.0)
-    assert Weighed(told, Beliefs()).left == pytest.approx(0.1 * 0.04 / 0.05)
+    told = evidence(structure=left_over(0.1), after=0.4, floor=2.0, gap=2.0)
+    assert Weighed(told, Beliefs()).left == pytest.approx(0.1 * 0.16 / (0.05 * 4.0))
 
 
 def test_without_gap_and_floor_a_nanometre_is_divided_by():

@@ -18,7 +18,7 @@ of its command, instead of behind. That is ``form: coast``, play mirrored about 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,8 @@ from .registry import register
 from .view import Parameter, Stage, Value, View
 
 FORMS = ('play', 'reversal', 'coast')
+CLOSED = 1e-5
+"""Width [rad] that many small errors start from; less is none."""
 
 
 @register
@@ -112,11 +114,22 @@ class Backlash(MemoryEffect):
         for width in (5e-5, 5e-4, 2e-3):
             yield cls(str(joint), width)
 
+    @classmethod
+    def small(cls, view: View, joint: str | None, most: int) -> list[Backlash]:
+        """Return a gap that is all but closed."""
+        return [cls(str(joint), CLOSED)]
+
+    def turned(self) -> Backlash:
+        """Return a gap that the data refuse as the arm resting ahead instead of behind."""
+        if self.coordinates()[0] > CLOSED:
+            return self
+        return replace(self, form='coast', width=CLOSED)
+
     def atoms(self, view: View) -> list[Shift]:
         """Return the displacement per unit of width."""
         return [{key: value / self.width for key, value in self.displace(view).items()}]
 
-    def from_atoms(self, coefficients: Array) -> Effect:
+    def from_atoms(self, coefficients: Array) -> Backlash:
         """Return the gap whose width is the coefficient, never negative."""
         return Backlash(self.joint, max(float(coefficients[0]), 0.0), self.form)
 

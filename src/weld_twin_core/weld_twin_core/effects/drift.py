@@ -22,6 +22,7 @@ class Drift(Effect):
     place = 'base'
     of = 'robot'
     stage = Stage.POSE
+    common = False
     parameters = (Parameter('xyz_rate', 'm/s', size=3, typical=1e-6),)
     needs = frozenset({'time'})
 

@@ -22,6 +22,7 @@ class MeasurementScale(Effect):
     place = 'instrument'
     of = 'robot'
     stage = Stage.POSE
+    common = False
     parameters = (Parameter('scale', '-', typical=5e-5),)
 
     def displace(self, view: View) -> Shift:

@@ -145,6 +145,31 @@ class Parametric:
         """Return the typical size of every fit coordinate, shape (K,)."""
         return np.array([p.typical for p, _ in self.components() if p.differentiable])
 
+    def errors(self, std: Array) -> dict[str, Any]:
+        """
+        Return standard errors by parameter, None for a component that has none.
+
+        Parameters
+        ----------
+        std : array, shape (K,)
+            Of the fit coordinates; NaN where the data tell nothing.
+
+        """
+        out: dict[str, Any] = {}
+        values = iter(None if np.isnan(value) else float(value) for value in std)
+        for parameter, index in self.components():
+            if not parameter.differentiable:
+                continue
+            if index is None:
+                out[parameter.name] = next(values)
+            else:
+                out.setdefault(parameter.name, []).append(next(values))
+        return {
+            name: value
+            for name, value in out.items()
+            if value is not None and value != [None] * len(np.atleast_1d(value))
+        }
+
     def to_mapping(self) -> dict[str, Any]:
         """Return the entry of an effects file that makes this effect."""
         out: dict[str, Any] = {'effect': self.name}

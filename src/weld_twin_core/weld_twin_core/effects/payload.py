@@ -29,6 +29,7 @@ class Payload(Effect):
     place = 'load'
     of = 'robot'
     stage = Stage.LOAD
+    common = False
     parameters = (
         Parameter('mass', 'kg', typical=1.0),
         Parameter('com', 'm', size=3, typical=0.05, linear=False),

@@ -36,6 +36,7 @@ class Quantization(Effect):
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
+    common = False
     parameters = (
         Parameter('step', 'rad', typical=2e-4, lower=0.0, differentiable=False, linear=False),
     )
@@ -111,7 +112,7 @@ class Quantization(Effect):
         """Return the rounding error itself; its right coefficient is one."""
         return [self.displace(view)]
 
-    def from_atoms(self, coefficients: Array) -> Effect:
+    def from_atoms(self, coefficients: Array) -> Quantization:
         """Return the same staircase: its height and step are one parameter."""
         return self
 

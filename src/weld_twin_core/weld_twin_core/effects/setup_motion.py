@@ -15,7 +15,7 @@ from .setup_step import SetupStep
 
 def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return the effects without those of one set-up."""
-    return tuple(e for e in effects if not isinstance(e, SetupSettling | SetupStep))
+    return tuple(e for e in effects if not e.of_setup)
 
 
 def seen_from(

@@ -37,6 +37,7 @@ class SetupSettling(Effect):
     of = 'robot'
     stage = Stage.LINK
     cause = False
+    of_setup = True
     parameters = (
         Parameter('xyz', 'm', size=3, typical=1e-4),
         Parameter('rotvec', 'rad', size=3, typical=1e-4),

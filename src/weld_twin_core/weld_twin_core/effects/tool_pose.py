@@ -21,3 +21,4 @@ class ToolPose(FrameError):
     depends_on = 'constant'
     place = 'tool'
     channel = 'tool'
+    frame = 'tool'

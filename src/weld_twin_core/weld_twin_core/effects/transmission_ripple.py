@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +14,17 @@ from ..arm.channels import Shift
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
+from .hooks import Waves
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
 MAX_ORDER = 100
 """Highest order a search considers: one per tooth of a 100:1 strain-wave gear."""
+HIGHEST_LINE = 420
+"""Highest order of a single line looked for: some four per tooth of such a gear. A judgement."""
+BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
+"""Orders whose amplitudes are expected to be alike: up to a band's last order. Amplitudes fall off
+with the order, so bands widen with it; where they end is a judgement."""
 
 
 @register
@@ -39,6 +46,7 @@ class TransmissionRipple(Effect):
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
+    waves = Waves(dense=MAX_ORDER, highest=HIGHEST_LINE)
     parameters = (
         Parameter('amplitude', 'rad', size=0, typical=2e-4),
         Parameter('order', '1/rev', size=0, lower=0.0, differentiable=False, linear=False),
@@ -92,12 +100,48 @@ class TransmissionRipple(Effect):
         for order in range(1, MAX_ORDER + 1):
             yield cls(str(joint), 0.0, float(order), 0.0)
 
+    @classmethod
+    def small(cls, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
+        """Return one ripple of all orders that the measurements can hold apart."""
+        orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
+        zero = np.zeros(orders.size)
+        return [cls(str(joint), zero, orders, zero)] if orders.size else []
+
+    def alike(self) -> list[tuple[str, ...]]:
+        """Return a label per sine and cosine: the joint and the band of its order."""
+        band = np.searchsorted(BANDS, np.repeat(self.orders(), 2))
+        return [(self.name, self.joint, str(b)) for b in band]
+
+    def orders(self) -> Array:
+        """Return the orders, in cycles per turn."""
+        return np.atleast_1d(np.asarray(self.order, dtype=np.float64))
+
+    def with_order(self, order: float) -> TransmissionRipple:
+        """Return the ripple with one more order."""
+        return self.joined(TransmissionRipple(self.joint, 0.0, order, 0.0))
+
+    def joined(self, other: TransmissionRipple) -> TransmissionRipple:
+        """Return the orders of both in one ripple."""
+        parts: dict[str, Any] = {
+            p.name: np.append(getattr(self, p.name), getattr(other, p.name))
+            for p in self.parameters
+        }
+        return replace(self, **parts)
+
+    def errors(self, std: Array) -> dict[str, Any]:
+        """Return the errors of amplitude and phase; sine and cosine are what was fitted."""
+        amplitude = np.atleast_1d(np.asarray(self.amplitude))
+        spread = np.sqrt((std.reshape(-1, 2) ** 2).mean(axis=1))
+        phase = np.minimum(spread / np.maximum(amplitude, 1e-300), np.pi)
+        if np.ndim(self.amplitude) > 0:
+            return {'amplitude': spread.tolist(), 'phase': phase.tolist()}
+        return {'amplitude': float(spread[0]), 'phase': float(phase[0])}
+
     def atoms(self, view: View) -> list[Shift]:
         """Return sine and cosine of every order, so that amplitude and phase become linear."""
         site = ('q', view.robot.index(self.joint))
         theta = view.joint(site[1])
-        orders = np.atleast_1d(np.asarray(self.order, dtype=np.float64))
-        return [{site: f(n * theta)} for n in orders for f in (np.sin, np.cos)]
+        return [{site: f(n * theta)} for n in self.orders() for f in (np.sin, np.cos)]
 
     def from_atoms(self, coefficients: Array) -> TransmissionRipple:
         """Return amplitude and phase of sine and cosine coefficients, pairs in `atoms` order."""

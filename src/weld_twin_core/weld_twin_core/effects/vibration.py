@@ -162,6 +162,6 @@ class Vibration(MemoryEffect):
             out[k] = np.interp(view.t, t, response)
         return list(modes), out
 
-    def from_atoms(self, coefficients: Array) -> Effect:
+    def from_atoms(self, coefficients: Array) -> Vibration:
         """Return the mode whose gain is the in-phase coefficient."""
         return Vibration(self.joint, self.frequency, self.damping, float(coefficients[0]))

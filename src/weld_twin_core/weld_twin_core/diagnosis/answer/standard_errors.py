@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.transmission_ripple import TransmissionRipple
 from ..algebra.fit import coordinates, design
 from ..algebra.problem import Model, Problem, Scale
 from ..hypotheses.starts import profile
 
 BLOCKS = 24
+"""Stretches whose scores are held apart: enough to tell a variance to a third."""
 UNSEEN = 1e-2
 """A coordinate a thousand times its typical size must move some row by this much noise."""
 
@@ -58,10 +58,8 @@ def standard_errors(
         size = effect.coordinates().size
         own = np.sqrt(variance[at : at + size])
         at += size
-        if not isinstance(effect, TransmissionRipple):
-            own = np.maximum(own, _elsewhere(problem, model, scale, k, share))
-            own = np.hypot(own, _idealised(effect))
-        out.append(_shaped(effect, own))
+        own = np.maximum(own, _elsewhere(problem, model, scale, k, share))
+        out.append(effect.errors(np.hypot(own, _idealised(effect))))
     return out
 
 
@@ -95,9 +93,6 @@ def _free(model: Model) -> NDArray[np.bool_]:
     """Return which fit coordinates are off their bounds, shape (K,)."""
     out: list[bool] = []
     for effect in model.found:
-        if isinstance(effect, TransmissionRipple):
-            out += [True] * effect.coordinates().size
-            continue
         specs = [p for p, _ in effect.components() if p.differentiable]
         out += [
             p.lower < value < p.upper for p, value in zip(specs, effect.coordinates(), strict=True)
@@ -128,33 +123,3 @@ def _idealised(effect: Effect) -> Array:
     """Return how far real arms differ from the formulas, per coordinate."""
     specs = [p for p, _ in effect.components() if p.differentiable]
     return np.array([p.idealised for p in specs]) * np.abs(effect.coordinates())
-
-
-def _shaped(effect: Effect, std: Array) -> dict[str, Any]:
-    """Return standard errors by parameter, None for a component that has none."""
-    if isinstance(effect, TransmissionRipple):
-        return _ripple(effect, std)
-    out: dict[str, Any] = {}
-    values = iter(None if np.isnan(value) else float(value) for value in std)
-    for parameter, index in effect.components():
-        if not parameter.differentiable:
-            continue
-        if index is None:
-            out[parameter.name] = next(values)
-        else:
-            out.setdefault(parameter.name, []).append(next(values))
-    return {
-        name: value
-        for name, value in out.items()
-        if value is not None and value != [None] * len(np.atleast_1d(value))
-    }
-
-
-def _ripple(effect: TransmissionRipple, std: Array) -> dict[str, Any]:
-    """Return the errors of amplitude and phase; sine and cosine are what was fitted."""
-    amplitude = np.atleast_1d(np.asarray(effect.amplitude))
-    spread = np.sqrt((std.reshape(-1, 2) ** 2).mean(axis=1))
-    phase = np.minimum(spread / np.maximum(amplitude, 1e-300), np.pi)
-    if np.ndim(effect.amplitude) > 0:
-        return {'amplitude': spread.tolist(), 'phase': phase.tolist()}
-    return {'amplitude': float(spread[0]), 'phase': float(phase[0])}

@@ -16,8 +16,6 @@ from ...twin.features import Features, sites
 from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
 
-NUISANCE = {'base': 'base_pose', 'tool': 'tool_pose'}
-
 
 @dataclass(frozen=True, eq=False)
 class Unit:
@@ -85,8 +83,11 @@ class Library:
 
 def families(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]]:
     """Return the families that may be a cause, in the order of their stages."""
-    out = set(exclude) | {NUISANCE[frame] for frame in align}
-    kinds = [k for k in REGISTRY.values() if k.cause and k.name not in out]
+    kinds = [
+        kind
+        for kind in REGISTRY.values()
+        if kind.cause and kind.name not in exclude and kind.frame not in align
+    ]
     return sorted(kinds, key=lambda kind: (kind.stage, kind.name))
 
 

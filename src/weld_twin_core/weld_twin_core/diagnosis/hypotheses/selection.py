@@ -120,8 +120,9 @@ def ranking(gram: Gram, units: Sequence[Unit], effective: float) -> list[Choice]
 
 
 def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
-    """A unit may enter once; only a ripple has further orders to add."""
-    return choice.unit.site in taken and choice.unit.family != 'transmission_ripple'
+    """Return whether a unit is in the model already and its kind cannot take in another."""
+    kind = type(choice.unit.seeds[0])
+    return choice.unit.site in taken and kind.joined is Effect.joined
 
 
 def _refined(
@@ -157,14 +158,12 @@ def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
 
 
 def merged(found: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
-    """Return the effects with one more; orders of one joint's ripple go into one effect."""
+    """Return the effects with one more, in one with its like where their kind can join."""
     for k, other in enumerate(found):
-        if other.name == effect.name == 'transmission_ripple' and other.site == effect.site:
-            parts = {
-                p.name: np.append(getattr(other, p.name), getattr(effect, p.name))
-                for p in other.parameters
-            }
-            return (*found[:k], replace(other, **parts), *found[k + 1 :])
+        if (other.name, other.site) == (effect.name, effect.site):
+            both = other.joined(effect)
+            if both is not None:
+                return (*found[:k], both, *found[k + 1 :])
     return (*found, effect)
 
 

@@ -23,14 +23,12 @@ from scipy.linalg.lapack import dtrtri
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.transmission_ripple import TransmissionRipple
 from ..algebra.fit import Fit, coordinates, design, fit, robust_scale, solve_scaled, stepped
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 
-BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
-"""Ripple orders whose amplitudes are expected to be alike: up to a band's last order."""
 ROUNDS = 15
+"""Times that variances and noise are learned in turn; they settle within ten."""
 
 
 def groups(found: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
@@ -39,16 +37,8 @@ def groups(found: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
 
     Number -1 marks coordinates that are fitted freely.
     """
-    labels: list[tuple[str, str, int]] = []
-    scales: list[Array] = []
-    for effect in found:
-        size = effect.coordinates().size
-        scales.append(effect.coordinate_scales())
-        if isinstance(effect, TransmissionRipple):
-            band = np.searchsorted(BANDS, np.repeat(np.atleast_1d(effect.order), 2))
-            labels += [(effect.name, str(effect.site), int(b)) for b in band]
-        else:
-            labels += [(effect.name, '', 0)] * size
+    labels = [label for effect in found for label in effect.alike()]
+    scales = [effect.coordinate_scales() for effect in found]
     names = {label: k for k, label in enumerate(dict.fromkeys(labels))}
     numbers = np.array([names[label] for label in labels], dtype=int)
     counts = np.bincount(numbers, minlength=len(names)) if numbers.size else np.zeros(0, int)

@@ -10,27 +10,21 @@ lines above the dense orders are then looked for one by one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from ...arrays import Array
 from ...effects import REGISTRY
-from ...effects.effect import Effect, Stage
-from ...twin.features import Features, sites
+from ...effects.effect import Effect, Stage, View
+from ...twin.features import sites
 from ..algebra.fit import Fit, robust_scale
 from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.library import families
-from ..hypotheses.ripple_lines import DENSE_ORDERS, with_lines
 from .shrinkage import shrunk_fit, shrunk_step
-
-CLOSED = 1e-5
-"""Width of play [rad] that many small errors start from; less is none."""
-ONE_BY_ONE = ('quantization', 'payload', 'drift', 'measurement_scale')
-"""Families kept only where the search has found them: not small errors of the arm's making."""
+from .wave_lines import with_lines
 
 
 def many_small(
@@ -44,11 +38,10 @@ def many_small(
     everything = model.with_found(_everything(problem, model, exclude, beliefs))
     scale = robust_scale(problem, problem.residuals(model))
     model, scale = shrunk_step(problem, everything, scale, beliefs)
-    model = model.with_found(tuple(_coasting(effect) for effect in model.found))
+    model = model.with_found(tuple(effect.turned() for effect in model.found))
     progress('families fitted together')
-    if 'transmission_ripple' not in exclude:
-        model = with_lines(problem, model, scale, beliefs)
-        progress('lines of high order looked for')
+    model = with_lines(problem, model, scale, beliefs)
+    progress('lines of high order looked for')
     if 'base' in problem.align:
         model = with_setup(problem, model, scale, beliefs)
         progress('motion of the set-up looked for')
@@ -57,49 +50,39 @@ def many_small(
     return result, scale, precision
 
 
-def _coasting(effect: Effect) -> Effect:
-    """Return play that the data refuse as the arm resting ahead instead of behind."""
-    if effect.name != 'backlash' or effect.coordinates()[0] > CLOSED:
-        return effect
-    return replace(effect, form='coast', width=CLOSED)  # type: ignore[call-arg]
-
-
 def _everything(
     problem: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs
 ) -> tuple[Effect, ...]:
     """Return every effect that fits linearly, at zero unless the search has found its value."""
-    maker = problem.features(model)[0]
+    view = problem.features(model)[0].view
     have = {effect.key: effect for effect in model.found}
+    # All joints' pairs of coordinates together stay below half the rows.
+    most = problem.size // (4 * model.robot.n)
     out: list[Effect] = []
     for kind in families(exclude, problem.align):
-        if kind.stage in (Stage.SERVO, Stage.CLOCK) or kind.name in ONE_BY_ONE:
+        if kind.stage in (Stage.SERVO, Stage.CLOCK) or not kind.common:
             out += [e for e in model.found if e.name == kind.name]
             continue
         for joint in sites(kind, model.robot.joint_names):
-            if kind.applicable(maker.view, joint) is not None:
-                continue
-            if kind.name == 'transmission_ripple':
-                out += _dense_ripple(maker, str(joint), problem.size, beliefs)
-                continue
-            for seed in list(kind.seeds(maker.view, joint))[:2]:
-                if seed.name == 'backlash':
-                    seed = seed.with_coordinates(np.array([CLOSED]))
-                if seed.key not in {e.key for e in out}:
-                    out.append(have.get(seed.key, seed))
+            if kind.applicable(view, joint) is None:
+                out += _small(kind, view, joint, most, beliefs, have)
     return tuple(out)
 
 
-def _dense_ripple(maker: Features, joint: str, rows: int, beliefs: Beliefs) -> list[Effect]:
-    q = maker.view.joint(maker.twin.robot.index(joint))
-    if float(np.ptp(q)) < beliefs.wave_range:
-        return []
-    # All joints' sines and cosines together stay below half the rows.
-    highest = min(DENSE_ORDERS, rows // (4 * maker.twin.robot.n))
-    if highest < 1:
-        return []
-    orders = np.arange(1.0, highest + 1.0)
-    zero = np.zeros(orders.size)
-    return [REGISTRY['transmission_ripple'](joint, zero, orders, zero)]  # type: ignore[call-arg]
+def _small(
+    kind: type[Effect],
+    view: View,
+    joint: str | None,
+    most: int,
+    beliefs: Beliefs,
+    have: Mapping[tuple[str, ...], Effect],
+) -> list[Effect]:
+    """Return the instances of one kind on one joint, as found where the search has found them."""
+    if kind.waves is not None:
+        travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
+        return kind.small(view, joint, most) if travel >= beliefs.wave_range else []
+    each = {seed.key: seed for seed in reversed(kind.small(view, joint, most))}
+    return [have.get(key, seed) for key, seed in reversed(each.items())]
 
 
 def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -> Model:
@@ -108,8 +91,7 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
 
     Both are nuisance: they are part of where the frames were, not of the robot.
     """
-    for name in ('setup_settling', 'setup_step'):
-        kind = REGISTRY[name]
+    for kind in [kind for kind in REGISTRY.values() if kind.of_setup]:
         features = problem.features(model)
         residual = problem.whitened(problem.residuals(model), scale)
         frames = problem.whitened(problem.frame_columns(features)[0], scale)

@@ -4,9 +4,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from ...effects.transmission_ripple import TransmissionRipple
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
@@ -16,7 +13,7 @@ from ..result import Shrink
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 from .evidence import Evidence
-from .partial_ripple import glimpsed
+from .partial_waves import glimpsed
 
 
 def gathered(
@@ -67,9 +64,8 @@ def _parts(unseen: Unseen) -> tuple[float, ...]:
 
 
 def _causes(rival: Rival) -> int:
-    """Return how many causes a slot stands for: every further order of a ripple is another."""
+    """Return how many causes a slot stands for: its leader says."""
     for effect in rival.fit.model.found:
-        is_it = (effect.name, effect.site) == (rival.site.effect, rival.site.joint)
-        if is_it and isinstance(effect, TransmissionRipple):
-            return int(np.size(effect.order))
+        if (effect.name, effect.site) == (rival.site.effect, rival.site.joint):
+            return effect.causes()
     return 1

@@ -1,24 +1,21 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Narrow ripple lines of high order, looked for one by one."""
+"""Narrow lines of high order in waves of a joint's angle, looked for one by one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.transmission_ripple import TransmissionRipple
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 
-DENSE_ORDERS = 100
-"""One per tooth of a 100:1 gear, the highest order that a search takes one by one."""
-HIGHEST_ORDER = 420
 LINES = 40
+"""Lines at the most; the weakest of so many is far below what decides anything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +98,17 @@ class _Waves:
 
 def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -> Model:
     """
-    Return the model with narrow ripple lines above its dense orders.
+    Return the model with narrow lines above the dense orders of its waves.
 
     The score statistic of sine and cosine at every order costs one small product per joint; the
     strongest line enters, the residual it explains is taken off, and the look is repeated.
     """
+    kinds = [effect.waves for effect in model.found if effect.waves is not None]
+    if not kinds:
+        return model
     residual = problem.residuals(model)
     features = problem.features(model)
-    orders = np.arange(DENSE_ORDERS + 1.0, HIGHEST_ORDER + 1.0)
+    orders = np.arange(kinds[0].dense + 1.0, kinds[0].highest + 1.0)
     each = [
         _Waves.of(problem, features, scale, i, orders, beliefs.wave_range)
         for i in range(model.robot.n)
@@ -132,25 +132,17 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
 
 
 def _free(model: Model, waves: _Waves, orders: Array) -> Array:
-    """Return which orders no ripple of the joint is too close to, shape (O,)."""
+    """Return which orders no wave of the joint is too close to, shape (O,)."""
     free = np.ones(orders.size, bool)
     for effect in model.found:
-        here = effect.site == model.robot.joint_names[waves.joint]
-        if isinstance(effect, TransmissionRipple) and here:
-            for order in np.atleast_1d(effect.order):
+        if effect.site == model.robot.joint_names[waves.joint]:
+            for order in effect.orders():
                 free &= np.abs(orders - order) >= waves.apart
     return free
 
 
 def _with_order(found: list[Effect], joint: str, order: float) -> list[Effect]:
-    out = []
-    for effect in found:
-        if isinstance(effect, TransmissionRipple) and effect.site == joint:
-            effect = replace(
-                effect,
-                amplitude=np.append(effect.amplitude, 0.0),
-                order=np.append(effect.order, order),
-                phase=np.append(effect.phase, 0.0),
-            )
-        out.append(effect)
-    return out
+    return [
+        effect.with_order(order) if effect.waves and effect.site == joint else effect
+        for effect in found
+    ]

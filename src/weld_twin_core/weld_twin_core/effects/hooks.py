@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an effect may tell of itself beyond `displace` and `gradient`; every hook has a default.
+
+The search, the fit of many small errors, the standard errors and the verdict ask these hooks and
+nothing else, so that none of them knows any effect by name. The page of effects lists them in a
+table.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from ..arm.channels import Shift
+from ..arrays import Array
+from .parametric import Parametric
+from .view import Stage, View
+
+H = TypeVar('H', bound='Hooks')
+
+
+@dataclass(frozen=True)
+class Waves:
+    """
+    Which orders of waves in its joint's angle an effect is searched for.
+
+    Attributes
+    ----------
+    dense : int
+        A fit of many small errors takes all orders up to this one along, in cycles per turn.
+    highest : int
+        Single lines are looked for up to this order.
+
+    """
+
+    dense: int
+    highest: int
+
+
+@dataclass(frozen=True, eq=False)
+class Hooks(Parametric, ABC):
+    """The optional part of the contract; `Effect` is the rest."""
+
+    of: ClassVar[str]
+    """What it sits on: 'joint', 'link', 'links' or 'robot'."""
+    stage: ClassVar[Stage]
+    needs: ClassVar[frozenset[str]] = frozenset()
+    """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
+    cause: ClassVar[bool] = True
+    """Whether a diagnosis may name it; noise and the set-up's own motion are nuisance."""
+    depends_on: ClassVar[str] = 'constant'
+    """What it depends on: 'constant', 'angle', 'direction', 'speed', 'acceleration', 'load',
+    'temperature', 'time' or 'place' (in the workspace)."""
+    place: ClassVar[str] = 'joint'
+    """Where it sits: at its 'joint', or at 'base', 'tool', 'instrument', 'clock' or 'load'."""
+    frame: ClassVar[str | None] = None
+    """The frame it is an error of, 'base' or 'tool': no cause where that frame is fitted."""
+    of_setup: ClassVar[bool] = False
+    """Whether it belongs to one set-up and not to the robot."""
+    common: ClassVar[bool] = True
+    """Whether every arm has a little of it, so that a fit of many small errors takes it along."""
+    waves: ClassVar[Waves | None] = None
+    """Set by an effect that is a sum of waves in its joint's angle; it gives `orders` too."""
+
+    @abstractmethod
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return d displacement / d component for every component; None where there is none."""
+
+    @property
+    def site(self) -> str | None:
+        """Return the joint the effect sits on, or None for the robot as a whole."""
+        return getattr(self, 'joint', None)
+
+    @property
+    def at(self) -> str:
+        """Return where it sits: the name of its joint, or its `place`."""
+        return str(self.site) if self.place == 'joint' else self.place
+
+    @property
+    def on(self) -> str:
+        """Return what it depends on."""
+        return self.depends_on
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Return what tells this effect from others of the file: name, joint and options."""
+        extra = tuple(str(getattr(self, k)) for k in self.options if k != 'joint')
+        return (self.name, self.site or '', *extra)
+
+    @classmethod
+    def _at(cls, joint: str | None, **values: Any) -> Any:
+        if cls.of in ('joint', 'link'):
+            values['joint'] = joint
+        return cls(**values)
+
+    # The twin: derivatives through effects that act later ---------------------------------------
+
+    def slope(self, view: View) -> Shift:
+        """Return d displacement / d own joint position, per ('q', i) channel; empty when none."""
+        return {}
+
+    # The search ---------------------------------------------------------------------------------
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """Return why the data cannot show this effect at all, or None when they can."""
+        if 'velocity' in cls.needs and view.static:
+            return 'static stations carry no velocity'
+        if 'wrench' in cls.needs and view.wrench is None:
+            return 'no tool wrench was recorded'
+        if 'load' in cls.needs and view.wrench is None and view.robot.mass is None:
+            return 'the robot model has no link masses and no wrench was recorded'
+        if 'temperature' in cls.needs and view.temperature is None:
+            return 'no temperature was recorded'
+        return None
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Any]:
+        """
+        Yield the instances a search starts from; each spans one linear subspace.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+        pull : array, shape (N,), optional
+            How strongly the residual would move the joint at every sample; an effect too fine to
+            search on a grid may look for itself in it.
+
+        """
+        yield cls._at(joint)
+
+    @classmethod
+    def trials(cls, view: View, joint: str | None) -> float:
+        """Return how many instances `seeds` chose among; 0 means as many as it yields."""
+        return 0.0
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return the linear features of this instance; their combinations start a fit."""
+        return [shift for shift in self.gradient(view) if shift is not None]
+
+    def from_atoms(self: H, coefficients: Array) -> H:
+        """Return the instance that a combination of `atoms` stands for."""
+        return self.with_vector(np.asarray(coefficients, dtype=np.float64))
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
+        """
+        Return instances to choose a fit's start from, and what each displaces, shape (D, N).
+
+        For an effect on one joint whose response bends so much with a parameter that a local fit
+        would stop beside the best. ``zoom`` counts up from 0, each time about the best so far,
+        until there are none. Where a parameter is linear, the instances have it at one.
+        """
+        return None
+
+    def joined(self: H, other: H) -> H | None:
+        """Return this effect and another of its kind and joint as one; None where one has to do."""
+        return None
+
+    # The fit ------------------------------------------------------------------------------------
+
+    def coordinate_shifts(self, view: View) -> list[Shift]:
+        """Return d displacement / d fit coordinates."""
+        return [shift for shift in self.gradient(view) if shift is not None]
+
+    # Many small errors at once ------------------------------------------------------------------
+
+    @classmethod
+    def small(cls, view: View, joint: str | None, most: int) -> list[Any]:
+        """
+        Return the instances that a fit of many small errors takes along, of hardly any size.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+        most : int
+            Pairs of coordinates that the measurements allow every joint.
+
+        """
+        return list(cls.seeds(view, joint))[:2]
+
+    def alike(self) -> list[tuple[str, ...]]:
+        """Return a label for every fit coordinate; those of one label are expected alike in size."""
+        return [(self.name,)] * self.coordinates().size
+
+    def turned(self: H) -> H:
+        """Return what data that push this instance to its bound ask for instead; else itself."""
+        return self
+
+    def orders(self) -> Array:
+        """Return the orders of the waves that this instance is a sum of, in cycles per turn."""
+        return np.zeros(0)
+
+    def with_order(self: H, order: float) -> H:
+        """Return the instance with a wave of one more order, of no size yet."""
+        return self
+
+    # The verdict --------------------------------------------------------------------------------
+
+    def causes(self) -> int:
+        """Return how many separate causes this instance stands for."""
+        return max(1, self.orders().size)

@@ -4,40 +4,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.verdict.decision import Verdict, decide
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
 from weld_twin_core.errors import DataError
+from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from . import layout, seal
-from .diagnosing import diagnosis_of
+from .diagnosing import diagnosis_of, engine_digest
 from .judging import Judged, judge
 
 MOVE = 0.25
 """Share of its value by which every belief is moved, both ways; whole numbers by one at least."""
+LATE = 'verdict'
+"""Step of the beliefs that need no new fit."""
+Told = Mapping[str, Any]
+"""A verdict in plain values, as `told_of` gives it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A case with its truth, and what is said of it with the usual beliefs."""
+@dataclass(frozen=True)
+class Move:
+    """One belief moved: its name, the step it acts in, its usual value and the other one."""
 
-    place: Path
-    truth: Mapping[str, Any]
-    evidence: Evidence
-    judged: Judged
-    said: Verdict
+    belief: str
+    step: str
+    value: float
+    other: float
+
+    @property
+    def beliefs(self) -> Beliefs:
+        """Return the beliefs with this one moved."""
+        changed: dict[str, Any] = {self.belief: self.other}
+        return replace(Beliefs(), **changed)
 
 
 def study(
-    cases: Path, truths: Path, refitted: int, only: Sequence[str], tell: Callable[[str], None]
+    cases: Path, truths: Path, runner: Runner, refitted: int, only: Sequence[str] = ()
 ) -> dict[str, Any]:
     """
     Return what changes when each belief is moved.
@@ -46,13 +55,13 @@ def study(
     ----------
     cases, truths : Path
         As ``blind make`` writes them; the cases must be readable beside their truths.
+    runner : Runner
+        Its store makes the work resumable.
     refitted : int
-        Cases diagnosed anew for a belief that acts before the verdict, spread evenly. The
-        others are only decided anew, on all cases.
+        Cases diagnosed anew for a belief that acts before the verdict, spread evenly. For the
+        others the verdict is drawn anew from the same evidence, on all cases.
     only : sequence of str
         Beliefs to move; all when empty.
-    tell : callable
-        Told what has been done.
 
     Raises
     ------
@@ -60,118 +69,120 @@ def study(
         A case or a truth is not what was sealed, or there is no belief of a name in ``only``.
 
     """
-    usual = Beliefs()
-    moved = _chosen(usual, only)
-    whole = [_case(cases, truth, tell) for truth in seal.opened(cases, truths)]
-    few = [whole[k] for k in _spread(len(whole), refitted)]
-    rows = []
-    for name, step, value, other in moved:
-        changed: dict[str, Any] = {name: other}
-        beliefs = replace(usual, **changed)
-        late = step == 'verdict'
-        if not late and not few:
-            continue
-        row = _row(whole, _decided(beliefs)) if late else _row(few, _refitted(beliefs))
-        rows.append({'belief': name, 'step': step, 'value': value, 'moved_to': other, **row})
-        tell(f'{name} {value:g} -> {other:g}: {row["verdicts"]} of {row["cases"]} verdicts change')
+    moves = list(_moves(only))
+    opened = seal.opened(cases, truths)
+    late = [(move.belief, move.other) for move in moves if move.step == LATE]
+    engine = engine_digest()
+    whole = runner.run([_task(decided, cases, truth, engine, late) for truth in opened])
+    usual = [told['usual'] for told in whole]
+    few = [int(k) for k in np.unique(np.linspace(0, len(opened) - 1, refitted).round())]
+    early = [move for move in moves if move.step != LATE] if few else []
+    anew = runner.run(
+        [
+            _task(refitted_case, cases, opened[k], engine, (move.belief, move.other))
+            for move in early
+            for k in few
+        ]
+    )
+    rows = [
+        _row(move, opened, usual, [told['moved'][k] for told in whole])
+        for k, move in enumerate(m for m in moves if m.step == LATE)
+    ]
+    rows += [
+        _row(move, [opened[i] for i in few], [usual[i] for i in few], anew[at : at + len(few)])
+        for move, at in zip(early, range(0, len(anew), max(len(few), 1)), strict=True)
+    ]
     return {
         'schema': 'weld_twin/beliefs/1',
         'seal': layout.read(cases / layout.CASES)['seal'],
         'move': MOVE,
-        'usual': {'verdict': _totals(whole), 'others': _totals(few)},
+        'usual': {
+            'verdict': _totals(_judged(opened, usual)),
+            'others': _totals(_judged([opened[k] for k in few], [usual[k] for k in few])),
+        },
         'rows': rows,
     }
 
 
-def _chosen(usual: Beliefs, only: Sequence[str]) -> list[tuple[str, str, float, float]]:
-    """Return name, step, value and moved value of every move to make."""
+def _task(function: Any, cases: Path, truth: Told, engine: str, moved: Any) -> Task:
+    name = str(truth['name'])
+    return Task(function, (str(cases / name), engine, moved), name)
+
+
+def decided(place: str, engine: str, moves: Sequence[tuple[str, float]]) -> dict[str, Any]:
+    """Return the verdict on a case, and the one drawn from the same evidence for every move."""
+    evidence = _evidence(Path(place), Beliefs())
+    verdicts = [decide(evidence, Move(name, LATE, 0.0, other).beliefs) for name, other in moves]
+    return {'usual': told_of(decide(evidence)), 'moved': [told_of(v) for v in verdicts]}
+
+
+def refitted_case(place: str, engine: str, move: tuple[str, float]) -> dict[str, Any]:
+    """Return the verdict on a case that is diagnosed anew with one belief moved."""
+    beliefs = Move(move[0], '', 0.0, move[1]).beliefs
+    return told_of(decide(_evidence(Path(place), beliefs), beliefs))
+
+
+def _evidence(place: Path, beliefs: Beliefs) -> Evidence:
+    found = diagnosis_of(place, beliefs=beliefs).evidence
+    if not isinstance(found, Evidence):
+        raise DataError(f'the diagnosis of {place.name} came to no evidence to decide on')
+    return found
+
+
+def told_of(verdict: Verdict) -> dict[str, Any]:
+    """Return a verdict in plain values, without estimates: beliefs do not move them."""
+    return {
+        'status': verdict.status,
+        'confidence': verdict.confidence,
+        'indistinguishable': [
+            [{'effect': s.effect, 'joint': s.joint} for s in group] for group in verdict.sets
+        ],
+        'effects': [],
+    }
+
+
+def _moves(only: Sequence[str]) -> Iterator[Move]:
+    """Yield every move to make."""
+    usual = Beliefs()
     steps = {item.name: str(item.metadata['step']) for item in fields(usual)}
     unknown = sorted(set(only) - set(steps))
     if unknown:
         raise DataError(f'there is no belief {unknown[0]!r}; they are ' + ', '.join(steps))
-    return [
-        (name, step, getattr(usual, name), other)
-        for name, step in steps.items()
-        if not only or name in only
-        for other in _others(getattr(usual, name))
-    ]
+    for name in only or steps:
+        value = getattr(usual, name)
+        for way in (-1, 1):
+            step = max(1, round(MOVE * value)) if isinstance(value, int) else MOVE * value
+            yield Move(name, steps[name], value, value + way * step)
 
 
-def _others(value: float) -> Iterator[float]:
-    for way in (-1, 1):
-        if isinstance(value, int):
-            yield value + way * max(1, round(MOVE * value))
-        else:
-            yield value * (1.0 + way * MOVE)
-
-
-def _spread(count: int, wanted: int) -> list[int]:
-    places = np.linspace(0, count - 1, min(wanted, count)).round().astype(int)
-    return [int(k) for k in np.unique(places)]
-
-
-def _case(cases: Path, truth: Mapping[str, Any], tell: Callable[[str], None]) -> Case:
-    place = cases / str(truth['name'])
-    result = diagnosis_of(place)
-    evidence = _evidence(result)
-    said = decide(evidence)
-    tell(f'{place.name}: {said.status}')
-    return Case(place, truth, evidence, _judged(truth, said), said)
-
-
-def _evidence(result: Diagnosis) -> Evidence:
-    if not isinstance(result.evidence, Evidence):
-        raise DataError('a diagnosis of this version holds no evidence to decide on anew')
-    return result.evidence
-
-
-def _judged(truth: Mapping[str, Any], verdict: Verdict) -> Judged:
-    """Return what a verdict is worth; estimates are left out, as beliefs do not move them."""
-    groups = [[{'effect': s.effect, 'joint': s.joint} for s in group] for group in verdict.sets]
-    told = {
-        'status': verdict.status,
-        'confidence': verdict.confidence,
-        'indistinguishable': groups,
-        'effects': [],
-    }
-    return judge(truth, {'verdict': told})
-
-
-def _decided(beliefs: Beliefs) -> Callable[[Case], Verdict]:
-    return lambda case: decide(case.evidence, beliefs)
-
-
-def _refitted(beliefs: Beliefs) -> Callable[[Case], Verdict]:
-    def anew(case: Case) -> Verdict:
-        return decide(_evidence(diagnosis_of(case.place, beliefs=beliefs)), beliefs)
-
-    return anew
-
-
-def _row(cases: Sequence[Case], anew: Callable[[Case], Verdict]) -> dict[str, Any]:
+def _row(
+    move: Move, truths: Sequence[Told], usual: Sequence[Told], moved: Sequence[Told]
+) -> dict[str, Any]:
     """Return how many verdicts change, by how much confidence does, and how many are right."""
-    verdicts = [anew(case) for case in cases]
-    judged = [_judged(case.truth, v) for case, v in zip(cases, verdicts, strict=True)]
-    changed = [
-        (v.status, {frozenset(g) for g in v.sets})
-        != (case.said.status, {frozenset(g) for g in case.said.sets})
-        for case, v in zip(cases, verdicts, strict=True)
-    ]
-    drift = [
-        abs(v.confidence - case.said.confidence) for case, v in zip(cases, verdicts, strict=True)
-    ]
+    pairs = list(zip(usual, moved, strict=True))
     return {
-        'cases': len(cases),
-        'verdicts': sum(changed),
-        'confidence': max(drift, default=0.0),
-        'right': sum(j.right for j in judged),
-        'sure_and_wrong': sum(j.confidently_wrong for j in judged),
+        'belief': move.belief,
+        'step': move.step,
+        'value': move.value,
+        'moved_to': move.other,
+        'verdicts': sum(_named(a) != _named(b) for a, b in pairs),
+        'confidence': max((abs(a['confidence'] - b['confidence']) for a, b in pairs), default=0.0),
+        **_totals(_judged(truths, moved)),
     }
 
 
-def _totals(cases: Sequence[Case]) -> dict[str, int]:
+def _named(told: Told) -> tuple[str, list[list[str]]]:
+    groups = [sorted(map(str, group)) for group in told['indistinguishable']]
+    return str(told['status']), sorted(groups)
+
+
+def _judged(truths: Sequence[Told], told: Sequence[Told]) -> list[Judged]:
+    return [judge(truth, {'verdict': one}) for truth, one in zip(truths, told, strict=True)]
+
+
+def _totals(judged: Sequence[Judged]) -> dict[str, int]:
     return {
-        'cases': len(cases),
-        'right': sum(case.judged.right for case in cases),
-        'sure_and_wrong': sum(case.judged.confidently_wrong for case in cases),
+        'cases': len(judged),
+        'right': sum(one.right for one in judged),
+        'sure_and_wrong': sum(one.confidently_wrong for one in judged),
     }

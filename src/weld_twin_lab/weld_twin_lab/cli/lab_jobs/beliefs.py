@@ -3,7 +3,7 @@
 """What hangs on each tuned number of a diagnosis: every one moved by 25 % both ways.
 
 Diagnoses cases whose truths are known, then decides or diagnoses anew with one number moved at a
-time. Writes beliefs.json and beliefs.md.
+time. Writes beliefs.json and beliefs.md. Stopped, it goes on where it was when run again.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-RESULT, TABLE = 'beliefs.json', 'beliefs.md'
+from ..blind_jobs.options import add_pool, runner_of
+
+RESULT, TABLE, STORE = 'beliefs.json', 'beliefs.md', 'done'
 REFITTED = 10
 """Cases diagnosed anew for numbers that act before the verdict: some 10 minutes of one core."""
 
@@ -30,26 +32,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--only', default='', metavar='LIST', help='only these numbers, comma-separated'
     )
+    add_pool(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='where the table goes')
 
 
 def run(args: argparse.Namespace) -> int:
     """Move every number, write the table and print it."""
     import json
-    import sys
 
-    from weld_twin_nodes.offline.output_directory import new_directory
+    from weld_twin_msgs_py.files.whole_files import write_text
 
     from ...blind.belief_study import study
     from ...blind.belief_table import table
 
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
+    out = Path(args.out)
     only = [name for name in args.only.split(',') if name]
-    with new_directory(args.out, mark=RESULT) as place:
-        result = study(Path(args.cases), Path(args.truths), args.refit, only, tell)
-        (place / RESULT).write_text(json.dumps(result, indent=1) + '\n', encoding='utf-8')
-        (place / TABLE).write_text(table(result), encoding='utf-8')
-    print(table(result))
+    with runner_of(args, out / STORE, 'deciding') as runner:
+        result = study(Path(args.cases), Path(args.truths), runner, args.refit, only)
+    text = table(result)
+    write_text(out / RESULT, json.dumps(result, indent=1) + '\n', overwrite=True)
+    write_text(out / TABLE, text, overwrite=True)
+    print(text, end='')
     return 0

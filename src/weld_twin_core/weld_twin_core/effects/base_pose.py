@@ -21,4 +21,4 @@ class BasePose(FrameError):
     depends_on = 'constant'
     place = 'base'
     channel = 'base'
-    frame = 'base'
+    fitted_with = 'base'

@@ -59,7 +59,7 @@ class Hooks(Parametric, ABC):
     'temperature', 'time' or 'place' (in the workspace)."""
     place: ClassVar[str] = 'joint'
     """Where it sits: at its 'joint', or at 'base', 'tool', 'instrument', 'clock' or 'load'."""
-    frame: ClassVar[str | None] = None
+    fitted_with: ClassVar[str | None] = None
     """The frame it is an error of, 'base' or 'tool': no cause where that frame is fitted."""
     of_setup: ClassVar[bool] = False
     """Whether it belongs to one set-up and not to the robot."""

@@ -21,4 +21,4 @@ class ToolPose(FrameError):
     depends_on = 'constant'
     place = 'tool'
     channel = 'tool'
-    frame = 'tool'
+    fitted_with = 'tool'

@@ -86,7 +86,7 @@ def families(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]
     kinds = [
         kind
         for kind in REGISTRY.values()
-        if kind.cause and kind.name not in exclude and kind.frame not in align
+        if kind.cause and kind.name not in exclude and kind.fitted_with not in align
     ]
     return sorted(kinds, key=lambda kind: (kind.stage, kind.name))
 

@@ -17,7 +17,7 @@ from ..recording import Recording
 
 LEAST_MARGIN = 0.02
 """A joint this near [rad or m] to where it was recorded counts as recorded there: one degree."""
-MOST_MARGIN = 0.5
+MOST_MARGIN = 0.8
 """Never farther than this [rad or m], however few stations there are."""
 LEFT_OUT = 0.95
 """Share of the measurements, each left out in turn, that shall lie inside what the others show."""

@@ -37,6 +37,7 @@ class LivePosterior:
         self.posterior = posterior
         self._time = -np.inf
         self._q: Array | None = None
+        self._moving = False
         self._covariance = np.zeros((6, 6))
         self._outside: tuple[str, ...] = ()
 
@@ -71,8 +72,9 @@ class LivePosterior:
         since = t - self._time
         if self._q is None or since < 0.0:
             self._look(twin, q, np.zeros_like(q), wrench, wrench_frame, temperature)
-        elif since >= EVERY and np.abs(q - self._q).max() > MOVED:
+        elif since >= EVERY and (self._moving or np.abs(q - self._q).max() > MOVED):
             speed = (q - self._q) / since
+            self._moving = bool(np.abs(q - self._q).max() > MOVED)
             self._look(twin, q, speed, wrench, wrench_frame, temperature)
         else:
             return self._covariance

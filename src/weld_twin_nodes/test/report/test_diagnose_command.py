@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.recording import Recording
+from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.bags import BagReader, provenance, read_recording
+from weld_twin_msgs_py.bags import BagReader, provenance, read_recording, write_recording
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.robots import read_robot_yaml, read_urdf
 from weld_twin_nodes.cli import main
@@ -354,3 +354,96 @@ def test_a_file_that_is_no_diagnosis_is_told_in_one_line(tmp_path, capsys, conte
     assert run('export', path, '--robot', 'ur5') == 2
     err = capsys.readouterr().err
     assert reason in err and err.count('\n') == 1
+
+
+def covariances(bag):
+    """Stamps, positions and covariances of the poses that a bag says it is sure of."""
+    topic = '/twin/tool_pose_with_covariance'
+    with BagReader(bag) as reader:
+        rows = [
+            (
+                m.message.header.stamp.sec * 10**9 + m.message.header.stamp.nanosec,
+                m.message.pose.pose.position,
+                np.reshape(m.message.pose.covariance, (6, 6)),
+            )
+            for m in reader.messages([topic])
+        ]
+    positions = np.array([[p.x, p.y, p.z] for _, p, _ in rows])
+    return np.array([ns for ns, _, _ in rows]), positions, np.array([c for _, _, c in rows])
+
+
+def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path, capsys):
+    out = tmp_path / 'predicted'
+    model = found / 'diagnosis.json'
+    assert run('predict', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    assert 'within' in capsys.readouterr().out
+    ns, position = twin_poses(out)
+    sure_ns, sure_position, covariance = covariances(out)
+    assert np.array_equal(ns, sure_ns)
+    assert np.array_equal(position, sure_position)
+    np.testing.assert_allclose(covariance, np.swapaxes(covariance, 1, 2), rtol=1e-9)
+    assert np.linalg.eigvalsh(covariance).min() > -1e-18
+    # The true pose is that of the cell without the instrument's noise of 0.02 mm per axis.
+    measured = read_recording(out, load('ur5')).measured.position
+    off = measured - position
+    whole = covariance[:, :3, :3] + 2e-5**2 * np.eye(3)
+    squared = np.einsum('mi,mi->m', off, np.linalg.solve(whole, off[..., None])[..., 0])
+    assert 0.85 <= np.mean(squared < 6.2514) <= 1.0
+    sigma = np.sqrt(np.linalg.eigvalsh(covariance[:, :3, :3])[:, -1])
+    assert np.median(sigma) < 1e-3
+
+
+def test_a_joint_taken_beyond_what_was_recorded_is_told_with_its_time(cell, found, tmp_path):
+    data = json.loads((found / 'diagnosis.json').read_text())
+    high = data['posterior']['recorded']['joints'][3]['measured'][-1][1]
+    robot = load('ur5')
+    t = np.linspace(0.0, 4.0, 401)
+    q = np.tile(read_recording(cell / 'first', robot).joints.q[0], (401, 1))
+    q[:, 3] = high + np.clip(t - 2.0, 0.0, 0.96)
+    write_recording(tmp_path / 'far', Recording('far', JointMotion(t, q)), robot)
+    out = tmp_path / 'predicted'
+    model = found / 'diagnosis.json'
+    assert run('predict', tmp_path / 'far', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    outside = json.loads((out / 'prediction.json').read_text())['outside']
+    mine = [item for item in outside if 'beyond' in item['why']]
+    assert [item['why'] for item in mine] == ['wrist_1_joint is 0.96 rad beyond what was recorded']
+    margin = data['posterior']['recorded']['joints'][3]['margin']
+    assert mine[0]['t_start'] == pytest.approx(2.0 + margin, abs=0.02)
+    assert mine[0]['t_end'] == pytest.approx(4.0)
+    _, _, covariance = covariances(out)
+    near, far = np.sqrt(covariance[[0, -1]][:, range(3), range(3)].sum(axis=1))
+    assert far > near
+
+
+def test_a_model_written_without_a_posterior_still_predicts_and_says_so(
+    cell, found, tmp_path, capsys
+):
+    data = json.loads((found / 'diagnosis.json').read_text())
+    del data['posterior']
+    (tmp_path / 'old.json').write_text(json.dumps(data))
+    out = tmp_path / 'predicted'
+    words = ('--robot', 'ur5', '--model', tmp_path / 'old.json', '--out', out)
+    assert run('predict', cell / 'second', *words) == 0
+    assert 'has no posterior' in capsys.readouterr().out
+    assert covariances(out)[0].size == 0
+    assert not (out / 'prediction.json').exists()
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'reason'),
+    [
+        (lambda p: p.pop('covariance'), "lacks 'covariance'"),
+        (lambda p: p['covariance'].pop(), 'lower triangle'),
+        (lambda p: p['recorded']['joints'].reverse(), 'it was made for joints'),
+        (lambda p: p['discrepancy'].update(position_m=-1.0), 'must be a size'),
+    ],
+)
+def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, capsys, spoil, reason):
+    data = json.loads((found / 'diagnosis.json').read_text())
+    spoil(data['posterior'])
+    (tmp_path / 'spoilt.json').write_text(json.dumps(data))
+    words = ('--robot', 'ur5', '--model', tmp_path / 'spoilt.json', '--out', tmp_path / 'p')
+    assert run('predict', cell / 'second', *words) == 2
+    err = capsys.readouterr().err
+    assert reason in err
+    assert err.count('\n') == 1

@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
@@ -52,11 +53,24 @@ TRUST = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Where coordinates lie before the data, counted from the fit, and how wide; shapes (P,)."""
+    """
+    Where coordinates lie before the data.
+
+    Attributes
+    ----------
+    middle, width : array, shape (P,)
+        Counted from the fit; standard deviation.
+    group : array of int, shape (P,)
+        Family, -1 for frames.
+    gears : array of bool, shape (G,)
+        Families that say nothing of others.
+
+    """
 
     middle: Array
     width: Array
     group: Array
+    gears: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +119,7 @@ def allowed(
     what = Directions(frames, len(problem.recordings), effects)
     knots = plausible_arm.fine_knots([_joints(r) for r in problem.recordings])
     rows = _rows(problem, model, scale, what, knots)
-    prior = _prior(what, model, sum(k.size for k in knots))
+    prior = _prior(what, model, knots)
     width, noise = learned(rows, prior, (USUAL_NOISE / scale.position) ** 2)
     mean, covariance = conditioned(rows, prior, width, noise)
     count = what.count
@@ -117,8 +131,8 @@ def allowed(
         return middle[:count], spread[:count, :count]
 
     left = leftover(problem, scale, unseen, given, floor)
-    curve = width[-1] if width.size > count else 0.0
-    rest = plausible_arm.discrepancy(model.robot, left, curve)
+    curves = width[count + np.cumsum([0] + [k.size for k in knots[:-1]])]
+    rest = plausible_arm.discrepancy(model.robot, left, curves)
     return Posterior(
         what,
         mean[:count],
@@ -187,35 +201,37 @@ def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:
     return thin, replace(scale, weights=tuple(kept))
 
 
-def _prior(what: Directions, model: Model, fine: int) -> Prior:
-    """Return the prior of frames, effects and the fine curves' heights."""
+def _prior(what: Directions, model: Model, knots: list[Array]) -> Prior:
+    """Return the prior of frames, effects and the heights of every joint's fine curve."""
     frames, effects = what.frame_count, what.effects
-    group = plausible_arm.groups(effects)
+    group, gears = plausible_arm.groups(effects)
+    sizes = [k.size for k in knots]
+    fine = sum(sizes)
+    curves = gears.size + np.repeat(np.arange(len(sizes)), sizes)
+    tied = plausible_arm.middles(effects, model.found)
+    widths = plausible_arm.widths(model.robot, effects)
     return Prior(
-        np.concatenate(
-            [np.zeros(frames), plausible_arm.middles(effects, model.found), np.zeros(fine)]
-        ),
+        np.concatenate([np.zeros(frames), tied, np.zeros(fine)]),
         np.concatenate(
             [
                 np.tile(np.repeat(FRAME_WIDTHS, 3), frames // 6),
-                plausible_arm.widths(model.robot, effects),
+                widths,
                 np.full(fine, plausible_arm.FINE),
             ]
         ),
-        np.concatenate(
-            [np.full(frames, -1), group, np.full(fine, group.max(initial=-1) + 1)]
-        ).astype(int),
+        np.concatenate([np.full(frames, -1), group, curves]).astype(int),
+        np.concatenate([gears, np.ones(len(sizes), bool)]),
     )
 
 
-def learned(rows: Rows, prior: Prior, usual: float = 1.0) -> tuple[Array, float]:
+def learned(rows: Rows, prior: Prior, expected: float = 1.0) -> tuple[Array, float]:
     """
     Return the width of every coordinate as this arm shows it, shape (P,), and the noise.
 
     Parameters
     ----------
     rows, prior : Rows, Prior
-    usual : float
+    expected : float
         Variance of a row before anything is known; the noise returned is a variance too.
 
     """
@@ -224,19 +240,26 @@ def learned(rows: Rows, prior: Prior, usual: float = 1.0) -> tuple[Array, float]
     rss = rows.share * float(rows.residual @ rows.residual)
     count = rows.share * rows.residual.size
     middle = prior.middle / prior.width
-    grown, noise = np.ones(prior.group.max(initial=-1) + 1), 1.0
+    grown, noise = np.ones(prior.gears.size), 1.0
+    tied = prior.group >= 0
     size = np.ones(prior.width.size)
     for _ in range(ROUNDS):
         step, spread = _solved(normal / noise, right / noise, middle, size)
         known = np.clip(1.0 - spread / size**2, 0.0, 1.0)
         left = rss - 2.0 * right @ step + step @ normal @ step
         free = max(count - float(known.sum()), 0.0)
-        noise = (max(left, 0.0) + NOISE_TRUST * usual) / (free + NOISE_TRUST)
-        for k in range(grown.size):
-            mine = prior.group == k
-            shown = float(((step - middle)[mine] ** 2).sum())
-            grown[k] = np.sqrt((shown + TRUST) / (known[mine].sum() + TRUST))
-        size = np.where(prior.group >= 0, grown[prior.group], 1.0)
+        noise = (max(left, 0.0) + NOISE_TRUST * expected) / (free + NOISE_TRUST)
+        shown = np.bincount(prior.group[tied], (step - middle)[tied] ** 2, grown.size)
+        weight = np.bincount(prior.group[tied], known[tied], grown.size)
+        # A good arm is good in everything, so that families are compared with all together.
+        common, rough = (
+            (shown[part].sum() + TRUST) / (weight[part].sum() + TRUST)
+            for part in (~prior.gears, prior.gears)
+        )
+        # One rough gear makes the others suspect; a smooth one says nothing of them.
+        usual = np.where(prior.gears, max(rough, 1.0), common)
+        grown = np.sqrt((shown + TRUST * usual) / (weight + TRUST))
+        size = np.where(tied, grown[prior.group], 1.0)
     return prior.width * size, noise
 
 

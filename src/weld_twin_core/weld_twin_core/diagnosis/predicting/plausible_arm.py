@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm.robot import Robot
 from ...arrays import Array
@@ -117,11 +118,21 @@ def _low(effect: TransmissionRipple, found: Sequence[Effect]) -> Array:
     return out.ravel()
 
 
-def groups(effects: Sequence[Effect]) -> Array:
-    """Return the family number of every coordinate, shape (K,)."""
-    names = list(dict.fromkeys(effect.name for effect in effects))
+def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
+    """
+    Return the family number of every coordinate, shape (K,), and which families are a gear's.
+
+    A family is an effect on all joints; but every gear is as uneven as it was cut, and says
+    nothing of the others.
+    """
+    names = [
+        effect.name if not isinstance(effect, TransmissionRipple) else f'gear {effect.joint}'
+        for effect in effects
+    ]
+    distinct = list(dict.fromkeys(names))
     sizes = [effect.coordinates().size for effect in effects]
-    return np.repeat([names.index(effect.name) for effect in effects], sizes).astype(int)
+    numbers = np.repeat([distinct.index(name) for name in names], sizes).astype(int)
+    return numbers, np.array([name.startswith('gear ') for name in distinct], dtype=bool)
 
 
 def widths(robot: Robot, effects: Sequence[Effect]) -> Array:
@@ -156,8 +167,19 @@ def fine_columns(features: Features, knots: Sequence[Array]) -> Array:
     return np.concatenate(out)
 
 
-def discrepancy(robot: Robot, rest: Rest, fine: float) -> Discrepancy:
-    """Return what no parameter explains, with gears as uneven where they were not seen."""
+def discrepancy(robot: Robot, rest: Rest, fine: Array) -> Discrepancy:
+    """
+    Return what no parameter explains, with gears as uneven where they were not seen.
+
+    Parameters
+    ----------
+    robot : Robot
+    rest : Rest
+        What is left over where it was recorded.
+    fine : array, shape (n,)
+        Height of every joint's fine curve.
+
+    """
     turning = np.where(robot.prismatic, 0.0, 1.0)
     return Discrepancy(
         rest.position, rest.orientation, rest.gear * turning, fine * turning, SPACING

@@ -92,7 +92,8 @@ def _name(path: Path) -> str:
 def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[str, Role]:
     """Return the topics to read; the joint states are a must, the others as they are there."""
     roles = {getattr(names, role.value): role for role in Role}
-    defaults = set(vars(TopicNames()).values())
+    space = names.joints.removesuffix(TopicNames().joints)
+    defaults = {*vars(TopicNames()).values(), *vars(TopicNames.within(space)).values()}
     for topic, role in list(roles.items()):
         kind, count = present.get(topic, ('', 0))
         if count == 0:

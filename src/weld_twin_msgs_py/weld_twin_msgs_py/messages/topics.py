@@ -69,6 +69,11 @@ class Topic:
         """Return whether its messages begin with a header."""
         return self.type not in _UNSTAMPED
 
+    @property
+    def relative(self) -> str:
+        """Return the name that a node's namespace goes before; `DIAGNOSTICS` is one for all."""
+        return self.name if self.name == DIAGNOSTICS.name else self.name.lstrip('/')
+
     def message_class(self) -> Any:
         """Return the rclpy message class; needs a ROS installation."""
         from importlib import import_module
@@ -253,3 +258,9 @@ class TopicNames:
         for item in fields(self):
             name = getattr(self, item.name)
             object.__setattr__(self, item.name, name if name.startswith('/') else f'/{name}')
+
+    @classmethod
+    def within(cls, namespace: str) -> TopicNames:
+        """Return the names of one robot's topics where each robot has a namespace."""
+        space = '/' + namespace.strip('/') if namespace.strip('/') else ''
+        return cls(**{item.name: f'{space}{item.default}' for item in fields(cls)})

@@ -161,7 +161,7 @@ def test_unsound_data_are_an_error_on_both_topics_until_they_are_mended(tmp_path
         cell.wait(lambda: node._verdict.get_subscription_count() > 0, 'a listener')
 
         def own():
-            return [s for m in health.messages for s in m.status if s.name == 'live_diagnosis']
+            return [s for m in health.messages for s in m.status if s.name == '/live_diagnosis']
 
         node._tell(unsound)
         cell.wait(lambda: len(said) == 1, 'a verdict')

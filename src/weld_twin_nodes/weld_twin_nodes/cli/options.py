@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -36,6 +37,9 @@ def robot_of(args: argparse.Namespace) -> Robot:
 def add_topics(parser: argparse.ArgumentParser) -> None:
     """Add the options that say what the topics of a bag are called."""
     group = parser.add_argument_group('topics, for bags recorded elsewhere')
+    group.add_argument(
+        '--namespace', default='', metavar='NS', help='of the robot, such as left for /left/...'
+    )
     for name in TOPIC_OPTIONS:
         group.add_argument(f'--{name}-topic', metavar='TOPIC')
 
@@ -46,7 +50,8 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
 
     given = {name: getattr(args, f'{name}_topic') for name in TOPIC_OPTIONS}
     given['joints'] = given.pop('joint')
-    return TopicNames(**{name: value for name, value in given.items() if value})
+    named = {name: value for name, value in given.items() if value}
+    return replace(TopicNames.within(args.namespace), **named)
 
 
 def add_bag_output(parser: argparse.ArgumentParser) -> None:

@@ -43,7 +43,8 @@ class HealthListener:
         self.told.clear()
 
     def of(self, node: str) -> list[tuple[str, str]]:
-        """Return level and message of all statuses of a node."""
+        """Return level and message of all statuses of a node, by its name with the namespace."""
+        node = '/' + node.lstrip('/')
         return [
             entry
             for name, entries in self.told.items()

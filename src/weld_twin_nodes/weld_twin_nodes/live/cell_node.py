@@ -23,6 +23,7 @@ from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, VOLATILE, Topic
 from . import qos_events
 from .health import Health, Input
 from .outputs import Output
+from .partners import unheard_publishers, unreached_subscribers
 from .settings import Setting
 
 WARN_EVERY = 5.0
@@ -55,6 +56,11 @@ SHARED = (
         False,
         'request reliable delivery; only for inputs whose publishers offer it',
     ),
+    Setting(
+        'hardware_id',
+        '',
+        'what the diagnostics call this robot; empty: the namespace and the name of the model',
+    ),
     Setting('stale_after', 1.0, 'silence after which an input counts as stale [s]', 0.05, 3600.0),
 )
 
@@ -74,10 +80,12 @@ class CellNode(Node):
         self._outputs: list[Output] = []
         self._awaited: list[Output] = []
         self._waiting: list[Callable[[], None]] = []
+        self._partners: list[Callable[[], list[str]]] = []
+        self._unmatched: list[str] = []
         for item in (*SHARED, *self.settings):
             self.declare_parameter(item.name, item.default, item.descriptor())
-        self.health = Health(name, self.setting('stale_after'))
-        self.health.full_name = self.get_fully_qualified_name()
+        self.health = Health(self.get_fully_qualified_name(), self.setting('stale_after'))
+        self.take_robot_name('')
         self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
         self.every(HEALTH_EVERY, self._tell_health)
         self._jumps = self.get_clock().create_jump_callback(
@@ -106,6 +114,11 @@ class CellNode(Node):
                 output.wait_for_all_acked(Duration(seconds=left))
         super().destroy_node()  # type: ignore[no-untyped-call]
 
+    def take_robot_name(self, name: str) -> None:
+        """Take the name of the robot model, for the diagnostics to tell robots apart."""
+        parts = self.get_namespace().strip('/'), name
+        self.health.hardware_id = self.setting('hardware_id') or '/'.join(filter(None, parts))
+
     def setting(self, name: str) -> Any:
         """Return the value of a parameter."""
         return self.get_parameter(name).value
@@ -128,13 +141,12 @@ class CellNode(Node):
 
     def offer(self, topic: Topic, *, awaited: bool = True) -> Output:
         """Return a publisher of a topic of the table; ``wait_for_subscribers`` is for awaited."""
+        name = self.resolve_topic_name(topic.relative)
         publisher = self.create_publisher(
             topic.message_class(),
-            topic.name,
+            topic.relative,
             topic.offered.to_rclpy(),
-            event_callbacks=qos_events.of_publisher(
-                topic.name, topic.offered, partial(self.mismatch, topic.name)
-            ),
+            event_callbacks=qos_events.of_publisher(name, topic.offered, self._unmatched_event),
         )
         output = Output(publisher, stamped=topic.stamped)
         if awaited:
@@ -142,6 +154,9 @@ class CellNode(Node):
         if topic.offered.durability == VOLATILE and topic is not DIAGNOSTICS:
             self.health.outputs.append(output)
         self._outputs.append(output)
+        self._partners.append(
+            partial(unreached_subscribers, self, name, topic.type, topic.offered)
+        )
         return output
 
     def listen(
@@ -166,7 +181,8 @@ class CellNode(Node):
             The node can do nothing without this input; health calls its absence stale.
 
         """
-        state = self.health.watch(topic.name, required=required, steady=topic.steady)
+        name = self.resolve_topic_name(topic.relative)
+        state = self.health.watch(name, required=required, steady=topic.steady)
         decode = checked(topic.type) if raw else decoder(topic.type)
 
         def guarded(data: bytes) -> None:
@@ -175,27 +191,26 @@ class CellNode(Node):
             try:
                 callback(decode(data))
             except TwinError as error:
-                self.refuse(topic.name, str(error))
+                self.refuse(name, str(error))
             except Exception:
                 self._raise_unless_over()
 
-        def subscribe() -> None:
-            wanted = topic.requested
-            if self.setting('reliable_inputs'):
-                wanted = replace(wanted, reliability=topic.offered.reliability)
-            self.create_subscription(
-                topic.message_class(),
-                topic.name,
-                guarded,
-                wanted.to_rclpy(),
-                raw=True,
-                event_callbacks=qos_events.of_subscription(
-                    topic.name, wanted, partial(self.mismatch, topic.name)
-                ),
-            )
-
-        self.when_ready(subscribe)
+        self.when_ready(partial(self._subscribe_to, topic, name, guarded))
         return state
+
+    def _subscribe_to(self, topic: Topic, name: str, callback: Callable[[bytes], None]) -> None:
+        wanted = topic.requested
+        if self.setting('reliable_inputs'):
+            wanted = replace(wanted, reliability=topic.offered.reliability)
+        self.create_subscription(
+            topic.message_class(),
+            topic.relative,
+            callback,
+            wanted.to_rclpy(),
+            raw=True,
+            event_callbacks=qos_events.of_subscription(name, wanted, self._unmatched_event),
+        )
+        self._partners.append(partial(unheard_publishers, self, name, topic.type, wanted))
 
     def refuse(self, source: str, reason: str) -> None:
         """Count a sample that cannot be used, and say why, now and then."""
@@ -285,9 +300,25 @@ class CellNode(Node):
     def _tell_health(self) -> None:
         for name, state in self.health.inputs.items():
             state.publishers = self.count_publishers(name)
-        for name in [name for name in self.health.lasting if name.startswith('/')]:
-            if not self.count_publishers(name) * self.count_subscribers(name):
-                del self.health.lasting[name]
+        self._look_at_partners()
         self._diagnostics.publish(
             self.messages.statuses(self.get_clock().now().nanoseconds, self.health.statuses())
         )
+
+    def _unmatched_event(self, _: str) -> None:
+        """Tell at once of what the graph shows; the event itself does not know the partner."""
+        self._look_at_partners()
+
+    def _look_at_partners(self) -> None:
+        """Tell of every partner that does not match, as long as it is there."""
+        for key in [key for key in self.health.lasting if key.startswith('/')]:
+            if not self.count_publishers(key) * self.count_subscribers(key):
+                del self.health.lasting[key]
+        unmatched = [sentence for look in self._partners for sentence in look()]
+        for sentence in unmatched:
+            if sentence not in self._unmatched:
+                self.get_logger().warning(sentence)
+        self._unmatched = unmatched
+        self.health.lasting.pop('partners', None)
+        if unmatched:
+            self.health.lasting['partners'] = '; '.join(unmatched)

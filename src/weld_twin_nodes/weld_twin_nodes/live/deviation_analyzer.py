@@ -98,7 +98,12 @@ class DeviationAnalyzer(CellNode):
     def _publish_metrics(self) -> None:
         self._told = self._deviations.samples
         self._metrics.publish(
-            self.messages.diagnostics(self._stamp, METRICS, self._deviations.metrics())
+            self.messages.diagnostics(
+                self._stamp,
+                METRICS,
+                self._deviations.metrics(),
+                hardware_id=self.health.hardware_id,
+            )
         )
 
 

@@ -100,7 +100,7 @@ class Health:
         self.fault = ''
         """What makes the work of the node worthless as long as it lasts; empty for nothing."""
         self._run = time.time_ns()
-        self.full_name = node
+        self.hardware_id = ''
         self._said: list[str] = []
         self._said_in_all = 0
 
@@ -128,8 +128,9 @@ class Health:
                 **{f'remark_{k}': sentence for k, sentence in enumerate(self.remarks)},
                 SENT: sent_so_far(self.outputs),
                 RUN: self._run,
-                NODE: self.full_name,
+                NODE: self._node,
             },
         )
         self._said.clear()
-        return [own, *(item.status(self._node, now) for item in self.inputs.values())]
+        all_of_it = [own, *(item.status(self._node, now) for item in self.inputs.values())]
+        return [status._replace(hardware_id=self.hardware_id) for status in all_of_it]

@@ -110,7 +110,7 @@ class LiveDiagnosis(CellNode):
                     result.values,
                     LEVELS[result.status],
                     result.sentence,
-                    self._twin.robot.name,
+                    self.health.hardware_id,
                 )
             )
 

@@ -45,9 +45,12 @@ def robot_of(node: CellNode) -> Robot:
     name = node.setting('robot')
     base, tip = node.setting('base_link') or None, node.setting('tip_link') or None
     if told_by_topic(name):
-        topic = ROBOT_DESCRIPTION.name if name == 'topic' else name
-        return parse_urdf(_described(node, topic), topic, base, tip)
-    return load_robot(name, base, tip)
+        topic = node.resolve_topic_name(ROBOT_DESCRIPTION.relative if name == 'topic' else name)
+        robot = parse_urdf(_described(node, topic), topic, base, tip)
+    else:
+        robot = load_robot(name, base, tip)
+    node.take_robot_name(robot.name)
+    return robot
 
 
 def told_by_topic(name: str) -> bool:

@@ -135,11 +135,11 @@ class TrajectoryGenerator(CellNode):
         name = self.setting('follow')
         if not name:
             return
-        if name not in BY_NAME:
+        topic = BY_NAME.get('/' + name.lstrip('/'))
+        if topic is None:
             raise DataError(f'follow must be one of {", ".join(BY_NAME)}, got {name!r}')
-        topic = BY_NAME[name]
         self.create_subscription(
-            topic.message_class(), topic.name, self._on_answer, topic.offered.to_rclpy()
+            topic.message_class(), name, self._on_answer, topic.offered.to_rclpy()
         )
 
     def _on_answer(self, message: Any) -> None:

@@ -108,7 +108,7 @@ def _inputs(bench: Bench, node: str) -> list[bool]:
     return [
         any(level == 'ok' for level, _ in entries)
         for name, entries in bench.health.told.items()
-        if name.split(': ')[0] == node and not name.endswith(unfed)
+        if name.split(': ')[0] == f'/{node}' and not name.endswith(unfed)
     ]
 
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from weld_twin_core import __version__
+import weld_twin_core
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -59,7 +59,7 @@ def test_package_xml_and_setup_py_agree(package):
     xml = ElementTree.parse(ROOT / 'src' / package / 'package.xml').getroot()
     told = setup_keywords(package)
     assert xml.findtext('name') == package
-    assert xml.findtext('version') == told['version'].value == __version__
+    assert xml.findtext('version') == told['version'].value == weld_twin_core.__version__
     assert xml.findtext('description') == told['description'].value
     assert xml.findtext('license') == told['license'].value == 'Apache-2.0'
     assert xml.findtext('export/build_type') == 'ament_python'

@@ -21,7 +21,7 @@ from weld_twin_core.sensitivity import (
     sweep,
 )
 from weld_twin_core.sensitivity.claims import CaseName, judge, measure_case
-from weld_twin_core.sensitivity.claims.combined_measures import _exponent
+from weld_twin_core.sensitivity.claims.combined_measures import growth_exponent
 
 
 @pytest.fixture(scope='module')
@@ -63,8 +63,8 @@ def test_combined_scenario_is_below_the_sum_of_its_parts(study):
 
 def test_the_power_of_a_sum_of_constants_is_one():
     grid = np.linspace(0.0, 1.0, 1000)
-    assert _exponent(grid, np.arange(1.0, 1001.0)) == pytest.approx(1.0, abs=0.01)
-    assert _exponent(grid, np.cumsum(grid)) == pytest.approx(2.0, abs=0.01)
+    assert growth_exponent(grid, np.arange(1.0, 1001.0)) == pytest.approx(1.0, abs=0.01)
+    assert growth_exponent(grid, np.cumsum(grid)) == pytest.approx(2.0, abs=0.01)
 
 
 def test_time_laws_do_not_matter_to_pure_geometry(ur5):

@@ -17,6 +17,7 @@ from .rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
 CONVENTIONS = ('standard', 'modified')
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
+"""In the world frame [m/s^2], of a robot file that does not say."""
 _TOP_KEYS = {
     'name',
     'convention',

@@ -18,10 +18,12 @@ from .view import Parameter, Stage, Value, View
 FINEST, COARSEST = 1e-4, 2e-2
 """Steps that a search considers [rad]."""
 PEAKS = 3
+"""Steps that a search starts from; beside the right one stand its half and its double."""
 PHASE = 1.0 / 16.0
 """Periods by which neighbours on the first grid of steps differ at the far end of the travel."""
 ZOOM, ZOOMS = 16, 3
 MOST = 2000
+"""Steps tried at once at most, which bounds memory."""
 
 
 @register

@@ -20,6 +20,7 @@ from .registry import register
 from .view import Parameter, Stage, Value, View, single
 
 TIMES = 40
+"""Times that a search tries, evenly over the recording."""
 
 
 @register

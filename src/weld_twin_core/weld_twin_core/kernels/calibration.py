@@ -33,6 +33,7 @@ from ..arrays import Array
 SETTLED = 1e-12
 """Step [m, rad] that ends the iteration."""
 STEPS = 20
+"""Steps at most; each squares the error, so that a fit which needs more does not converge."""
 _SQUARED = 1e-10
 """Squared pivot of the scaled normal equations below which they are not trusted."""
 _DEPENDENT = 1e-10

@@ -43,6 +43,7 @@ ROUNDING = 1e-14
 _NEGLIGIBLE = 1e-13
 """Remainder up to which all samples are taken as determined by a few."""
 _MIXTURES = 48
+"""Mixtures that stand for all features; a motion with more independent ones is worked on whole."""
 BLOCK = 504
 """Draws whose weights are built at once."""
 POINTS = 8000

@@ -100,30 +100,9 @@ class SinglePose:
         z0, z1 = c * z0 - s * z1, s * z0 + c * z1
         p0, p1, p2 = c * p0 - s * p1, s * p0 + c * p1, p2 + d
         # Packed numbers become an array in less time than a tuple of them.
-        pose: Array = np.ndarray(
-            (4, 4),
-            np.float64,
-            bytearray(
-                _PACKED(
-                    x0,
-                    z1 * x2 - z2 * x1,
-                    z0,
-                    p0,
-                    x1,
-                    z2 * x0 - z0 * x2,
-                    z1,
-                    p1,
-                    x2,
-                    z0 * x1 - z1 * x0,
-                    z2,
-                    p2,
-                    0.0,
-                    0.0,
-                    0.0,
-                    1.0,
-                )
-            ),
-        )
+        y0, y1, y2 = z1 * x2 - z2 * x1, z2 * x0 - z0 * x2, z0 * x1 - z1 * x0
+        packed = _PACKED(x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2, 0.0, 0.0, 0.0, 1.0)
+        pose: Array = np.ndarray((4, 4), np.float64, bytearray(packed))
         return pose if self._base is None else self._base @ pose
 
 

@@ -30,6 +30,7 @@ from .iso9283 import (
 from .path_cycles import PathCycles, path_cycles
 
 HOUR = 3600.0
+"""Seconds."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -157,9 +157,21 @@ def plan(
         slowed *= 1.01 * excess
     if excess > 1.0:
         raise PathError(_too_fast(robot, motion, timing, velocity, acceleration))
-    solution = line.solution
-    report = PlanReport(
-        float(timing.t[-1]),
+    report = _report(line.solution, float(timing.t[-1]), slowed, velocity, acceleration, residual)
+    seam = path.sample(timing.s)
+    return Plan(motion, line.poses(timing.s), seam, timing.s, path.length, report)
+
+
+def _report(
+    solution: PathSolution,
+    duration: float,
+    slowed: float,
+    velocity: Array,
+    acceleration: Array,
+    residual: float,
+) -> PlanReport:
+    return PlanReport(
+        duration,
         slowed,
         velocity,
         acceleration,
@@ -169,8 +181,6 @@ def plan(
         float(solution.limit_margin.min()),
         solution.method,
     )
-    seam = path.sample(timing.s)
-    return Plan(motion, line.poses(timing.s), seam, timing.s, path.length, report)
 
 
 class _JointLine:

@@ -23,6 +23,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 }
 """Distributions and their numbers; the spread of a lognormal is the std of the logarithm."""
 _DEFAULTS = {'mean': 0.0}
+"""Parameters that may be left out."""
 
 
 @dataclass(frozen=True)
@@ -180,3 +181,4 @@ def _below_triangle(value: float, low: float, mode: float, high: float) -> float
 
 
 _MIDPOINTS = (np.arange(2000) + 0.5) / 2000.0
+"""Probabilities at which mean and deviation are summed."""

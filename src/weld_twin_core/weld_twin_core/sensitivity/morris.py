@@ -27,6 +27,7 @@ from .outcome import refuse_unfinite
 from .salib import salib
 
 LEVELS = 8
+"""Levels of the grid of each input; even, as the method wants, so that all are visited alike."""
 MARGIN = 0.02
 """Probability left out at either end, where a normal distribution is infinitely far out."""
 

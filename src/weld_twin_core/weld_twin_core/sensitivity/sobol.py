@@ -28,6 +28,7 @@ from .evaluate import Function
 from .outcome import refuse_unfinite
 
 CONFIDENCE = 0.95
+"""Of the intervals of the indices."""
 SETTLED = 0.05
 """Half-width and change of a total index below which a study counts as converged."""
 

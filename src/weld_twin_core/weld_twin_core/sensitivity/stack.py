@@ -15,7 +15,9 @@ from ..errors import DataError
 from .outcome import Outcomes, refuse_unfinite
 
 PERCENTILES = (5.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0)
+"""What the distribution is told by [%]."""
 _COVERAGE = 0.95
+"""Confidence of the intervals of the percentiles."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from .seam_study import Study
 from .tolerance import Tolerance
 
 DEGREE = np.pi / 180.0
+"""Radians."""
 RANGES: dict[str, tuple[float, float]] = {
     'joint_offset': (0.01 * DEGREE, 0.5 * DEGREE),
     'link_length': (0.0, 0.5e-3),

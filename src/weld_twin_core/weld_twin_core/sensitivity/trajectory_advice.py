@@ -31,6 +31,7 @@ from .seam_study import Study, planned_study
 from .tolerance import Tolerance, with_draws
 
 _POINTS = 17
+"""Points of the seam at which placements are compared."""
 _SPEED = 0.02
 """Travel speed [m/s] while placements are compared."""
 

@@ -38,7 +38,9 @@ BEYOND_COMMANDS = frozenset(
 )
 """Effects of the measurement, or new in every run: no joint command mends them."""
 _CLOSED = 1e-12
+"""Error [m, rad] that is rounding; nothing is left to correct."""
 _LEAST_SHARE = 1e-3
+"""Share of a step below which no shorter one is tried: the sample stays as it is."""
 _SINGULAR = 1e-9
 """Damping of a step [m^2]: invisible but within some tens of micrometres of a singularity."""
 

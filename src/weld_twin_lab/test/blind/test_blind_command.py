@@ -90,7 +90,7 @@ def test_another_seed_does_not_go_where_cases_are(checked, weld_twin):
 
 def test_a_cause_put_into_a_real_bag_moves_it_as_the_twin_says():
     from weld_twin_lab.blind.blind_cell import Cell, Take
-    from weld_twin_lab.blind.real_motion import _command, _with
+    from weld_twin_lab.blind.real_motion import recorded_command, with_cause
     from weld_twin_lab.plant.tracker import Tracker
 
     robot = catalog.load('ur5')
@@ -106,7 +106,7 @@ def test_a_cause_put_into_a_real_bag_moves_it_as_the_twin_says():
     cause = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3}
 
     cell = Cell(robot, Tracker())
-    mixed, size = _with(cell, cause, Take(_command(real), 1), real)
+    mixed, size = with_cause(cell, cause, Take(recorded_command(real), 1), real)
 
     moved = Twin(robot, effects_from_list([cause], robot)).poses(bare, measured_t)
     off = moved.position - poses.position

@@ -42,6 +42,7 @@ class Effort:
 
 FULL = Effort()
 QUICK = Effort(3, 0.01, (1000,), 500, 16, 100, 100_000, (0.2, 0.5), True)
+"""For a look, and for the tests: seconds instead of minutes."""
 
 
 def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:

@@ -25,7 +25,9 @@ from .race import Contender, Workload
 CLOSED = 1e-9
 """What inverse kinematics leaves open [m]."""
 NEWTON_STEPS = 20
+"""Steps to a point at most; it begins at the solution of the point before."""
 PYBOTICS_STEPS = 4
+"""Steps after which it is stopped; its time for one is what is compared."""
 
 
 def fits(poses: int, seam: int, peers: set[str]) -> Iterator[Workload]:

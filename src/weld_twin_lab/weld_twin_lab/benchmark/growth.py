@@ -17,10 +17,15 @@ from .arms import arm_of, calibrated_arm, random_positions
 from .processes import bag
 
 ROUNDS = 7
+"""Timings of which the least counts."""
 COUNTS = (10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000, 300_000)
+"""Poses at once."""
 JOINTS = tuple(range(2, 13))
+"""Joints of the arm."""
 MANY = 20_000
+"""Poses over which time and memory of one are taken."""
 QUICK = 3000
+"""The same for a quick run."""
 
 
 def growth(minutes: tuple[float, ...], quick: bool) -> dict[str, Any]:

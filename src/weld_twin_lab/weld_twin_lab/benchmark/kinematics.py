@@ -27,6 +27,7 @@ LOOPED = 500
 BATCH = 10_000
 """Poses a peer that takes batches is timed on for derivatives, the slowest of the workloads."""
 EXACT = 1e-12
+"""Difference [m or rad] that rounding may leave between two ways to the same number."""
 
 
 def batches(robot: Robot, peers: dict[str, Peer], count: int) -> Iterator[Workload]:

@@ -25,6 +25,7 @@ from .arms import smooth_motion
 
 JOINT_RATE, POSE_RATE = 125.0, 60.0
 STARTS = 7
+"""Starts of a process of which the median counts."""
 COMMANDS = {
     'python': ['-c', 'pass'],
     'import numpy': ['-c', 'import numpy'],

@@ -15,7 +15,9 @@ from .kinematics import OWN
 from .race import Outcome
 
 UNITS = ((1.0, 's'), (1e-3, 'ms'), (1e-6, 'us'), (1e-9, 'ns'))
+"""Units of time, the largest that a figure reaches is used."""
 MEGABYTE = 1e6
+"""Bytes."""
 LEFT_OUT = ('N = 1,000', 'arbitrary points')
 """Ends of the titles that the brief table goes without."""
 

@@ -19,11 +19,15 @@ from .kinematics import OWN
 from .race import Contender, Workload
 
 POINTS = 200
+"""Points of a seam, as the sensitivity study has."""
 BASE = 1024
+"""Rows of the base design; the study runs as many, times the inputs and two."""
 FEW = 16
 """Draws the peer is timed on; every draw costs it the same."""
 EXACT = 1e-12
+"""Difference [m] that rounding may leave between two ways to the same pose."""
 CONFIDENCE = 0.95
+"""Of the intervals; SALib's own default."""
 ESTIMATES = ('S1', 'ST', 'S1_conf', 'ST_conf')
 
 

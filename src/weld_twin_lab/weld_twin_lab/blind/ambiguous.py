@@ -20,6 +20,7 @@ from .cause_sizes import Cause, draw
 
 Site = tuple[str, str | None]
 PARALLEL = 1e-6
+"""Sine of the angle between two axes up to which they are parallel; tables of rows are exact."""
 
 
 class Construction(NamedTuple):

@@ -26,7 +26,9 @@ from .displacement import rigid, rms
 from .recorded_motion import Motion, motion
 
 SPANS = (20.0, 60.0)
+"""Length [s] of a recording, drawn between these."""
 RICHNESS = (0.0, 1.0)
+"""How far the physics goes beyond the textbook, drawn between these."""
 GROSS = 6.0
 """Standard deviations from which a measurement is an outlier."""
 

@@ -74,6 +74,7 @@ MOST = {
 LEAST = {'servo_lag': 0.15, 'joint_compliance': 0.1}
 """The same for causes that the simulator cannot have any smaller: a servo or spring too stiff."""
 RIPPLE_ORDERS = (1, 2, 3, 8, 20, 50, 80, 100)
+"""Orders of ripple [1/turn]: eccentric wheels, teeth, and the waves of a strain wave gear."""
 
 
 def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Cause:

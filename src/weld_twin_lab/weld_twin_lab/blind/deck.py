@@ -41,7 +41,12 @@ _STRATUM = {
     'ambiguous': (1, 2, 2, 3),
     'none': (0,),
 }
+"""
+Number of the stratum of each case of a kind, dealt like cards: each comes as often as it stands
+here.
+"""
 _COUNT = {'double': 2, 'triple': 3, 'none': 0}
+"""Causes of a case; one where the kind is not named."""
 ROBOTS = (
     'ur5',
     'ur10',

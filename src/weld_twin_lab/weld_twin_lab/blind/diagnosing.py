@@ -72,12 +72,7 @@ def diagnose_cases(
         )
         for entry in listed['cases']
     ]
-    verdicts = runner.run(tasks)
-    for verdict in verdicts:
-        content = verdict.pop('diagnosis')
-        if content is not None:
-            file = out / verdict['name'] / layout.DIAGNOSIS
-            write_text(file, json.dumps(content, indent=1) + '\n', overwrite=True)
+    verdicts = [_written(out, verdict) for verdict in runner.run(tasks)]
     layout.write(
         out / layout.VERDICTS,
         {
@@ -91,6 +86,15 @@ def diagnose_cases(
         overwrite=True,
     )
     return verdicts
+
+
+def _written(out: Path, verdict: dict[str, Any]) -> dict[str, Any]:
+    """Write the diagnosis of one case; return what was said of it without that."""
+    content = verdict.pop('diagnosis')
+    if content is not None:
+        file = out / verdict['name'] / layout.DIAGNOSIS
+        write_text(file, json.dumps(content, indent=1) + '\n', overwrite=True)
+    return verdict
 
 
 def _truths_readable(cases: Path, allowed: bool) -> bool:

@@ -15,6 +15,7 @@ from .ambiguous import Site
 from .cause_sizes import SIZES, site
 
 CONFIDENT = 0.8
+"""Confidence above which a wrong answer counts as confidently wrong."""
 IN_LIBRARY = frozenset({'single', 'double', 'triple', 'ambiguous'})
 NOT_IN_LIBRARY = frozenset({'outside', 'withheld'})
 SEMI_REAL, AS_IT_IS = 'semi-real', 'as it is'

@@ -41,6 +41,9 @@ from .displacement import rms
 from .sizing import Unseen, draw_causes, sized_together
 
 TRIES = 30
+"""
+Cells and motions drawn for a case before it is given up; causes that cannot show need another.
+"""
 DECOY = 0.1
 """Share of cases with their causes in the library from which another family is taken out."""
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,80 +56,45 @@ class Measure:
         return {**asdict(self), 'estimate': self.estimate._asdict(), 'reached': self.reached}
 
 
-def verdict_measures(cases: Sequence[Judged]) -> list[Measure]:
-    """Return how often which kind of case was answered rightly."""
-    clear = [c for c in cases if c.kind == 'single' and c.stratum >= CLEAR]
-    faint = [c for c in cases if c.kind == 'single' and 1.0 <= c.stratum < CLEAR]
-    two, three = (
-        [c for c in cases if c.kind == kind and c.stratum >= CLEAR]
-        for kind in ('double', 'triple')
-    )
-    nothing, withheld, outside, ambiguous = (
-        [c for c in cases if c.kind == kind]
-        for kind in ('none', 'withheld', 'outside', 'ambiguous')
-    )
-    known = [c for c in cases if c.in_library]
-    return [
-        Measure(
-            'single_family', 'one cause, 3 sigma or more: family named', _of(clear, _family), 0.98
-        ),
-        Measure('single_joint', 'the same: joint named', _of(clear, _joint), 0.98),
-        Measure('single_exact', 'the same: nothing else named', _of(clear, _exact)),
-        Measure(
-            'faint_named',
-            'one cause, 1-3 sigma: named, or in the set that is',
-            _of(faint, _named),
-            0.85,
-        ),
-        Measure(
-            'double_named', 'two causes, both 3 sigma or more: both named', _of(two, _named), 0.90
-        ),
-        Measure(
-            'triple_named',
-            'three causes, all 3 sigma or more: all named',
-            _of(three, _named),
-            0.80,
-        ),
-        Measure(
-            'ambiguous_named',
-            'ambiguous by construction: truth or its like named',
-            _of(ambiguous, _named),
-        ),
-        Measure(
-            'ambiguous_said',
-            'the same: and said to be ambiguous',
-            _of(ambiguous, lambda c: c.named and c.status == 'ambiguous'),
-        ),
-        Measure(
-            'false_alarm',
-            'no cause: something named or found',
-            _of(nothing, lambda c: c.status != 'none'),
-            0.01,
-            False,
-        ),
-        Measure(
-            'withheld_honest',
-            "family withheld: 'unknown' or a set, no wrong name",
-            _of(withheld, lambda c: c.status in ('unknown', 'ambiguous')),
-            0.90,
-        ),
-        Measure('withheld_unknown', "the same: 'unknown'", _of(withheld, _unknown)),
-        Measure('outside_unknown', "cause outside the library: 'unknown'", _of(outside, _unknown)),
-        Measure(
-            'false_unknown',
-            "cause in the library, or none: 'unknown' all the same",
-            _of([*known, *nothing], _unknown),
-            0.03,
-            False,
-        ),
-        Measure(
-            'confident_wrong',
-            'sure (> 0.8) and wrong',
-            _of(cases, lambda c: c.confidently_wrong),
-            0.01,
-            False,
-        ),
-    ]
+class Question(NamedTuple):
+    """
+    What is asked of some of the cases.
+
+    Attributes
+    ----------
+    key, title : str
+    asked : callable
+        Tells which cases are asked.
+    told : callable
+        Tells whether the answer to a case is right; None where it cannot be said.
+    goal : float, optional
+    at_least : bool
+        Whether the goal is a least or a most.
+
+    """
+
+    key: str
+    title: str
+    asked: Callable[[Judged], bool]
+    told: Callable[[Judged], bool | None]
+    goal: float | None = None
+    at_least: bool = True
+
+
+def _clear(kind: str) -> Callable[[Judged], bool]:
+    return lambda case: case.kind == kind and case.stratum >= CLEAR
+
+
+def _kind(*kinds: str) -> Callable[[Judged], bool]:
+    return lambda case: case.kind in kinds
+
+
+def _faint(case: Judged) -> bool:
+    return case.kind == 'single' and 1.0 <= case.stratum < CLEAR
+
+
+def _status(*statuses: str) -> Callable[[Judged], bool]:
+    return lambda case: case.status in statuses
 
 
 def alias_measure(cases: Sequence[Judged], shrinks: Mapping[str, Achieved]) -> Measure:
@@ -307,3 +272,95 @@ def _off(shrinks: Sequence[Achieved]) -> Estimate:
 def _trimmed(values: Sequence[float]) -> list[float]:
     ordered = sorted(values, key=abs)
     return ordered[: int(np.ceil(0.98 * len(ordered)))]
+
+
+QUESTIONS = (
+    Question(
+        'single_family',
+        'one cause, 3 sigma or more: family named',
+        _clear('single'),
+        _family,
+        0.98,
+    ),
+    Question('single_joint', 'the same: joint named', _clear('single'), _joint, 0.98),
+    Question('single_exact', 'the same: nothing else named', _clear('single'), _exact),
+    Question(
+        'faint_named', 'one cause, 1-3 sigma: named, or in the set that is', _faint, _named, 0.85
+    ),
+    Question(
+        'double_named',
+        'two causes, both 3 sigma or more: both named',
+        _clear('double'),
+        _named,
+        0.90,
+    ),
+    Question(
+        'triple_named',
+        'three causes, all 3 sigma or more: all named',
+        _clear('triple'),
+        _named,
+        0.80,
+    ),
+    Question(
+        'ambiguous_named',
+        'ambiguous by construction: truth or its like named',
+        _kind('ambiguous'),
+        _named,
+    ),
+    Question(
+        'ambiguous_said',
+        'the same: and said to be ambiguous',
+        _kind('ambiguous'),
+        lambda case: case.named and case.status == 'ambiguous',
+    ),
+    Question(
+        'false_alarm',
+        'no cause: something named or found',
+        _kind('none'),
+        lambda case: case.status != 'none',
+        0.01,
+        False,
+    ),
+    Question(
+        'withheld_honest',
+        "family withheld: 'unknown' or a set, no wrong name",
+        _kind('withheld'),
+        _status('unknown', 'ambiguous'),
+        0.90,
+    ),
+    Question('withheld_unknown', "the same: 'unknown'", _kind('withheld'), _unknown),
+    Question(
+        'outside_unknown', "cause outside the library: 'unknown'", _kind('outside'), _unknown
+    ),
+    Question(
+        'false_unknown',
+        "cause in the library, or none: 'unknown' all the same",
+        lambda case: case.in_library or case.kind == 'none',
+        _unknown,
+        0.03,
+        False,
+    ),
+    Question(
+        'confident_wrong',
+        'sure (> 0.8) and wrong',
+        lambda case: True,
+        lambda case: case.confidently_wrong,
+        0.01,
+        False,
+    ),
+)
+"""What verdicts are measured by, with the goals they are held against."""
+
+
+def verdict_measures(cases: Sequence[Judged]) -> list[Measure]:
+    """Return how often which kind of case was answered rightly."""
+    return [
+        Measure(
+            q.key,
+            q.title,
+            _of([case for case in cases if q.asked(case)], q.told),
+            q.goal,
+            q.at_least,
+        )
+        for q in QUESTIONS
+    ]

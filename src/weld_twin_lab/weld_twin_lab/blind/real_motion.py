@@ -15,6 +15,7 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -41,10 +42,13 @@ from .displacement import rms
 from .judging import AS_IT_IS, SEMI_REAL
 
 RATE = 125.0
+"""Rate [Hz] at which a recorded motion is given to the plant, that of most controllers."""
 TRAINING = 0.7
 """Share of a bag, from its beginning, that is diagnosed; the rest is the sealed test."""
 ROUNDS = 4
+"""Times a cause is scaled until it shows as large as wanted."""
 NEAR = 1.25
+"""Ratio to the wanted size that is near enough; the size itself is drawn over a range of ten."""
 
 
 @dataclass(frozen=True)
@@ -123,42 +127,34 @@ def make_one(
     with new_directory(Path(cases) / name, mark=layout.CASE) as place:
         write_robot_yaml(place / layout.ROBOT, arm)
         write_recording(place / layout.TRAIN, train, arm)
-        layout.write(
-            place / layout.CASE,
-            {
-                'name': name,
-                'align': list(align),
-                'exclude': [],
-                'known': False,
-            },
-        )
+        case = {'name': name, 'align': list(align), 'exclude': [], 'known': False}
+        layout.write(place / layout.CASE, case)
+    truth = {'name': name, 'robot': arm.name, 'ratio': ratio, 'align': list(align)}
     with new_directory(Path(truths) / name, mark=layout.TRUTH) as place:
         write_recording(place / layout.TEST, test, arm)
-        layout.write(
-            place / layout.TRUTH,
-            {
-                'name': name,
-                'salt': secrets.token_hex(16),
-                'robot': arm.name,
-                'kind': SEMI_REAL if cause else AS_IT_IS,
-                'motion': Path(wish.bag).name,
-                'construction': None,
-                'causes': [cause] if cause else [],
-                'sites': [site(cause)] if cause else [],
-                'alike': [],
-                'ratios': [ratio] if cause else [],
-                'ratio': ratio,
-                'excluded': [],
-                'align': list(align),
-                'test': 'same motion',
-                'floor_m': None,
-                'outliers': [],
-            },
-        )
+        layout.write(place / layout.TRUTH, truth | _truth(wish, cause, ratio))
     return {
         'name': name,
         'case': seal.digest(Path(cases) / name),
         'truth': seal.digest(Path(truths) / name),
+    }
+
+
+def _truth(wish: Wish, cause: Cause | None, ratio: float) -> dict[str, Any]:
+    """Return what is true of a case with one cause or none on a real motion."""
+    return {
+        'salt': secrets.token_hex(16),
+        'kind': SEMI_REAL if cause else AS_IT_IS,
+        'motion': Path(wish.bag).name,
+        'construction': None,
+        'causes': [cause] if cause else [],
+        'sites': [site(cause)] if cause else [],
+        'alike': [],
+        'ratios': [ratio] if cause else [],
+        'excluded': [],
+        'test': 'same motion',
+        'floor_m': None,
+        'outliers': [],
     }
 
 
@@ -173,7 +169,7 @@ def _mixed(
     arm = aligned.robot.with_frames(base=aligned.bases[0])
     noise = noise_floor(problem, problem.residuals(aligned)).rms_m
     cell = Cell(arm, Tracker(), richness=float(rng.uniform(0.0, 1.0)))
-    taken = Take(_command(real), int(rng.integers(2**31)))
+    taken = Take(recorded_command(real), int(rng.integers(2**31)))
     wanted = float(np.exp(rng.uniform(*np.log(STRATA[wish.stratum]))))
     possible = [name for name in _possible(real, align) if name != wish.family]
     for family in (wish.family, *rng.permutation(possible)):
@@ -181,7 +177,7 @@ def _mixed(
             continue
         cause = draw(str(family), arm, float(taken.command.t[-1]), rng)
         for _ in range(ROUNDS):
-            mixed, ratio = _with(cell, cause, taken, real)
+            mixed, ratio = with_cause(cell, cause, taken, real)
             ratio /= noise
             if 1.0 / NEAR < ratio / wanted < NEAR:
                 return cause, ratio, mixed
@@ -201,7 +197,7 @@ def _possible(real: Recording, align: Sequence[str]) -> list[str]:
     return [name for name in FAMILIES if name in out]
 
 
-def _command(real: Recording) -> Command:
+def recorded_command(real: Recording) -> Command:
     """Return the motion of a bag as the plant takes it, evenly spaced unless at rest."""
     joints = real.joints
     if joints.static:
@@ -219,7 +215,7 @@ def _command(real: Recording) -> Command:
     )
 
 
-def _with(cell: Cell, cause: Cause, taken: Take, real: Recording) -> tuple[Recording, float]:
+def with_cause(cell: Cell, cause: Cause, taken: Take, real: Recording) -> tuple[Recording, float]:
     """Return the recording with a cause added, and the RMS of what was added [m]."""
     measured = real.measured
     if measured is None:

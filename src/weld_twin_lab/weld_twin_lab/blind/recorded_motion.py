@@ -16,6 +16,7 @@ from .seams import seam_motion, working_posture
 RATE = 125.0
 """Joint states a second."""
 STATION_PAUSE = 2.0
+"""Seconds from one station to the next."""
 AIR_SPEED = 0.5
 """Mean joint speed [rad/s] from one seam to the next."""
 RAMP = 2.0

@@ -38,7 +38,9 @@ ARMS = ('ur5', 'kuka_kr6_r900', 'franka_panda')
 SIZES = (0.5, 1.0, 3.0, 10.0)
 """Effect RMS over measurement noise."""
 SECONDS = 30.0
+"""Length [s] of the recording that is diagnosed."""
 TRIES = 12
+"""Cells and motions drawn for a row of the table before it is given up."""
 NAME = 'case'
 
 

@@ -31,6 +31,7 @@ from .measures import (
 from .statistics import reliability
 
 MIB = 1 << 20
+"""Bytes."""
 SHRINKING = IN_LIBRARY | NOT_IN_LIBRARY
 """Kinds of cases with a gap to shrink."""
 

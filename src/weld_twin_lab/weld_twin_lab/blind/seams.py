@@ -21,6 +21,7 @@ KINDS = ('line', 'arc', 'circle', 'polyline', 'spline', 'weave')
 SIZE = (0.1, 0.3)
 """Length of a seam [m]."""
 TRIES = 40
+"""Seams drawn for a robot before it is given up; many are out of its reach."""
 LONGEST = 2.0
 """How many times as long as wanted a seam may take where the joints are slow."""
 

@@ -16,6 +16,7 @@ from .deck import STRATA
 from .displacement import correlation, rms
 
 TRIES = 6
+"""Sizes and places drawn for one cause before another cell is drawn."""
 ALIKE = 0.95
 """Correlation of two deviations from which they are one to whoever measures."""
 NEAR = 1.15

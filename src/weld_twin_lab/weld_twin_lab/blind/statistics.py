@@ -12,8 +12,11 @@ import numpy as np
 from weld_twin_core.arrays import Array
 
 NORMAL_95 = 1.959963984540054
+"""Standard deviations that hold 95 % of a normal distribution."""
 DRAWS = 2000
+"""Bootstrap samples; fifty of them lie beyond either end of a 95 % interval."""
 BINS = 10
+"""Bins of confidence in which hits are counted, a tenth wide each."""
 
 
 class Estimate(NamedTuple):

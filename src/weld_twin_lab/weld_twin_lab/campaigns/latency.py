@@ -17,6 +17,7 @@ from typing import Any
 from weld_twin_msgs_py.files import markdown
 
 RATES = (125.0, 500.0, 1000.0)
+"""Rates [Hz] of joint states: common controllers, and twice the fastest of them."""
 LIMIT = 1.25
 """Largest ratio of the twin to the relay that passes."""
 COMPARED = ('p50_us', 'p99_us', 'cpu_us')

@@ -14,6 +14,7 @@ from inspect import getdoc
 from typing import Any
 
 FAILED = 1
+"""Exit code of a campaign that ran and did not pass."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -17,8 +17,10 @@ from .entries import Entry
 from .exponentials import Arm
 from .textbook_effects import Causes
 
-HARDENING = 0.03  # share of a spring's stiffness gained from no load to the rated one
+HARDENING = 0.03
+"""Share of a spring's stiffness gained from no load to the rated one."""
 RATING_POSES = 200
+"""Poses drawn to find the largest load torque, which the rated load is."""
 
 
 class Compliant:

@@ -25,8 +25,11 @@ from .plant_recording import Course
 from .textbook_effects import Causes
 
 STEP = 5e-4
+"""Step [s] of the simulation; a flywheel of 50 Hz gets forty to a period."""
 LOOP_SHARE = 0.1
-HARDENING = 0.1  # of the flywheel's spring at the largest swing expected
+"""Time constant of the velocity loop, as a share of that of the position loop."""
+HARDENING = 0.1
+"""Share by which a flywheel's spring is stiffer at the largest swing expected."""
 
 
 def displacement(causes: Causes, course: Course, richness: float) -> CubicSpline | None:

@@ -20,10 +20,14 @@ from .entries import Entry
 from .exponentials import Arm
 from .screws import Motion
 
-MASSLESS = 1e-6  # kg; MuJoCo wants some mass on every moving body
-GYRATION = 0.3  # radius of gyration of a link, whose inertia is not known, per length
-SMALL = 0.03  # m, the least radius of gyration
+MASSLESS = 1e-6
+"""Mass [kg] of a body that has none; MuJoCo wants some on every moving body."""
+GYRATION = 0.3
+"""Radius of gyration of a link whose inertia is not known, over its length."""
+SMALL = 0.03
+"""Least radius of gyration [m]."""
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
+"""Of a robot file that does not say [m/s^2]."""
 
 
 @dataclass(frozen=True, eq=False)

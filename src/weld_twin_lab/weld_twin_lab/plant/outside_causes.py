@@ -26,9 +26,12 @@ from . import screws
 from .screws import Motion
 from .textbook_effects import Causes
 
-STUCK_AFTER = 0.3  # share of the wind-up that a jump leaves
-SLOW = 0.01  # rad/s, below which friction gives way smoothly
-FLANK_TORQUE = 0.1  # share of the largest load at which the flank is certain
+STUCK_AFTER = 0.3
+"""Share of the wind-up that a jump leaves."""
+SLOW = 0.01
+"""Joint speed [rad/s] below which friction gives way smoothly."""
+FLANK_TORQUE = 0.1
+"""Share of the largest load at which the flank is certain."""
 JOINT_LEVEL = frozenset({'stick_slip', 'friction_wander', 'loaded_play', 'dress_pack'})
 OUTSIDE = JOINT_LEVEL | {
     'bearing_tilt',

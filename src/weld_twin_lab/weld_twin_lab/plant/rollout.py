@@ -9,8 +9,11 @@ import mujoco.rollout
 import numpy as np
 
 CHUNK = 30000
-HEAVY = 1e4  # kg m^2; a motor side this heavy feels nothing of what it drives
-SERVO = 200.0  # rad/s, of the spring that keeps a motor side on its course
+"""Steps simulated at once; a state of some hundred numbers then takes tens of megabytes."""
+HEAVY = 1e4
+"""Inertia [kg m^2] of a motor side, so large that it feels nothing of what it drives."""
+SERVO = 200.0
+"""Stiffness [rad/s] of the spring that keeps a motor side on its course."""
 
 
 def grid(start: float, end: float, step: float) -> np.ndarray:

@@ -19,6 +19,7 @@ from .exponentials import Arm, Rows
 from .screws import Motion
 
 REFERENCE_TEMPERATURE = 20.0
+"""Temperature [degC] at which the arm has the lengths of its file, as for gauges (ISO 1)."""
 ROW_EFFECTS = {
     'link_length': ('a', 'da'),
     'link_offset': ('d', 'dd'),

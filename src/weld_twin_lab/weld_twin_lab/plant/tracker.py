@@ -13,7 +13,8 @@ from .screws import Motion
 Readings = tuple[np.ndarray, np.ndarray] | tuple[None, None]
 """Stamps and values of a sensor, or that there is none."""
 
-STAMP_MARGIN = 0.45  # jittered stamps keep their order: at most this share of the spacing
+STAMP_MARGIN = 0.45
+"""Share of the spacing that jitter may move a stamp by, so that stamps keep their order."""
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,24 @@ from .compliance import HARDENING, Compliant
 Course = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Position, velocity and acceleration of the motor sides, each (N, n), `STEP` apart."""
 
-STEP = 1e-3  # s, of the simulation
-DAMPING = 0.1  # damping ratio of a spring with the links beyond it
-EDGE_SHARE = 0.02  # share of the width that the edges of a gap give
-UNBALANCED = 0.2  # share of the load a counterbalance leaves to the gap
-GRIP = 2.0  # friction over the largest torque that would move a link by itself
-FASTEST = 0.5  # square of the fastest swing in radians per step
-COARSE = 0.02  # s, spacing at which torques are worth computing
+STEP = 1e-3
+"""Step [s] of the simulation."""
+DAMPING = 0.1
+"""Damping ratio of a spring with the links beyond it."""
+EDGE_SHARE = 0.02
+"""Share of the width that the edges of a gap give."""
+UNBALANCED = 0.2
+"""Share of the load that a counterbalance leaves to the gap."""
+GRIP = 2.0
+"""Friction over the largest torque that would move a link by itself."""
+FASTEST = 0.5
+"""Square of the fastest swing, in radians to a step."""
+COARSE = 0.02
+"""Spacing [s] at which torques are computed; they change with the pose, which is slow."""
 SOFTEST = 10.0
-STIFFEST = 9e3  # of a gap's edge, in 1/(tc^2 inverse weight); MuJoCo allows 1e4
+"""Least stiffness of the edge of a gap, in 1/(step^2 inverse weight): a softer one rings."""
+STIFFEST = 9e3
+"""Largest stiffness of the edge, in the same unit; MuJoCo allows 1e4."""
 
 
 def moving(

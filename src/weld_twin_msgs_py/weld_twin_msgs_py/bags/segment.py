@@ -51,7 +51,9 @@ OFFERED, TYPE_HASH = 'offered_qos_profiles', 'topic_type_hash'
 _CRC_AT = 1 + 8 + 8 + 8 + 8
 """Where in a chunk record its checksum is: after opcode, length, two times and a size."""
 _NEVER = QosTime(9223372036, 854775807)
+"""A duration that stands for none at all in the profiles of rosbag2."""
 _DEFAULT_QOS = TopicQos(RELIABLE, 10)
+"""Of a topic that is none of ours."""
 
 
 class _Sqlite3Writer(Sqlite3Writer):

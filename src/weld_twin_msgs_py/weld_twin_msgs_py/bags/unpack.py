@@ -26,6 +26,7 @@ SMALL = 64_000_000
 MOST = 2_000_000_000
 """Bytes that are never unpacked in memory."""
 _PIECE = 1 << 20
+"""Bytes read at once."""
 
 
 def allowed(packed: int) -> int:

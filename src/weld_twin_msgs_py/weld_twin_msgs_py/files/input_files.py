@@ -12,6 +12,7 @@ from typing import NamedTuple
 from weld_twin_core.errors import DataError
 
 _PIECE = 1 << 20
+"""Bytes read at once."""
 
 
 class InputFile(NamedTuple):

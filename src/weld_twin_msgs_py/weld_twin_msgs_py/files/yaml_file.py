@@ -24,6 +24,7 @@ SIZE_LIMIT = 1_000_000
 """Bytes; robot and effects files are a few kilobytes."""
 
 MACHINE = 2**63
+"""Integers from here on do not fit 64 bits, and nothing of a robot is counted so far."""
 
 
 class _Loader(yaml.SafeLoader):

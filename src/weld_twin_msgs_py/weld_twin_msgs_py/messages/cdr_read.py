@@ -43,6 +43,7 @@ from .cdr_types import (
 HEADER = 4
 """Bytes of encapsulation before the first field; alignment counts from behind them."""
 _STAMP_END = HEADER + 8
+"""Where the frame name begins: behind seconds and nanoseconds."""
 
 
 class _Cursor:

@@ -22,6 +22,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 
 NANOSECONDS = 1_000_000_000
+"""In a second."""
 
 
 class Unstamped(DataError):

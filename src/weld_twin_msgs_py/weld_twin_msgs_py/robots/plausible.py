@@ -13,6 +13,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
 TURN = 2.0 * np.pi + 1e-6
+"""A whole turn [rad], and what rounding may add."""
 MANY_TURNS = 60.0
 """Joint limits beyond this [rad] are degrees: no arm turns ten times."""
 LONG = 20.0

@@ -11,6 +11,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 
 _ROUNDS = 30
+"""Rounds of fitting the frames in turn; a guess of units needs no more digits."""
 
 
 def misfit(robot: Robot, q: Array, position: Array) -> Array:

@@ -14,6 +14,7 @@ from weld_twin_core.errors import DataError
 from .cells import Cells
 
 _SECONDS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
+"""Units a clock may count in."""
 _LARGEST = (('s', 1e11), ('ms', 1e14), ('us', 1e17), ('ns', np.inf))
 """Beyond these, stamps since 1970 must be in the next finer unit."""
 

@@ -26,6 +26,7 @@ _LENGTHS = {
     'rotation_columns': (3, 4),
     'sigma_columns': (1, 3),
 }
+"""How many columns each option may name."""
 
 
 @dataclass(frozen=True)

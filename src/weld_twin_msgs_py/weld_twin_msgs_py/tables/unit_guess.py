@@ -11,7 +11,9 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 
 METRES = {'m': 1.0, 'mm': 1e-3}
+"""Lengths a table may be in."""
 RADIANS = {'rad': 1.0, 'deg': np.pi / 180.0}
+"""Angles a table may be in."""
 _WIDEST = 20.0
 """Spread [m] of measured positions beyond that of any cell with one robot."""
 _DOUBT = 6.0

@@ -14,7 +14,9 @@ from inspect import getdoc
 from pathlib import Path
 
 USAGE_ERROR = 2
+"""Exit code where the user can do something about it."""
 INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
 PROOFS = 'weld_twin.commands'
 """Entry points under which other packages, such as weld_twin_lab, bring subcommands."""
 LAB = ('benchmark', 'blind', 'campaign', 'real-robots', 'lab')

@@ -32,6 +32,7 @@ from ..streams.deviation_stream import METRICS, Deviation, Deviations
 from ..streams.injected_noise import Noise
 
 METRICS_EVERY = 50
+"""Samples between two messages of metrics."""
 
 
 class Entry(NamedTuple):

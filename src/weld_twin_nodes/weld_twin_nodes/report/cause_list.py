@@ -16,6 +16,7 @@ from .words import carries_curves, found_name, in_words, listed, site_name
 _CANDIDATES = 6
 """Hypotheses shown for a cause."""
 _SLOTS = 6
+"""Places of which rivals are listed."""
 _INSTEAD = (
     'No effect is named. These come nearest; the twin carries the curves shown above in their '
     'place.'

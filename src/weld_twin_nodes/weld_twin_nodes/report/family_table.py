@@ -16,7 +16,9 @@ from .quantities import millimetres
 from .words import cause
 
 _LARGEST = 3
+"""Actions told; the others are counted."""
 _LINES = 3
+"""Orders of ripple told for each joint."""
 
 
 class Ripple(NamedTuple):

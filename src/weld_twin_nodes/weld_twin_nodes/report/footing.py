@@ -17,6 +17,7 @@ from .words import in_words
 _APART = ('kind', 'motion', 'cost', 'expected_separation_sigma')
 """What programs need of a measurement, or the page says in words."""
 _ORDER = {'unsound': 0, 'warning': 1, 'note': 2, 'ok': 3}
+"""What needs attention comes first."""
 
 
 def next_section(diagnosis: Diagnosis) -> Html:

@@ -12,6 +12,7 @@ from .seam_view import at_rest
 from .words import REGIMES
 
 _VISIBLE = 0.005
+"""Share below which a cell of the map stays empty: it would read 0."""
 
 
 def where_section(diagnosis: Diagnosis) -> Html:

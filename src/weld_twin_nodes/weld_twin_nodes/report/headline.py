@@ -21,6 +21,7 @@ _SURE_OF = {
     'unknown': 'that the cause is none of those known',
 }
 _FEW = 3
+"""Causes named in a heading."""
 _FIRST_REAL_STAMP = 10**18
 """Stamps [ns] before 2001 count from something else than the epoch."""
 

@@ -23,7 +23,9 @@ _BY_UNIT = {
     'm/N': (1e6, 'µm/N'),
     '-': (1.0, ''),
 }
+"""Factor from SI and the unit that people read, by the unit of the parameter ..."""
 _BY_NAME = {'phase': (1.0, 'rad'), 'scale': (1e6, 'ppm'), 'ratio': (1e6, 'ppm')}
+"""... or by its name, where the unit alone does not tell."""
 UNCHANGED = 0.005
 """Share of a gap below which it counts as the same."""
 MISSING = '\N{EN DASH}'

@@ -16,7 +16,9 @@ from .seam_view import at_rest, trusted
 from .words import cause
 
 _STEPS = 12
+"""Steps of the waterfall; more are drawn as one."""
 _RECORDINGS = 6
+"""Recordings drawn over time."""
 
 
 def shrink_section(diagnosis: Diagnosis) -> Html:

@@ -24,6 +24,7 @@ _COLOURS = {
     'unsound': 'red',
 }
 _MOST = 8
+"""Rows of a table; the files have all."""
 
 
 def print_summary(diagnosis: Diagnosis, console: Console) -> None:

@@ -73,6 +73,7 @@ DEPENDENCES = {
     'place': 'the place in the workspace',
 }
 _NAMED = 3
+"""Names in a sentence; more are counted."""
 
 
 def cause(effect: str, joint: str | None) -> str:

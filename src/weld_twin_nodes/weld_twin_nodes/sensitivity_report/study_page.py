@@ -20,6 +20,7 @@ figure { margin: 0 0 1.5rem; } figure img { width: 100%; height: auto; backgroun
 .claims { font-size: .85rem; } table { margin-bottom: 1rem; }
 """
 _SHOWN = 12
+"""Bars shown; the file has all."""
 
 
 def study_page(

@@ -11,6 +11,7 @@ import numpy as np
 from ...arrays import Array
 
 CACHE_LINE = 64
+"""Bytes; arrays begin at a multiple of it."""
 SHORT = 512
 """Numbers in numpy's buffer while rows are worked on."""
 

@@ -34,6 +34,7 @@ SINE = (
     -2.1903499125519212e-05,
     7.697847275590284e-07,
 )
+"""Coefficients of sin(pi x) / x in powers of x^2."""
 COSINE = (
     1.0,
     -4.934802200544676,
@@ -45,7 +46,9 @@ COSINE = (
     -0.00010456656706174584,
     4.149578027057121e-06,
 )
+"""Coefficients of cos(pi x) in powers of x^2."""
 DEGREE = len(COSINE) - 1
+"""Of the polynomials, in the square of the angle."""
 _POLYNOMIALS = np.array([COSINE, SINE])
 
 

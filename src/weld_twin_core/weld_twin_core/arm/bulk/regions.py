@@ -26,6 +26,7 @@ from .weights import Piece, factors, generator
 ROWS = 13
 """Rows that hold a pose: columns x, y, z and origin, three components each, and 1."""
 _ORIGIN = slice(9, 12)
+"""Rows of a frame that hold its origin; the nine before hold its axes."""
 
 
 class Region(Enum):

@@ -5,8 +5,9 @@
 from math import pi
 
 DEGREE = pi / 180.0
+"""Radians."""
 
-_ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
+_ROWS = (
     (0.0, -pi / 2, 0.29, 0.0, -165.0, 165.0, 250.0),
     (0.27, 0.0, 0.0, -pi / 2, -110.0, 110.0, 250.0),
     (0.07, -pi / 2, 0.0, 0.0, -110.0, 70.0, 250.0),
@@ -14,6 +15,7 @@ _ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
     (0.0, -pi / 2, 0.0, 0.0, -120.0, 120.0, 320.0),
     (0.0, 0.0, 0.072, pi, -400.0, 400.0, 420.0),
 )
+"""a, alpha, d, theta at zero, lower, upper and speed in degrees; else m and rad."""
 
 DATA = {
     'name': 'abb_irb120',
@@ -43,3 +45,4 @@ DATA = {
         {'mass': 0.137, 'com': [0.0, -0.00017, -0.00706]},
     ],
 }
+"""The robot file, with the source of its numbers."""

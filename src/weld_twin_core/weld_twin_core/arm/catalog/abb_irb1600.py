@@ -5,8 +5,9 @@
 from math import pi
 
 DEGREE = pi / 180.0
+"""Radians."""
 
-_ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
+_ROWS = (
     (0.15, -pi / 2, 0.4865, 0.0, -180.0, 180.0, 150.0),
     (0.475, 0.0, 0.0, -pi / 2, -63.0, 110.0, 160.0),
     (0.0, -pi / 2, 0.0, 0.0, -235.0, 55.0, 170.0),
@@ -14,6 +15,7 @@ _ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
     (0.0, -pi / 2, 0.0, 0.0, -115.0, 115.0, 400.0),
     (0.0, 0.0, 0.065, pi, -400.0, 400.0, 450.0),
 )
+"""a, alpha, d, theta at zero, lower, upper and speed in degrees; else m and rad."""
 
 DATA = {
     'name': 'abb_irb1600',
@@ -44,3 +46,4 @@ DATA = {
         {'mass': 1.5, 'com': [0.0, 0.0, -0.015]},
     ],
 }
+"""The robot file, with the source of its numbers."""

@@ -10,8 +10,9 @@ ground (its J3 is the joint 3 of this model minus J2). The base is at the floor.
 from math import pi
 
 DEGREE = pi / 180.0
+"""Radians."""
 
-_ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
+_ROWS = (
     (0.15, -pi / 2, 0.45, 0.0, -180.0, 180.0, 210.0),
     (0.6, pi, 0.0, -pi / 2, -90.0, 160.0, 190.0),
     (0.2, -pi / 2, 0.0, 0.0, -180.0, 264.0, 210.0),
@@ -19,6 +20,7 @@ _ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
     (0.0, -pi / 2, 0.0, 0.0, -190.0, 190.0, 400.0),
     (0.0, pi, -0.1, 0.0, -360.0, 360.0, 600.0),
 )
+"""a, alpha, d, theta at zero, lower, upper and speed in degrees; else m and rad."""
 
 DATA = {
     'name': 'fanuc_m10ia',
@@ -49,3 +51,4 @@ DATA = {
         {'mass': 1.0, 'com': [0.0, 0.0, -0.02]},
     ],
 }
+"""The robot file, with the source of its numbers."""

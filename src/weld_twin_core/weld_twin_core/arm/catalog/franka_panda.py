@@ -4,7 +4,7 @@
 
 from math import pi
 
-_ROWS = (  # a, alpha, d, lower, upper, speed, acceleration
+_ROWS = (
     (0.0, 0.0, 0.333, -2.8973, 2.8973, 2.175, 15.0),
     (0.0, -pi / 2, 0.0, -1.7628, 1.7628, 2.175, 7.5),
     (0.0, pi / 2, 0.316, -2.8973, 2.8973, 2.175, 10.0),
@@ -13,6 +13,7 @@ _ROWS = (  # a, alpha, d, lower, upper, speed, acceleration
     (0.0, pi / 2, 0.0, -0.0175, 3.7525, 2.61, 20.0),
     (0.088, pi / 2, 0.107, -2.8973, 2.8973, 2.61, 20.0),
 )
+"""a, alpha, d, lower, upper, speed, acceleration: m and rad unless said."""
 
 DATA = {
     'name': 'franka_panda',
@@ -45,3 +46,4 @@ DATA = {
         {'mass': 0.735522, 'com': [0.010517, -0.004252, 0.061597 - 0.107]},
     ],
 }
+"""The robot file, with the source of its numbers."""

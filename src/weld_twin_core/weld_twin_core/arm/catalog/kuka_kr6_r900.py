@@ -10,8 +10,9 @@ half turn in ``tool`` makes the tool frame KUKA's $FLANGE. A tool of one's own g
 from math import pi
 
 DEGREE = pi / 180.0
+"""Radians."""
 
-_ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
+_ROWS = (
     (0.0, pi, -0.4, 0.0, -170.0, 170.0, 360.0),
     (0.025, pi / 2, 0.0, 0.0, -190.0, 45.0, 300.0),
     (0.455, 0.0, 0.0, -pi / 2, -120.0, 156.0, 360.0),
@@ -19,6 +20,7 @@ _ROWS = (  # a, alpha, d, theta at zero, lower, upper and speed in degrees
     (0.0, -pi / 2, 0.0, 0.0, -120.0, 120.0, 388.0),
     (0.0, pi / 2, -0.08, pi, -350.0, 350.0, 615.0),
 )
+"""a, alpha, d, theta at zero, lower, upper and speed in degrees; else m and rad."""
 
 DATA = {
     'name': 'kuka_kr6_r900',
@@ -51,3 +53,4 @@ DATA = {
         {'mass': 0.4, 'com': [0.0, 0.0, 0.01]},
     ],
 }
+"""The robot file, with the source of its numbers."""

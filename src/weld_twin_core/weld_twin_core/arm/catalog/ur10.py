@@ -4,7 +4,7 @@
 
 from math import pi
 
-_ROWS = (  # joint, a, alpha, d, speed
+_ROWS = (
     ('shoulder_pan_joint', 0.0, pi / 2, 0.1273, 2 * pi / 3),
     ('shoulder_lift_joint', -0.612, 0.0, 0.0, 2 * pi / 3),
     ('elbow_joint', -0.5723, 0.0, 0.0, pi),
@@ -12,6 +12,7 @@ _ROWS = (  # joint, a, alpha, d, speed
     ('wrist_2_joint', 0.0, -pi / 2, 0.1157, pi),
     ('wrist_3_joint', 0.0, 0.0, 0.0922, pi),
 )
+"""joint, a, alpha, d, speed: m and rad unless said."""
 
 DATA = {
     'name': 'ur10',
@@ -40,3 +41,4 @@ DATA = {
         {'mass': 0.365, 'com': [0.0, 0.0, -0.026]},
     ],
 }
+"""The robot file, with the source of its numbers."""

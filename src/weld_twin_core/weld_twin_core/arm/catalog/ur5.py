@@ -12,7 +12,7 @@ _NAMES = (
     'wrist_2_joint',
     'wrist_3_joint',
 )
-_ROWS = (  # a, alpha, d
+_ROWS = (
     (0.0, pi / 2, 0.089159),
     (-0.425, 0.0, 0.0),
     (-0.39225, 0.0, 0.0),
@@ -20,6 +20,7 @@ _ROWS = (  # a, alpha, d
     (0.0, -pi / 2, 0.09465),
     (0.0, 0.0, 0.0823),
 )
+"""a, alpha, d: m and rad unless said."""
 
 DATA = {
     'name': 'ur5',
@@ -48,3 +49,4 @@ DATA = {
         {'mass': 0.1879, 'com': [0.0, 0.0, -0.001159]},
     ],
 }
+"""The robot file, with the source of its numbers."""

@@ -31,6 +31,7 @@ _TRACKED = 6
 _SINGULAR = 1e-8
 """Determinant of the Jacobian below which a closed form loses digits."""
 _NUDGE = 1e-3
+"""Share of the way to a neighbour by which a singular pose is moved to see its postures."""
 _COMFORTABLE = 0.5
 """Distance from a joint limit [rad] beyond which more of it is worth nothing."""
 

@@ -28,6 +28,7 @@ from ...arrays import Array
 from .continuity import LEAP
 
 KNOTS = 16
+"""Knots of the polynomials through which the rest of a smooth seam is guessed."""
 SHORT = 2 * KNOTS
 """Samples below which polynomials through knots would say nothing about those between them."""
 _LONG = 2000
@@ -39,9 +40,11 @@ _SMOOTH = 0.02
 _STIFF = 1e3
 """Joint motion per motion of the tool that is too near a singularity."""
 _CLOSED = 1e-12
+"""Gap [m, rad] that is rounding."""
 _ROUGH = 1e-4
 """Gap of a knot [m, rad] after which one more step is enough."""
 _ROUNDS = 8
+"""Newton's steps at most; a seam that needs more is followed point by point."""
 
 
 def follow(robot: Robot, poses: Array, seed: Array) -> Array | None:

@@ -23,8 +23,13 @@ from .whole_turns import centred, middle
 CLOSED = 1e-9
 """Largest error [m, rad] of a solution."""
 _STARTS = 128
+"""
+Joint positions that a search starts from; of an arm with eight postures each is met many times.
+"""
 _ROUNDS = 60
+"""Newton's steps from a start at most; a start that needs more is given up."""
 _SAME = 1e-4
+"""Joint difference [rad or m] up to which two solutions are one."""
 
 
 def search(robot: Robot, pose: Array, seed: Array | None = None) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ from ...arm.robot import Robot
 from ...arrays import Array
 
 TURN = 2.0 * np.pi
+"""A whole turn [rad]."""
 
 
 def middle(robot: Robot) -> Array:

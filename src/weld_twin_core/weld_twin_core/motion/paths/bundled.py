@@ -23,7 +23,9 @@ from .torch import Torch
 from .weave import Weave
 
 _COMFORT_LIMIT = 0.15
+"""Distance to a joint limit [rad] from which a place is as good as any."""
 _COMFORT_CONDITION = 40.0
+"""Condition number of the Jacobian up to which a place is as good as any."""
 
 
 class Place(NamedTuple):

@@ -26,7 +26,9 @@ GROUPS = {
 ORDER = ('angular', 'backlash', 'length', 'initial')
 """The paper's final ranking (V.vii), the strongest first."""
 _DRAWS = 200
+"""Draws of all errors at once, of which median and extremes are told."""
 _RANKED = 500
+"""Scalings of the tolerances under which the order of the groups is looked at."""
 _FACTOR = 3.0
 """Tolerances of a group are multiplied by up to this, or divided, to see whether ranks hold."""
 
@@ -73,7 +75,7 @@ def drift(case: Case) -> dict[str, float]:
     for name, off in scenario_deviations(study).items():
         distance = np.interp(grid, study.s, np.linalg.norm(off, axis=-1))
         total = cumulative(distance[:, None])
-        out[name] = _exponent(grid, total)
+        out[name] = growth_exponent(grid, total)
     off = scenario_deviations(study)['angular']
     speed = np.linalg.norm(off, axis=-1)
     return {
@@ -84,7 +86,7 @@ def drift(case: Case) -> dict[str, float]:
     }
 
 
-def _exponent(path: Array, total: Array) -> float:
+def growth_exponent(path: Array, total: Array) -> float:
     """Return the power of the path length with which a sum grows over its second half."""
     late = slice(len(path) // 2, None)
     return float(np.polyfit(np.log(path[late]), np.log(total[late]), 1)[0])

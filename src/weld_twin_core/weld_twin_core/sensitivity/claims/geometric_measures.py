@@ -24,6 +24,7 @@ from ..tolerance import default_tolerances
 from .claim_case import BENT_TORCH, POINTS, Case, Measure
 
 _POSTURES = 2000
+"""Postures drawn over the joint limits; a rank correlation is then good to 0.02."""
 
 
 def baseline(case: Case) -> dict[str, float]:

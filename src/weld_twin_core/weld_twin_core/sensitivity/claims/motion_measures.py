@@ -22,7 +22,9 @@ from ..trajectory_advice import compare_profiles
 from .claim_case import POINTS, Case, Measure
 
 _WIDTH = 0.03 * DEGREE
+"""Play [rad] of every joint where claims on backlash are measured; they are ratios."""
 _LAG = 5e-3
+"""Lag [s] of every joint where profiles are compared; the claims are ratios."""
 _NEAR = 2
 """Path points to either side of a reversal that count as at it."""
 

@@ -9,6 +9,7 @@ import numpy as np
 from .rule import Rule
 
 _DEGREE_IN_MM = 1e3 * np.pi / 180.0
+"""Factor from metres a radian to millimetres a degree."""
 _SAME = 1e-3
 """Ratios closer to one than this are the same."""
 

@@ -15,8 +15,8 @@ from ..arms import links
 from . import Peer
 
 
-def make(robot: Robot) -> Peer:
-    """Return the peer."""
+def arm_model(robot: Robot) -> mujoco.MjModel:
+    """Return the arm as a chain of hinges with a site at its tool."""
     spec = mujoco.MjSpec()
     body = spec.worldbody
     *placements, tool = links(robot)
@@ -32,7 +32,12 @@ def make(robot: Robot) -> Peer:
         )
         body.add_joint(name=f'q{i}', axis=[0.0, 0.0, 1.0])
     body.add_site(name='tool', pos=tool[:3, 3], quat=_quaternion(tool))
-    model = spec.compile()
+    return spec.compile()
+
+
+def make(robot: Robot) -> Peer:
+    """Return the peer."""
+    model = arm_model(robot)
     data = mujoco.MjData(model)
     site = model.site('tool').id
     position, rotation = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)

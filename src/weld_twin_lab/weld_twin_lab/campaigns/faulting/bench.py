@@ -26,7 +26,9 @@ from weld_twin_nodes.harness import Cell, NodeProcess
 from weld_twin_nodes.harness.health_listener import HealthListener
 
 RATE = 100.0
+"""Joint states a second."""
 S = 1_000_000_000
+"""Nanoseconds."""
 LISTENERS = 4
 """Twin, injector, live diagnosis and recorder take joint states."""
 SURE = {'use_sim_time': True, 'reliable_inputs': True}

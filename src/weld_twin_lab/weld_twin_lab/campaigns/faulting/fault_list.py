@@ -28,6 +28,7 @@ LEASE = 25.0
 LONG = 2.5
 """Seconds of a fault: at least two looks of every node at its health."""
 HOUR = 3600 * S
+"""Nanoseconds."""
 
 
 @dataclass(frozen=True)
@@ -262,6 +263,7 @@ JOINT_FAULTS = (
     Fault('a second publisher of the same', _twice(0.0)),
     Fault('a second publisher that differs', _twice(0.05)),
 )
+"""What a joint state can be spoilt by."""
 OTHER_FAULTS = (
     Fault(
         'NaN in a measured pose',
@@ -308,3 +310,4 @@ OTHER_FAULTS = (
         _beside(TEMPERATURE, lambda b, k: b.make.temperature(b.stamp, 294.0)),
     ),
 )
+"""What else can come, be missing or be stopped."""

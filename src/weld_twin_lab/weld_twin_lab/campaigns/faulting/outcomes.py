@@ -45,27 +45,7 @@ def trial(bench: Bench, fault: Fault) -> dict[str, Any]:
     bench.run(AFTER)
     _settle(bench)
     well = _well_again(bench)
-    rows = {}
-    for name in NODES:
-        process = bench.processes[name]
-        log = process.log[marks[name] :] if len(process.log) >= marks[name] else process.log
-        row = {
-            'alive': process.code is None,
-            'traceback': 'Traceback' in log,
-            'outputs': _outputs(bench, name),
-            'wrong': _wrong(bench, name),
-            **_summary(told[name]),
-            'must_tell': name in fault.tell,
-            'ok_again': well[name],
-        }
-        row['passed'] = bool(
-            row['alive']
-            and not row['traceback']
-            and row['wrong'] == 0
-            and row['ok_again']
-            and (row['told'] not in ('ok', 'silent') or not row['must_tell'])
-        )
-        rows[name] = row
+    rows = {name: _row(bench, name, marks[name], told[name], fault, well[name]) for name in NODES}
     resumed = _outputs(bench, 'deviation_analyzer') > 0
     return {
         'fault': fault.name,
@@ -73,6 +53,31 @@ def trial(bench: Bench, fault: Fault) -> dict[str, Any]:
         'nodes': rows,
         'passed': resumed and all(row['passed'] for row in rows.values()),
     }
+
+
+def _row(
+    bench: Bench, name: str, mark: int, told: list[tuple[str, str]], fault: Fault, well: bool
+) -> dict[str, Any]:
+    """Return what became of one node; its log before the mark is of earlier faults."""
+    process = bench.processes[name]
+    log = process.log[mark:] if len(process.log) >= mark else process.log
+    row = {
+        'alive': process.code is None,
+        'traceback': 'Traceback' in log,
+        'outputs': _outputs(bench, name),
+        'wrong': _wrong(bench, name),
+        **_summary(told),
+        'must_tell': name in fault.tell,
+        'ok_again': well,
+    }
+    row['passed'] = bool(
+        row['alive']
+        and not row['traceback']
+        and row['wrong'] == 0
+        and row['ok_again']
+        and (row['told'] not in ('ok', 'silent') or not row['must_tell'])
+    )
+    return row
 
 
 def _settle(bench: Bench) -> None:

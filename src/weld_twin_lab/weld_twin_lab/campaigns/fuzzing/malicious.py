@@ -27,6 +27,7 @@ from . import hunt
 from .targets import ROBOT, Target, targets
 
 GIGABYTE = 1_000_000_000
+"""Bytes."""
 Make = Callable[[Path], Path]
 
 

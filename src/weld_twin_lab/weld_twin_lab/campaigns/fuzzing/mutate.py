@@ -36,6 +36,7 @@ NUMBERS = (
     b'1,5',
     b'~',
 )
+"""What may stand in the place of a number: none, endless, huge, and no number at all."""
 VALUES: tuple[Any, ...] = (
     None,
     True,
@@ -66,9 +67,11 @@ VALUES: tuple[Any, ...] = (
     ['a', 1, None],
 )
 SIZES = (0, 1, 0x7F, 0xFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 2**40, 2**62, 2**63 - 1, 2**64 - 1)
+"""What may stand in the place of a length: ends of the ranges of integers."""
 _NUMBER = re.compile(rb'-?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?')
 _WORD = re.compile(rb'[A-Za-z_]{3,}')
 _DEEP = 3000
+"""Brackets put before; three times as deep as Python's own limit of calls."""
 
 Change = Callable[[Random, bytes], bytes]
 

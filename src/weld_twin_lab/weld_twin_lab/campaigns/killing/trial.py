@@ -33,6 +33,7 @@ FIRST = 1_000_000_000
 NOTHING = 'holds no whole message'
 """Of a recording killed before anything reached the disk; what is missing of it is counted."""
 JOINTS = tuple(f'joint_{k}' for k in range(1, 7))
+"""Names in every joint state."""
 
 
 @dataclass(frozen=True)

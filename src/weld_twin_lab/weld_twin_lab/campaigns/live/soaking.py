@@ -23,6 +23,7 @@ from weld_twin_nodes.offline.seam_motion import plan_motion
 from .usage import children, cpu_ns, rss_bytes
 
 MIB = 2.0**20
+"""Bytes."""
 ROBOT, PATH = 'ur5', 'polyline'
 COMPLETE = 300.0
 """Seconds the recorder has to complete its bag."""

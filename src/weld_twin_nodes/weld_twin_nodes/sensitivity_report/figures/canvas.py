@@ -32,6 +32,7 @@ COLOURS = (
 )
 """Okabe and Ito's, which people with any colour vision tell apart."""
 WIDTH = 9.0
+"""Width of a figure [inch]."""
 _STYLE: dict[Any, Any] = {  # matplotlib types its settings key by key
     'font.size': 9.0,
     'axes.spines.top': False,

@@ -23,9 +23,13 @@ from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, svg
 
 _SIZES = Sizes()
 _TURN = 1e-3
+"""Turn of the base [rad] that is drawn."""
 _LAG = 5e-3
+"""Lag of every joint [s] that is drawn."""
 _EXAGGERATED = 50.0
+"""How much larger than life deviations are drawn."""
 _POINTS = 600
+"""Points of a line."""
 _AXES = ('along', 'across', 'normal to')
 _FORMS = {'play': 'play', 'reversal': 'written'}
 

@@ -15,6 +15,7 @@ from ..setting import Setting
 from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, svg
 
 _GRID = 400
+"""Even steps of the path that deviations are summed over."""
 
 
 def _scenarios(setting: Setting) -> tuple[Study, dict[str, Array]]:

@@ -61,7 +61,7 @@ def curved(found: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     beliefs : Beliefs
 
     """
-    if verdict.status == 'none' or found.dense:
+    if found.dense:
         return None
     sure = {site for group in verdict.sets for site in group}
     unknown = verdict.status == 'unknown'

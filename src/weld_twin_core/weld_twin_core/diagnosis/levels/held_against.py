@@ -28,7 +28,7 @@ def held_against(
     beliefs : Beliefs
 
     """
-    if rival is None or verdict.status not in ('identified', 'ambiguous'):
+    if rival is None or verdict.status == 'unknown':
         return verdict
     before = named.squares(named.predict(range(len(named.parts))))
     after = rival.unseen.squares(rival.unseen.predict(range(len(rival.unseen.parts))))

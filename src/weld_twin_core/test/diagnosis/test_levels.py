@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Causes that no effect stands for: where they are, what they depend on, and their curve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.diagnosis.levels.regions import posture_regions
+from weld_twin_core.diagnosis.levels.sparse_groups import Folds, steadiness
+from weld_twin_core.effects.curve import basis
+from weld_twin_core.effects.joint_curve import JointCurve
+
+NOISE = 2e-5
+ELBOW = 2
+
+
+def motion(seconds: float, seed: int) -> wt.JointMotion:
+    """Return joints that swing at frequencies of their own, within the UR5's limits."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, 0.02)
+    waves = [
+        (rng.uniform(0.3, 0.9), rng.uniform(0.05, 0.3), rng.uniform(0.0, 6.0)) for _ in range(6)
+    ]
+    centre = np.array([0.3, -1.2, 1.4, -1.0, -1.3, 0.2])
+    q = centre + np.stack([a * np.sin(2 * np.pi * f * t + p) for a, f, p in waves], axis=1)
+    return wt.JointMotion(t, q)
+
+
+def recorded(bend, seed: int = 3, seconds: float = 40.0) -> wt.Recording:
+    """Return a recording of a UR5 whose elbow is bent by a function of its angle."""
+    robot, commanded = wt.load('ur5'), motion(seconds, seed)
+    q = np.array(commanded.q)
+    q[:, ELBOW] += bend(q[:, ELBOW])
+    real = wt.Twin(robot).poses(wt.Recording('bent', wt.JointMotion(commanded.t, q)))
+    noise = np.random.default_rng(seed + 1).normal(scale=NOISE, size=real.position.shape)
+    measured = wt.Measurements(commanded.t, real.position + noise)
+    return wt.Recording('bent', commanded, measured=measured)
+
+
+def bump(angle):
+    """Return a dent of one tooth's width in the gear [rad]."""
+    return 8e-4 * np.exp(-0.5 * ((angle - 1.5) / 0.12) ** 2)
+
+
+@pytest.fixture(scope='module')
+def dented():
+    robot = wt.load('ur5')
+    exclude = ('transmission_ripple', 'backlash')
+    return wt.diagnose(recorded(bump), robot, exclude=exclude, holdout=[recorded(bump, seed=9)])
+
+
+def test_a_dent_nobody_has_a_name_for_is_placed(dented):
+    assert dented.status == 'unknown'
+    cause = dented.causes[0]
+    assert cause.place[0][0] == 'elbow_joint'
+    assert cause.dependence[0][0] == 'angle'
+    assert cause.share > 0.5
+
+
+def test_its_curve_is_carried_and_shrinks_the_gap_of_another_motion(dented):
+    assert {effect.name for effect in dented.model.found} == {'joint_curve'}
+    assert dented.shrink.held_out == 'bent'
+    assert dented.shrink.ratio < 0.6
+
+
+def test_the_curve_has_the_shape_of_the_dent(dented):
+    (curve,) = [e for e in dented.model.found if e.channel == 'q']
+    angle = np.linspace(1.1, 1.9, 50)
+    shape = np.asarray(curve.values) @ basis(curve.knots, angle)
+    wanted = bump(angle)
+    assert np.corrcoef(shape, wanted)[0, 1] > 0.9
+
+
+def test_what_an_effect_explains_is_not_taken_from_it():
+    robot = wt.load('ur5')
+    spring = wt.effects.JointOffset('elbow_joint', offset=6e-4)
+    recording = recorded(lambda angle: np.full_like(angle, 6e-4))
+    found = wt.diagnose(recording, robot)
+    assert found.status == 'identified'
+    assert [f.effect.name for f in found.effects] == [spring.name]
+    assert found.causes[0].place[0][0] == 'elbow_joint'
+    assert found.causes[0].dependence[0][0] == 'constant'
+    assert found.causes[0].name[0][0].effect == 'joint_offset'
+
+
+def test_folds_leave_out_what_they_judge():
+    rng = np.random.default_rng(0)
+    columns, target = rng.normal(size=(3, 40)), rng.normal(size=40)
+    labels = np.repeat(np.arange(4), 10)
+    precision = np.full(3, 0.5)
+    got = Folds.of(columns, target, labels).errors(np.arange(3), precision)
+    for k in range(4):
+        fit, judge = labels != k, labels == k
+        a = columns[:, fit]
+        x = np.linalg.solve(a @ a.T + np.diag(precision), a @ target[fit])
+        left = target[judge] - x @ columns[:, judge]
+        assert got[k] == pytest.approx(left @ left)
+
+
+def test_a_steady_fall_counts_more_than_one_lucky_fold():
+    before = np.full(8, 2.0)
+    steady = before - 0.5 + 0.01 * np.arange(8)
+    lucky = before.copy()
+    lucky[3] -= 4.0
+    assert steadiness(before, steady) > 10.0
+    assert steadiness(before, lucky) == pytest.approx(1.0)
+    assert steadiness(steady, before) < 0.0
+
+
+def test_regions_of_posture_hold_as_many_and_lie_apart():
+    recording = recorded(bump)
+    problem = wt.diagnosis.algebra.problem.Problem((recording,))
+    labels = posture_regions(problem)[::3]
+    counts = np.bincount(labels)
+    assert counts.size == 8
+    assert counts.max() - counts.min() <= 3
+    q = recording.joints.q
+    widest = int(np.argmax(np.ptp(q, axis=0)))
+    low, high = q[labels < 4, widest], q[labels >= 4, widest]
+    assert low.max() <= high.min() + 1e-9
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        ({'over': 'colour'}, 'over must be one of'),
+        ({'knots': [0.0, 0.0, 1.0]}, 'increasing numbers'),
+        ({'knots': [0.0, 1.0]}, 'every knot needs its value'),
+        ({'channel': 'tau'}, 'channel must be one of'),
+    ],
+)
+def test_a_curve_that_is_none_is_refused_in_a_sentence(change, words):
+    values = {'values': [0.0, 1e-4, 0.0], 'knots': [0.0, 1.0, 2.0]} | change
+    with pytest.raises(wt.ModelError, match=words):
+        wt.Twin(wt.load('ur5'), [JointCurve('elbow_joint', **values)])

@@ -24,6 +24,9 @@ from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run
 from .settings import Setting
 
+LOOK_EVERY = 1.0
+"""Seconds between two looks at the clocks."""
+
 
 class DeviationAnalyzer(CellNode):
     """Publishes the deviation of every measurement it can pair, and counts the others."""
@@ -40,6 +43,13 @@ class DeviationAnalyzer(CellNode):
             'longest step of the twin that is interpolated, if its usual step allows [s]',
             0.0,
             60.0,
+        ),
+        Setting(
+            'implausible',
+            0.02,
+            'deviation above which frames, clocks or tool must be wrong [m]',
+            1e-6,
+            100.0,
         ),
         Setting('metrics_every', 50, 'deviations between two metrics messages [1]', 1, 100_000),
         Setting('metrics_idle', 1.0, 'wait for more before the last metrics [s]', 0.05, 60.0),
@@ -60,6 +70,7 @@ class DeviationAnalyzer(CellNode):
         self._seen = self._told = 0
         self._every = self.setting('metrics_every')
         self.every(self.setting('metrics_idle'), self._on_idle)
+        self.every(LOOK_EVERY, self._look_at_clocks)
         self.listen(MEASURED_POSE, self._on_pose)
         self.listen(MEASURED_POINT, self._on_point)
         self.listen(TWIN_POSE, self._on_twin, required=True)
@@ -94,6 +105,25 @@ class DeviationAnalyzer(CellNode):
         if samples == self._seen != self._told:
             self._publish_metrics()
         self._seen = samples
+
+    def _look_at_clocks(self) -> None:
+        """Warn, as long as it is so, of clocks that disagree and of deviations no arm has."""
+        self._keep('clocks', self._deviations.clocks())
+        recent, most = self._deviations.recent, self.setting('implausible')
+        self._keep(
+            'implausible',
+            f'the deviation is {recent * 1e3:.3g} mm, more than any arm is off by '
+            f'({most * 1e3:.3g} mm): compare frames, clocks, base and tool'
+            if recent > most
+            else '',
+        )
+
+    def _keep(self, key: str, sentence: str) -> None:
+        if not sentence:
+            self.health.lasting.pop(key, None)
+            return
+        self.health.lasting[key] = sentence
+        self.warn(key, sentence)
 
     def _publish_metrics(self) -> None:
         self._told = self._deviations.samples

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+import math
+import time
+from collections import deque
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -11,10 +14,13 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.metrics.running import RunningMetrics
 
+from .clock_watch import ClockWatch
 from .pairing import Pair, Pairing
 
 METRICS = 'deviation'
 """Name of the status that carries the metrics."""
+RECENT = 50
+"""Deviations whose median is held against what is plausible: single outliers are none of it."""
 
 
 class Deviation(NamedTuple):
@@ -46,10 +52,14 @@ class Deviations:
         self._pairing = Pairing(depth, max_gap)
         self._path_length = path_length
         self._metrics = RunningMetrics(path_length)
+        self._clocks = ClockWatch()
+        self._recent: deque[float] = deque(maxlen=RECENT)
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock."""
         self._pairing.reset()
+        self._clocks.reset()
+        self._recent.clear()
         self._metrics = RunningMetrics(self._path_length)
 
     @property
@@ -59,15 +69,28 @@ class Deviations:
 
     def add_measured(self, stamp: int, position: Array) -> Iterator[Deviation]:
         """Take a measured position (3,) [m]; yield the deviations that are known now."""
+        self._clocks.measured.add(stamp, position, time.monotonic())
         return self._each(self._pairing.add_measured(stamp, position))
 
     def add_twin(self, stamp: int, position: Array) -> Iterator[Deviation]:
         """Take a twin position (3,) [m]; yield the deviations that are known now."""
+        self._clocks.twin.add(stamp, position, time.monotonic())
         restarts = self._pairing.restarts
         pairs = self._pairing.add_twin(stamp, position)
         if self._pairing.restarts > restarts:
             self._metrics = RunningMetrics(self._path_length)
         return self._each(pairs)
+
+    def clocks(self) -> str:
+        """Return what is to be told of the two clocks, empty where nothing is."""
+        return self._clocks.look(
+            time.monotonic(), self._metrics.samples, self._pairing.waiting, self._pairing.dropped
+        )
+
+    @property
+    def recent(self) -> float:
+        """Return the median length of the last deviations [m]; 0 before there are any."""
+        return sorted(self._recent)[len(self._recent) // 2] if self._recent else 0.0
 
     def metrics(self) -> dict[str, float | int]:
         """Return the metrics so far by their names on `/deviation/metrics`."""
@@ -82,4 +105,5 @@ class Deviations:
         for stamp, measured, twin in pairs:
             vector = self._rotation_base_world @ (measured - twin)
             self._metrics.add(vector, twin)
+            self._recent.append(math.sqrt(float(vector @ vector)))
             yield Deviation(stamp, vector)

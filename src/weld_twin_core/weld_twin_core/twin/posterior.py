@@ -19,11 +19,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.stats.qmc import Halton
 
+from ..arm.robot import Robot
 from ..arrays import Array, readonly
 from ..effects.effect import Effect
 from ..errors import DataError, ModelError
-from ..recording import Recording
+from ..recording import JointMotion, Recording, Signal
 from .domain import Domain
 from .features import Features
 from .twin import Twin
@@ -175,6 +177,9 @@ class Posterior:
         What was recorded.
     left_open : tuple of str
         Directions that the recordings do not show, in words; they are as they were given.
+    recorded_m, anywhere_m : float
+        Standard deviation of position in its worst direction [m], in the middle of the postures
+        that were recorded and of those that the joints' limits allow.
 
     """
 
@@ -184,6 +189,8 @@ class Posterior:
     discrepancy: Discrepancy
     domain: Domain
     left_open: tuple[str, ...] = ()
+    recorded_m: float = 0.0
+    anywhere_m: float = 0.0
 
     def __post_init__(self) -> None:
         count = self.directions.count
@@ -272,6 +279,40 @@ def _pieces(at: Array) -> Iterator[Array]:
         yield at[start : start + CHUNK]
 
 
+def usual_sigma(posterior: Posterior, twin: Twin, like: Recording, q: Array) -> float:
+    """
+    Return the median of `largest_sigma` over postures at rest [m].
+
+    Parameters
+    ----------
+    posterior : Posterior
+    twin : Twin
+    like : Recording
+        Gives the temperature; the tool is not loaded.
+    q : array, shape (M, n)
+
+    """
+    t = np.arange(float(q.shape[0]))
+    warm = like.temperature
+    still = Recording(
+        'postures',
+        JointMotion(t, q, None, True),
+        None,
+        None if like.wrench is None else Signal(t[:1], np.zeros((1, 6))),
+        like.wrench_frame,
+        None if warm is None else Signal(t[:1], np.array([float(np.median(warm.value))])),
+    )
+    return float(np.median(largest_sigma(pose_covariances(posterior, twin, still, t))))
+
+
+def postures_within_limits(robot: Robot, count: int) -> Array:
+    """Return postures spread evenly over what the joints' limits allow, shape (count, n)."""
+    reach = np.where(robot.prismatic, 1.0, np.pi)
+    low, high = np.maximum(robot.lower, -reach), np.minimum(robot.upper, reach)
+    drawn = Halton(robot.n, scramble=False).random(count + 1)[1:]
+    return np.asarray(low + drawn * (high - low))
+
+
 def largest_sigma(covariances: Array) -> Array:
     """Return the largest standard deviation of position in any direction, shape (M,) [m]."""
     return np.asarray(np.sqrt(np.linalg.eigvalsh(covariances[:, :3, :3])[:, -1]))
@@ -301,4 +342,6 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
         },
         'recorded': posterior.domain.as_dict(),
         'left_open': list(posterior.left_open),
+        'sigma_recorded_m': posterior.recorded_m,
+        'sigma_anywhere_m': posterior.anywhere_m,
     }

@@ -59,7 +59,9 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
         _covariance(entry['covariance'], what.count),
         discrepancy,
         _domain(robot, entry['recorded']),
-        tuple(str(item) for item in entry.get('left_open', ())),
+        tuple(str(item) for item in entry['left_open']),
+        _size(entry['sigma_recorded_m'], 'sigma_recorded_m'),
+        _size(entry['sigma_anywhere_m'], 'sigma_anywhere_m'),
     )
 
 

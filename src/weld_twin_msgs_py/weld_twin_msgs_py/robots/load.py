@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from weld_twin_core.arm import catalog
@@ -78,9 +79,11 @@ def read_robot_yaml(path: Path | str) -> Robot:
     return robot
 
 
-def write_robot_yaml(path: Path | str, robot: Robot, *, overwrite: bool = False) -> None:
+def write_robot_yaml(
+    path: Path | str, robot: Robot, *, notes: Sequence[str] = (), overwrite: bool = False
+) -> None:
     """
-    Write a robot file; numbers round trip exactly.
+    Write a robot file, notes as comments first; numbers round trip exactly.
 
     Raises
     ------
@@ -88,4 +91,5 @@ def write_robot_yaml(path: Path | str, robot: Robot, *, overwrite: bool = False)
         The file exists and ``overwrite`` is not set, or the place cannot be written.
 
     """
-    write_text(path, yaml_text(robot.to_mapping()), overwrite=overwrite)
+    head = ''.join(f'# {note}\n' for note in notes)
+    write_text(path, head + yaml_text(robot.to_mapping()), overwrite=overwrite)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
@@ -24,7 +25,7 @@ _NOTE = (
 
 
 def write_urdf(
-    path: Path | str, robot: Robot, *, overwrite: bool = False, remark: str = ''
+    path: Path | str, robot: Robot, *, overwrite: bool = False, notes: Sequence[str] = ()
 ) -> None:
     """
     Write a URDF from the measuring frame (link ``world``) to the tool (link ``tool``).
@@ -34,8 +35,8 @@ def write_urdf(
     path : Path or str
     robot : Robot
     overwrite : bool
-    remark : str
-        A comment at the top.
+    notes : sequence of str
+        Comments at the top.
 
     Raises
     ------
@@ -46,8 +47,8 @@ def write_urdf(
     root = Element('robot', {'name': robot.name})
     gravity = ' '.join(f'{value:g}' for value in robot.gravity)
     root.append(Comment(_NOTE.format(name=robot.name.replace('--', '-'), gravity=gravity)))
-    if remark:
-        root.append(Comment(f' {remark.replace("--", "-")} '))
+    for note in notes:
+        root.append(Comment(f' {note.replace("--", "-")} '))
     SubElement(root, 'link', {'name': 'world'})
     parent, ahead = 'world', robot.T_world_base
     for k, name in enumerate(robot.joint_names):

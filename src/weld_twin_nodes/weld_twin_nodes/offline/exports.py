@@ -16,41 +16,46 @@ from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
 
-_EVERYTHING = '# Every effect of the twin; goes with the nominal robot.\n'
-_LEFT_OVER = '# What the corrected robot.yaml cannot hold; goes with that, not with the nominal.\n'
+_EVERYTHING = 'Every effect of the twin; goes with the nominal robot.'
+_LEFT_OVER = 'What the corrected robot.yaml cannot hold; goes with that, not with the nominal.'
 
 
-def write_yaml(path: Path, model: Model) -> None:
+def write_yaml(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the corrected robot as a robot file."""
-    write_robot_yaml(path, _corrected(model)[0], overwrite=True)
+    write_robot_yaml(path, _corrected(model)[0], notes=[*_mended(model), *notes], overwrite=True)
 
 
-def write_model_urdf(path: Path, model: Model) -> None:
+def write_model_urdf(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the corrected robot as a URDF."""
-    write_urdf(path, _corrected(model)[0], overwrite=True, remark=' '.join(model.mended))
+    write_urdf(path, _corrected(model)[0], overwrite=True, notes=[*_mended(model), *notes])
 
 
-def write_offsets(path: Path, model: Model) -> None:
-    """Write how much further each joint really stands than its reading [rad, or m]."""
+def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
+    """
+    Write how much further each joint really stands than its reading [rad, or m].
+
+    A table is read by spreadsheets; where the model holds stands in the other files.
+    """
+    del notes
     robot = model.robot
     offsets = joint_offsets(robot, _causes(model))
-    rows = [*_mended(model), 'joint,offset,unit']
+    rows = [*(f'# {line}' for line in _mended(model)), 'joint,offset,unit']
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         rows.append(f'{name},{float(offset)!r},{"m" if slides else "rad"}')
     write_text(path, '\n'.join(rows) + '\n', overwrite=True)
 
 
-def write_effects(path: Path, model: Model) -> None:
+def write_effects(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write every effect, known and found, for use with the nominal robot."""
-    _write_effects(path, _EVERYTHING, model, _causes(model))
+    _write_effects(path, [_EVERYTHING, *_mended(model), *notes], _causes(model))
 
 
-def write_left_over(path: Path, model: Model) -> None:
+def write_left_over(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the effects that the corrected robot cannot hold."""
-    _write_effects(path, _LEFT_OVER, model, _corrected(model)[1])
+    _write_effects(path, [_LEFT_OVER, *_mended(model), *notes], _corrected(model)[1])
 
 
-FORMATS: dict[str, tuple[str, Callable[[Path, Model], None]]] = {
+FORMATS: dict[str, tuple[str, Callable[[Path, Model, Sequence[str]], None]]] = {
     'yaml': ('robot.yaml', write_yaml),
     'urdf': ('robot.urdf', write_model_urdf),
     'offsets': ('joint_offsets.csv', write_offsets),
@@ -60,10 +65,10 @@ FORMATS: dict[str, tuple[str, Callable[[Path, Model], None]]] = {
 """What the command line calls a form, its usual file name, and how it is written."""
 
 
-def write_all(directory: Path, model: Model) -> None:
-    """Write the model in every form."""
+def write_all(directory: Path, model: Model, notes: Sequence[str] = ()) -> None:
+    """Write the model in every form, with notes on where it holds."""
     for name, write in FORMATS.values():
-        write(directory / name, model)
+        write(directory / name, model, notes)
 
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
@@ -80,12 +85,12 @@ def _causes(model: Model) -> tuple[Effect, ...]:
     return tuple(effect for effect in model.known + model.found if effect.cause)
 
 
-def _write_effects(path: Path, comment: str, model: Model, effects: Sequence[Effect]) -> None:
+def _write_effects(path: Path, notes: Sequence[str], effects: Sequence[Effect]) -> None:
     entries = [effect.to_mapping() for effect in effects]
-    told = ''.join(f'{line}\n' for line in _mended(model))
-    write_text(path, comment + told + yaml_text(entries), overwrite=True)
+    comment = ''.join(f'# {note}\n' for note in notes)
+    write_text(path, comment + yaml_text(entries), overwrite=True)
 
 
 def _mended(model: Model) -> list[str]:
-    """Return what was wrong with the data that the model comes from, as lines of a comment."""
-    return [f'# Mended before the diagnosis: {sentence}' for sentence in model.mended]
+    """Return what was wrong with the data that the model comes from."""
+    return [f'Mended before the diagnosis: {sentence}' for sentence in model.mended]

@@ -20,6 +20,7 @@ from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
 
 from ..offline.exports import write_all
+from ..offline.where_it_holds import where_it_holds
 from .diagnosis_page import report_page
 
 RESULT = 'diagnosis.json'
@@ -40,7 +41,9 @@ def write_results(directory: Path, diagnosis: Diagnosis, inputs: Sequence[InputF
         diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': NEXT})
     write_text(directory / PAGE, report_page(diagnosis, inputs))
     if diagnosis.status != 'unsound':
-        write_all(directory, diagnosis.model)
+        posterior = diagnosis.posterior
+        notes = [] if posterior is None else where_it_holds(posterior)
+        write_all(directory, diagnosis.model, notes)
     write_text(directory / RESULT, diagnosis_text(diagnosis, inputs))
 
 

@@ -10,6 +10,7 @@ from datetime import datetime, timezone
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.recording import Recording
 
+from ..offline.where_it_holds import where_it_holds
 from .family_table import worth_doing
 from .html import Html, tag
 from .quantities import interval, millimetres, milliradians, odds, percent, turns_only
@@ -58,9 +59,19 @@ def opening(diagnosis: Diagnosis) -> Html:
         tag('p', second, class_='second'),
         _mended(diagnosis),
         _figures(diagnosis) if sound else None,
+        _holds(diagnosis) if sound else None,
         _actions(diagnosis) if sound else None,
         id_='verdict',
     )
+
+
+def _holds(diagnosis: Diagnosis) -> Html | None:
+    """Return how far the corrected robot can be relied on, and what the data left open."""
+    if diagnosis.posterior is None:
+        return None
+    first, *rest = where_it_holds(diagnosis.posterior)[:-1]
+    kind = 'note left-open' if rest else 'note'
+    return tag('p', ' '.join(['The corrected model: ' + first, *rest]), class_=kind)
 
 
 def _mended(diagnosis: Diagnosis) -> Html | None:

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
+from ..offline.where_it_holds import where_it_holds
 from .cause_levels import LEVEL_HEADS, level_row
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows, worth_doing
 from .quantities import change, millimetres, odds, parameter_rows
@@ -52,8 +53,19 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     for recording in diagnosis.recordings:
         for note in recording.notes:
             console.print(f'[dim]note:[/] {escape(recording.name)}: {escape(note)}')
+    _print_holds(diagnosis, console)
     for action in worth_doing(diagnosis):
         console.print(f'[bold]do:[/] {escape(action)}')
+
+
+def _print_holds(diagnosis: Diagnosis, console: Console) -> None:
+    """Print how far the corrected robot can be relied on, and what the data left open."""
+    if diagnosis.posterior is None:
+        return
+    first, *left = where_it_holds(diagnosis.posterior)[:-1]
+    console.print(f'[dim]model:[/] {escape(first)}')
+    for sentence in left:
+        console.print(f'[yellow]open:[/] {escape(sentence)}')
 
 
 def _print_families(diagnosis: Diagnosis, console: Console) -> None:

@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
+from ...effects.setup_motion import of_the_robot
 from ...recording import Recording
 from ...twin.domain import Domain
-from ...twin.posterior import Directions, Posterior
+from ...twin.posterior import Directions, Posterior, postures_within_limits, usual_sigma
+from ...twin.twin import Twin
 from ..algebra.fit import LEAST_TURN, coordinates, design
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
@@ -38,6 +40,8 @@ ROWS = 9000
 FRAME_WIDTHS = (0.05, 0.05)
 """Standard deviation of an aligned frame about the fitted one before the data [m, rad]: a guess at
 a flange or a tripod is good to some centimetres and degrees."""
+POSTURES = 200
+"""Enough for a median to be good to some per cent."""
 LEAST = 1e-6
 """Least noise of a position per axis [m]: no instrument is better, and a simulated cell without
 noise would leave no digits for what is open."""
@@ -46,7 +50,7 @@ USUAL_NOISE = 3e-5
 """What an arm and an instrument leave of a position per axis [m] before anything is known of
 them: arms repeat within 0.02 to 0.1 mm, trackers measure within 0.02 mm."""
 NOISE_TRUST = 8.0
-"""So many rows' worth of belief in that."""
+"""So many rows' worth of belief in that; of a stream as few as count as independent."""
 TRUST = 4.0
 """So many coordinates' worth of belief in the usual sizes, against what this arm shows."""
 
@@ -133,13 +137,28 @@ def allowed(
     left = leftover(problem, scale, unseen, given, floor)
     curves = width[count + np.cumsum([0] + [k.size for k in knots[:-1]])]
     rest = plausible_arm.discrepancy(model.robot, left, curves)
-    return Posterior(
+    posterior = Posterior(
         what,
         mean[:count],
         covariance[:count, :count],
         rest,
         Domain.of(recordings, model.robot),
         left_open(problem, model, scale),
+    )
+    return _with_usual_sigma(posterior, model, problem)
+
+
+def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> Posterior:
+    """Return the posterior with its usual size where it was recorded, and anywhere."""
+    seen = np.concatenate([_joints(r) for r in problem.recordings])
+    spread = np.linspace(0, seen.shape[0] - 1, min(seen.shape[0], POSTURES)).round().astype(int)
+    twin = Twin(model.twin(0).robot, of_the_robot(model.known + model.found))
+    like = problem.recordings[0]
+    anywhere = postures_within_limits(model.robot, POSTURES)
+    return replace(
+        posterior,
+        recorded_m=usual_sigma(posterior, twin, like, seen[spread]),
+        anywhere_m=usual_sigma(posterior, twin, like, anywhere),
     )
 
 
@@ -241,14 +260,14 @@ def learned(rows: Rows, prior: Prior, expected: float = 1.0) -> tuple[Array, flo
     count = rows.share * rows.residual.size
     middle = prior.middle / prior.width
     grown, noise = np.ones(prior.gears.size), 1.0
-    tied = prior.group >= 0
+    tied, trusted = prior.group >= 0, NOISE_TRUST * rows.share
     size = np.ones(prior.width.size)
     for _ in range(ROUNDS):
         step, spread = _solved(normal / noise, right / noise, middle, size)
         known = np.clip(1.0 - spread / size**2, 0.0, 1.0)
         left = rss - 2.0 * right @ step + step @ normal @ step
         free = max(count - float(known.sum()), 0.0)
-        noise = (max(left, 0.0) + NOISE_TRUST * expected) / (free + NOISE_TRUST)
+        noise = (max(left, 0.0) + trusted * expected) / (free + trusted)
         shown = np.bincount(prior.group[tied], (step - middle)[tied] ** 2, grown.size)
         weight = np.bincount(prior.group[tied], known[tied], grown.size)
         # A good arm is good in everything, so that families are compared with all together.

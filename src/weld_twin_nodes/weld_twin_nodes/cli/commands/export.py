@@ -33,17 +33,21 @@ def run(args: argparse.Namespace) -> int:
 
     from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.files.diagnosis_model import read_model
+    from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
     from ...offline.exports import FORMATS
+    from ...offline.where_it_holds import where_it_holds
 
-    model = read_model(robot_of(args), args.model)
+    robot = robot_of(args)
+    model, posterior = read_model(robot, args.model), read_posterior(robot, args.model)
+    notes = [] if posterior is None else where_it_holds(posterior)
     name, write = FORMATS[args.format]
     if args.out is None:
         with TemporaryDirectory() as scratch:
-            write(Path(scratch) / name, model)
+            write(Path(scratch) / name, model, notes)
             sys.stdout.write((Path(scratch) / name).read_text(encoding='utf-8'))
         return 0
     if Path(args.out).exists():
         raise DataError(f"'{args.out}' exists already and is not overwritten")
-    write(Path(args.out), model)
+    write(Path(args.out), model, notes)
     return 0

@@ -13,7 +13,7 @@ def where_it_holds(posterior: Posterior) -> list[str]:
         f'{v * 1e3:.2g} mm' for v in (posterior.recorded_m, posterior.anywhere_m)
     )
     out = [
-        f'Holds within {recorded} (one standard deviation) where it was measured, within '
+        f'This model holds within {recorded} (one standard deviation) where it was measured, within '
         f'{anywhere} elsewhere in its reach.'
     ]
     out += left_open(posterior)

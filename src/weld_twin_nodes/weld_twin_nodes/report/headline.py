@@ -71,7 +71,7 @@ def _holds(diagnosis: Diagnosis) -> Html | None:
         return None
     first, *rest = where_it_holds(diagnosis.posterior)[:-1]
     kind = 'note left-open' if rest else 'note'
-    return tag('p', ' '.join(['The corrected model: ' + first, *rest]), class_=kind)
+    return tag('p', ' '.join([first, *rest]), class_=kind)
 
 
 def _mended(diagnosis: Diagnosis) -> Html | None:

@@ -63,7 +63,7 @@ def _print_holds(diagnosis: Diagnosis, console: Console) -> None:
     if diagnosis.posterior is None:
         return
     first, *left = where_it_holds(diagnosis.posterior)[:-1]
-    console.print(f'[dim]model:[/] {escape(first)}')
+    console.print(escape(first))
     for sentence in left:
         console.print(f'[yellow]open:[/] {escape(sentence)}')
 

@@ -50,7 +50,7 @@ USUAL_NOISE = 3e-5
 """What an arm and an instrument leave of a position per axis [m] before anything is known of
 them: arms repeat within 0.02 to 0.1 mm, trackers measure within 0.02 mm."""
 NOISE_TRUST = 8.0
-"""So many rows' worth of belief in that; of a stream as few as count as independent."""
+"""So many rows' worth of belief in that."""
 TRUST = 4.0
 """So many coordinates' worth of belief in the usual sizes, against what this arm shows."""
 
@@ -124,7 +124,7 @@ def allowed(
     knots = plausible_arm.fine_knots([_joints(r) for r in problem.recordings])
     rows = _rows(problem, model, scale, what, knots)
     prior = _prior(what, model, knots)
-    width, noise = learned(rows, prior, (USUAL_NOISE / scale.position) ** 2)
+    width, noise = learned(rows, prior, _expected(problem, scale))
     mean, covariance = conditioned(rows, prior, width, noise)
     count = what.count
     unseen = _unseen(problem, model, scale, precision, rows, count)
@@ -160,6 +160,18 @@ def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> P
         recorded_m=usual_sigma(posterior, twin, like, seen[spread]),
         anywhere_m=usual_sigma(posterior, twin, like, anywhere),
     )
+
+
+def _expected(problem: Problem, scale: Scale) -> float:
+    """
+    Return the variance of a whitened row before the fit is looked at.
+
+    A fit of few stations leaves less than the noise; one of a stream has a hundred rows for every
+    coordinate and leaves what there is.
+    """
+    if not problem.recordings[0].joints.static:
+        return 1.0
+    return float((USUAL_NOISE / scale.position) ** 2)
 
 
 def _joints(recording: Recording) -> Array:
@@ -260,7 +272,7 @@ def learned(rows: Rows, prior: Prior, expected: float = 1.0) -> tuple[Array, flo
     count = rows.share * rows.residual.size
     middle = prior.middle / prior.width
     grown, noise = np.ones(prior.gears.size), 1.0
-    tied, trusted = prior.group >= 0, NOISE_TRUST * rows.share
+    tied, trusted = prior.group >= 0, NOISE_TRUST
     size = np.ones(prior.width.size)
     for _ in range(ROUNDS):
         step, spread = _solved(normal / noise, right / noise, middle, size)

@@ -18,7 +18,7 @@ from ..recording import JointMotion
 from .inverse import PathSolution, solve_path
 from .inverse.newton import chain_jacobian, least_step, polish, pose_error
 from .paths import Path, SeamFrames, Torch
-from .profiles import Profile, Timing, named
+from .profiles import MOST_SAMPLES, Profile, Timing, named
 
 _DIFFERENCE = 1e-6
 """Arc length [m] over which the pose is differentiated."""
@@ -105,6 +105,7 @@ def plan(
     torch: Torch | None = None,
     fit: bool = False,
     seed: Array | None = None,
+    most_samples: int = MOST_SAMPLES,
 ) -> Plan:
     """
     Return the joint motion that travels a seam.
@@ -125,13 +126,16 @@ def plan(
         Slow the motion down until it is within the joint limits, instead of refusing it.
     seed : array, shape (n,), optional
         Joint positions near which the motion begins.
+    most_samples : int
+        How many the motion may have: near a singular posture ``fit`` may slow it down endlessly.
 
     Raises
     ------
     ReachError
         Part of the seam is out of reach.
     PathError
-        A joint would have to be too fast; the message says which, when and by how much.
+        A joint would have to be too fast; the message says which, when and by how much. Or the
+        motion would have too many samples.
 
     Examples
     --------
@@ -148,7 +152,7 @@ def plan(
     line = _JointLine(robot, path, torch or Torch(), seed)
     slowed, dt = 1.0, 1.0 / rate_hz
     for _ in range(20):
-        timing = _slowed(law.sample(path.length, dt / slowed), slowed)
+        timing = _slowed(law.sample(path.length, dt / slowed, most_samples), slowed)
         motion, residual = line.motion(timing)
         velocity, acceleration = _use(robot, motion)
         excess = max(velocity.max(), np.sqrt(acceleration.max()))

@@ -33,6 +33,13 @@ from ..errors import PathError
 from .paths.seam_path import positive
 
 
+MOST_SAMPLES = 2_000_000
+"""
+Samples a motion may have: four and a half hours at 125 Hz, half an hour at 1 kHz. Planning takes
+2.6 to 3.2 kB for each with six and seven joints, so these take 6 GB at most.
+"""
+
+
 class Timing(NamedTuple):
     """Stamps t [s], arc length s [m], its rate sd [m/s] and acceleration sdd [m/s^2], (N,)."""
 
@@ -54,7 +61,7 @@ class Profile(ABC):
     def law(self, length: float) -> PPoly:
         """Return s(t) from 0 to the length, from t = 0 to the last breakpoint."""
 
-    def sample(self, length: float, dt: float) -> Timing:
+    def sample(self, length: float, dt: float, most: int = MOST_SAMPLES) -> Timing:
         """
         Return the law at equal steps, the last of them at or just after the end.
 
@@ -62,10 +69,18 @@ class Profile(ABC):
         ----------
         length : float [m]
         dt : float [s]
+        most : int
+            Samples it may have.
+
+        Raises
+        ------
+        PathError
+            It would have more.
 
         """
         law = self.law(length)
         end = float(law.x[-1])
+        refuse_endless(end, dt, most)
         t = dt * np.arange(int(np.ceil(end / dt - 1e-9)) + 1, dtype=np.float64)
         inside = np.minimum(t, end)
         moving = t <= end
@@ -74,6 +89,29 @@ class Profile(ABC):
             np.where(moving, law(inside), length),
             np.where(moving, law(inside, 1), 0.0),
             np.where(moving, law(inside, 2), 0.0),
+        )
+
+
+def refuse_endless(duration: float, dt: float, most: int = MOST_SAMPLES) -> None:
+    """
+    Refuse a motion of more samples than make sense.
+
+    Parameters
+    ----------
+    duration, dt : float [s]
+    most : int
+
+    Raises
+    ------
+    PathError
+        It would have more samples than that.
+
+    """
+    if not duration <= most * dt:
+        raise PathError(
+            f'the motion would take {duration / dt:.3g} samples, and {most:,} are the most; lower '
+            'the rate, raise the speed, or keep the seam away from a singular posture, where the '
+            'joints slow it down'
         )
 
 

@@ -36,6 +36,7 @@ def seam_motion(robot: Robot, span: float, rate: float, rng: np.random.Generator
         None of the seams drawn can be welded.
 
     """
+    most = int(np.ceil(LONGEST * span * rate))
     for _ in range(TRIES):
         q = working_posture(robot) + rng.uniform(-0.4, 0.4, robot.n)
         seam = _seam(str(rng.choice(KINDS)), forward(robot, q), float(rng.uniform(*SIZE)), rng)
@@ -44,7 +45,9 @@ def seam_motion(robot: Robot, span: float, rate: float, rng: np.random.Generator
         if rng.random() < 0.5:
             law = Aggressive(speed=float(rng.uniform(0.05, 0.2)), reversals=6)
         try:
-            moved = plan(robot, seam, law, rate, torch=torch, fit=True, seed=q).motion.q
+            moved = plan(
+                robot, seam, law, rate, torch=torch, fit=True, seed=q, most_samples=most
+            ).motion.q
         except PathError:
             continue
         if len(moved) < LONGEST * span * rate:

@@ -13,6 +13,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+from weld_twin_core.motion.profiles import refuse_endless
 from weld_twin_core.recording import JointMotion
 
 from .whole_files import write_text
@@ -100,6 +101,11 @@ def through_stations(robot: Robot, t: Array, q: Array, rate: float) -> JointMoti
     q : array, shape (K, n)
     rate : float [1/s]
 
+    Raises
+    ------
+    PathError
+        It would have more samples than make sense.
+
     """
     leave, arrive = [], [0.0]
     for k, step in enumerate(np.abs(np.diff(q, axis=0))):
@@ -110,6 +116,7 @@ def through_stations(robot: Robot, t: Array, q: Array, rate: float) -> JointMoti
         )
         leave.append(max(arrive[-1] + REST, float(t[k + 1] - t[0]) - 0.5 * REST - way))
         arrive.append(leave[-1] + way)
+    refuse_endless(arrive[-1] + REST, 1.0 / rate)
     start, end = np.array(leave), np.array(arrive[1:])
     times = np.arange(0.0, arrive[-1] + REST, 1.0 / rate)
     leg = np.clip(np.searchsorted(start, times, side='right') - 1, 0, len(leave) - 1)

@@ -13,7 +13,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.paths import KINDS, default_seam, from_mapping
 from weld_twin_core.motion.planned_motion import Plan, plan
-from weld_twin_core.motion.profiles import Profile, named
+from weld_twin_core.motion.profiles import Profile, named, refuse_endless
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.files.joint_file import read_joint_motion, through_stations
 from weld_twin_msgs_py.files.path_file import read_path
@@ -103,8 +103,11 @@ def sampled(robot: Robot, motion: JointMotion, rate: float) -> JointMotion:
     ------
     DataError
         It leaves the limits of the robot.
+    PathError
+        It would have more samples than make sense.
 
     """
+    refuse_endless(float(motion.t[-1]), 1.0 / rate)
     count = max(round(float(motion.t[-1]) * rate), 1)
     t = np.linspace(0.0, float(motion.t[-1]), count + 1)
     q, qd = motion.at(t)

@@ -1,0 +1,3 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Running the demo and comparing what it leaves."""

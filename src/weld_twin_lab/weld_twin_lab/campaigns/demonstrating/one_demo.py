@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One run of the demo as a program of its own, with busy processes beside it or none."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from weld_twin_msgs_py.bags import bag_info
+
+LIMIT = 1800.0
+"""Seconds after which a run is given up: it takes one minute where eight processes share a core."""
+COMPARED = ('deviation.csv', 'summary.txt')
+"""Files that are the same on every run: each deviation, and the words on the terminal."""
+SAID = 2000
+"""Characters kept of what a failed run says."""
+
+
+def run_once(busy: int) -> dict[str, Any]:
+    """
+    Return what one run left.
+
+    Parameters
+    ----------
+    busy : int
+        How many processes compute beside it.
+
+    Returns
+    -------
+    dict
+        ``seconds``, ``code``, ``messages`` by topic of the bag, ``incomplete`` sentences,
+        ``digests`` of the compared files, ``headline``, and ``said`` where the run failed.
+
+    """
+    begin = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix='weld_twin_demo_') as place, _busy(busy):
+        out = Path(place) / 'out'
+        try:
+            run = subprocess.run(
+                [sys.executable, '-m', 'weld_twin_nodes', 'demo', '--out', str(out)],
+                capture_output=True,
+                text=True,
+                timeout=LIMIT,
+            )
+            code, said = run.returncode, run.stderr
+        except subprocess.TimeoutExpired:
+            code, said = -1, f'not finished after {LIMIT:g} s'
+        row = {'busy': busy, 'seconds': round(time.monotonic() - begin, 1), 'code': code}
+        return {**row, **(_left(out) if code == 0 else {'said': said[-SAID:]})}
+
+
+def _left(out: Path) -> dict[str, Any]:
+    info = bag_info(out / 'bag')
+    summary = (out / 'summary.txt').read_text(encoding='utf-8')
+    return {
+        'messages': {topic.name: topic.count for topic in info.topics},
+        'incomplete': list(info.incomplete),
+        'digests': {
+            name: hashlib.sha256((out / name).read_bytes()).hexdigest() for name in COMPARED
+        },
+        'headline': next(line for line in summary.splitlines() if line.startswith('The gap')),
+    }
+
+
+@contextmanager
+def _busy(count: int) -> Iterator[None]:
+    """Let processes compute meanwhile."""
+    crowd = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for process in crowd:
+            process.kill()
+        for process in crowd:
+            process.wait()

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Run the demo again and again: every recording whole, every result the same.
+
+Every second run has busy processes beside it. A run passes if it ends by itself with a recording of
+one message on each topic for each joint state; the campaign passes if all runs do and leave the
+same table and the same words.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import Any
+
+from weld_twin_msgs_py.files import markdown
+
+BUSY = 6
+"""Processes beside every second run; with the demo's own, five to a core of a machine with two."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('--runs', type=int, default=60, metavar='N', help='demos (default: 60)')
+    parser.add_argument(
+        '--busy', type=int, default=BUSY, metavar='N', help=f'busy processes (default: {BUSY})'
+    )
+    parser.add_argument(
+        '--minutes',
+        type=float,
+        default=float('inf'),
+        metavar='M',
+        help='begin no more demos after this time (default: no limit)',
+    )
+
+
+def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return one row for each run, and what they come to."""
+    from .demonstrating.one_demo import run_once
+
+    rows: list[dict[str, Any]] = []
+    latest = time.monotonic() + 60.0 * args.minutes
+    for k in range(args.runs):
+        if time.monotonic() > latest:
+            break
+        row = run_once(args.busy if k % 2 else 0)
+        rows.append(row)
+        what = fault(row, rows[0]) or 'whole and the same'
+        tell(f'{k + 1}: {row["busy"]} busy, {row["seconds"]} s, {what}')
+    return {**summary(rows, args.busy), 'demos': rows}
+
+
+def summary(rows: list[dict[str, Any]], busy: int) -> dict[str, Any]:
+    """Return what rows of runs come to, the first of them the one to compare with."""
+    groups = {
+        name: _group([row for row in rows if row['busy'] == count], rows[0])
+        for name, count in (('alone', 0), ('crowded', busy))
+    }
+    passed = all(not fault(row, rows[0]) for row in rows)
+    messages = rows[0].get('messages', {})
+    headline = rows[0].get('headline', '')
+    return {'passed': passed, 'messages': messages, 'headline': headline, **groups}
+
+
+def fault(row: dict[str, Any], first: dict[str, Any]) -> str:
+    """Return what is wrong with a run, empty when nothing is."""
+    if row['code'] != 0:
+        return f'ended with {row["code"]}: {row["said"][:200]}'
+    if row['incomplete'] or not _even(row['messages']):
+        return '; '.join(row['incomplete']) or f'unequal counts {row["messages"]}'
+    if row['digests'] != first.get('digests'):
+        changed = [
+            name for name in row['digests'] if row['digests'][name] != first['digests'][name]
+        ]
+        return f'another {", ".join(changed)}'
+    return ''
+
+
+def _even(messages: dict[str, int]) -> bool:
+    """Return whether the streams with one message for each joint state have as many."""
+    streams = {count for topic, count in messages.items() if topic != '/deviation/metrics'}
+    return len(streams) == 1
+
+
+def _group(rows: list[dict[str, Any]], first: dict[str, Any]) -> dict[str, Any]:
+    import numpy as np
+
+    whole = [row for row in rows if row['code'] == 0]
+    seconds = [row['seconds'] for row in rows] or [0.0]
+    return {
+        'runs': len(rows),
+        'failed': len(rows) - len(whole),
+        'incomplete': sum(bool(row['incomplete']) or not _even(row['messages']) for row in whole),
+        'different': sum(row['digests'] != first.get('digests') for row in whole),
+        'seconds': {
+            'median': round(float(np.median(seconds)), 1),
+            'max': round(max(seconds), 1),
+        },
+    }
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return a row for the runs alone and one for those with busy processes beside."""
+    head = ('beside it', 'demos', 'failed', 'incomplete', 'another result', 'median', 'longest')
+    rows = []
+    for name, beside in (('alone', 'nothing of ours'), ('crowded', 'six busy processes')):
+        row = result[name]
+        seconds = (f'{row["seconds"][key]:.0f} s' for key in ('median', 'max'))
+        rows.append(
+            (beside, row['runs'], row['failed'], row['incomplete'], row['different'], *seconds)
+        )
+    return markdown.table(head, *rows)

@@ -32,7 +32,6 @@ from ..arrays import Array
 from ..errors import PathError
 from .paths.seam_path import positive
 
-
 MOST_SAMPLES = 2_000_000
 """
 Samples a motion may have: four and a half hours at 125 Hz, half an hour at 1 kHz. Planning takes

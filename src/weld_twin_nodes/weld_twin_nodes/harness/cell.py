@@ -34,7 +34,7 @@ from weld_twin_msgs_py.messages.topics import BY_NAME, JOINT_STATES, Topic
 from ..live.pacing import Pump
 from ..offline.seam_motion import stamps
 from .domain import own_domain
-from .process import NodeProcess
+from .process import NodeProcess, stop_all
 from .tap import Tap
 
 DEEP = 20_000
@@ -361,10 +361,7 @@ class Cell:
             self.remove(node)
 
     def _stop_all(self) -> None:
-        for process in self.processes:
-            process.interrupt()
-        for process in self.processes:
-            process.stop()
+        stop_all(self.processes)
 
 
 class _Asked:

@@ -7,7 +7,10 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +29,9 @@ MODULES = {
 }
 GRACE = 20.0
 """Seconds a process has to end after SIGINT before it is killed."""
+AGAIN = 1.0
+"""Seconds after which it is told again."""
+LOOK = 0.02
 
 
 class NodeProcess:
@@ -60,7 +66,7 @@ class NodeProcess:
             file = folder / f'{self.name}.yaml'
             file.write_text(yaml.safe_dump({'/**': {'ros__parameters': dict(parameters)}}))
             command += ['--ros-args', '--params-file', str(file)]
-        with self._log.open('w') as log:
+        with self._log.open('w') as log, _interruptible():
             self._process = subprocess.Popen(
                 command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
             )
@@ -96,12 +102,55 @@ class NodeProcess:
 
     def stop(self) -> int:
         """Interrupt the process, kill it if that does not help; return its exit code."""
-        self.interrupt()
-        try:
-            return self.end()
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            return self._process.wait()
+        stop_all([self])
+        return self._process.wait()
+
+    def kill(self) -> None:
+        """End the process as it is."""
+        self._process.kill()
+
+
+def stop_all(processes: Sequence[NodeProcess], grace: float = GRACE) -> None:
+    """
+    Interrupt processes, and kill those that still run after a time [s] that all have together.
+
+    A node of this package is told again and again: a signal may come before the interpreter
+    handles it, and the node takes the second one for the first. Other programs may take a second
+    one for an order to drop everything.
+    """
+    for process in processes:
+        process.interrupt()
+    end, again = time.monotonic() + grace, time.monotonic() + AGAIN
+    while any(process.code is None for process in processes):
+        now = time.monotonic()
+        if now > end:
+            for process in processes:
+                process.kill()
+        elif now > again:
+            again = now + AGAIN
+            for process in processes:
+                if process.known and process.code is None:
+                    process.signal(signal.SIGINT)
+        time.sleep(LOOK)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """
+    Let a child be interrupted although this process is not.
+
+    A job in the background of a script ignores Ctrl-C; what is ignored is inherited, what is
+    handled is not.
+    """
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: None)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _command(node: str | Sequence[str]) -> list[str]:

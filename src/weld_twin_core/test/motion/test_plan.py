@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Planned motions of every bundled robot on every bundled seam."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -133,3 +135,28 @@ def test_a_senseless_rate_is_refused():
     robot = catalog.load('ur5')
     with pytest.raises(PathError, match=r'sample rate must be positive, got 0\.0 Hz'):
         plan(robot, default_seam(robot), rate_hz=0.0)
+
+
+@pytest.mark.parametrize(
+    ('profile', 'rate'),
+    [(Smooth(), 1e9), (Smooth(speed=1e-9), 1e5), (Constant(speed=1e-300), 1.0)],
+)
+def test_an_endless_motion_is_refused_before_it_takes_memory(profile, rate):
+    robot = catalog.load('ur5')
+    tracemalloc.start()
+    try:
+        with pytest.raises(PathError, match=r'would take .* samples, and 2,000,000 are the most'):
+            plan(robot, default_seam(robot, 'line'), profile, rate)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 50e6
+
+
+def test_a_seam_that_slows_down_endlessly_is_refused_where_it_would_pass_the_limit():
+    robot = catalog.load('ur5')
+    seam = default_seam(robot, 'line')
+    whole = plan(robot, seam, Smooth(), 50.0, fit=True).motion.t.size
+    assert plan(robot, seam, Smooth(), 50.0, fit=True, most_samples=whole).motion.t.size == whole
+    with pytest.raises(PathError, match=f'and {whole - 2:,} are the most'):
+        plan(robot, seam, Smooth(), 50.0, fit=True, most_samples=whole - 2)

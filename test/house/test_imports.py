@@ -97,3 +97,12 @@ def test_tests_of_a_package_import_it_and_those_below_alone(package):
 
 def test_no_files_import_each_other_in_a_circle():
     assert circles(GRAPH) == []
+
+
+def test_the_architecture_page_names_every_folder():
+    text = (ROOT / 'docs/architecture.md').read_text(encoding='utf-8')
+    packages = {name.rpartition('.')[0] for name in FILES}
+    folders = {name.split('.')[-1] for name in packages if 2 <= len(name.split('.')) <= 3}
+    detail = {'peers', 'fuzzing', 'faulting', 'killing', 'keeping', 'figures', 'commands'}
+    detail |= {name for name in folders if name.endswith('_jobs')}
+    assert [name for name in sorted(folders - detail) if f'`{name}/`' not in text] == []

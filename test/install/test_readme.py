@@ -77,3 +77,22 @@ def test_the_example_bag_is_what_its_readme_says(tmp_path, monkeypatch):
 def test_no_page_that_a_command_made_is_kept():
     kept = list((ROOT / 'docs').rglob('*.html'))
     assert kept == [], 'keep the data; the build of the documentation makes the pages'
+
+
+def test_the_files_that_contributing_names_exist():
+    table = (ROOT / 'CONTRIBUTING.md').read_text().partition('## Rules')[0]
+    rows = [line for line in table.splitlines() if line.startswith('| ')][2:]
+    assert len(rows) >= 10
+    missing = []
+    for row in rows:
+        package = re.search(r'\| (core|msgs_py|nodes|lab): ', row)
+        inside = ROOT / f'src/weld_twin_{package[1]}' if package else ROOT
+        lab = ROOT / 'src/weld_twin_lab/weld_twin_lab'
+        room = ''
+        for path in re.findall(r'`([\w/]+\.(?:py|md|toml))`', row):
+            room = path.rpartition('/')[0] or room
+            name = path.replace('NAME', '__init__') if path.endswith('.py') else path
+            places = [ROOT, inside, inside / inside.name, inside / inside.name / room, lab]
+            if 'NAME.md' not in name and not any((place / name).exists() for place in places):
+                missing.append(path)
+    assert missing == []

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         text = getdoc(module) or ''
         job = jobs.add_parser(
             name,
-            help=text.partition('\n')[0],
+            help=text.partition('\n')[0].replace('%', '%%'),
             description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

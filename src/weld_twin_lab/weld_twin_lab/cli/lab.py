@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         text = getdoc(module) or ''
         proof = subparsers.add_parser(
             name,
-            help=text.partition('\n')[0],
+            help=text.partition('\n')[0].replace('%', '%%'),
             description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

@@ -89,7 +89,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         text = getdoc(module) or ''
         sub = subparsers.add_parser(
             name,
-            help=text.partition('\n')[0],
+            help=text.partition('\n')[0].replace('%', '%%'),
             description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

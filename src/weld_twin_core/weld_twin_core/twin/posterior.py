@@ -51,12 +51,20 @@ class Directions:
         Number of base frames.
     effects : tuple of Effect
         Each with all its fit coordinates, as instances at which derivatives are taken.
+    knots : tuple of array, shapes (K,) [rad or m]
+        For every joint, where the heights of a curve of its own angle are coordinates: straight
+        lines between, nothing beyond. Evenly spaced; none for no curve.
 
     """
 
     frames: tuple[str, ...]
     setups: int
     effects: tuple[Effect, ...]
+    knots: tuple[Array, ...] = ()
+
+    def __post_init__(self) -> None:
+        knots = tuple(readonly(k, (None,), 'knots') for k in self.knots)
+        object.__setattr__(self, 'knots', knots)
 
     @property
     def frame_count(self) -> int:
@@ -71,7 +79,7 @@ class Directions:
     @property
     def count(self) -> int:
         """Return the number of coordinates."""
-        return self.frame_count + sum(self.sizes)
+        return self.frame_count + sum(self.sizes) + sum(k.size for k in self.knots)
 
     def names(self) -> list[str]:
         """Return a name for every coordinate: 'base 0.x', 'joint_offset elbow_joint 0'."""
@@ -83,6 +91,8 @@ class Directions:
         for effect, size in zip(self.effects, self.sizes, strict=True):
             where = f' {effect.site}' if effect.site else ''
             out += [f'{effect.name}{where} {k}' for k in range(size)]
+        for joint, knots in enumerate(self.knots):
+            out += [f'curve of joint {joint + 1} at {place:.3f}' for place in knots]
         return out
 
     def columns(self, features: Features, setup: int) -> Array:
@@ -105,7 +115,18 @@ class Directions:
             if effect.applicable(features.view, effect.site) is None:
                 out[at : at + size] = features.columns(effect, atoms=False)
             at += size
+        for joint, knots in enumerate(self.knots):
+            if knots.size:
+                hats = _hats(features.run.view.joint(joint), knots)
+                out[at : at + knots.size] = hats[:, None] * features.column(('q', joint))
+            at += knots.size
         return out
+
+
+def _hats(q: Array, knots: Array) -> Array:
+    """Return the straight-line interpolation from heights at knots, shape (K, M)."""
+    width = knots[1] - knots[0] if knots.size > 1 else 1.0
+    return np.asarray(np.maximum(0.0, 1.0 - np.abs(q - knots[:, None]) / max(width, 1e-9)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,6 +347,7 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
         'frames': list(what.frames),
         'setups': what.setups,
         'effects': [effect.to_mapping() for effect in what.effects],
+        'knots': [knots.tolist() for knots in what.knots],
         'coordinates': [
             {'name': name, 'std': float(std), 'mean': float(mean)}
             for name, std, mean in zip(what.names(), deviation, posterior.mean, strict=True)

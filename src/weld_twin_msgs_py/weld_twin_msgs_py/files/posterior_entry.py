@@ -43,7 +43,10 @@ def read_posterior(robot: Robot, path: Path | str) -> Posterior | None:
 
 def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
     what = Directions(
-        tuple(entry['frames']), int(entry['setups']), effects_from_list(entry['effects'], robot)
+        tuple(entry['frames']),
+        int(entry['setups']),
+        effects_from_list(entry['effects'], robot),
+        tuple(readonly(knots, (None,), 'posterior.knots') for knots in entry['knots']),
     )
     rest = entry['discrepancy']
     discrepancy = Discrepancy(

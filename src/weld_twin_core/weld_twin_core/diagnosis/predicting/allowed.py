@@ -120,27 +120,24 @@ def allowed(
     )
     effects = plausible_arm.directions(model.robot, model.found)
     frames = tuple(frame for frame in ('base', 'tool') if frame in problem.align)
-    what = Directions(frames, len(problem.recordings), effects)
     knots = plausible_arm.fine_knots([_joints(r) for r in problem.recordings])
-    rows = _rows(problem, model, scale, what, knots)
-    prior = _prior(what, model, knots)
+    what = Directions(frames, len(problem.recordings), effects, knots)
+    rows = _rows(problem, model, scale, what)
+    prior = _prior(what, model)
     width, noise = learned(rows, prior, _expected(problem, scale))
     mean, covariance = conditioned(rows, prior, width, noise)
-    count = what.count
-    unseen = _unseen(problem, model, scale, precision, rows, count)
+    unseen = _unseen(problem, model, scale, precision, rows)
 
     def given(keep: Array) -> tuple[Array, Array]:
-        # The fine curves stay where they were seen: between postures they are left over.
-        middle, spread = conditioned(rows.kept(keep), prior, width, noise)
-        return middle[:count], spread[:count, :count]
+        return conditioned(rows.kept(keep), prior, width, noise)
 
     left = leftover(problem, scale, unseen, given, floor)
-    curves = width[count + np.cumsum([0] + [k.size for k in knots[:-1]])]
-    rest = plausible_arm.discrepancy(model.robot, left, curves)
+    ends = what.count - np.cumsum([k.size for k in reversed(knots)])[::-1]
+    rest = plausible_arm.discrepancy(model.robot, left, width[ends])
     posterior = Posterior(
         what,
-        mean[:count],
-        covariance[:count, :count],
+        mean,
+        covariance,
         rest,
         Domain.of(recordings, model.robot),
         left_open(problem, model, scale),
@@ -179,21 +176,17 @@ def _joints(recording: Recording) -> Array:
     return recording.joints.at(recording.joints.t if measured is None else measured.t)[0]
 
 
-def _rows(
-    problem: Problem, model: Model, scale: Scale, what: Directions, knots: list[Array]
-) -> Rows:
-    parts = []
-    for k, maker in enumerate(problem.features(model)):
-        both = (what.columns(maker, k), plausible_arm.fine_columns(maker, knots))
-        parts.append(np.concatenate(both)[:, : problem.rows[k]])
+def _rows(problem: Problem, model: Model, scale: Scale, what: Directions) -> Rows:
+    parts = [
+        what.columns(maker, k)[:, : problem.rows[k]]
+        for k, maker in enumerate(problem.features(model))
+    ]
     residual = problem.whitened(problem.residuals(model), scale)
     share = effective_share(residual, problem.rows, problem.samples)
     return Rows(problem.whitened(parts, scale), residual, share)
 
 
-def _unseen(
-    problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows, count: int
-) -> Unseen:
+def _unseen(problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows) -> Unseen:
     own, _ = design(problem, model, scale)
     pull, x = np.zeros(own.shape[0]), np.zeros(own.shape[0])
     if precision.size:
@@ -202,7 +195,7 @@ def _unseen(
         own,
         pull,
         pull * x,
-        rows.columns[:count],
+        rows.columns,
         _turns(problem, model, scale),
         rows.residual,
         posture_blocks(problem),
@@ -232,11 +225,11 @@ def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:
     return thin, replace(scale, weights=tuple(kept))
 
 
-def _prior(what: Directions, model: Model, knots: list[Array]) -> Prior:
+def _prior(what: Directions, model: Model) -> Prior:
     """Return the prior of frames, effects and the heights of every joint's fine curve."""
     frames, effects = what.frame_count, what.effects
     group, gears = plausible_arm.groups(effects)
-    sizes = [k.size for k in knots]
+    sizes = [k.size for k in what.knots]
     fine = sum(sizes)
     curves = gears.size + np.repeat(np.arange(len(sizes)), sizes)
     tied = plausible_arm.middles(effects, model.found)

@@ -15,7 +15,6 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
 from ...effects.transmission_ripple import TransmissionRipple
-from ...twin.features import Features
 from ...twin.posterior import Discrepancy
 from .leftover import Rest
 
@@ -33,9 +32,13 @@ ORDERS = np.arange(1.0, 5.0)
 """Ripple orders [1/rev] that bend a joint's whole range; finer ones are part of what is left over,
 for they are as large inside as outside what was recorded."""
 SPACING = 0.1
-"""Distance of the knots of a joint's fine curve [rad or m]: shorter than the orders above bend."""
-KNOTS = 30
-"""Most knots per joint."""
+"""Least distance of the knots of a joint's fine curve [rad or m], and distance beyond what was
+recorded at which nothing is known of it: orders above four bend within some tenths of a radian."""
+KNOTS = 8
+"""Most intervals of a joint's fine curve. It is there for joints that hardly moved, where a gear's
+fine error looks like a slope that it is not; over a wide range it averages out."""
+LEAST_RANGE = 1e-3
+"""Range of a curve [rad or m] on a joint that did not move."""
 FINE = 1e-4
 """Usual height of the fine curve [rad]: ripple of the orders above four."""
 MOST = 24
@@ -146,25 +149,14 @@ def widths(robot: Robot, effects: Sequence[Effect]) -> Array:
     return np.concatenate(sizes)
 
 
-def fine_knots(motions: Sequence[Array]) -> list[Array]:
+def fine_knots(motions: Sequence[Array]) -> tuple[Array, ...]:
     """Return knots along every joint's recorded range, one array (K,) for each joint [rad, m]."""
     q = np.concatenate(motions)
     out = []
     for low, high in zip(q.min(axis=0), q.max(axis=0), strict=True):
         count = int(np.clip(np.ceil((high - low) / SPACING), 1, KNOTS))
-        out.append(np.linspace(low, high, count + 1))
-    return out
-
-
-def fine_columns(features: Features, knots: Sequence[Array]) -> Array:
-    """Return d pose / d height of every joint's curve at its knots, shape (K, 6, M)."""
-    out = []
-    for i, places in enumerate(knots):
-        at = np.asarray(features.run.view.joint(i))
-        width = places[1] - places[0] if places[-1] > places[0] else 1.0
-        hats = np.maximum(0.0, 1.0 - np.abs(at - places[:, None]) / width)
-        out.append(hats[:, None] * features.column(('q', i)))
-    return np.concatenate(out)
+        out.append(np.linspace(low, max(high, low + LEAST_RANGE), count + 1))
+    return tuple(out)
 
 
 def discrepancy(robot: Robot, rest: Rest, fine: Array) -> Discrepancy:

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.algebra.gram import Gram, by_block
+from weld_twin_core.diagnosis.algebra.gram import Gram
 
 COUNT, ROWS = 7, 60
 
@@ -59,13 +59,6 @@ def test_no_columns_gain_nothing(system):
     assert Gram.of(*system).gain(np.array([], dtype=int)) == 0.0
 
 
-def test_the_sum_of_squares_for_given_coefficients_is_that_of_the_residual(system):
-    columns, y = system
-    index, x = np.array([2, 3]), np.array([0.7, -1.9])
-    left = y - x @ columns[index]
-    assert Gram.of(columns, y).residual_of(index, x) == pytest.approx(left @ left, rel=1e-12)
-
-
 def test_columns_taken_out_leave_what_they_do_not_span(system):
     columns, y = system
     out, rest = np.array([1, 4]), np.array([0, 2, 3, 5, 6])
@@ -101,15 +94,3 @@ def test_two_equal_columns_share_one_coefficient_without_failing(system):
     alone, _ = least_squares(columns[:1], y)
     both = Gram.of(columns, y).solve(np.array([0, COUNT]))
     np.testing.assert_allclose(both.sum(), alone[0], rtol=1e-6)
-
-
-def test_blocks_add_up_and_come_off_again(system):
-    columns, y = system
-    labels = np.repeat([0, 1, 2], [13, 30, 17])
-    total, blocks = by_block(columns, y, labels)
-    others = labels != 1
-    without_second = total - blocks[1]
-    expected, _ = least_squares(columns[:3][:, others], y[others])
-    np.testing.assert_allclose(total.normal, columns @ columns.T, rtol=1e-9, atol=1e-9)
-    assert (total.rows, without_second.rows) == (ROWS, 30)
-    np.testing.assert_allclose(without_second.solve(np.arange(3)), expected, rtol=1e-7)

@@ -343,22 +343,3 @@ def identification_channels(robot: Robot) -> tuple[Channel, ...]:
     rows = tuple((key, i) for i in range(robot.n) for key in ROW_CHANNELS)
     base = tuple(('base', k) for k in range(6))
     return base + rows + tuple(('tool', k) for k in range(6))
-
-
-def identification_jacobian(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Array:
-    """
-    Return d(pose) / d(every geometric channel), shape (..., 6, 12 + 5 n).
-
-    Columns follow `identification_channels`.
-
-    Parameters
-    ----------
-    robot : Robot
-    q : array, shape (..., n) [rad or m]
-    shift : mapping of channel to array, optional
-        Displaced channels; each value broadcasts with ``q[..., 0]``.
-
-    """
-    chain = frames(robot, q, shift)
-    columns = [column(robot, chain, key, shift) for key in identification_channels(robot)]
-    return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), (0, 1), (-2, -1))

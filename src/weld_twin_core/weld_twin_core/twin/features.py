@@ -70,11 +70,7 @@ class Features:
 
     def pose_change(self, shift: Shift) -> Array:
         """Return the change of pose, shape (6, M), that displaced channels make."""
-        total = np.zeros((6, self.at.size))
-        for channel, value in shift.items():
-            for direct, factor in self.twin.direct(channel):
-                total += (factor * value) * self.column(direct)
-        return total
+        return self.twin.pose_change(shift, self.column, self.at.shape)
 
     def shifts(self, effect: Effect, atoms: bool = True) -> list[Shift]:
         """Return the effect's linear features (or fit-coordinate derivatives) at the stamps."""

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -139,9 +141,10 @@ class Twin(EffectStages):
         """
         run = self._evaluate(recording, at, True)
         poses = self._full(run)
+        columns = partial(column, self.robot, run.chain, shift=run.view.shift)
         out = np.empty((6, len(run.tangents), *poses.position.shape[:-1]))
         for k, (_, _, shift) in enumerate(run.tangents):
-            out[:, k] = self.pose_change(run, shift)
+            out[:, k] = self.pose_change(shift, columns, run.chain.position.shape[:-1])
         return poses, np.moveaxis(out, (0, 1), (-2, -1))
 
     def _full(self, run: Evaluation) -> Poses:
@@ -152,14 +155,25 @@ class Twin(EffectStages):
             np.broadcast_to(run.poses.rotation, (*samples, 3, 3)),
         )
 
-    def pose_change(self, run: Evaluation, shift: Shift) -> Array:
-        """Return the change of pose, shape (6, ...), that a small change of channels makes."""
-        total = np.zeros((6, *run.chain.position.shape[:-1]))
+    def pose_change(
+        self, shift: Shift, columns: Callable[[Channel], Array], shape: tuple[int, ...]
+    ) -> Array:
+        """
+        Return the change of pose, shape (6, ...), that a small change of channels makes.
+
+        Parameters
+        ----------
+        shift : mapping of channel to array
+        columns : callable
+            Gives d pose / d channel, shape (6, ...), of a channel.
+        shape : tuple of int
+            Of the samples.
+
+        """
+        total = np.zeros((6, *shape))
         for channel, value in shift.items():
             for direct, factor in self.direct(channel):
-                total = total + factor * value * column(
-                    self.robot, run.chain, direct, run.view.shift
-                )
+                total = total + factor * value * columns(direct)
         return total
 
     def direct(self, channel: Channel) -> list[tuple[Channel, Any]]:

@@ -11,6 +11,8 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ...arrays import Array
 from .problem import Model, Problem, Scale
+from .robust_spread import robust_spread
+from .unit_diagonal import unit_diagonal
 
 HUBER = 3.0
 """A sample this many robust deviations off starts to lose weight."""
@@ -57,8 +59,7 @@ class Fit:
         count = self.coordinates.size
         if count == 0:
             return np.zeros((0, 0))
-        size = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
-        scaled = self.information / np.outer(size, size)
+        scaled, size = unit_diagonal(self.information)
         inverse = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True) / np.outer(size, size)
         return np.asarray(inflation * inverse[-count:, -count:])
 
@@ -163,8 +164,7 @@ def solve_scaled(normal: Array, right: Array, damping: float) -> Array:
     out = np.zeros(right.size)
     if not live.any():
         return out
-    scaled = normal[np.ix_(live, live)] / np.outer(size[live], size[live])
-    scaled[np.diag_indices_from(scaled)] += max(damping, 1e-11)
+    scaled, _ = unit_diagonal(normal[np.ix_(live, live)], max(damping, 1e-11))
     wanted = right[live] / size[live]
     try:
         out[live] = cho_solve(cho_factor(scaled), wanted) / size[live]
@@ -192,8 +192,8 @@ def robust_scale(
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
     position = np.concatenate([r[:3].ravel() for r in residuals])
     turn = np.concatenate([r[3:].ravel() for r in residuals])
-    sigma = _spread(position) / lost
-    sigma_turn = _spread(turn) / lost if turn.size else 1.0
+    sigma = robust_spread(position) / lost
+    sigma_turn = robust_spread(turn) / lost if turn.size else 1.0
     if least is not None:
         sigma, sigma_turn = max(sigma, least.position), max(sigma_turn, least.orientation)
     sigma = max(sigma, 1e-9)
@@ -216,10 +216,6 @@ def robust_fit(
         scale = robust_scale(problem, problem.residuals(result.model))
         result = fit(problem, result.model, scale, precision, iterations=4)
     return result, scale
-
-
-def _spread(values: Array) -> float:
-    return float(1.4826 * np.median(np.abs(values))) if values.size else 0.0
 
 
 def with_weights(scale: Scale, problem: Problem) -> Scale:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array
+from .row_layout import by_sample
 
 
 def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, ...]) -> float:
@@ -27,13 +28,9 @@ def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, 
     .. [1] C. J. Geyer, "Practical Markov chain Monte Carlo", Statist. Sci. 7, 1992.
 
     """
-    at, shares, counts = 0, [], []
-    for c, m in zip(rows, samples, strict=True):
-        part = residual[at : at + c * m].reshape(m, c)
-        at += c * m
-        times = _correlation_time(part - part.mean(axis=0))
-        shares.append(1.0 / times)
-        counts.append(c * m)
+    parts = by_sample(residual, rows, samples)
+    shares = [1.0 / _correlation_time(part - part.mean(axis=0)) for part in parts]
+    counts = [part.size for part in parts]
     return float(np.average(shares, weights=counts))
 
 

@@ -10,10 +10,12 @@ import numpy as np
 
 from ...arrays import Array
 from .problem import Problem
+from .robust_spread import robust_spread
 
 SAME_STATION = 2e-3
 """Stations closer than this in every joint [rad, m] are repeats of one pose."""
 ENOUGH = 12
+"""Samples, or repeats, from which on a median tells the noise to a quarter."""
 
 
 class NoiseFloor(NamedTuple):
@@ -54,7 +56,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
     independent = True
     for recording, part in zip(problem.recordings, residuals, strict=True):
         position = part[:3]
-        left = 1.4826 * float(np.median(np.abs(position)))
+        left = robust_spread(position)
         static = recording.joints.static
         direct = _repeats(recording.joints.q, position) if static else _differences(position)
         if direct is None and recording.measured is not None:
@@ -71,7 +73,7 @@ def _differences(position: Array) -> float | None:
     if position.shape[1] < ENOUGH:
         return None
     third = np.diff(position, n=3, axis=1)
-    return 1.4826 * float(np.median(np.abs(third))) / float(np.sqrt(20.0))
+    return robust_spread(third) / float(np.sqrt(20.0))
 
 
 def _repeats(q: Array, position: Array) -> float | None:
@@ -83,4 +85,4 @@ def _repeats(q: Array, position: Array) -> float | None:
     if close.sum() < ENOUGH:
         return None
     change = np.diff(position[:, order], axis=1)[:, close]
-    return 1.4826 * float(np.median(np.abs(change))) / float(np.sqrt(2.0))
+    return robust_spread(change) / float(np.sqrt(2.0))

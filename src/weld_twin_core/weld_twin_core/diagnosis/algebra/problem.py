@@ -17,6 +17,7 @@ from ...errors import DataError, ModelError
 from ...recording import Measurements, Recording
 from ...twin.features import Features
 from ...twin.twin import Twin
+from .row_layout import by_sample
 
 FRAMES = ('base', 'tool')
 
@@ -94,6 +95,10 @@ class Model:
         """Return the model with the tool moved by (xyz, rotvec)."""
         tool = _moved(self.robot.T_flange_tool, step, left=False)
         return replace(self, robot=self.robot.with_frames(tool=tool))
+
+    def without(self, k: int) -> Model:
+        """Return the model without found effect k."""
+        return self.with_found(self.found[:k] + self.found[k + 1 :])
 
     def with_found(self, found: tuple[Effect, ...]) -> Model:
         """Return the model with other found effects."""
@@ -173,6 +178,10 @@ class Problem:
             out.append(scaled.reshape(*part.shape[:-2], weight.size * unit.size))
         return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
 
+    def by_sample(self, values: Array) -> list[Array]:
+        """Return what `whitened` has laid out in rows as one array per recording, (M, c, ...)."""
+        return by_sample(values, self.rows, self.samples)
+
     def frame_columns(self, features: list[Features]) -> tuple[list[Array], list[str]]:
         """Return nuisance columns, one (P, c, M) array per recording, and their names."""
         names: list[str] = []
@@ -225,14 +234,6 @@ class Problem:
             index = np.unique(np.linspace(0, measured.t.size - 1, count).round().astype(int))
             out.append(recording.with_measured(measured.take(index)))
         return replace(self, recordings=tuple(out))
-
-    def restricted(self, keep: list[Array]) -> Problem:
-        """Return the problem with a mask or index of measurements per recording."""
-        recordings = tuple(
-            r.with_measured(_measured(r).take(index))
-            for r, index in zip(self.recordings, keep, strict=True)
-        )
-        return replace(self, recordings=recordings)
 
     def unit_scale(self) -> Scale:
         """Return a scale before anything is known of the noise."""

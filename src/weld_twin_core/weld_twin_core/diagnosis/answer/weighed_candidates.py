@@ -29,12 +29,9 @@ def weighed_candidates(found: Search, evidence: Evidence) -> tuple[Candidate, ..
 
 def _position_rms(found: Search, rival: Rival) -> float:
     """Return the RMS position residual of a rival's fit, weighted, [m]."""
-    at, total, count = 0, 0.0, 0
-    for c, m in zip(found.work.problem.rows, found.work.problem.samples, strict=True):
-        part = rival.fit.residual[at : at + c * m].reshape(m, c)[:, :3]
-        at += c * m
-        total += float((part**2).sum())
-        count += m
+    parts = found.work.problem.by_sample(rival.fit.residual)
+    total = sum(float((part[:, :3] ** 2).sum()) for part in parts)
+    count = sum(found.work.problem.samples)
     return found.work.scale.position * float(np.sqrt(total / max(count, 1)))
 
 

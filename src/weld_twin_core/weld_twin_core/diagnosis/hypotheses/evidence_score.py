@@ -12,6 +12,11 @@ from ...effects.effect import Effect
 from ..algebra.gram import Gram, Index
 from .library import Unit
 
+PERFECT = 1e-12
+"""Share of the sum of squares that counts as left at the least; keeps a logarithm finite."""
+FEWEST = 3.0
+"""Independent rows at the least: a position has three coordinates."""
+
 
 @dataclass(frozen=True, eq=False)
 class Choice:
@@ -43,23 +48,31 @@ class Choice:
         return seed.from_atoms(coefficients)
 
 
-def evidence(gram: Gram, gain: float, freedom: float, effective: float) -> float:
+def evidence(rss: float, gain: float, freedom: float, effective: float) -> float:
     """
     Return the nats that a fall of the sum of squares is worth, noise level unknown.
 
     .. math:: \\tfrac{n}{2} \\log\\frac{RSS}{RSS - gain} - \\tfrac{p}{2} \\log n
 
-    ``effective`` is the number of independent rows [1]_: autocorrelated residuals carry less
-    than their count.
+    Parameters
+    ----------
+    rss : float
+        Sum of squares before.
+    gain : float
+        By how much it falls.
+    freedom : float
+        Coordinates that the fall took.
+    effective : float
+        Number of independent rows [1]_: autocorrelated residuals carry less than their count.
 
     References
     ----------
     .. [1] G. Schwarz, "Estimating the dimension of a model", Ann. Statist. 6, 1978.
 
     """
-    left = max(gram.rss - gain, 1e-12 * gram.rss)
-    count = max(effective, 3.0)
-    return 0.5 * count * float(np.log(gram.rss / left)) - 0.5 * freedom * float(np.log(count))
+    left = max(rss - gain, PERFECT * rss)
+    count = max(effective, FEWEST)
+    return 0.5 * count * float(np.log(rss / left)) - 0.5 * freedom * float(np.log(count))
 
 
 def best_choice(gram: Gram, unit: Unit, effective: float) -> Choice | None:
@@ -79,13 +92,13 @@ def _grow(gram: Gram, columns: Index, effective: float) -> tuple[Index, float]:
     nats = -np.inf
     rest = list(columns)
     if columns.size > 1:
-        everything = evidence(gram, gram.gain(columns), columns.size, effective)
+        everything = evidence(gram.rss, gram.gain(columns), columns.size, effective)
         best_all = (columns, everything)
     else:
         best_all = (columns, -np.inf)
     while rest:
         trials = [
-            evidence(gram, gram.gain(np.append(chosen, c)), chosen.size + 1, effective)
+            evidence(gram.rss, gram.gain(np.append(chosen, c)), chosen.size + 1, effective)
             for c in rest
         ]
         k = int(np.argmax(trials))

@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..algebra.fit import Fit, fit
-from ..algebra.gram import Gram
 from ..result import Site
 from .evidence_score import Choice, evidence
-from .selection import Workspace, fitted_with, ranking, without
+from .selection import Workspace, fitted_with, ranking
 
 SHORTLIST = 7
 """Rivals fitted at the most; bounds the time that a slot takes."""
@@ -51,7 +50,7 @@ def rivals(
 
     """
     effect, beliefs = now.model.found[k], work.beliefs
-    rest = fit(work.problem, without(now.model, k), work.scale, None, 4)
+    rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
     gram = work.conditioned(rest.model, rest.residual)
     ranked = ranking(gram, work.library.units, effective(now))
     own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
@@ -75,11 +74,10 @@ def rivals(
 
 def _nats(rest: Fit, full: Fit, count: float, choice: Choice | None) -> float:
     """Return the evidence of a fit in the place of an effect, by the rule that holds for all."""
-    gram = Gram(np.zeros((0, 0)), np.zeros(0), rest.rss, rest.residual.size, np.zeros(0))
     freedom = float(full.coordinates.size - rest.coordinates.size)
     trials = 1.0
     if choice is not None:
         # Unused components of a vector effect buy nothing and cost nothing.
         freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
         trials = max(choice.unit.trials, 1.0)
-    return evidence(gram, rest.rss - full.rss, freedom, count) - float(np.log(trials))
+    return evidence(rest.rss, rest.rss - full.rss, freedom, count) - float(np.log(trials))

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -140,11 +140,10 @@ def _refined(
     # One count for all, that of the fit which leaves least: a worse model explains less and would
     # otherwise be allowed more rows.
     count = effective(min((f for _, f in tried), key=lambda f: f.rss))
-    before = replace(gram, rss=now.rss)
     best: Step | None = None
     for choice, result in tried:
         freedom = result.coordinates.size - now.coordinates.size
-        nats = evidence(before, now.rss - result.rss, freedom, count)
+        nats = evidence(now.rss, now.rss - result.rss, freedom, count)
         nats -= float(np.log(choice.unit.trials))
         if nats > work.beliefs.enter_nats and (best is None or nats > best.nats):
             best = Step(choice.unit, nats, result)
@@ -167,11 +166,6 @@ def merged(found: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
     return (*found, effect)
 
 
-def without(model: Model, k: int) -> Model:
-    """Return the model without found effect k."""
-    return model.with_found(model.found[:k] + model.found[k + 1 :])
-
-
 def restarted(work: Workspace, now: Fit) -> Fit:
     """
     Return the fit after effects with many optima were searched for again beside all others.
@@ -181,7 +175,7 @@ def restarted(work: Workspace, now: Fit) -> Fit:
     for k, effect in enumerate(now.model.found):
         if not searched(effect):
             continue
-        rest = fit(work.problem, without(now.model, k), work.scale, None, 4)
+        rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
         again = fitted_with(work, rest.model, effect)
         if again.rss < now.rss:
             found = list(again.model.found)
@@ -197,10 +191,9 @@ def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fi
         count = effective(now)
         losses = []
         for k in range(len(now.model.found)):
-            less = fit(work.problem, without(now.model, k), work.scale, None, 4)
-            gram = Gram(np.zeros((0, 0)), np.zeros(0), less.rss, now.residual.size, np.zeros(0))
+            less = fit(work.problem, now.model.without(k), work.scale, None, 4)
             freedom = now.coordinates.size - less.coordinates.size
-            losses.append((evidence(gram, less.rss - now.rss, freedom, count), less))
+            losses.append((evidence(less.rss, less.rss - now.rss, freedom, count), less))
         worst = min(losses, key=lambda item: item[0])
         if worst[0] >= work.beliefs.enter_nats:
             break
@@ -219,13 +212,13 @@ def without_negligible(work: Workspace, now: Fit) -> Fit:
     while now.model.found:
         sizes = []
         for k in range(len(now.model.found)):
-            parts = work.problem.residuals(without(now.model, k))
+            parts = work.problem.residuals(now.model.without(k))
             change = work.problem.whitened(parts, work.scale) - now.residual
             sizes.append(float(np.sqrt((change**2).mean())))
         least = int(np.argmin(sizes))
         if sizes[least] > (beliefs.negligible if len(sizes) > 1 else beliefs.invisible):
             break
-        now = fit(work.problem, without(now.model, least), work.scale, None, 4)
+        now = fit(work.problem, now.model.without(least), work.scale, None, 4)
     return now
 
 
@@ -250,20 +243,21 @@ def consolidated(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -
 def _one_for_two(
     work: Workspace, now: Fit, a: int, b: int, effective: Callable[[Fit], float]
 ) -> Fit | None:
-    rest = fit(work.problem, without(without(now.model, b), a), work.scale, None, 4)
+    rest = fit(work.problem, now.model.without(b).without(a), work.scale, None, 4)
     gram = work.conditioned(rest.model, rest.residual)
     count = effective(now)
     ranked = ranking(gram, work.library.units, count)
     taken = {(e.name, e.site) for e in rest.model.found}
-    pair = replace(gram, rss=rest.rss)
     freedom = now.coordinates.size - rest.coordinates.size
-    wanted = evidence(pair, rest.rss - now.rss, freedom, count)
+    wanted = evidence(rest.rss, rest.rss - now.rss, freedom, count)
     for choice in [c for c in ranked if c.unit.site not in taken][:SHORTLIST]:
         if choice.nats < wanted - work.beliefs.replacing_slack * abs(wanted):
             break
         one = fitted_with(work, rest.model, choice.effect(gram))
         free = one.coordinates.size - rest.coordinates.size
-        nats = evidence(pair, rest.rss - one.rss, free, count) - float(np.log(choice.unit.trials))
+        nats = evidence(rest.rss, rest.rss - one.rss, free, count) - float(
+            np.log(choice.unit.trials)
+        )
         if nats >= wanted:
             return one
     return None

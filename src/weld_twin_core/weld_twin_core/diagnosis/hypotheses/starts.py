@@ -70,8 +70,7 @@ def profile(
     effect = model.found[k]
     if not searched(effect):
         return None
-    others = model.with_found(model.found[:k] + model.found[k + 1 :])
-    looker = _Looker.of(problem, others, scale)
+    looker = _Looker.of(problem, model.without(k), scale)
     found = looker.profile(effect, 0)
     if found is None:
         return None
@@ -123,7 +122,9 @@ class _Looker:
 
     def profile(self, effect: Effect, zoom: int) -> Profile | None:
         """Return the instances of one zoom, each with its best linear parameter."""
-        at, joint = 0, self.features[0].twin.robot.index(str(effect.site))
+        joint = self.features[0].twin.robot.index(str(effect.site))
+        residuals = self.problem.by_sample(self.residual)
+        bases = self.problem.by_sample(self.basis)
         found: list[Effect] = []
         pull, mass, shared = (np.zeros(()) for _ in range(3))
         for k, maker in enumerate(self.features):
@@ -135,15 +136,10 @@ class _Looker:
             found, moved = trials
             if effect.stage in MEMORY:
                 moved = Picker(maker.recording.joints, maker.run.view.t).pick(moved)
-            rows = self.problem.rows[k] * self.problem.samples[k]
             column = self._white(maker, joint, k)
-            own = slice(at, at + rows)
-            at += rows
-            residual = self.residual[own].reshape(column.shape)
-            basis = self.basis[own].reshape(*column.shape, -1)
-            pull = pull + moved @ (column * residual).sum(axis=1)
+            pull = pull + moved @ (column * residuals[k]).sum(axis=1)
             mass = mass + moved**2 @ (column**2).sum(axis=1)
-            shared = shared + moved @ np.einsum('mc,mcp->mp', column, basis)
+            shared = shared + moved @ np.einsum('mc,mcp->mp', column, bases[k])
         left = np.maximum(mass - (shared**2).sum(axis=1), 1e-12 * mass + 1e-300)
         return _sized(found, pull, left)
 

@@ -21,6 +21,7 @@ from ..algebra.fit import solve_scaled
 from ..algebra.gram import Index
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem, Scale
+from ..algebra.row_layout import by_sample
 
 HALVINGS = 3
 """Eight blocks: each leaves out an eighth, few enough for the others to stand for the fit."""
@@ -155,12 +156,9 @@ def _shared(errors: Array, moments: Array, levers: Array) -> tuple[float, float]
 
 def _by_sample(problem: Problem) -> list[Index]:
     """Return the row numbers of every sample."""
-    out: list[Index] = []
-    at = 0
-    for c, m in zip(problem.rows, problem.samples, strict=True):
-        out += list(at + np.arange(c * m).reshape(m, c))
-        at += c * m
-    return out
+    size = sum(c * m for c, m in zip(problem.rows, problem.samples, strict=True))
+    parts = by_sample(np.arange(size), problem.rows, problem.samples)
+    return [row for part in parts for row in part]
 
 
 def _predicted(

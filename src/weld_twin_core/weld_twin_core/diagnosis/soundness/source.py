@@ -10,6 +10,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...recording import JointMotion
+from ..algebra.robust_spread import NORMAL
 from .evidence import Case, Finding
 
 SMOOTH = 2e-8
@@ -42,4 +43,4 @@ def _commanded(joints: JointMotion) -> bool:
 def _noise(q: Array) -> Array:
     """Return the noise of every joint from its fifth differences, which a smooth path has not."""
     fifth = np.diff(q, n=5, axis=0)
-    return np.asarray(1.4826 * np.median(np.abs(fifth), axis=0) / np.sqrt(252.0))
+    return np.asarray(NORMAL * np.median(np.abs(fifth), axis=0) / np.sqrt(252.0))

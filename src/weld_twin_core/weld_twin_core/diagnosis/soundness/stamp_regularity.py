@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...arrays import Array
+from ..algebra.robust_spread import robust_spread
 from .evidence import Case, Finding
 from .snapshot import measured
 
@@ -57,7 +58,7 @@ def _stream(t: Array, name: str) -> Iterator[Finding]:
             f'uncertain by the way made in {grid * 5e2:g} ms.',
         )
         return
-    spread = 1.4826 * float(np.median(np.abs(steps[~gaps] - usual)))
+    spread = robust_spread(steps[~gaps] - usual)
     if spread > JITTER * usual:
         yield Finding(
             'note',

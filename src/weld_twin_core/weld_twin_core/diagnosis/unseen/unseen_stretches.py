@@ -24,8 +24,12 @@ from ...arrays import Array
 from ..algebra.fit import Fit, design
 from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
+from ..algebra.unit_diagonal import unit_diagonal
 
 BLOCKS = 8
+"""Stretches left out in turn: enough for a standard error, few enough that each tells much."""
+DAMPING = 1e-11
+"""Of columns that repeat others, far below what a fit can tell."""
 MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""
 TRUSTED = 0.2
@@ -79,7 +83,7 @@ class Unseen:
             parts.append(slice(at, at + size))
             at += size
         targets = [fit.residual] + [
-            problem.whitened(problem.residuals(_without(model, k)), scale) - fit.residual
+            problem.whitened(problem.residuals(model.without(k)), scale) - fit.residual
             for k in range(len(model.found))
         ]
         prior = np.zeros(columns.shape[0])
@@ -142,7 +146,7 @@ class Unseen:
             size = np.sqrt(np.maximum(np.diag(system), 0.0))
             unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
             system *= np.outer(unit, unit)
-            system[np.diag_indices_from(system)] += 1e-11
+            system[np.diag_indices_from(system)] += DAMPING
             half, _ = dpotri(cho_factor(system, lower=True)[0], lower=1)
             out.append((np.tril(half) + np.tril(half, -1).T) * np.outer(unit, unit))
         return out
@@ -155,10 +159,7 @@ class Unseen:
         target = mix @ self.targets
         factors, residual = [], target.copy()
         for b, (low, high) in enumerate(self._spans() if index.size else ()):
-            system = self._system(b, index)
-            size = np.sqrt(np.maximum(np.diag(system), 1e-300))
-            system /= np.outer(size, size)
-            system[np.diag_indices_from(system)] += 1e-11
+            system, size = unit_diagonal(self._system(b, index), DAMPING)
             factor = cho_factor(system, overwrite_a=True)
             step = cho_solve(factor, self._right(b, mix)[index] / size) / size
             residual[low:high] -= self._moved(step, index, low, high)
@@ -198,13 +199,10 @@ class Unseen:
 
     def squares(self, residual: Array) -> Array:
         """Return the squared position error of every trusted sample, shape (samples,) [m^2]."""
-        out, at = [], 0
-        for c, m, weight in zip(
-            self.problem.rows, self.problem.samples, self.scale.weights, strict=True
-        ):
-            part = residual[at : at + c * m].reshape(m, c)[:, :3] * self.scale.position
-            at += c * m
-            out.append(((part**2).sum(axis=1) / weight)[weight >= TRUSTED])
+        out = [
+            ((part[:, :3] * self.scale.position) ** 2).sum(axis=1) / weight
+            for part, weight in self._weighted(residual)
+        ]
         return np.concatenate(out)
 
     def rms(self, residual: Array) -> float:
@@ -213,25 +211,21 @@ class Unseen:
 
     def turn_rms(self, residual: Array) -> float | None:
         """Return the RMS orientation error over trusted samples [rad], None without any."""
-        out, at = [], 0
-        for c, m, weight in zip(
-            self.problem.rows, self.problem.samples, self.scale.weights, strict=True
-        ):
-            part = residual[at : at + c * m].reshape(m, c)[:, 3:] * self.scale.orientation
-            at += c * m
-            if c > 3:
-                out.append(((part**2).sum(axis=1) / weight)[weight >= TRUSTED])
+        out = [
+            ((part[:, 3:] * self.scale.orientation) ** 2).sum(axis=1) / weight
+            for part, weight in self._weighted(residual)
+            if part.shape[1] > 3
+        ]
         return float(np.sqrt(np.concatenate(out).mean())) if out else None
 
     def trusted_labels(self) -> Array:
         """Return the stretch of every trusted sample."""
-        out, at = [], 0
-        for c, m, weight in zip(
-            self.problem.rows, self.problem.samples, self.scale.weights, strict=True
-        ):
-            out.append(self.labels[at : at + c * m : c][weight >= TRUSTED])
-            at += c * m
-        return np.concatenate(out)
+        return np.concatenate([part[:, 0] for part, _ in self._weighted(self.labels)])
+
+    def _weighted(self, values: Array) -> list[tuple[Array, Array]]:
+        """Return the rows of trusted samples, (m, c), and their weights, one per recording."""
+        parts = zip(self.problem.by_sample(values), self.scale.weights, strict=True)
+        return [(part[w >= TRUSTED], w[w >= TRUSTED]) for part, w in parts]
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,7 +285,3 @@ def _tether(model: Model) -> Array:
     """
     sizes = [np.maximum(np.abs(e.coordinates()), e.coordinate_scales()) for e in model.found]
     return 1.0 / (TETHER * np.concatenate([np.zeros(0), *sizes])) ** 2
-
-
-def _without(model: Model, k: int) -> Model:
-    return model.with_found(model.found[:k] + model.found[k + 1 :])

@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Normal equations in units of their own columns, so that radians and metres weigh alike."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+
+EMPTY = 1e-300
+"""Least squared norm of a column; keeps a column of zeros from a division by zero."""
+
+
+def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
+    """
+    Return a normal matrix with ones on its diagonal, and the norms of its columns.
+
+    Parameters
+    ----------
+    normal : array, shape (P, P)
+    damping : float
+        Added to the diagonal of ones, so that columns that repeat others do no harm.
+
+    Returns
+    -------
+    scaled : array, shape (P, P)
+        ``normal / outer(size, size)``; solve it for ``right / size`` and divide by ``size``.
+    size : array, shape (P,)
+
+    """
+    size = np.sqrt(np.maximum(normal.diagonal(), EMPTY))
+    scaled = normal / (size[:, None] * size)
+    each = np.arange(size.size)
+    scaled[each, each] += damping
+    return scaled, size

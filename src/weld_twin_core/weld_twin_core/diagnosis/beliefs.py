@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,9 +24,9 @@ def _unseen(value: Any) -> Any:
     return field(default=value, metadata={'step': 'unseen'})
 
 
-def _verdict(value: Any) -> Any:
+def _verdict(value: Any, most: float = math.inf) -> Any:
     """Return a field that only the verdict reads: it can be drawn anew from the same evidence."""
-    return field(default=value, metadata={'step': 'verdict'})
+    return field(default=value, metadata={'step': 'verdict', 'most': most})
 
 
 def _levels(value: Any) -> Any:
@@ -142,6 +143,9 @@ class Beliefs:
     dependence_sure: float = _unseen(2.0)
     """The same in standard errors between stretches."""
 
+    periods: float = _unseen(0.8)
+    """Periods of its finest wave that a joint must pass through for a wave to be told as one."""
+
     other_setup: float = _unseen(5.0)
     """Times by which a held-out recording must fit better with a frame of its own to stem from
     another set-up. A judgement."""
@@ -152,7 +156,7 @@ class Beliefs:
 
     # The verdict -----------------------------------------------------------------------------
 
-    sure: float = _verdict(0.85)
+    sure: float = _verdict(0.85, most=1.0)
     """Probability from which on a leader is named alone."""
 
     listed: float = _verdict(0.03)
@@ -211,12 +215,9 @@ class Beliefs:
     stacked: float = _verdict(0.75)
     """Belief left when two effects that show at rest sit on one joint: two may stand for a third."""
 
-    calibration: float = _verdict(0.95)
+    calibration: float = _verdict(0.95, most=1.0)
     """Belief left for every cause named where all evidence agrees: no library is complete, and on
     some motions a cause that it lacks moves the tool exactly as those that it holds."""
-
-    periods: float = _verdict(0.8)
-    """Periods of its finest wave that a joint must pass through for a wave to be told as one."""
 
     glimpsed: float = _verdict(0.6)
     """Belief left in a wave of which less was seen."""
@@ -227,7 +228,7 @@ class Beliefs:
     unknown_least: float = _verdict(0.7)
     """Belief in 'unknown' where little is unexplained; the share unexplained is added,"""
 
-    unknown_most: float = _verdict(0.95)
+    unknown_most: float = _verdict(0.95, most=1.0)
     """up to this."""
 
     noise_unseen: float = _verdict(0.6)

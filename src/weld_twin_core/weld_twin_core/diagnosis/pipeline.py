@@ -21,7 +21,7 @@ from .levels.held_against import held_against
 from .many.fitted_together import fitted_together
 from .predicting.allowed import allowed
 from .result import Diagnosis
-from .soundness import Given, examine, refuse_reused
+from .soundness import Examined, Given, examine, refuse_reused
 from .unseen.held_out_shrink import held_out_shrink
 from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
@@ -109,6 +109,18 @@ def diagnose(
     progress('data checked')
     if examined.posed is None:
         return refusal(examined)
+    return _explained(examined, exclude, holdout, beliefs, progress)
+
+
+def _explained(
+    examined: Examined,
+    exclude: Sequence[str],
+    holdout: Sequence[Recording],
+    beliefs: Beliefs,
+    progress: Progress,
+) -> Diagnosis:
+    """Return the diagnosis of recordings that were found sound."""
+    assert examined.posed is not None
     found = search(*examined.posed, exclude, beliefs, progress)
     found = fitted_together(found, exclude, beliefs, progress)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
@@ -130,10 +142,8 @@ def diagnose(
         unseen=unseen,
         evidence=evidence,
         verdict=verdict,
-        noise=noise,
         shrink=shrink,
         examined=examined,
-        beliefs=beliefs,
         posterior=posterior,
         rival=rival,
     )

@@ -175,15 +175,15 @@ def _report(
     residual: float,
 ) -> PlanReport:
     return PlanReport(
-        duration,
-        slowed,
-        velocity,
-        acceleration,
-        residual,
-        float(solution.condition.max()),
-        float(solution.manipulability.min()),
-        float(solution.limit_margin.min()),
-        solution.method,
+        duration=duration,
+        slowed=slowed,
+        velocity_use=velocity,
+        acceleration_use=acceleration,
+        residual=residual,
+        condition=float(solution.condition.max()),
+        manipulability=float(solution.manipulability.min()),
+        limit_margin=float(solution.limit_margin.min()),
+        method=solution.method,
     )
 
 

@@ -167,18 +167,18 @@ class SobolDesign:
         change = float(np.abs(total - before).max())
         settled = max(change, float(total_half.max())) < SETTLED
         return SobolIndices(
-            self.labels,
-            first,
-            first_half,
-            total,
-            total_half,
-            self.base_samples,
-            values.size,
-            float(values.mean()),
-            float(values.std()),
-            change,
-            settled,
-            self.seed,
+            names=self.labels,
+            first=first,
+            first_half=first_half,
+            total=total,
+            total_half=total_half,
+            base_samples=self.base_samples,
+            runs=values.size,
+            mean=float(values.mean()),
+            std=float(values.std()),
+            change=change,
+            converged=settled,
+            seed=self.seed,
         )
 
 

@@ -168,15 +168,15 @@ class LiveTwin:
     ) -> View:
         stamp = np.array([t])
         return View(
-            self.twin.robot,
-            stamp,
-            stamp - self._start,
-            q[None],
-            qd[None],
-            False,
-            None if wrench is None else np.asarray(wrench)[None],
-            wrench_frame,
-            None if temperature is None else np.array([temperature]),
+            robot=self.twin.robot,
+            t=stamp,
+            elapsed=stamp - self._start,
+            q=q[None],
+            qd=qd[None],
+            static=False,
+            wrench=None if wrench is None else np.asarray(wrench)[None],
+            wrench_frame=wrench_frame,
+            temperature=None if temperature is None else np.array([temperature]),
         )
 
     def _remembered(self, t: float, view: View) -> View:

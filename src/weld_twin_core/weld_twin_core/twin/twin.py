@@ -239,17 +239,24 @@ class Twin(EffectStages):
 
 def _view(robot: Robot, recording: Recording, t: Array, q: Array, qd: Array) -> View:
     return View(
-        robot,
-        t,
-        t - recording.joints.t[0],
-        q,
-        qd,
-        recording.joints.static,
-        None if recording.wrench is None else recording.wrench.at(t),
-        recording.wrench_frame,
-        None if recording.temperature is None else recording.temperature.at(t),
+        robot=robot,
+        t=t,
+        elapsed=t - recording.joints.t[0],
+        q=q,
+        qd=qd,
+        static=recording.joints.static,
+        wrench=None if recording.wrench is None else recording.wrench.at(t),
+        wrench_frame=recording.wrench_frame,
+        temperature=None if recording.temperature is None else recording.temperature.at(t),
     )
 
 
 def _clock_view(robot: Robot, motion: JointMotion) -> View:
-    return View(robot, motion.t[:1], motion.t[:1], motion.q[:1], motion.q[:1], motion.static)
+    return View(
+        robot=robot,
+        t=motion.t[:1],
+        elapsed=motion.t[:1],
+        q=motion.q[:1],
+        qd=motion.q[:1],
+        static=motion.static,
+    )

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.verdict.decision import Verdict, decide
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
@@ -75,6 +76,7 @@ def study(
     engine = engine_digest()
     whole = runner.run([_task(decided, cases, truth, engine, late) for truth in opened])
     usual = [told['usual'] for told in whole]
+    final = [told['whole'] for told in whole]
     few = [int(k) for k in np.unique(np.linspace(0, len(opened) - 1, refitted).round())]
     early = [move for move in moves if move.step != LATE] if few else []
     anew = runner.run(
@@ -89,7 +91,7 @@ def study(
         for k, move in enumerate(m for m in moves if m.step == LATE)
     ]
     rows += [
-        _row(move, [opened[i] for i in few], [usual[i] for i in few], anew[at : at + len(few)])
+        _row(move, [opened[i] for i in few], [final[i] for i in few], anew[at : at + len(few)])
         for move, at in zip(early, range(0, len(anew), max(len(few), 1)), strict=True)
     ]
     return {
@@ -98,7 +100,7 @@ def study(
         'move': MOVE,
         'usual': {
             'verdict': _totals(_judged(opened, usual)),
-            'others': _totals(_judged([opened[k] for k in few], [usual[k] for k in few])),
+            'others': _totals(_judged([opened[k] for k in few], [final[k] for k in few])),
         },
         'rows': rows,
     }
@@ -111,31 +113,35 @@ def _task(function: Any, cases: Path, truth: Told, engine: str, moved: Any) -> T
 
 def decided(place: str, engine: str, moves: Sequence[tuple[str, float]]) -> dict[str, Any]:
     """Return the verdict on a case, and the one drawn from the same evidence for every move."""
-    evidence = _evidence(Path(place), Beliefs())
+    result = diagnosis_of(Path(place))
+    evidence = _evidence(result)
     verdicts = [decide(evidence, Move(name, LATE, 0.0, other).beliefs) for name, other in moves]
-    return {'usual': told_of(decide(evidence)), 'moved': [told_of(v) for v in verdicts]}
+    return {
+        'usual': told_of(decide(evidence)),
+        'whole': told_of(result),
+        'moved': [told_of(v) for v in verdicts],
+    }
 
 
 def refitted_case(place: str, engine: str, move: tuple[str, float]) -> dict[str, Any]:
     """Return the verdict on a case that is diagnosed anew with one belief moved."""
-    beliefs = Move(move[0], '', 0.0, move[1]).beliefs
-    return told_of(decide(_evidence(Path(place), beliefs), beliefs))
+    return told_of(diagnosis_of(Path(place), beliefs=Move(move[0], '', 0.0, move[1]).beliefs))
 
 
-def _evidence(place: Path, beliefs: Beliefs) -> Evidence:
-    found = diagnosis_of(place, beliefs=beliefs).evidence
-    if not isinstance(found, Evidence):
-        raise DataError(f'the diagnosis of {place.name} came to no evidence to decide on')
-    return found
+def _evidence(result: Diagnosis) -> Evidence:
+    if not isinstance(result.evidence, Evidence):
+        raise DataError(f'{result.status}: such a diagnosis comes to no evidence to decide on')
+    return result.evidence
 
 
-def told_of(verdict: Verdict) -> dict[str, Any]:
+def told_of(said: Verdict | Diagnosis) -> dict[str, Any]:
     """Return a verdict in plain values, without estimates: beliefs do not move them."""
+    sets = said.sets if isinstance(said, Verdict) else said.indistinguishable
     return {
-        'status': verdict.status,
-        'confidence': verdict.confidence,
+        'status': said.status,
+        'confidence': said.confidence or 0.0,
         'indistinguishable': [
-            [{'effect': s.effect, 'joint': s.joint} for s in group] for group in verdict.sets
+            [{'effect': s.effect, 'joint': s.joint} for s in group] for group in sets
         ],
         'effects': [],
     }
@@ -145,6 +151,7 @@ def _moves(only: Sequence[str]) -> Iterator[Move]:
     """Yield every move to make."""
     usual = Beliefs()
     steps = {item.name: str(item.metadata['step']) for item in fields(usual)}
+    most = {item.name: float(item.metadata.get('most', np.inf)) for item in fields(usual)}
     unknown = sorted(set(only) - set(steps))
     if unknown:
         raise DataError(f'there is no belief {unknown[0]!r}; they are ' + ', '.join(steps))
@@ -152,7 +159,7 @@ def _moves(only: Sequence[str]) -> Iterator[Move]:
         value = getattr(usual, name)
         for way in (-1, 1):
             step = max(1, round(MOVE * value)) if isinstance(value, int) else MOVE * value
-            yield Move(name, steps[name], value, value + way * step)
+            yield Move(name, steps[name], value, min(value + way * step, most[name]))
 
 
 def _row(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
@@ -14,6 +15,8 @@ from .problem import Model, Problem, Scale
 from .robust_spread import robust_spread
 from .unit_diagonal import unit_diagonal
 
+DAMPING, DAMPED = 1e-9, 1e6
+"""Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
 HUBER = 3.0
 """A sample this many robust deviations off starts to lose weight."""
 LEAST_TURN = 0.5
@@ -123,38 +126,49 @@ def fit(
         Stops when the objective falls by less than this share.
 
     """
-    residual = problem.whitened(problem.residuals(model), scale)
-    x = coordinates(model)
-    prior = np.zeros(x.size) if precision is None else precision
-    damping = 1e-9
-    cost = float(residual @ residual + prior @ x**2)
+    prior = np.zeros(coordinates(model).size) if precision is None else precision
+    here, damping = _Point.at(problem, model, scale, prior), DAMPING
     columns, names = design(problem, model, scale)
     for _ in range(iterations):
-        frames = columns.shape[0] - x.size
-        ridge = np.concatenate([np.zeros(frames), prior])
-        normal = columns @ columns.T + np.diag(ridge)
-        right = columns @ residual - ridge * np.concatenate([np.zeros(frames), x])
-        improved = False
-        while damping < 1e6:
-            trial = stepped(problem, model, solve_scaled(normal, right, damping))
-            moved = problem.whitened(problem.residuals(trial), scale)
-            x_trial = coordinates(trial)
-            cost_trial = float(moved @ moved + prior @ x_trial**2)
-            if cost_trial <= cost:
-                improved = True
+        normal, right = here.normal_equations(columns, prior)
+        there = None
+        while damping < DAMPED:
+            trial = stepped(problem, here.model, solve_scaled(normal, right, damping))
+            there = _Point.at(problem, trial, scale, prior)
+            if there.cost <= here.cost:
                 break
-            damping = max(damping * 100.0, 1e-6)
-        if not improved:
+            there, damping = None, max(damping * 100.0, 1e-6)
+        if there is None:
             break
-        gain = (cost - cost_trial) / max(cost, 1e-300)
-        model, residual, x, cost = trial, moved, x_trial, cost_trial
-        damping = max(damping * 0.01, 1e-9)
-        columns, names = design(problem, model, scale)
+        gain = (here.cost - there.cost) / max(here.cost, 1e-300)
+        here, damping = there, max(damping * 0.01, DAMPING)
+        columns, names = design(problem, here.model, scale)
         if gain < tolerance:
             break
-    frames = columns.shape[0] - x.size
-    information = columns @ columns.T + np.diag(np.concatenate([np.zeros(frames), prior]))
-    return Fit(model, residual, information, names, x)
+    information, _ = here.normal_equations(columns, prior)
+    return Fit(here.model, here.residual, information, names, here.x)
+
+
+class _Point(NamedTuple):
+    """A model on the way of a fit: its whitened residual, its coordinates, and its cost."""
+
+    model: Model
+    residual: Array
+    x: Array
+    cost: float
+
+    @classmethod
+    def at(cls, problem: Problem, model: Model, scale: Scale, prior: Array) -> _Point:
+        """Return the cost of a model under a prior precision about zero, shape (K,)."""
+        residual, x = problem.whitened(problem.residuals(model), scale), coordinates(model)
+        return cls(model, residual, x, float(residual @ residual + prior @ x**2))
+
+    def normal_equations(self, columns: Array, prior: Array) -> tuple[Array, Array]:
+        """Return normal matrix and right-hand side of a step, the prior included."""
+        frames = np.zeros(columns.shape[0] - self.x.size)
+        ridge = np.concatenate([frames, prior])
+        right = columns @ self.residual - ridge * np.concatenate([frames, self.x])
+        return columns @ columns.T + np.diag(ridge), right
 
 
 def solve_scaled(normal: Array, right: Array, damping: float) -> Array:

@@ -7,8 +7,6 @@ from __future__ import annotations
 from ...twin.posterior import Posterior
 from ..advice import actions
 from ..advice.next_step import next_step
-from ..algebra.noise_floor import NoiseFloor
-from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..levels.causes import causes
 from ..levels.curved import Curved
@@ -24,15 +22,12 @@ from .weighed_candidates import unexplained, weighed_candidates
 
 
 def answer(
-    *,
     found: Search,
     unseen: Unseen,
     evidence: Evidence,
     verdict: Verdict,
-    noise: NoiseFloor,
     shrink: Shrink,
     examined: Examined,
-    beliefs: Beliefs,
     posterior: Posterior,
     rival: Curved | None = None,
 ) -> Diagnosis:
@@ -46,21 +41,19 @@ def answer(
         Of the final model.
     evidence : Evidence
     verdict : Verdict
-    noise : NoiseFloor
     shrink : Shrink
     examined : Examined
         Whether the data are sound, and what was mended.
-    beliefs : Beliefs
     posterior : Posterior
         The models that the recordings allow.
     rival : Curved or None
         What explains the gap without a formula.
 
     """
-    told, shares = causes(found, unseen, verdict, rival, noise.rms_m, beliefs)
+    told, shares = causes(found, unseen, verdict, rival, evidence.floor, found.work.beliefs)
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
-        gap=gap(found, noise.rms_m),
+        gap=gap(found, evidence.floor),
         where=locate(found, unseen),
         status=verdict.status,
         effects=effects,
@@ -69,9 +62,7 @@ def answer(
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,
-        unexplained=unexplained(
-            evidence, beliefs, shrink.rms_after_m, rival if verdict.status == 'unknown' else None
-        ),
+        unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, rival),
         next_experiment=next_step(found, verdict),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         checks=examined.checks,

@@ -10,7 +10,8 @@ from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..levels.curved import Curved
-from ..result import Candidate, Unexplained
+from ..result import Candidate, Shrink, Unexplained
+from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
 from ..verdict.weighing import Weighed
 
@@ -36,11 +37,24 @@ def _position_rms(found: Search, rival: Rival) -> float:
 
 
 def unexplained(
-    evidence: Evidence, beliefs: Beliefs, after: float, rival: Curved | None
+    beliefs: Beliefs, evidence: Evidence, verdict: Verdict, shrink: Shrink, rival: Curved | None
 ) -> Unexplained:
-    """Return what remains after the verdict, and what that or the gap itself depends on."""
+    """
+    Return what remains after the verdict, and what that or the gap itself depends on.
+
+    Parameters
+    ----------
+    beliefs : Beliefs
+    evidence : Evidence
+    verdict : Verdict
+    shrink : Shrink
+        Of the model that is carried.
+    rival : Curved or None
+        Curves tell what an unknown gap depends on where nothing else does.
+
+    """
     case = Weighed(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
-    if not names and rival is not None:
+    if not names and rival is not None and verdict.status == 'unknown':
         names = tuple(str(part.group) for part in rival.form.parts)
-    return Unexplained(after, case.above_noise, names)
+    return Unexplained(shrink.rms_after_m, case.above_noise, names)

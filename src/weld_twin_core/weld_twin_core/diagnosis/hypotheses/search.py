@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -109,7 +110,42 @@ def search(
     baseline, scale = robust_fit(full, start, robust_scale(full, full.residuals(start)))
     progress('baseline fitted')
     small = problem.thinned(SEARCH_ROWS)
-    model, crowded = baseline.model, False
+    chosen = _chosen(small, baseline.model, exclude, beliefs, progress)
+    work, now, bare = chosen.work, chosen.now, chosen.bare_rss
+    slots: tuple[tuple[Rival, ...], ...] = ()
+    if not chosen.crowded:
+        now, slots = settled(
+            work, now, lambda f: effective_rows(small, f, bare, beliefs), progress
+        )
+    model = now.model
+    final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
+    return Search(
+        problem=full,
+        scale=scale,
+        baseline=baseline,
+        final=final,
+        precision=np.zeros(0),
+        work=work,
+        small=now,
+        bare_rss=bare,
+        slots=slots,
+        crowded=chosen.crowded,
+    )
+
+
+class _Chosen(NamedTuple):
+    """A selection: what it worked on, its fit, the bare sum of squares, whether it was crowded."""
+
+    work: Workspace
+    now: Fit
+    bare_rss: float
+    crowded: bool
+
+
+def _chosen(
+    small: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs, progress: Progress
+) -> _Chosen:
+    """Return the effects chosen, with a library built anew until the choice stays."""
     work, now, bare = _workspace(small, model, exclude, beliefs)
     for _ in range(ROUNDS):
         before = names(model)
@@ -131,25 +167,7 @@ def search(
         if crowded or names(model) == before:
             break
         work, now, bare = _workspace(small, model, exclude, beliefs)
-    slots: tuple[tuple[Rival, ...], ...] = ()
-    if not crowded:
-        now, slots = settled(
-            work, now, lambda f: effective_rows(small, f, bare, beliefs), progress
-        )
-        model = now.model
-    final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
-    return Search(
-        problem=full,
-        scale=scale,
-        baseline=baseline,
-        final=final,
-        precision=np.zeros(0),
-        work=work,
-        small=now,
-        bare_rss=bare,
-        slots=slots,
-        crowded=crowded,
-    )
+    return _Chosen(work, now, bare, crowded)
 
 
 def settled(

@@ -37,14 +37,14 @@ def held_out_shrink(
         source = ', '.join(r.name for r in holdout)
     ratio, interval = ratio_interval(before, after, labels, elsewhere, beliefs.farthest)
     return Shrink(
-        float(np.sqrt(before.mean())),
-        float(np.sqrt(after.mean())),
-        ratio,
-        interval,
-        source,
-        steps,
-        alone,
-        None if turned[0] is None or turned[1] is None else (turned[0], turned[1]),
+        rms_before_m=float(np.sqrt(before.mean())),
+        rms_after_m=float(np.sqrt(after.mean())),
+        ratio=ratio,
+        ci95=interval,
+        held_out=source,
+        steps=steps,
+        alone=alone,
+        orientation_rad=None if turned[0] is None or turned[1] is None else (turned[0], turned[1]),
     )
 
 

@@ -99,16 +99,16 @@ class Unseen:
         normals = np.array([columns[:, a:b] @ columns[:, a:b].T for a, b in spans])
         rights = np.array([columns[:, a:b] @ stacked[:, a:b].T for a, b in spans])
         return cls(
-            problem,
-            scale,
-            labels,
-            columns,
-            tuple(parts),
-            stacked,
-            prior + tether,
-            prior * x,
-            normals,
-            rights,
+            problem=problem,
+            scale=scale,
+            labels=labels,
+            columns=columns,
+            parts=tuple(parts),
+            targets=stacked,
+            precision=prior + tether,
+            pull=prior * x,
+            normals=normals,
+            rights=rights,
         )
 
     @property

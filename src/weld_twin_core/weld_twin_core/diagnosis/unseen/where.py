@@ -61,12 +61,12 @@ def locate(found: Search, final: Unseen) -> Where:
     ordered = sorted(joints.items(), key=lambda item: -item[1])
     good = [weight >= TRUSTED for weight in final.scale.weights]
     return Where(
-        tuple(ordered),
-        regimes,
-        _path(problem, start, good),
-        _direction(problem, start, good),
-        REGRESSORS,
-        tuple(tuple(float(v) for v in row) for row in shares),
+        joints=tuple(ordered),
+        regimes=regimes,
+        path=_path(problem, start, good),
+        direction=_direction(problem, start, good),
+        map_regressors=REGRESSORS,
+        map_shares=tuple(tuple(float(v) for v in row) for row in shares),
     )
 
 

@@ -10,7 +10,7 @@ demo: setup
 	@$(RUN) weld-twin demo --out out
 
 test: lint
-	@$(RUN) python -m pytest
+	@$(RUN) python -m pytest -n auto --dist loadscope --no-loadscope-reorder
 
 docs: setup-docs
 	@$(RUN) python -m sphinx -q -W --keep-going -c docs . build/site

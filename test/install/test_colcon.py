@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ['weld_twin_core', 'weld_twin_lab', 'weld_twin_msgs_py', 'weld_twin_nodes']
 NODES = list(MODULES)
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.cells]
 
 
 @pytest.fixture(scope='module')

@@ -59,6 +59,7 @@ def test_the_ten_lines_of_python_draw_and_find_the_play(monkeypatch, capsys):
     names['plt'].close('all')
 
 
+@pytest.mark.cells
 def test_the_harness_example_runs():
     pytest.importorskip('rclpy', reason='needs ROS 2')
     assert len(run(example('from weld_twin_nodes.harness import Cell'))['poses']) > 0

@@ -17,7 +17,10 @@ import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-LIMIT = 60.0
+pytestmark = pytest.mark.cells
+
+LIMIT = 600.0
+"""Seconds after which a wait is given up for lost; what is waited for are events."""
 NODES = 7
 
 

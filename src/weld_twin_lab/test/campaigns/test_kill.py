@@ -8,6 +8,8 @@ pytest.importorskip('rclpy', reason='needs ROS 2')
 
 from weld_twin_lab.campaigns.killing.trial import Trial, try_once
 
+pytestmark = pytest.mark.cells
+
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_a_kill_leaves_a_prefix_of_what_was_sent(storage):

@@ -16,13 +16,15 @@ from weld_twin_msgs_py.bags import provenance, read_recording
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
+pytestmark = pytest.mark.cells
+
 
 def demo(out):
     return subprocess.run(
         [sys.executable, '-m', 'weld_twin_nodes', 'demo', '--out', str(out)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=900,  # given up for lost; the demo has waits of its own
     )
 
 

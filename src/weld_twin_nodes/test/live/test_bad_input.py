@@ -16,6 +16,8 @@ from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 
+pytestmark = pytest.mark.cells
+
 S = 1_000_000_000
 Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
 NAN, INF = float('nan'), float('inf')

@@ -28,6 +28,8 @@ from weld_twin_nodes.live.deviation_markers import DeviationMarkers
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 from weld_twin_nodes.live.trajectory_generator import TrajectoryGenerator
 
+pytestmark = pytest.mark.cells
+
 S = 1_000_000_000
 Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
 

@@ -18,6 +18,8 @@ from weld_twin_nodes.offline.simulated_bag import write_simulation
 from weld_twin_nodes.offline.simulation import Simulation
 from weld_twin_nodes.offline.told_twin import build_twin
 
+pytestmark = pytest.mark.cells
+
 EFFECTS = """
 - {effect: backlash, joint: elbow_joint, width: 5e-4}
 - {effect: servo_lag, joint: shoulder_pan_joint, time_constant: 0.02}

@@ -18,6 +18,8 @@ from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 
+pytestmark = pytest.mark.cells
+
 S = 1_000_000_000
 Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
 TURN = 1e-3
@@ -108,7 +110,7 @@ def test_the_live_twin_tells_its_covariance_and_where_it_knows_nothing(cell, rob
     )
     stand_at(cell, robot, sure, Q, now)
     health.clear()
-    cell.wait(lambda: len(health.of('forward_kinematics_twin')) > 4, 'health again')
+    cell.wait(lambda: health.told.get('forward_kinematics_twin'), 'health again')
     last = [text for _, text in health.told['forward_kinematics_twin']][-1]
     assert 'outside' not in last
 

@@ -31,6 +31,8 @@ from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 from weld_twin_nodes.live.recorder import Recorder
 
+pytestmark = pytest.mark.cells
+
 S = 1_000_000_000
 ROBOTS = {'left': 'ur5', 'right': 'ur10'}
 OFFSETS = {'left': 1e-3, 'right': -2e-3}

@@ -16,6 +16,8 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.bag_player import Playing, play
 
+pytestmark = pytest.mark.cells
+
 BAG = Path(__file__).parents[4] / 'bags/elbow_play'
 EFFECTS = (
     '[{effect: backlash, joint: elbow_joint, width: 5e-4},'

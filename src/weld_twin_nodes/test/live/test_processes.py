@@ -22,6 +22,8 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness import Cell, CellTimeout
 from weld_twin_nodes.harness.process import MODULES
 
+pytestmark = pytest.mark.cells
+
 S = 1_000_000_000
 
 

@@ -25,6 +25,8 @@ from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.cell_node import CellNode
 from weld_twin_nodes.live.recorded_topic import message_class
 
+pytestmark = pytest.mark.cells
+
 ROBOT = catalog.load('ur5')
 FIRST = 1_000_000_000
 

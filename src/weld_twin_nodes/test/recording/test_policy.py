@@ -17,6 +17,8 @@ from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.process import MODULES
 from weld_twin_nodes.live.cell_node import CellNode
 
+pytestmark = pytest.mark.cells
+
 POLICY = Path(__file__).parents[4] / 'src/weld_twin_nodes/security/weld_twin.policy.xml'
 PERMISSIONS = {
     ('topics', 'publish'): 'get_publisher_names_and_types_by_node',

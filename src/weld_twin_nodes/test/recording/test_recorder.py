@@ -20,6 +20,8 @@ from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.bags import BagReader, recover
 from weld_twin_nodes.harness import Cell
 
+pytestmark = pytest.mark.cells
+
 ROBOT = catalog.load('ur5')
 NUMBERED = 1_000_000_000
 BLOCKS = 100

@@ -94,12 +94,9 @@ def test_a_bag_played_again_starts_a_new_window():
 
 def test_a_job_runs_elsewhere_while_the_caller_goes_on():
     worker, job = Worker(), Job(filled().recording(least=3.0), load('ur5'))
-    begun = time.monotonic()
     worker.start(job)
-    assert time.monotonic() - begun < 0.3
-    assert worker.busy and worker.take() is None
+    assert worker.busy and worker.take() is None  # the caller is back before the answer
     while worker.busy:
-        assert time.monotonic() - begun < 120.0
         time.sleep(0.05)
     finding = worker.take()
     assert isinstance(finding, Finding)
@@ -171,6 +168,7 @@ def test_unsound_data_are_an_error_on_both_topics_until_they_are_mended(tmp_path
         cell.wait(lambda: own()[-1].level != b'\x02', 'that it is over')
 
 
+@pytest.mark.cells
 @pytest.mark.slow
 def test_the_node_tells_a_gap_from_the_streams(tmp_path):
     pytest.importorskip('rclpy', reason='needs ROS 2')

@@ -292,6 +292,9 @@ class Recording:
         What the stamps count from, [ns] since 1970.
     notes : tuple of str
         What a reader should know of it, in sentences.
+    incomplete : tuple of str
+        What of it is missing, in sentences: messages its recorder knows were sent, and streams
+        that begin late or end early against the others.
 
     Raises
     ------
@@ -318,6 +321,7 @@ class Recording:
     temperature: Signal | None = None
     epoch_ns: int = 0
     notes: tuple[str, ...] = ()
+    incomplete: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.wrench_frame not in WRENCH_FRAMES:

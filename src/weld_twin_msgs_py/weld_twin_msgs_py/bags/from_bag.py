@@ -5,13 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 
-from ..assembly import Intake, Role, assembled
+from ..assembly import Intake, Role, Samples, assembled
 from ..messages.topics import (
     JOINT_STATES,
     MEASURED_POINT,
@@ -22,6 +25,7 @@ from ..messages.topics import (
     TopicNames,
 )
 from .columns import LEFT_OUT, Stream
+from .ends import Ends, never_recorded, uneven_ends
 from .reader import BagReader
 
 POSE_TYPES = (MEASURED_POSE.type, 'geometry_msgs/msg/PoseWithCovarianceStamped')
@@ -75,7 +79,7 @@ def read_recording(path: Path | str, robot: Robot, topics: TopicNames | None = N
             f'{robot.name!r}: {", ".join(robot.joint_names)}'
         )
     samples = {role: stream.samples() for role, stream in streams.items()}
-    return assembled(
+    recording = assembled(
         _name(Path(path)),
         robot,
         samples,
@@ -83,6 +87,20 @@ def read_recording(path: Path | str, robot: Robot, topics: TopicNames | None = N
         static=bool(made['static']) if 'static' in made else None,
         notes=_notes(names, streams, intake, bool(points)),
     )
+    lacking = never_recorded(made)
+    uneven = () if recording.joints.static else uneven_ends(_ends(names, samples))
+    return replace(recording, incomplete=(*lacking, *uneven), notes=(*recording.notes, *lacking))
+
+
+def _ends(names: TopicNames, samples: Mapping[Role, Samples]) -> dict[str, Ends]:
+    """Return the ends of what a comparison cannot do without: joint states and measurements."""
+    return {
+        getattr(names, role.value): Ends(
+            int(item.ns[0]), int(item.ns[-1]), int(np.median(np.diff(item.ns)))
+        )
+        for role, item in samples.items()
+        if role in (Role.JOINTS, Role.POSE, Role.POINT) and item.ns.size > 1
+    }
 
 
 def _name(path: Path) -> str:

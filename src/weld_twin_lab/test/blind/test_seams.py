@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Seams drawn at random: one that passes near a singular posture is drawn again, not planned."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.errors import PathError
+from weld_twin_lab.blind import seams
+
+SPAN, RATE = 20.0, 50.0
+
+
+def test_a_seam_that_would_take_too_long_is_drawn_again(monkeypatch):
+    refused, plan = [], seams.plan
+
+    def watched(*args, **options):
+        try:
+            return plan(*args, **options)
+        except PathError as error:
+            refused.append(str(error))
+            raise
+
+    monkeypatch.setattr(seams, 'plan', watched)
+    robot = catalog.load('abb_irb120')
+    q = seams.seam_motion(robot, SPAN, RATE, np.random.default_rng(3))
+    most = round(seams.LONGEST * SPAN * RATE)
+    assert any(f'samples, and {most:,} are the most' in sentence for sentence in refused)
+    assert 0.5 * SPAN * RATE < len(q) < most
+    robot.check_positions(q)

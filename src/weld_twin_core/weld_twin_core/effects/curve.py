@@ -121,6 +121,17 @@ def check_knots(name: str, over: str, knots: Sequence[float], count: int) -> Non
     """
     Refuse a curve that is none.
 
+    Parameters
+    ----------
+    name : str
+        How the message names the curve.
+    over : str
+        The quantity that it runs over.
+    knots : sequence of float
+        Where it has values, in the unit of that quantity.
+    count : int
+        How many values it has.
+
     Raises
     ------
     ModelError

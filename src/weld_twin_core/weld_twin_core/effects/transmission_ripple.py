@@ -96,13 +96,38 @@ class TransmissionRipple(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """Yield one instance per integer order that the joint's range of motion can tell."""
+        """
+        Yield one instance per integer order that the joint's range of motion can tell.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it would sit on; None for the robot as a whole.
+        pull : array, shape (N,), optional
+            How strongly the residual would move the joint at every sample [rad or m, up to
+            scale].
+
+        """
         for order in range(1, MAX_ORDER + 1):
             yield cls(str(joint), 0.0, float(order), 0.0)
 
     @classmethod
     def small(cls, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
-        """Return one ripple of all orders that the measurements can hold apart."""
+        """
+        Return one ripple of all orders that the measurements can hold apart.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it sits on.
+        most : int
+            How many numbers the measurements can hold apart.
+
+        """
         orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
         zero = np.zeros(orders.size)
         return [cls(str(joint), zero, orders, zero)] if orders.size else []

@@ -99,6 +99,15 @@ class Features:
         Return the instances a search for this kind of effect starts from, and among how many.
 
         ``residual``, shape (c, M), is what the search wants explained.
+
+        Parameters
+        ----------
+        kind : type of Effect
+        joint : str or None
+            The joint it would sit on; None for the robot as a whole.
+        residual : array, shape (c, M) [m, rad], optional
+            What the search wants explained.
+
         """
         view = self.joint_view if kind.stage in (Stage.SERVO, Stage.PLAY) else self.view
         pull = None

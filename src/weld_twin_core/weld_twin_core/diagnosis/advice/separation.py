@@ -49,7 +49,21 @@ class Side:
 def at_hand(
     problem: Problem, model: Model, alternatives: Sequence[Alternative], scale: Scale
 ) -> Side:
-    """Return what the alternatives say of the data at hand."""
+    """
+    Return what the alternatives say of the data at hand.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    alternatives : sequence of Alternative
+        The explanations to tell apart.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+
+    """
     few = problem.thinned(ROWS)
     return _side(few, model, alternatives, with_weights(scale, few), '')
 
@@ -57,7 +71,21 @@ def at_hand(
 def ahead(
     problem: Problem, candidate: Candidate, alternatives: Sequence[Alternative], scale: Scale
 ) -> Side:
-    """Return what the alternatives say of a candidate measurement."""
+    """
+    Return what the alternatives say of a candidate measurement.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    candidate : Candidate
+        A measurement that could be made.
+    alternatives : sequence of Alternative
+        The explanations to tell apart.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+
+    """
     recording = _measured(candidate, points=max(problem.rows) == 3)
     align = set(problem.align)
     align |= {'base'} if candidate.new_base else set()

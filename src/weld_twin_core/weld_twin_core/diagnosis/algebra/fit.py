@@ -68,7 +68,19 @@ class Fit:
 
 
 def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[str]]:
-    """Return the whitened columns of frames and found effects, shape (P, rows), and names."""
+    """
+    Return the whitened columns of frames and found effects, shape (P, rows), and names.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+
+    """
     features = problem.features(model)
     parts, names = problem.frame_columns(features)
     columns = [problem.whitened(parts, scale)]
@@ -80,7 +92,19 @@ def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[st
 
 
 def stepped(problem: Problem, model: Model, step: Array) -> Model:
-    """Return the model after a step of frames and coordinates, in the order of `design`."""
+    """
+    Return the model after a step of frames and coordinates, in the order of `design`.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    step : array, shape (P,)
+        Of base and tool frames (xyz, rotvec) and fit coordinates.
+
+    """
     at = 0
     if 'base' in problem.align:
         for k in range(len(problem.recordings)):
@@ -159,7 +183,20 @@ class _Point(NamedTuple):
 
     @classmethod
     def at(cls, problem: Problem, model: Model, scale: Scale, prior: Array) -> _Point:
-        """Return the cost of a model under a prior precision about zero, shape (K,)."""
+        """
+        Return the cost of a model under a prior precision about zero, shape (K,).
+
+        Parameters
+        ----------
+        problem : Problem
+            The recordings to explain, and the frames that are fitted along.
+        model : Model
+            What is believed so far; everything is taken about it.
+        scale : Scale
+            The noise that residuals are measured in, and the weight of every sample.
+        prior : ?
+
+        """
         residual, x = problem.whitened(problem.residuals(model), scale), coordinates(model)
         return cls(model, residual, x, float(residual @ residual + prior @ x**2))
 
@@ -172,7 +209,19 @@ class _Point(NamedTuple):
 
 
 def solve_scaled(normal: Array, right: Array, damping: float) -> Array:
-    """Return the solution of damped, column-scaled normal equations; flat directions stay put."""
+    """
+    Return the solution of damped, column-scaled normal equations; flat directions stay put.
+
+    Parameters
+    ----------
+    normal : array, shape (P, P)
+        Columns times columns.
+    right : array, shape (P,)
+        Columns times residual.
+    damping : float
+        Added to the unit diagonal of the scaled equations.
+
+    """
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     live = size > 1e-12 * max(size.max(initial=0.0), 1e-300)
     out = np.zeros(right.size)
@@ -224,7 +273,23 @@ def robust_scale(
 def robust_fit(
     problem: Problem, model: Model, scale: Scale, precision: Array | None = None, rounds: int = 2
 ) -> tuple[Fit, Scale]:
-    """Return a fit and the noise and weights that go with it, by reweighting a few times."""
+    """
+    Return a fit and the noise and weights that go with it, by reweighting a few times.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    precision : array, shape (K,), optional
+        Prior precision of the fit coordinates; left out, there is no prior.
+    rounds : int
+        How often the weights are taken anew.
+
+    """
     result = fit(problem, model, scale, precision)
     for _ in range(rounds):
         scale = robust_scale(problem, problem.residuals(result.model))

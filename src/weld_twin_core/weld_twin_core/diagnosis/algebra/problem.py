@@ -202,7 +202,18 @@ class Problem:
     def effect_columns(
         self, features: list[Features], effect: Effect, *, atoms: bool = True
     ) -> list[Array]:
-        """Return an effect's columns, one (P, c, M) array per recording."""
+        """
+        Return an effect's columns, one (P, c, M) array per recording.
+
+        Parameters
+        ----------
+        features : list of Features
+            One per recording; see `Problem.features`.
+        effect : Effect
+        atoms : bool
+            Its linear features; else the derivatives by its fit coordinates.
+
+        """
         return [
             maker.columns(effect, atoms)[:, : self.rows[k]] for k, maker in enumerate(features)
         ]

@@ -95,7 +95,19 @@ def initial_frames(problem: Problem, model: Model) -> Model:
 
 
 def rough_frames(problem: Problem, model: Model, *, thorough: bool = False) -> Model:
-    """Return the model with base and tool frames in closed form, both free."""
+    """
+    Return the model with base and tool frames in closed form, both free.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    thorough : bool
+        Use more measurements and more rounds.
+
+    """
     tracks = [_track(problem, model, k) for k in range(len(problem.recordings))]
     return _base_and_tool(tracks, model, REACHES if thorough else ())
 

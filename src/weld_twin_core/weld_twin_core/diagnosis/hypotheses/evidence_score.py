@@ -76,7 +76,19 @@ def evidence(rss: float, gain: float, freedom: float, effective: float) -> float
 
 
 def best_choice(gram: Gram, unit: Unit, effective: float) -> Choice | None:
-    """Return a unit's best seed and columns on normal equations conditioned on the model."""
+    """
+    Return a unit's best seed and columns on normal equations conditioned on the model.
+
+    Parameters
+    ----------
+    gram : Gram
+        Normal equations that all hypotheses share.
+    unit : Unit
+        What enters or stays out together.
+    effective : float
+        Number of independent rows.
+
+    """
     best: Choice | None = None
     tried = float(np.log(unit.trials))
     for k, columns in enumerate(unit.columns):

@@ -92,7 +92,21 @@ def families(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]
 
 
 def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] = ()) -> Library:
-    """Return the library at a model: one set of columns that all hypotheses share."""
+    """
+    Return the library at a model: one set of columns that all hypotheses share.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    exclude : sequence of str
+        Families taken out of the library.
+
+    """
     features = problem.features(model)
     residual = problem.residuals(model)[0]
     residual[:3] *= scale.weights[0] / scale.position**2

@@ -94,6 +94,20 @@ def effective_rows(
 
     ``trust`` is how far to believe the autocorrelation, as its exponent: while causes are still
     missing from the model, it is theirs.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    found : Fit
+        A fit of the problem.
+    bare_rss : float
+        Whitened sum of squares before any effect was found.
+    beliefs : Beliefs
+        The numbers that decide.
+    trust : float
+        Exponent between 0 and 1; see above.
+
     """
     share = effective_share(found.residual, problem.rows, problem.samples) ** trust
     count = share * found.residual.size
@@ -104,7 +118,23 @@ def effective_rows(
 def search(
     problem: Problem, start: Model, exclude: Sequence[str], beliefs: Beliefs, progress: Progress
 ) -> Search:
-    """Return the effects that earn their place, fitted on all measurements."""
+    """
+    Return the effects that earn their place, fitted on all measurements.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    start : Model
+        The nominal robot with frames to start from, and the effects known.
+    exclude : sequence of str
+        Families taken out of the library.
+    beliefs : Beliefs
+        The numbers that decide.
+    progress : callable
+        Told in a few words what has been done.
+
+    """
     full = problem.thinned(FIT_ROWS)
     # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
     baseline, scale = robust_fit(full, start, robust_scale(full, full.residuals(start)))
@@ -173,7 +203,21 @@ def _chosen(
 def settled(
     work: Workspace, now: Fit, effective: Callable[[Fit], float], progress: Progress
 ) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
-    """Return the fit in which every effect is the best in its place, and its rivals."""
+    """
+    Return the fit in which every effect is the best in its place, and its rivals.
+
+    Parameters
+    ----------
+    work : Workspace
+        The problem with its library, multiplied out.
+    now : Fit
+        The fit so far.
+    effective : callable
+        From a fit to the number of its independent rows.
+    progress : callable
+        Told in a few words what has been done.
+
+    """
     for attempt in range(SWAPS + 1):
         slots = []
         for k, effect in enumerate(now.model.found):

@@ -40,7 +40,21 @@ class Workspace:
 
     @classmethod
     def of(cls, problem: Problem, scale: Scale, library: Library, beliefs: Beliefs) -> Workspace:
-        """Multiply the library out once."""
+        """
+        Multiply the library out once.
+
+        Parameters
+        ----------
+        problem : Problem
+            The recordings to explain, and the frames that are fitted along.
+        scale : Scale
+            The noise that residuals are measured in, and the weight of every sample.
+        library : Library
+            Every family on every joint, as columns.
+        beliefs : Beliefs
+            The numbers that decide.
+
+        """
         return cls(problem, scale, library, beliefs, library.columns @ library.columns.T)
 
     def conditioned(self, model: Model, residual: Array) -> Gram:
@@ -114,7 +128,19 @@ def forward(
 
 
 def ranking(gram: Gram, units: Sequence[Unit], effective: float) -> list[Choice]:
-    """Return every unit's best choice, most evidence first."""
+    """
+    Return every unit's best choice, most evidence first.
+
+    Parameters
+    ----------
+    gram : Gram
+        Normal equations that all hypotheses share.
+    units : sequence of Unit
+        What may enter, each as a whole.
+    effective : float
+        Number of independent rows.
+
+    """
     found = [best_choice(gram, unit, effective) for unit in units]
     return sorted((c for c in found if c is not None), key=lambda c: -c.nats)
 
@@ -151,7 +177,18 @@ def _refined(
 
 
 def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
-    """Return the fit of a model with one more effect, merged where its kind can merge."""
+    """
+    Return the fit of a model with one more effect, merged where its kind can merge.
+
+    Parameters
+    ----------
+    work : Workspace
+        The problem with its library, multiplied out.
+    model : Model
+        What is believed so far; everything is taken about it.
+    effect : Effect
+
+    """
     effect = started(work.problem, model, work.scale, effect)
     return fit(work.problem, model.with_found(merged(model.found, effect)), work.scale, None, 5)
 
@@ -185,7 +222,19 @@ def restarted(work: Workspace, now: Fit) -> Fit:
 
 
 def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
-    """Return the fit with every effect dropped that is not worth its freedom given the others."""
+    """
+    Return the fit with every effect dropped that is not worth its freedom given the others.
+
+    Parameters
+    ----------
+    work : Workspace
+        The problem with its library, multiplied out.
+    now : Fit
+        The fit so far.
+    effective : callable
+        From a fit to the number of its independent rows.
+
+    """
     now = restarted(work, now)
     while now.model.found:
         count = effective(now)
@@ -228,6 +277,16 @@ def consolidated(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -
 
     Selection one at a time can enter through a neighbour of the cause and then mend the rest
     with a second effect.
+
+    Parameters
+    ----------
+    work : Workspace
+        The problem with its library, multiplied out.
+    now : Fit
+        The fit so far.
+    effective : callable
+        From a fit to the number of its independent rows.
+
     """
     improved = True
     while improved and len(now.model.found) > 1:

@@ -42,6 +42,17 @@ def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Eff
     Return the instance of an effect from which to fit it beside those a model has.
 
     The effect itself where its kind has no need of a search.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    effect : Effect
+
     """
     if not searched(effect):
         return effect
@@ -66,6 +77,18 @@ def profile(
     Return instances in the place of found effect k, and by how much each fits worse, (D,).
 
     In whitened squares; None where the effect's kind has no need of a search.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    k : int
+        Which of the found effects, counted from 0.
+
     """
     effect = model.found[k]
     if not searched(effect):
@@ -112,7 +135,19 @@ class _Looker:
 
     @classmethod
     def of(cls, problem: Problem, model: Model, scale: Scale) -> _Looker:
-        """Take the residual and its columns at a model."""
+        """
+        Take the residual and its columns at a model.
+
+        Parameters
+        ----------
+        problem : Problem
+            The recordings to explain, and the frames that are fitted along.
+        model : Model
+            What is believed so far; everything is taken about it.
+        scale : Scale
+            The noise that residuals are measured in, and the weight of every sample.
+
+        """
         columns = design(problem, model, scale)[0]
         size = np.linalg.norm(columns, axis=1)
         basis, _ = np.linalg.qr((columns[size > 0.0] / size[size > 0.0, None]).T)

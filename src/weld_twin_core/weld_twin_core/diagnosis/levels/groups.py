@@ -77,7 +77,19 @@ class Group:
 
 
 def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """Return the groups that these data can show at all."""
+    """
+    Return the groups that these data can show at all.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+
+    """
     features = problem.features(model)
     out = []
     for at, on, curves in _curved(features, model):

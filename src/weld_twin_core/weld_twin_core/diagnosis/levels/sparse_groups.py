@@ -56,7 +56,19 @@ class Folds:
 
     @classmethod
     def of(cls, columns: Array, target: Array, labels: Array) -> Folds:
-        """Multiply out every fold."""
+        """
+        Multiply out every fold.
+
+        Parameters
+        ----------
+        columns : array, shape (P, rows)
+            Features, whitened.
+        target : array, shape (rows,)
+            What they are to explain, whitened.
+        labels : array of int, shape (rows,)
+            The fold that each row belongs to.
+
+        """
         names = np.unique(labels)
         parts = [(columns[:, labels == n], target[labels == n]) for n in names]
         return cls(
@@ -232,6 +244,18 @@ def rival_weights(
     A group that leaves as much on unseen folds weighs as much; one that leaves r times the squared
     error weighs r to the power of -rows / 4: the likelihood of so many independent rows, softened
     by two because real physics is a little richer than any group.
+
+    Parameters
+    ----------
+    work : Choosing
+        Groups and their folds.
+    members : list of Member
+        The groups chosen.
+    k : int
+        Which of them is held against the others.
+    beliefs : Beliefs
+        The numbers that decide.
+
     """
     rest = members[:k] + members[k + 1 :]
     own = (members[k], work.errors(members))

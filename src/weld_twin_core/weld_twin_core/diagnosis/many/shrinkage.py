@@ -91,7 +91,21 @@ def learned_precision(
 def shrunk_step(
     problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
 ) -> tuple[Model, Scale]:
-    """Return the model after one linear step with learned priors, and the noise it leaves."""
+    """
+    Return the model after one linear step with learned priors, and the noise it leaves.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    beliefs : Beliefs
+        The numbers that decide.
+
+    """
     model, _, freedom = _learned(problem, model, scale, beliefs)
     return model, robust_scale(problem, problem.residuals(model), freedom=freedom)
 
@@ -99,7 +113,21 @@ def shrunk_step(
 def shrunk_fit(
     problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
 ) -> tuple[Fit, Array]:
-    """Return the fit with learned priors, and their precision, shape (K,)."""
+    """
+    Return the fit with learned priors, and their precision, shape (K,).
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    beliefs : Beliefs
+        The numbers that decide.
+
+    """
     model, precision, _ = _learned(problem, model, scale, beliefs)
     return fit(problem, model, scale, precision, iterations=1), precision
 

@@ -34,7 +34,23 @@ def many_small(
     beliefs: Beliefs,
     progress: Callable[[str], None],
 ) -> tuple[Fit, Scale, Array]:
-    """Return the fit of all families together, its noise and its prior precision."""
+    """
+    Return the fit of all families together, its noise and its prior precision.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    exclude : sequence of str
+        Families taken out of the library.
+    beliefs : Beliefs
+        The numbers that decide.
+    progress : callable
+        Told in a few words what has been done.
+
+    """
     everything = model.with_found(_everything(problem, model, exclude, beliefs))
     scale = robust_scale(problem, problem.residuals(model))
     model, scale = shrunk_step(problem, everything, scale, beliefs)
@@ -90,6 +106,18 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     Return the model with the set-up's own creep and step in time, where they show.
 
     Both are nuisance: they are part of where the frames were, not of the robot.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    beliefs : Beliefs
+        The numbers that decide.
+
     """
     for kind in [kind for kind in REGISTRY.values() if kind.of_setup]:
         features = problem.features(model)

@@ -55,7 +55,25 @@ class _Waves:
         orders: Array,
         least: float,
     ) -> _Waves | None:
-        """Return the waves of a joint, or None when it travels less than ``least`` [rad]."""
+        """
+        Return the waves of a joint, or None when it travels less than ``least`` [rad].
+
+        Parameters
+        ----------
+        problem : Problem
+            The recordings to explain, and the frames that are fitted along.
+        features : list of Features
+            One per recording; see `Problem.features`.
+        scale : Scale
+            The noise that residuals are measured in, and the weight of every sample.
+        joint : int
+            Counted from 0.
+        orders : array, shape (K,) [1/rev]
+            Orders to look at.
+        least : float [rad]
+            Travel below which nothing is looked for.
+
+        """
         low = min(float(maker.view.q[:, joint].min()) for maker in features)
         high = max(float(maker.view.q[:, joint].max()) for maker in features)
         if high - low < least:
@@ -102,6 +120,18 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
 
     The score statistic of sine and cosine at every order costs one small product per joint; the
     strongest line enters, the residual it explains is taken off, and the look is repeated.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    beliefs : Beliefs
+        The numbers that decide.
+
     """
     kinds = [effect.waves for effect in model.found if effect.waves is not None]
     if not kinds:

@@ -304,7 +304,21 @@ def _factor(information: Array) -> tuple[Array, bool]:
 
 
 def conditioned(rows: Rows, prior: Prior, width: Array, noise: float) -> tuple[Array, Array]:
-    """Return mean, shape (P,), and covariance, shape (P, P), of the coordinates given rows."""
+    """
+    Return mean, shape (P,), and covariance, shape (P, P), of the coordinates given rows.
+
+    Parameters
+    ----------
+    rows : Rows
+        What was measured, as linear equations.
+    prior : Prior
+        What is known of the coordinates before.
+    width : array, shape (P,)
+        Prior standard deviation of every coordinate.
+    noise : float
+        Variance of a row.
+
+    """
     weight = rows.share / noise
     unit = rows.columns * width[:, None]
     middle = prior.middle / width

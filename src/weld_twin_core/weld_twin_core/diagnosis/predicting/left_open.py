@@ -21,6 +21,16 @@ def left_open(problem: Problem, model: Model, scale: Scale) -> tuple[str, ...]:
 
     A direction is named by the axes that make most of it: 'base z with tool z' is a shift of both
     along z by which no measured pose changes.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+
     """
     problem = problem.thinned(3000)
     parts, names = problem.frame_columns(problem.features(model))

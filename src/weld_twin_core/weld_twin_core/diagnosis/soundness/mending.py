@@ -38,7 +38,17 @@ Mend = Callable[[Given], Given]
 
 
 def joints_as(given: Given, matrix: Array, offset: Array) -> Given:
-    """Return what was given with joint positions q matrix' + offset."""
+    """
+    Return what was given with joint positions q matrix' + offset.
+
+    Parameters
+    ----------
+    given : Given
+        Recordings, robot and frames as they were given.
+    matrix : array, shape (n, n)
+    offset : array, shape (n,) [rad or m]
+
+    """
     out = []
     for r in given.recordings:
         qd = None if r.joints.qd is None else r.joints.qd @ matrix.T
@@ -90,7 +100,23 @@ def base_turned(given: Given, turn: Array) -> Given:
 
 
 def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> Given:
-    """Return what was given with measurements of recording k earlier by a lag [s] and its rate."""
+    """
+    Return what was given with measurements of recording k earlier by a lag [s] and its rate.
+
+    Parameters
+    ----------
+    given : Given
+        Recordings, robot and frames as they were given.
+    k : int
+        Which recording, counted from 0.
+    late : float [s]
+        How late its measurements are in the middle.
+    rate : float [s/s]
+        How much later they get with every second.
+    middle : float [s]
+        The instant that ``late`` belongs to.
+
+    """
     recordings = list(given.recordings)
     seen = measured(recordings[k])
     earlier = seen.t - (late + rate * (seen.t - middle))

@@ -71,12 +71,36 @@ def setup(case: Case) -> Sequence[Finding]:
 
 
 def moved_setup(parts: list[Array], problem: Problem, model: Model) -> list[Step]:
-    """Return the steps of the base frame among its `changes`."""
+    """
+    Return the steps of the base frame among its `changes`.
+
+    Parameters
+    ----------
+    parts : list of array, each shape (c, M) [m, rad]
+        Residuals of every recording; see `Problem.residuals`.
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+
+    """
     return [each for each in changes(parts, problem, model) if isinstance(each, Step)]
 
 
 def settling(parts: list[Array], problem: Problem, model: Model) -> list[Settling]:
-    """Return the settlings of the base frame among its `changes`."""
+    """
+    Return the settlings of the base frame among its `changes`.
+
+    Parameters
+    ----------
+    parts : list of array, each shape (c, M) [m, rad]
+        Residuals of every recording; see `Problem.residuals`.
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+
+    """
     return [each for each in changes(parts, problem, model) if isinstance(each, Settling)]
 
 

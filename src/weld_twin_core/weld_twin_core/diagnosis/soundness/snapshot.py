@@ -129,7 +129,19 @@ class Arm(NamedTuple):
 
 
 def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
-    """Return evenly spread samples of every recording as stations."""
+    """
+    Return evenly spread samples of every recording as stations.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    motions : list of array, each shape (M, n) [rad or m]
+        Joint positions at the measurements, one array per recording.
+
+    """
     share = max(12, SAMPLES // len(problem.recordings))
     out = []
     for recording, q in zip(problem.recordings, motions, strict=True):

@@ -24,7 +24,21 @@ LARGE = 300
 def held_out_shrink(
     found: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
 ) -> Shrink:
-    """Return the gap before and after, on the held-out bags or on stretches taking their turn."""
+    """
+    Return the gap before and after, on the held-out bags or on stretches taking their turn.
+
+    Parameters
+    ----------
+    found : Search
+        The fitted effects and the noise they leave.
+    unseen : Unseen
+        What models with more or fewer effects predict on stretches left out.
+    holdout : sequence of Recording
+        Recordings that were not fitted; none, and stretches take their turn.
+    beliefs : Beliefs
+        The numbers that decide.
+
+    """
     model = found.final.model
     steps, alone = _waterfall(unseen, model)
     first, last = unseen.predict([]), unseen.predict(range(len(model.found)))

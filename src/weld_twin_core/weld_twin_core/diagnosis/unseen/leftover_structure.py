@@ -55,7 +55,19 @@ class Structure:
 
 
 def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
-    """Return what generic columns add to a model on stretches not used for fitting."""
+    """
+    Return what generic columns add to a model on stretches not used for fitting.
+
+    Parameters
+    ----------
+    unseen : Unseen
+        What models with more or fewer effects predict on stretches left out.
+    model : Model
+        What is believed so far; everything is taken about it.
+    beliefs : Beliefs
+        The numbers that decide.
+
+    """
     base = unseen.base(range(len(model.found)))
     before = unseen.squares(base.residual)
     labels = unseen.trusted_labels()

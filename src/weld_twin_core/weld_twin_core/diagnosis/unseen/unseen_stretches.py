@@ -73,7 +73,21 @@ class Unseen:
 
     @classmethod
     def of(cls, problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
-        """Prepare the parts of a fitted model."""
+        """
+        Prepare the parts of a fitted model.
+
+        Parameters
+        ----------
+        problem : Problem
+            The recordings to explain, and the frames that are fitted along.
+        scale : Scale
+            The noise that residuals are measured in, and the weight of every sample.
+        fit : Fit
+            The fitted model with its columns.
+        precision : array, shape (K,)
+            Prior precision of the fit coordinates, one over variance.
+
+        """
         model = fit.model
         columns, _ = design(problem, model, scale)
         frames = columns.shape[0] - fit.coordinates.size

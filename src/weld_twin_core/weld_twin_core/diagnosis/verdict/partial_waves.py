@@ -11,7 +11,19 @@ from ..beliefs import Beliefs
 
 
 def glimpsed(problem: Problem, model: Model, beliefs: Beliefs) -> tuple[str, ...]:
-    """Return the joints of which a wave was seen over too little of a period."""
+    """
+    Return the joints of which a wave was seen over too little of a period.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    beliefs : Beliefs
+        The numbers that decide.
+
+    """
     names = model.robot.joint_names
     out = []
     for effect in model.found:

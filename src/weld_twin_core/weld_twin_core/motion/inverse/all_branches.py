@@ -94,7 +94,18 @@ def why_not(robot: Robot, pose: Array) -> str:
 
 
 def past_limit(robot: Robot, joint: int, value: float) -> str:
-    """Return what is wrong with a joint position for a message."""
+    """
+    Return what is wrong with a joint position for a message.
+
+    Parameters
+    ----------
+    robot : Robot
+    joint : int
+        Counted from 0.
+    value : float [rad or m]
+        The position that would be needed.
+
+    """
     return (
         f'joint {robot.joint_names[joint]!r} would have to be at {value:.3f}, outside '
         f'[{robot.lower[joint]:.3f}, {robot.upper[joint]:.3f}]; move the seam or turn the torch'

@@ -138,7 +138,18 @@ class _Circle:
 
     @classmethod
     def about(cls, centre: Array, axis: Array, start: Array) -> _Circle:
-        """Return the circle about a point and an axis of length 1, through a start (3,) [m]."""
+        """
+        Return the circle about a point and an axis of length 1, through a start (3,) [m].
+
+        Parameters
+        ----------
+        centre : array, shape (3,) [m]
+        axis : array, shape (3,), of length 1
+            The travel turns about it by the right hand.
+        start : array, shape (3,) [m]
+            A point on the circle, where it starts.
+
+        """
         radius = float(np.linalg.norm(start - centre))
         out = (start - centre) / radius
         return cls(centre, radius, out, np.cross(axis, out))

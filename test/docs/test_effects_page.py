@@ -11,6 +11,7 @@ import yaml
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import REGISTRY, MemoryEffect, effects_from_list
+from weld_twin_core.effects.hooks import Hooks
 from weld_twin_core.twin.twin import Twin
 
 PAGE = (Path(__file__).parents[2] / 'docs' / 'effects.md').read_text(encoding='utf-8')
@@ -51,6 +52,18 @@ def test_the_page_says_what_the_effect_is(name):
     if len(without) == len(kind.parameters):
         expected = 'none'
     assert row['derivative'] == expected
+
+
+def hooks():
+    """Return the hooks that the page lists."""
+    table = PAGE.partition('## What else an effect may tell')[2]
+    return re.findall(r'^\| `(\w+)` \|', table, flags=re.MULTILINE)
+
+
+def test_the_page_lists_every_hook_once():
+    told = set(vars(Hooks)) | set(Hooks.__annotations__)
+    contract = {'of', 'stage', 'site', 'at', 'on', 'key'}  # what every effect has, not a hook
+    assert sorted(hooks()) == sorted(k for k in told - contract if not k.startswith('_'))
 
 
 def robot():

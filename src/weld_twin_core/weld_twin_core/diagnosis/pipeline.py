@@ -15,6 +15,7 @@ from .answer.answer import answer
 from .answer.refusal import refusal
 from .beliefs import Beliefs
 from .hypotheses.search import search
+from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.carried import carried
 from .levels.curved import curved
 from .levels.held_against import held_against
@@ -123,6 +124,7 @@ def _explained(
     assert examined.posed is not None
     found = search(*examined.posed, exclude, beliefs, progress)
     found = fitted_together(found, exclude, beliefs, progress)
+    found = with_structural_aliases(found, exclude, beliefs)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     leftover = structure(unseen, found.final.model, beliefs)
     progress('looked for what is left')

@@ -9,7 +9,7 @@ these data tie, and are named together.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,18 +61,24 @@ def rivals(
     fits = [fitted_with(work, rest.model, c.effect(gram)) for c in close]
     # One count for all rivals: see `select`.
     count = effective(min([now, *fits], key=lambda f: f.rss))
-    out = [Rival(Site(effect.name, effect.site), _nats(rest, now, count, own), now)]
+    out = [Rival(Site(effect.name, effect.site), nats_in_place(rest, now, count, own), now)]
     for choice, other in zip(close, fits, strict=True):
-        out.append(Rival(Site(*choice.unit.site), _nats(rest, other, count, choice), other))
-    weights = np.exp(
-        (np.array([r.nats for r in out]) - max(r.nats for r in out)) / beliefs.temperature
-    )
+        out.append(
+            Rival(Site(*choice.unit.site), nats_in_place(rest, other, count, choice), other)
+        )
+    return weighed(out, beliefs.temperature)
+
+
+def weighed(out: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
+    """Return rivals with probabilities that add up to one, most probable first."""
+    nats = np.array([r.nats for r in out])
+    weights = np.exp((nats - nats.max()) / temperature)
     weights /= weights.sum()
-    weighed = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
-    return tuple(sorted(weighed, key=lambda r: -r.probability))
+    told = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
+    return tuple(sorted(told, key=lambda r: -r.probability))
 
 
-def _nats(rest: Fit, full: Fit, count: float, choice: Choice | None) -> float:
+def nats_in_place(rest: Fit, full: Fit, count: float, choice: Choice | None = None) -> float:
     """Return the evidence of a fit in the place of an effect, by the rule that holds for all."""
     freedom = float(full.coordinates.size - rest.coordinates.size)
     trials = 1.0

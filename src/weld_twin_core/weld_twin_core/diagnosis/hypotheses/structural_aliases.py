@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Constant errors that no motion tells apart, whatever the data: they follow from the arm itself.
+
+The offset of the first link lifts the tool exactly as a higher base does. Such a pair is told as
+a set even where one of the two was taken out of the library, the simplest member first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...effects.registry import REGISTRY
+from ...recording import JointMotion, Recording
+from ...twin.features import Features, sites
+from ...twin.twin import Twin
+from ..algebra.fit import fit
+from ..beliefs import Beliefs
+from ..result import Site
+from .rivals import Rival, nats_in_place, weighed
+from .search import Search
+from .selection import fitted_with, without
+
+POSTURES = 40
+"""Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
+LEVER = 0.5
+"""Metres of tool motion that a radian of turn counts as; it only scales a comparison."""
+SAME = 1e-6
+"""Share of an error that may lie outside what another one spans; far above rounding."""
+SEED = 7
+"""Of the postures: any generic set gives the same answer."""
+
+
+def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beliefs) -> Search:
+    """
+    Return what was found, each constant error with the excluded ones that are the same error.
+
+    Parameters
+    ----------
+    found : Search
+    exclude : sequence of str
+        Families taken out of the library.
+    beliefs : Beliefs
+
+    """
+    kinds = [name for name in exclude if name in REGISTRY and _constant(REGISTRY[name])]
+    if not kinds or not found.slots:
+        return found
+    slots = [
+        _extended(found, k, slot, kinds, beliefs) if k < len(found.small.model.found) else slot
+        for k, slot in enumerate(found.slots)
+    ]
+    return replace(found, slots=tuple(slots))
+
+
+def _constant(kind: type[Effect]) -> bool:
+    return kind.cause and kind.depends_on == 'constant'
+
+
+def _extended(
+    found: Search, k: int, slot: tuple[Rival, ...], kinds: Sequence[str], beliefs: Beliefs
+) -> tuple[Rival, ...]:
+    """Return a slot with the excluded errors that its leader cannot be told from on any motion."""
+    effect, work = found.small.model.found[k], found.work
+    if not _constant(type(effect)):
+        return slot
+    taken = {(e.name, e.site) for e in found.small.model.found}
+    rest = fit(work.problem, without(found.small.model, k), work.scale, None, 4)
+    count = found.effective(found.small)
+    more = []
+    for other in _candidates(found.baseline.model.robot, kinds, work.problem.align):
+        if (other.name, other.site) in taken:
+            continue
+        if same_error(found.baseline.model.robot, effect, other):
+            tried = fitted_with(work, rest.model, other)
+            nats = nats_in_place(rest, tried, count)
+            more.append(Rival(Site(other.name, other.site), nats, tried))
+    return weighed([*slot, *more], beliefs.temperature) if more else slot
+
+
+def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> Iterator[Effect]:
+    for name in kinds:
+        kind = REGISTRY[name]
+        if kind.fitted_with in align:
+            continue
+        for joint in sites(kind, robot.joint_names):
+            yield kind(**({'joint': joint} if joint is not None else {}))
+
+
+def same_error(robot: Robot, one: Effect, other: Effect) -> bool:
+    """
+    Return whether one of two constant errors can always do what the other does.
+
+    Parameters
+    ----------
+    robot : Robot
+    one, other : Effect
+        Their families and joints count, not their values.
+
+    """
+    a, b = _columns(robot, one), _columns(robot, other)
+    return _inside(a, b) or _inside(b, a)
+
+
+def _columns(robot: Robot, effect: Effect) -> Array:
+    """Return what an error does to the tool in many postures, one row per component."""
+    low = np.maximum(robot.lower, -np.pi)
+    high = np.minimum(robot.upper, np.pi)
+    q = low + (high - low) * np.random.default_rng(SEED).random((POSTURES, robot.n))
+    motion = JointMotion(np.arange(float(POSTURES)), q, static=True)
+    columns = Features(Twin(robot), Recording('postures', motion), motion.t).columns(effect)
+    columns[:, 3:] *= LEVER
+    return columns.reshape(columns.shape[0], -1)
+
+
+def _inside(rows: Array, span: Array) -> bool:
+    """Return whether every row lies in the span of others."""
+    size = np.linalg.norm(rows, axis=1)
+    if not (size > 0.0).all():
+        return False
+    left = rows.T - span.T @ np.linalg.lstsq(span.T, rows.T, rcond=None)[0]
+    return bool((np.linalg.norm(left, axis=0) < SAME * size).all())

@@ -19,7 +19,7 @@ from .registry import register
 from .view import Parameter, Stage, Value, View
 
 FRAMES = ('base', 'tool')
-OVER = ('temperature', 'time')
+OVER = ('constant', 'temperature', 'time')
 
 
 @register
@@ -28,7 +28,7 @@ class FrameCurve(Effect):
     """
     A spline over temperature or time, through ``xyz`` [m] and ``rotvec`` [rad] at ``knots``.
 
-    Both hold one value for each knot and axis, all knots of the first axis first. It stands for
+    ``over`` may be 'constant', with one knot. Both hold one value for each knot and axis, all knots of the first axis first. It stands for
     causes that nobody has a formula for; a diagnosis does not name it as a cause.
     """
 
@@ -57,7 +57,7 @@ class FrameCurve(Effect):
             check_knots(self.name, self.over, self.knots, count // 3 if count % 3 == 0 else -1)
         if self.frame not in FRAMES or self.over not in OVER:
             raise ModelError(
-                f'{self.name}: frame must be base or tool and over temperature or time, '
+                f'{self.name}: frame must be base or tool and over constant, temperature or time, '
                 f'got {self.frame!r} and {self.over!r}'
             )
 

@@ -24,6 +24,9 @@ from ..algebra.problem import Model, Problem, Scale
 
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}
 """Knots of a curve: enough for two waves of an angle, and few enough for a minute of motion."""
+FINE, LEAST_FINE = 21, 400
+"""Knots of a second curve over the angle, for the waves of a gear; and measurements from which it
+is tried: twenty for each knot."""
 LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
 """Span below which a quantity did not vary: angle [rad], speed [rad/s], torque [N m],
 temperature [K]. Curves over less are straight lines, and told from nothing."""
@@ -134,12 +137,16 @@ def _curved(features: list[Features], model: Model) -> Iterator[tuple[str, str, 
                 continue
             zero = (0.0,) * len(knots)
             yield joint, on, [JointCurve(joint, zero, knots, on)]
+            if on == 'angle' and sum(m.at.size for m in features) > LEAST_FINE:
+                fine = tuple(np.linspace(knots[0], knots[-1], FINE))
+                yield joint, on, [JointCurve(joint, (0.0,) * FINE, fine, on)]
             if on in ('angle', 'temperature'):
                 few = tuple(np.linspace(knots[0], knots[-1], min(len(knots), 4)))
                 zero = (0.0,) * len(few)
                 off = [JointCurve(joint, zero, few, on, channel) for channel in OFF_AXIS]
                 yield joint, on, list(off)
     for frame in ('base', 'tool'):
+        yield frame, 'constant', [FrameCurve((0.0,) * 3, (0.0,) * 3, (0.0,), 'constant', frame)]
         for on in ('temperature', 'time'):
             knots = _knots(features, 0, on)
             if knots is not None:

@@ -63,6 +63,11 @@ def _of_nothing(case: Weighed) -> Verdict:
     told, beliefs = case.evidence, case.beliefs
     if case.left > beliefs.unexplained:
         return Verdict('unknown', _unknown_confidence(case), (), (_depends(told),))
+    if not told.independent and told.after > beliefs.far_above * told.floor:
+        reason = (
+            'what remains is far wider spread than noise, though it depends on nothing looked at'
+        )
+        return Verdict('unknown', beliefs.noise_unseen, (), (reason,))
     if not told.independent and told.after > beliefs.above * told.floor:
         return Verdict(
             'none',

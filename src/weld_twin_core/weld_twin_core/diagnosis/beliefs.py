@@ -232,10 +232,10 @@ class Beliefs:
     """up to this."""
 
     far_above: float = _verdict(1.7)
-    """The same from which the answer is 'unknown' instead: what remains then has two thirds of its
-    squares beyond the middle of its spread, as steps and waves have and noise with trimmed
-    outliers has not. On 24 development cases (seed 515001) two causes outside the library were
-    called no gap without it, and no sound recording lies above 1.4."""
+    """What remains over the floor, RMS, from which the answer is 'unknown' where nothing was found
+    and nothing shows the noise by itself. A Gaussian gives 1, one with trimmed outliers up to
+    about 1.3; two causes outside the library (seed 515001) gave 1.9 and 2.6 and were called no gap
+    without it. Between the two, nearer to the noise. A judgement."""
 
     noise_unseen: float = _verdict(0.6)
     """Belief in 'none' where nothing on the recordings shows the noise by itself and what remains

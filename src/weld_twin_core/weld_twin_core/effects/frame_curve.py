@@ -28,8 +28,9 @@ class FrameCurve(Effect):
     """
     A spline over temperature or time, through ``xyz`` [m] and ``rotvec`` [rad] at ``knots``.
 
-    ``over`` may be 'constant', with one knot. Both hold one value for each knot and axis, all knots of the first axis first. It stands for
-    causes that nobody has a formula for; a diagnosis does not name it as a cause.
+    ``over`` may be 'constant', with one knot. Both hold one value for each knot and axis, all
+    knots of the first axis first. It stands for causes that nobody has a formula for; a diagnosis
+    does not name it as a cause.
     """
 
     xyz: Value = (0.0,) * 6

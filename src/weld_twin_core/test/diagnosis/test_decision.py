@@ -311,7 +311,9 @@ def test_without_gap_and_floor_a_nanometre_is_divided_by():
 @pytest.mark.parametrize(('left', 'status'), [(0.049, 'identified'), (0.051, 'unknown')])
 def test_a_twentieth_may_stay_unexplained(left, status):
     assert decide(structured(left, SURE)).status == status
-    assert decide(structured(left)).status == ('none' if status == 'identified' else 'unknown')
+    # Without an effect the same holds, of what stands above a noise that is not far below it.
+    told = structured(left * 0.64, floor=0.6e-3)
+    assert decide(told).status == ('none' if status == 'identified' else 'unknown')
 
 
 @pytest.mark.parametrize(('left', 'sure'), [(0.06, 0.76), (0.2, 0.9), (0.3, 0.95), (0.9, 0.95)])
@@ -365,6 +367,15 @@ def test_where_nothing_shows_the_noise_none_is_believed_less(times, sure):
     assert verdict.status == 'none'
     assert verdict.confidence == pytest.approx(sure)
     assert ('repeat some poses' in verdict.reasons[0]) is (sure < 0.9)
+
+
+@pytest.mark.parametrize(('times', 'status'), [(1.69, 'none'), (1.71, 'unknown')])
+def test_what_is_spread_far_wider_than_noise_is_unknown(times, status):
+    told = evidence(gap=times * FLOOR, after=times * FLOOR, independent=False)
+    verdict = decide(told)
+    assert verdict.status == status
+    assert verdict.confidence == pytest.approx(0.6)
+    assert ('far wider' in verdict.reasons[0]) is (status == 'unknown')
 
 
 # Many small errors ------------------------------------------------------------------------------

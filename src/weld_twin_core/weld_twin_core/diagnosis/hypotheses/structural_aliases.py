@@ -26,7 +26,7 @@ from ..beliefs import Beliefs
 from ..result import Site
 from .rivals import Rival, nats_in_place, weighed
 from .search import Search
-from .selection import fitted_with, without
+from .selection import fitted_with
 
 POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
@@ -72,7 +72,7 @@ def _extended(
     if not _constant(type(effect)):
         return slot
     taken = {(e.name, e.site) for e in found.small.model.found}
-    rest = fit(work.problem, without(found.small.model, k), work.scale, None, 4)
+    rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
     count = found.effective(found.small)
     more = []
     for other in _candidates(found.baseline.model.robot, kinds, work.problem.align):

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arm.chain import frames
 from ..arm.robot import Robot
-from ..arm.rotation import angle_between
+from ..arm.rotation import angle_between, rotation_matrix
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect, Stage
 from ..motion.inverse.newton import chain_jacobian, least_step
@@ -81,7 +81,11 @@ class Compensation:
 
 
 def compensate(
-    robot: Robot, effects: Sequence[Effect], recording: Recording, rounds: int = 40
+    robot: Robot,
+    effects: Sequence[Effect],
+    recording: Recording,
+    rounds: int = 40,
+    trust: Array | None = None,
 ) -> Compensation:
     """
     Return the commands under which an arm with effects goes where the arm without goes.
@@ -119,18 +123,20 @@ def compensate(
     """
     acting = tuple(e for e in effects if _commandable(e))
     real, nominal = Twin(robot, acting), Twin(robot)
-    wanted = nominal.poses(recording)
+    wanted, first = nominal.poses(recording), real.poses(recording)
+    before = _missing(wanted, first)
     motion = recording.joints
+    goal = wanted if trust is None else _part_way(first, before, trust)
     coupled = any(isinstance(effect, MemoryEffect) for effect in acting)
     q, share = motion.q, np.ones((motion.t.size, 1))
-    error = before = _missing(wanted, real.poses(recording))
+    error = _missing(goal, first)
     for _ in range(rounds):
         live = (np.abs(error).max(axis=1, keepdims=True) > _CLOSED) & (share > _LEAST_SHARE)
         if not live.any():
             break
         step = least_step(chain_jacobian(robot, frames(robot, q)), error, _SINGULAR)
         trial = replace(recording, joints=_commands(motion, q + share * step))
-        left = _missing(wanted, real.poses(trial))
+        left = _missing(goal, real.poses(trial))
         helps = np.linalg.norm(left, axis=1) < np.linalg.norm(error, axis=1)
         if coupled:
             helps[:] = _rms(left) < _rms(error)
@@ -138,7 +144,16 @@ def compensate(
         error = np.where(helps[:, None], left, error)
         share = np.where(helps[:, None], share, 0.5 * share)
     left_out = tuple(e for e in effects if not _commandable(e))
+    if trust is not None:
+        final = replace(recording, joints=_commands(motion, q))
+        error = _missing(wanted, real.poses(final))
     return Compensation(_commands(motion, q), -before, -error, left_out)
+
+
+def _part_way(start: Poses, missing: Array, share: Array) -> Poses:
+    """Return the poses a share of the way towards those that are wanted."""
+    step = missing * share[:, None]
+    return Poses(start.position + step[:, :3], rotation_matrix(step[:, 3:]) @ start.rotation)
 
 
 def _commandable(effect: Effect) -> bool:

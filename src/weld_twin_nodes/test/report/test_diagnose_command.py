@@ -454,3 +454,20 @@ def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, capsys, spoil, re
     err = capsys.readouterr().err
     assert reason in err
     assert err.count('\n') == 1
+
+
+def test_compensate_holds_back_where_the_model_knows_little(cell, found, tmp_path, capsys):
+    robot = load('ur5')
+    t = np.linspace(0.0, 4.0, 401)
+    q = np.tile(read_recording(cell / 'first', robot).joints.q[0], (401, 1))
+    q[:, 3] += np.clip(t - 2.0, 0.0, 1.0)
+    write_recording(tmp_path / 'far', Recording('far', JointMotion(t, q)), robot)
+    out = tmp_path / 'commands'
+    words = ('--robot', 'ur5', '--model', found / 'diagnosis.json', '--out', out)
+    assert run('compensate', tmp_path / 'far', *words) == 0
+    told = capsys.readouterr().out
+    assert 'outside what was recorded' in told
+    assert 'wrist_1_joint' in json.loads((out / 'prediction.json').read_text())['outside'][0]['why']
+    ns, _, covariance = covariances(out)
+    assert ns.size == 401
+    assert covariance[-1].trace() > covariance[0].trace()

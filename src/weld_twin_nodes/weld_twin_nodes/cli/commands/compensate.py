@@ -21,27 +21,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the commands and say what they gain by the model."""
-    from dataclasses import replace
+    """Write the commands and say what they gain by the model, and where it knows too little."""
+    from weld_twin_msgs_py.bags import read_recording
 
-    from weld_twin_core.twin.compensation import compensate
-    from weld_twin_msgs_py.bags import read_recording, write_recording
+    from ...offline.compensating import compensated, told_trust, write_compensated
 
-    from ...offline.told_twin import build_twin
-
-    twin = build_twin(robot_of(args), args.model)
-    recording = read_recording(args.bag, twin.robot, topics_of(args))
-    result = compensate(twin.robot, twin.effects, recording)
-    twin.robot.check_positions(result.motion.q)
-    commands = replace(recording, joints=result.motion, measured=None)
-    made = {'compensated_with': [effect.to_mapping() for effect in twin.effects]}
-    write_recording(args.out, commands, twin.robot, storage=args.storage, provenance=made)
-    before, after = result.rms
+    robot = robot_of(args)
+    recording = read_recording(args.bag, robot, topics_of(args))
+    made = compensated(robot, args.model, recording)
+    robot.check_positions(made.result.motion.q)
+    write_compensated(args.out, made, recording, storage=args.storage)
+    before, after = made.result.rms
     print(
         f'{args.out}: by the model the tool is {before * 1e3:.4f} mm RMS off with the nominal '
         f'commands and {after * 1e3:.4f} mm with these'
     )
-    if result.left_out:
-        names = ', '.join(effect.name for effect in result.left_out)
+    for sentence in told_trust(made):
+        print(sentence)
+    if made.result.left_out:
+        names = ', '.join(effect.name for effect in made.result.left_out)
         print(f'no joint command mends {names}')
     return 0

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Commands that put the real tool on the seam, as far as the model is known to hold there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.recording import Recording
+from weld_twin_core.twin.compensation import Compensation, compensate
+from weld_twin_core.twin.posterior import Posterior
+from weld_twin_core.twin.trust import trust
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.bags import write_recording
+from weld_twin_msgs_py.files.posterior_entry import read_posterior
+
+from .prediction import Predictor, Stretch, write_outside
+from .told_twin import build_twin
+
+WHOLE = 0.999
+"""Share of a correction that counts as all of it."""
+
+
+class Compensated(NamedTuple):
+    """
+    Compensated commands with what the model knows of them.
+
+    Attributes
+    ----------
+    result : Compensation
+    model : Predictor
+    outside : sequence of Stretch
+        Of the nominal commands: where they leave what was recorded.
+    least : float
+        Smallest share of the correction that was applied anywhere, 1 for all of it everywhere.
+
+    """
+
+    result: Compensation
+    model: Predictor
+    outside: Sequence[Stretch]
+    least: float
+
+
+def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compensated:
+    """
+    Return the commands for a model file, less corrected where the model knows less.
+
+    Raises
+    ------
+    ModelError
+        The file is of no use.
+
+    """
+    twin = build_twin(robot, path)
+    model = Predictor(twin, _posterior(robot, path))
+    nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
+    covariances = model.covariances(recording)
+    share = None
+    if model.posterior is not None and covariances is not None:
+        share = trust(
+            model.posterior.domain,
+            recording.joints.q,
+            real.position - nominal.position,
+            covariances[:, :3, :3],
+        )
+    result = compensate(twin.robot, twin.effects, recording, trust=share)
+    least = 1.0 if share is None else float(share.min())
+    return Compensated(result, model, model.outside(recording), least)
+
+
+def write_compensated(
+    path: Path | str, made: Compensated, recording: Recording, *, storage: str = 'mcap'
+) -> None:
+    """
+    Write the commands, where the model has the tool under them, and how sure it is.
+
+    Raises
+    ------
+    DataError
+        The path exists or cannot be written.
+
+    """
+    twin = made.model.twin
+    commands = replace(recording, joints=made.result.motion, measured=None)
+    poses = twin.poses(commands, commands.joints.t)
+    write_recording(
+        path,
+        commands,
+        twin.robot,
+        twin=(poses.position, poses.rotation),
+        covariance=made.model.covariances(commands),
+        storage=storage,
+        provenance={'compensated_with': [effect.to_mapping() for effect in twin.effects]},
+    )
+    if made.model.posterior is not None:
+        write_outside(Path(path), made.outside)
+
+
+def told_trust(made: Compensated) -> list[str]:
+    """Return in words where the commands lie outside what was recorded, and what was held back."""
+    if made.model.posterior is None or not made.outside:
+        return []
+    worst = made.outside[0]
+    out = [
+        f'outside what was recorded at {len(made.outside)} stretch(es), the first '
+        f'{worst.t_start:.2f} to {worst.t_end:.2f} s: {worst.why}'
+    ]
+    if made.least < WHOLE:
+        out.append(
+            f'there no more is corrected than the model knows: down to {made.least:.0%} of what '
+            'it would say'
+        )
+    return out
+
+
+def _posterior(robot: Robot, path: Path | str) -> Posterior | None:
+    return read_posterior(robot, path) if Path(path).suffix.lower() == '.json' else None

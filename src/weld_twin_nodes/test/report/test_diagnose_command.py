@@ -467,7 +467,9 @@ def test_compensate_holds_back_where_the_model_knows_little(cell, found, tmp_pat
     assert run('compensate', tmp_path / 'far', *words) == 0
     told = capsys.readouterr().out
     assert 'outside what was recorded' in told
-    assert 'wrist_1_joint' in json.loads((out / 'prediction.json').read_text())['outside'][0]['why']
+    assert (
+        'wrist_1_joint' in json.loads((out / 'prediction.json').read_text())['outside'][0]['why']
+    )
     ns, _, covariance = covariances(out)
     assert ns.size == 401
     assert covariance[-1].trace() > covariance[0].trace()

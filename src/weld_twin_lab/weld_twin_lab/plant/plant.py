@@ -60,7 +60,7 @@ def run(
     robot : mapping
         A robot file (interface section 2).
     effects : sequence of mappings
-        The flaws, as in an effects file; also those of `outside`.
+        The flaws, as in an effects file; also those of `outside_causes`.
     command : Command
     tracker : Tracker
     rng : Generator

@@ -5,7 +5,7 @@ Effects that have a closed form: geometry as built, gearing, frames, the instrum
 
 The names and parameters are those of the interface (section 3). Effects that need physics are in
 `drives` (servo_lag, vibration) and in `tree` and `compliance` (backlash, joint_compliance,
-payload); causes that no library knows are in `outside`.
+payload); causes that no library knows are in `outside_causes`.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Serialised messages to objects that `convert` reads.
+Serialised messages to objects that `from_messages` reads.
 
 A node reads its inputs here instead of in the middleware's typed take, for two reasons: bytes
 that are no message become a sentence with every length checked against what is there, and a
@@ -212,7 +212,7 @@ def decoded(kind: str, read: Callable[[_Cursor], Any], data: bytes) -> Any:
 
 
 def decoder(kind: str) -> Callable[[bytes], Any]:
-    """Return what turns serialised messages of a type into objects for `convert`."""
+    """Return what turns serialised messages of a type into objects for `from_messages`."""
     if kind == 'sensor_msgs/msg/JointState':
         return JointStateDecoder()
     read = READERS[kind]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages as `cdr` reads them: the fields of the standard types, immutable."""
+"""Messages as `cdr_read` reads them: the fields of the standard types, immutable."""
 
 from __future__ import annotations
 

@@ -194,7 +194,8 @@ class _Point(NamedTuple):
             What is believed so far; everything is taken about it.
         scale : Scale
             The noise that residuals are measured in, and the weight of every sample.
-        prior : ?
+        prior : array, shape (K,)
+            Precision of every fit coordinate, one over variance.
 
         """
         residual, x = problem.whitened(problem.residuals(model), scale), coordinates(model)

@@ -33,6 +33,59 @@ def plain_name(frame_id: str, robot: Robot) -> str:
     return name.removeprefix(f'{prefix}_') if prefix else name
 
 
+class MeasuringFrame:
+    """
+    The frame of a stream of measurements: the one that is expected, else the first that comes.
+
+    Parameters
+    ----------
+    expected : str
+        Empty for any.
+
+    Attributes
+    ----------
+    remark : str
+        What is to be told of the frame once it is known.
+
+    """
+
+    def __init__(self, expected: str = '') -> None:
+        self._expected = expected.strip('/')
+        self._frame_id: str | None = None
+        self.remark = ''
+
+    def take(self, frame_id: str) -> None:
+        """
+        Take the frame of a measurement.
+
+        Raises
+        ------
+        OtherFrame
+            It is neither the frame expected nor that of the measurements before.
+
+        """
+        if frame_id == self._frame_id:
+            return
+        name = frame_id.strip('/')
+        if self._expected and name not in ('', self._expected):
+            raise OtherFrame(
+                f'the measurement is given in {frame_id!r}, but measuring_frame is '
+                f'{self._expected!r}; publish it in that frame, or set measuring_frame and '
+                'T_measuring_base for the other'
+            )
+        if self._frame_id is not None and name != self._frame_id.strip('/'):
+            raise OtherFrame(
+                f'the measurement is given in {frame_id!r}, those before it in '
+                f'{self._frame_id!r}; publish one frame on one topic'
+            )
+        self._frame_id = frame_id
+        self.remark = (
+            f'measurements are given in {frame_id!r}; it is taken for the measuring frame'
+            if name
+            else 'measurements name no frame; they are taken to be in the measuring frame'
+        )
+
+
 class WrenchFrame:
     """
     The frame of a stream of wrenches: 'tool' or 'base', by the name in the headers.

@@ -16,7 +16,7 @@ from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 
 from ..messages import from_messages
-from .frame_names import WrenchFrame
+from .frame_names import MeasuringFrame, WrenchFrame
 from .joint_states import JointStates
 from .stamp_order import Forward
 
@@ -63,15 +63,19 @@ class Intake:
         Its joint names pick the columns.
     limits : bool
         Whether joint positions beyond the limits are refused; see `JointStates`.
+    measuring_frame : str
+        What poses and points must be given in; empty for the first frame that comes.
 
     Attributes
     ----------
     joints : JointStates
     wrench_frame : WrenchFrame
+    measuring_frame : MeasuringFrame
 
     """
 
-    def __init__(self, robot: Robot, *, limits: bool = True) -> None:
+    def __init__(self, robot: Robot, *, limits: bool = True, measuring_frame: str = '') -> None:
+        self.measuring_frame = MeasuringFrame(measuring_frame)
         self.joints = JointStates(robot, limits=limits)
         self.wrench_frame = WrenchFrame(robot)
         self._orders = {role: Forward() for role in Role}
@@ -114,6 +118,8 @@ class Intake:
             return self._joints(message)
         stamp = from_messages.stamp_ns(message)
         row = self._rows[role](message)
+        if role in (Role.POSE, Role.POINT):
+            self.measuring_frame.take(message.header.frame_id)
         return Taken(stamp, row, self._orders[role].restarted_at(stamp))
 
     def _joints(self, message: Any) -> Taken | None:

@@ -16,6 +16,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Measurements, Recording
 
+from ..assembly.frame_names import WORLD
 from ..messages.from_messages import NANOSECONDS
 from ..messages.to_messages import Messages, bag_messages
 from ..messages.topics import (
@@ -146,7 +147,9 @@ class _Entries:
             yield self.poses(MEASURED_POSE.name, measured.t, position, rotation)
         else:
             yield self._each(
-                MEASURED_POINT.name, measured.t, lambda ns, k: self.make.point(ns, position[k])
+                MEASURED_POINT.name,
+                measured.t,
+                lambda ns, k: self.make.point(ns, position[k], WORLD),
             )
         if sigma is not None:
             yield self.vectors(
@@ -155,7 +158,9 @@ class _Entries:
 
     def poses(self, topic: str, t: Array, position: Array, rotation: Array) -> Iterator[_Entry]:
         """Return poses, shapes (K, 3) and (K, 3, 3)."""
-        return self._each(topic, t, lambda ns, k: self.make.pose(ns, position[k], rotation[k]))
+        return self._each(
+            topic, t, lambda ns, k: self.make.pose(ns, position[k], rotation[k], WORLD)
+        )
 
     def sure_poses(
         self, t: Array, position: Array, rotation: Array, covariance: Array

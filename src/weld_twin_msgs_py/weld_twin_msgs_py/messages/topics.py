@@ -193,6 +193,11 @@ ROBOT_DESCRIPTION = _latched(
     'std_msgs/msg/String',
     'URDF of the cell, as robot_state_publisher tells it',
 )
+TWIN_BASE = _latched(
+    '/twin/base_pose',
+    'geometry_msgs/msg/PoseStamped',
+    "where the twin has the robot's base, in the measuring frame [m]",
+)
 JOINT_TRAJECTORY = _result(
     '/joint_trajectory',
     'trajectory_msgs/msg/JointTrajectory',
@@ -232,6 +237,7 @@ DIAGNOSTICS = _result(
 
 AROUND = (
     ROBOT_DESCRIPTION,
+    TWIN_BASE,
     JOINT_TRAJECTORY,
     PATH,
     PLANNED_TRAJECTORY,

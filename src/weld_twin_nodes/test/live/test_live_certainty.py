@@ -110,8 +110,8 @@ def test_the_live_twin_tells_its_covariance_and_where_it_knows_nothing(cell, rob
     )
     stand_at(cell, robot, sure, Q, now)
     health.clear()
-    cell.wait(lambda: health.told.get('forward_kinematics_twin'), 'health again')
-    last = [text for _, text in health.told['forward_kinematics_twin']][-1]
+    cell.wait(lambda: health.told.get('/forward_kinematics_twin'), 'health again')
+    last = [text for _, text in health.told['/forward_kinematics_twin']][-1]
     assert 'outside' not in last
 
 

@@ -120,8 +120,8 @@ class CellNode(Node):
         self.health.hardware_id = self.setting('hardware_id') or '/'.join(filter(None, parts))
 
     def setting(self, name: str) -> Any:
-        """Return the value of a parameter."""
-        return self.get_parameter(name).value
+        """Return the value of a parameter; None for a list of numbers that is not set."""
+        return self.get_parameter_or(name).value
 
     def every(self, period: float, action: Callable[[], None]) -> Any:
         """Return a timer [s] that runs on whether or not simulated time stands still."""

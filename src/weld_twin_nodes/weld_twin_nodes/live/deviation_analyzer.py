@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
-from weld_twin_msgs_py.assembly.frame_names import BASE
+from weld_twin_core.arrays import Array
+from weld_twin_msgs_py.assembly.frame_names import MeasuringFrame
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_write import Vector3Encoder
 from weld_twin_msgs_py.messages.topics import (
@@ -15,10 +16,12 @@ from weld_twin_msgs_py.messages.topics import (
     DEVIATION_METRICS,
     MEASURED_POINT,
     MEASURED_POSE,
+    TWIN_BASE,
     TWIN_POSE,
 )
 
 from ..streams.deviation_stream import METRICS, Deviation, Deviations
+from .cell_frames import base_frame
 from .cell_node import CellNode
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run
@@ -64,13 +67,15 @@ class DeviationAnalyzer(CellNode):
             self.setting('max_gap'),
         )
         self._vector = self.offer(DEVIATION)
-        self._encode = Vector3Encoder(BASE)
+        self._encode = Vector3Encoder(base_frame(self))
+        self._frame = MeasuringFrame(self.setting('measuring_frame'))
         self._metrics = self.offer(DEVIATION_METRICS, awaited=False)
         self._stamp = 0
         self._seen = self._told = 0
         self._every = self.setting('metrics_every')
         self.every(self.setting('metrics_idle'), self._on_idle)
         self.every(LOOK_EVERY, self._look_at_clocks)
+        self.listen(TWIN_BASE, self._on_base)
         self.listen(MEASURED_POSE, self._on_pose)
         self.listen(MEASURED_POINT, self._on_point)
         self.listen(TWIN_POSE, self._on_twin, required=True)
@@ -81,12 +86,19 @@ class DeviationAnalyzer(CellNode):
         self._seen = self._told = 0
 
     def _on_pose(self, message: Any) -> None:
-        position, _ = from_messages.pose(message)
-        self._publish(self._deviations.add_measured(from_messages.stamp_ns(message), position))
+        self._measured(message, from_messages.pose(message)[0])
 
     def _on_point(self, message: Any) -> None:
-        position = from_messages.point(message)
+        self._measured(message, from_messages.point(message))
+
+    def _measured(self, message: Any, position: Array) -> None:
+        self._frame.take(message.header.frame_id)
+        self.remark(self._frame.remark)
         self._publish(self._deviations.add_measured(from_messages.stamp_ns(message), position))
+
+    def _on_base(self, message: Any) -> None:
+        """Give deviations in the axes that the base has by the model of the twin."""
+        self._deviations.take_base(from_messages.pose(message)[1])
 
     def _on_twin(self, message: Any) -> None:
         position, _ = from_messages.pose(message)

@@ -6,10 +6,16 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.topics import DEVIATION, MARKERS, MEASURED_POINT, MEASURED_POSE
+from weld_twin_msgs_py.messages.topics import (
+    DEVIATION,
+    MARKERS,
+    MEASURED_POINT,
+    MEASURED_POSE,
+    TWIN_BASE,
+)
 
+from .cell_frames import measuring_frame
 from .cell_node import CellNode
 from .deviation_lines import DeviationLines
 from .robot_settings import ROBOT_SETTINGS, robot_of
@@ -32,8 +38,10 @@ class DeviationMarkers(CellNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('deviation_markers', **kwargs)
         self._rotation = robot_of(self).T_world_base[:3, :3]
+        self._frame = measuring_frame(self)
         self._markers = self.offer(MARKERS)
         self.time_went_back()
+        self.listen(TWIN_BASE, self._on_base)
         self.listen(MEASURED_POSE, self._on_pose)
         self.listen(MEASURED_POINT, self._on_point)
         self.listen(DEVIATION, self._on_deviation, required=True)
@@ -49,6 +57,9 @@ class DeviationMarkers(CellNode):
         )
         self._drawn = 0
 
+    def _on_base(self, message: Any) -> None:
+        self._rotation = from_messages.pose(message)[1]
+
     def _on_pose(self, message: Any) -> None:
         self._lines.measured(from_messages.stamp_ns(message), from_messages.pose(message)[0])
 
@@ -63,7 +74,9 @@ class DeviationMarkers(CellNode):
         if self._lines.count == self._drawn:
             return
         self._drawn = self._lines.count
-        self._markers.publish(self.messages.markers(self._lines.stamp, self._lines.drawn(), WORLD))
+        self._markers.publish(
+            self.messages.markers(self._lines.stamp, self._lines.drawn(), self._frame)
+        )
 
 
 def main(args: list[str] | None = None) -> int:

@@ -36,19 +36,27 @@ class Window:
     ----------
     robot : Robot
     duration : float [s]
+    measuring_frame : str
+        What measurements must be given in; empty for the first frame that comes.
 
     """
 
-    def __init__(self, robot: Robot, duration: float) -> None:
+    def __init__(self, robot: Robot, duration: float, measuring_frame: str = '') -> None:
         self._robot = robot
         self._duration = round(duration * NANOSECONDS)
-        self._intake = Intake(robot)
+        self._intake = Intake(robot, measuring_frame=measuring_frame)
         self._streams: dict[Role, deque[Row]] = {}
 
     def reset(self) -> None:
         """Forget everything, as after a jump of the clock."""
         self._streams.clear()
         self._intake.reset()
+
+    @property
+    def remarks(self) -> list[str]:
+        """Return what is to be told of the frames that were taken for granted."""
+        frames = self._intake.measuring_frame, self._intake.wrench_frame
+        return [frame.remark for frame in frames if frame.remark]
 
     @property
     def last(self) -> int | None:

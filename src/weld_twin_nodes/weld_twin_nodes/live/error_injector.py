@@ -7,12 +7,12 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder, PoseEncoder
 from weld_twin_msgs_py.messages.topics import ACTUAL_JOINT_STATES, MEASURED_POSE
 
 from ..streams.injected_noise import Noise
 from ..streams.twin_stream import Sample
+from .cell_frames import measuring_frame
 from .model_node import ModelNode
 from .run_node import run
 from .settings import Setting
@@ -31,7 +31,7 @@ class ErrorInjector(ModelNode):
         self._joints = self.offer(ACTUAL_JOINT_STATES, awaited=False)
         self._pose = self.offer(MEASURED_POSE)
         self._encode_joints = JointStateEncoder(self.robot.joint_names)
-        self._encode_pose = PoseEncoder(WORLD)
+        self._encode_pose = PoseEncoder(measuring_frame(self))
         self._noise = Noise(self.stream.twin.effects, self.setting('seed'))
         self.start()
 

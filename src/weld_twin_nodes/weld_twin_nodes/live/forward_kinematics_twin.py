@@ -8,13 +8,13 @@ from typing import Any
 
 from weld_twin_core.twin.live_posterior import LivePosterior
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 from weld_twin_msgs_py.messages.cdr_write import PoseCovarianceEncoder, PoseEncoder
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
-from weld_twin_msgs_py.messages.topics import TWIN_COVARIANCE, TWIN_POSE
+from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_COVARIANCE, TWIN_POSE
 
 from ..streams.twin_stream import Sample
+from .cell_frames import measuring_frame
 from .model_node import ModelNode
 from .run_node import run
 
@@ -28,8 +28,11 @@ class ForwardKinematicsTwin(ModelNode):
         super().__init__('forward_kinematics_twin', **kwargs)
         self._pose = self.offer(TWIN_POSE)
         self._sure_pose = self.offer(TWIN_COVARIANCE, awaited=False)
-        self._encode = PoseEncoder(WORLD)
-        self._encode_sure = PoseCovarianceEncoder(WORLD)
+        self._base = self.offer(TWIN_BASE, awaited=False)
+        frame = measuring_frame(self)
+        self._encode = PoseEncoder(frame)
+        self._encode_sure = PoseCovarianceEncoder(frame)
+        self._tell_base()
         self._sureness = self._read_sureness()
         self.start()
 
@@ -55,7 +58,14 @@ class ForwardKinematicsTwin(ModelNode):
     def on_twin(self, twin: Twin) -> None:
         """Go on with changed effects, and with the certainty of the model as it is now."""
         super().on_twin(twin)
+        self._tell_base()
         self._sureness = self._read_sureness()
+
+    def _tell_base(self) -> None:
+        """Tell where the base is by the model: a model that was aligned has fitted it."""
+        base = self.stream.twin.robot.T_world_base
+        now = self.get_clock().now().nanoseconds
+        self._base.publish(self._encode(now, base[:3, 3], base[:3, :3]))
 
     def _read_sureness(self) -> LivePosterior | None:
         """Return how sure the model is; None for an effects file or an older diagnosis."""

@@ -21,6 +21,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..offline.told_twin import build_twin
+from .cell_frames import placed_twin
 from .cell_node import CellNode
 from .diagnosis_window import Window
 from .diagnosis_worker import Finding, Job, Worker
@@ -60,9 +61,11 @@ class LiveDiagnosis(CellNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('live_diagnosis', **kwargs)
-        self._twin = build_twin(robot_of(self), self.setting('model'))
+        self._twin = placed_twin(self, build_twin(robot_of(self), self.setting('model')))
         self._align = frames_named(self.setting('align'))
-        self._window = Window(self._twin.robot, self.setting('window'))
+        self._window = Window(
+            self._twin.robot, self.setting('window'), self.setting('measuring_frame')
+        )
         self._worker = Worker()
         self._begun = -float('inf')
         self._seen: int | None = None
@@ -70,13 +73,18 @@ class LiveDiagnosis(CellNode):
         self._verdict = self.offer(DIAGNOSIS)
         for topic, role in INPUTS.items():
             required = role is Role.JOINTS
-            self.listen(topic, partial(self._window.take, role), required=required)
+            self.listen(topic, partial(self._take, role), required=required)
         self.every(LOOK_EVERY, self._look)
 
     def destroy_node(self) -> None:
         """End the diagnosis under way."""
         self._worker.stop()
         super().destroy_node()
+
+    def _take(self, role: Role, message: Any) -> None:
+        self._window.take(role, message)
+        for remark in self._window.remarks:
+            self.remark(remark)
 
     def time_went_back(self) -> None:
         """Forget the window."""

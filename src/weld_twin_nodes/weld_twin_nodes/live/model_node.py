@@ -17,6 +17,7 @@ from weld_twin_msgs_py.messages.topics import JOINT_STATES, TEMPERATURE, TOOL_WR
 
 from ..offline.told_twin import build_twin
 from ..streams.twin_stream import JointStream, Sample
+from .cell_frames import placed_twin
 from .cell_node import CellNode
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .settings import Setting
@@ -75,7 +76,8 @@ class ModelNode(CellNode):
         self.stream.change(twin)
 
     def _twin(self, effects: str) -> Twin:
-        return build_twin(self.robot, self.setting('model'), effects)
+        twin = build_twin(self.robot, self.setting('model'), effects)
+        return placed_twin(self, twin)
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:

@@ -15,6 +15,7 @@ from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
+from .cell_frames import FRAME_SETTINGS, placed
 from .cell_node import CellNode
 from .settings import Setting
 
@@ -27,6 +28,7 @@ ROBOT_SETTINGS = (
     ),
     Setting('base_link', '', 'first link of the chain in a URDF; empty: its root'),
     Setting('tip_link', '', 'last link of the chain in a URDF; empty: its only leaf'),
+    *FRAME_SETTINGS,
 )
 LOOK = 0.1
 """Seconds of one turn of the loop that waits for a description."""
@@ -50,7 +52,7 @@ def robot_of(node: CellNode) -> Robot:
     else:
         robot = load_robot(name, base, tip)
     node.take_robot_name(robot.name)
-    return robot
+    return placed(node, robot)
 
 
 def told_by_topic(name: str) -> bool:

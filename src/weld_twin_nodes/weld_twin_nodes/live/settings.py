@@ -8,6 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.parameter import Parameter
+
+NUMBERS = Parameter.Type.DOUBLE_ARRAY
+"""Default of a list of numbers that is not set."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +22,7 @@ class Setting:
     Attributes
     ----------
     name : str
-    default : bool, int, float, str or list of str
+    default : bool, int, float, str, list of str, or `NUMBERS`
         Also fixes the type.
     description : str
         What it is for, with its unit in square brackets.

@@ -12,7 +12,6 @@ from rclpy.duration import Duration
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
-from weld_twin_msgs_py.assembly.frame_names import WORLD
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
 from weld_twin_msgs_py.messages.topics import (
@@ -25,6 +24,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..offline.seam_motion import backward, joint_motion, plan_through, sampled, stamps, thinned
+from .cell_frames import measuring_frame
 from .cell_node import CellNode
 from .meeting import Meeting
 from .pacing import Pump
@@ -153,7 +153,9 @@ class TrajectoryGenerator(CellNode):
         now = self.get_clock().now().nanoseconds
         shown = thinned(motion, SHOWN)
         self._planned.publish(self.messages.joint_trajectory(now, self._robot.joint_names, shown))
-        self._seam.publish(self.messages.path(now, forward(self._robot, shown.q), WORLD))
+        self._seam.publish(
+            self.messages.path(now, forward(self._robot, shown.q), measuring_frame(self))
+        )
         self.get_logger().info(
             f'{motion.t.size} joint states in {motion.t[-1] - motion.t[0]:.1f} s'
         )

@@ -55,6 +55,10 @@ class Deviations:
         self._clocks = ClockWatch()
         self._recent: deque[float] = deque(maxlen=RECENT)
 
+    def take_base(self, rotation: Array) -> None:
+        """Take the axes of the base in the measuring frame, shape (3, 3)."""
+        self._rotation_base_world = rotation.T
+
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock."""
         self._pairing.reset()

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of the cell: where the base is, in which frame measurements come, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.rotation import quaternion_from_matrix, rotation_matrix, transform
+from weld_twin_core.errors import ModelError
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import MEASURED_POINT, MEASURED_POSE, TWIN_BASE, TWIN_POSE
+from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.live.cell_frames import frame_from
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
+from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+
+S = 1_000_000_000
+ROBOT = load('ur5')
+Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+TURN = np.array([0.1, -0.2, 0.9])
+PLACE = np.array([1.5, -0.4, 0.8])
+T = transform(rotation_matrix(TURN), PLACE)
+OFF = np.array([1e-3, 2e-3, -3e-3])
+
+
+def test_a_frame_is_six_or_seven_numbers():
+    np.testing.assert_allclose(frame_from([*PLACE, *TURN]), T, atol=1e-15)
+    quaternion = quaternion_from_matrix(rotation_matrix(TURN))
+    np.testing.assert_allclose(frame_from([*PLACE, *quaternion]), T, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ('values', 'sentence'),
+    [
+        ([1.0, 2.0], 'takes 6 numbers, x y z and a rotation vector, or 7'),
+        ([0.0] * 5 + [float('nan')], 'takes 6 numbers'),
+        ([0.0] * 7, 'T_measuring_base 0 has length 0, a rotation needs 1'),
+    ],
+)
+def test_what_is_no_frame_is_refused_in_a_sentence(values, sentence):
+    with pytest.raises(ModelError, match=sentence):
+        frame_from(values)
+
+
+def told(health, node, key):
+    return health.values.get(node, {}).get(key, '')
+
+
+def test_poses_are_in_the_measuring_frame_and_deviations_in_the_axes_of_the_base(cell):
+    """The analyzer is not told where the base is: it hears it from the twin."""
+    cell.add(
+        ForwardKinematicsTwin,
+        reliable_inputs=True,
+        measuring_frame='tracker',
+        T_measuring_base=[*PLACE, *TURN],
+    )
+    cell.add(DeviationAnalyzer, reliable_inputs=True, base_frame='left_base')
+    poses, deviations = cell.collect(TWIN_POSE.name), cell.collect('/deviation')
+    bases = cell.collect(TWIN_BASE.name)
+    states, measured = cell.publisher(), cell.publisher(MEASURED_POSE)
+    cell.wait(lambda: len(bases) > 0, 'the base')
+    np.testing.assert_allclose(from_messages.pose(bases.last)[0], PLACE, atol=1e-15)
+    expected = T @ forward(ROBOT, Q)
+    count = [0]
+
+    def step():
+        count[0] += 1
+        stamp = count[0] * S
+        states.publish(cell.messages.joint_state(stamp, ROBOT.joint_names, Q))
+        measured.publish(
+            cell.messages.pose(
+                stamp, expected[:3, 3] + T[:3, :3] @ OFF, expected[:3, :3], 'tracker'
+            )
+        )
+        return len(deviations) > 2
+
+    cell.wait(step, 'deviations')
+    assert poses.last.header.frame_id == 'tracker'
+    np.testing.assert_allclose(from_messages.pose(poses.last)[0], expected[:3, 3], atol=1e-12)
+    assert deviations.last.header.frame_id == 'left_base'
+    np.testing.assert_allclose(from_messages.vector3(deviations.last), OFF, atol=1e-12)
+
+
+def test_the_first_frame_is_taken_and_named_and_another_one_refused(cell):
+    cell.add(DeviationAnalyzer, reliable_inputs=True)
+    health, points = HealthListener(cell.node), cell.publisher(MEASURED_POINT)
+    points.publish(cell.messages.point(S, OFF, 'tracker'))
+    said = "measurements are given in 'tracker'; it is taken for the measuring frame"
+    cell.wait(lambda: said == told(health, '/deviation_analyzer', 'remark_0'), 'the frame')
+    key = '/deviation_analyzer: /measured/tool_point'
+    points.publish(cell.messages.point(2 * S, OFF, 'tracker_2'))
+    cell.wait(
+        lambda: "'tracker_2', those before it in 'tracker'" in told(health, key, 'last_reason'),
+        'it',
+    )
+    assert told(health, key, 'refused') == '1'
+
+
+def test_measurements_in_another_frame_than_the_one_set_are_refused(cell):
+    cell.add(DeviationAnalyzer, reliable_inputs=True, measuring_frame='world')
+    health, points = HealthListener(cell.node), cell.publisher(MEASURED_POINT)
+    points.publish(cell.messages.point(S, OFF, 'tracker'))
+    key = '/deviation_analyzer: /measured/tool_point'
+    said = "given in 'tracker', but measuring_frame is 'world'; publish it in that frame, or set"
+    cell.wait(lambda: said in told(health, key, 'last_reason'), 'the refusal')
+    assert ('error', f'1 of 1 refused: {told(health, key, "last_reason")}') in health.told[key]

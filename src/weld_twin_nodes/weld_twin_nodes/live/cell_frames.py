@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters by which a node is told its frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import matrix_from_quaternion, rotation_matrix, transform
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly.frame_names import BASE, WORLD
+
+from .cell_node import CellNode
+from .settings import NUMBERS, Setting
+
+FRAME_SETTINGS = (
+    Setting(
+        'measuring_frame',
+        '',
+        'frame that measurements must be given in, and that poses are told in; empty: the first '
+        'that comes, and world',
+    ),
+    Setting('base_frame', '', "name of the robot's base in what is published; empty: base"),
+    Setting(
+        'T_measuring_base',
+        NUMBERS,
+        'where the base is in the measuring frame [m, rad]: x y z and a rotation vector, or x y z '
+        'and a quaternion x y z w; not set: as the robot or its model has it',
+    ),
+)
+
+
+def measuring_frame(node: CellNode) -> str:
+    """Return the name of the frame in which poses are told."""
+    return node.setting('measuring_frame') or WORLD
+
+
+def base_frame(node: CellNode) -> str:
+    """Return the name of the robot's base in what is published."""
+    return node.setting('base_frame') or BASE
+
+
+def placed(node: CellNode, robot: Robot) -> Robot:
+    """
+    Return the robot with its base where the node's parameters put it.
+
+    Raises
+    ------
+    ModelError
+        ``T_measuring_base`` is no pose.
+
+    """
+    values = node.setting('T_measuring_base')
+    return robot if values is None else robot.with_frames(base=frame_from(values))
+
+
+def placed_twin(node: CellNode, twin: Twin) -> Twin:
+    """Return the twin of a model likewise; the parameter counts more than a fitted base."""
+    robot = placed(node, twin.robot)
+    moved = abs(robot.T_world_base - twin.robot.T_world_base).max()
+    if moved > 0.0:
+        node.remark('T_measuring_base is used; the base of the model differs from it')
+    return twin if moved == 0.0 else Twin(robot, twin.effects)
+
+
+def frame_from(values: Sequence[float]) -> Array:
+    """
+    Return the 4 x 4 matrix of x y z and a rotation vector or a quaternion.
+
+    Raises
+    ------
+    ModelError
+        There are neither six nor seven finite numbers, or the quaternion is not of length 1.
+
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    if numbers.size not in (6, 7) or not np.isfinite(numbers).all():
+        raise ModelError(
+            'T_measuring_base takes 6 numbers, x y z and a rotation vector, or 7, x y z and a '
+            f'quaternion x y z w, got {list(values)}'
+        )
+    if numbers.size == 6:
+        return transform(rotation_matrix(numbers[3:]), numbers[:3])
+    try:
+        return transform(matrix_from_quaternion(numbers[3:], 'T_measuring_base'), numbers[:3])
+    except DataError as error:
+        raise ModelError(str(error)) from None

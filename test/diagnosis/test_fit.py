@@ -73,7 +73,8 @@ def test_the_fit_is_the_minimum_that_another_optimiser_finds(name):
         ftol=1e-12,
         gtol=1e-10,
     )
-    found = fit(problem, start, scale)
+    free = np.zeros(sum(e.coordinates().size for e in start.found))
+    found = fit(problem, start, scale, free)
     assert found.rss == pytest.approx(2.0 * other.cost, rel=1e-4)
     expected = stepped(problem, start, other.x * unit)
     at = np.concatenate([e.coordinates() for e in expected.found])

@@ -82,6 +82,20 @@ def test_members_marked_free_have_no_prior():
     assert (precision[labels == 1] == 0.0).all() and (precision[labels == 0] > 0.0).all()
 
 
+def test_a_spread_learned_is_never_wider_than_that_of_machines_at_large():
+    columns, y, labels, scales = members([2.0, 0.5], noise=1.3)
+    believed = 1.0 / (np.where(labels == 0, 1.0, 3.0) * scales) ** 2
+    parts = columns @ columns.T, columns @ y, y @ y, y.size
+    precision, _ = learned_precision(*parts, labels, scales, believed)
+    alone, _ = learned(columns, y, labels, scales)
+    noise = (precision / believed)[labels == 0][0]
+    np.testing.assert_allclose((precision / believed)[labels == 0], noise)
+    assert noise == pytest.approx(1.3**2, rel=0.3)
+    # Where a machine's own spread is far below, its own members decide.
+    np.testing.assert_allclose(precision[labels == 1], alone[labels == 1], rtol=2.5)
+    assert (precision[labels == 1] > 4.0 * noise * believed[labels == 1]).all()
+
+
 def test_ripple_is_grouped_by_joint_and_band_and_small_groups_are_free():
     ripple = effect(
         'transmission_ripple',
@@ -133,7 +147,7 @@ def test_sizes_learned_predict_nearly_as_well_as_sizes_known_and_better_than_non
         fits = (
             shrunk_fit(problem, start, scale, Beliefs())[0],
             fit(problem, start, scale, precision),
-            fit(problem, start, scale),
+            fit(problem, start, scale, np.zeros(precision.size)),
             fit(problem, model, scale),
         )
         errors.append([(fresh.residuals(f.model)[0] ** 2).mean() for f in fits])

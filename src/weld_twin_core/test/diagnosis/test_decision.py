@@ -381,8 +381,9 @@ def test_what_is_spread_far_wider_than_noise_is_unknown(times, status):
 # Many small errors ------------------------------------------------------------------------------
 
 
-def family(effect, fall, error=1e-12, size=1e-4):
-    return WeighedFamily(effect, fall, error, 1e-8, ((Site(effect, ELBOW), size),))
+def family(effect, fall, error=1e-12, size=1e-4, elsewhere=0.0):
+    sites = ((Site(effect, ELBOW), size),)
+    return WeighedFamily(effect, fall, error, 1e-10, sites, elsewhere)
 
 
 def of_families(*families, **changes):
@@ -392,16 +393,38 @@ def of_families(*families, **changes):
 @pytest.mark.parametrize(
     ('fall', 'error', 'named'),
     [
-        (3.1e-10, 1e-12, True),
-        (2.9e-10, 1e-12, False),
+        (1.1e-10, 1e-12, True),
+        (0.9e-10, 1e-12, False),
         (1e-9, 0.49e-9, True),
         (1e-9, 0.51e-9, False),
     ],
 )
-def test_a_family_is_named_that_earns_3_percent_and_two_standard_errors(fall, error, named):
+def test_a_family_is_named_without_which_the_error_doubles_at_two_standard_errors(
+    fall, error, named
+):
     verdict = of_families(family('link_length', fall, error))
     assert verdict.families[0].named is named
     assert verdict.sets == (((Site('link_length', ELBOW),),) if named else ())
+
+
+@pytest.mark.parametrize(('elsewhere', 'named'), [(1.1, True), (0.9, False)])
+def test_a_family_may_earn_its_name_on_postures_that_took_no_part(elsewhere, named):
+    verdict = of_families(family('link_length', 0.5e-10, elsewhere=elsewhere))
+    assert verdict.families[0].named is named
+
+
+def test_families_of_which_none_is_needed_leave_the_cause_unknown():
+    verdict = of_families(family('link_length', 1e-11), family('link_twist', 2e-11))
+    assert verdict.status == 'unknown' and not verdict.sets
+    assert 'takes the place' in verdict.reasons[1]
+
+
+def test_what_no_machine_has_is_evidence_for_something_else():
+    told = evidence(slot((PLAY, 0.99)), refused=('payload with mass -10.5 kg',))
+    verdict = decide(told)
+    assert verdict.status == 'unknown' and not verdict.sets
+    assert 'payload with mass -10.5 kg' in verdict.reasons[0]
+    assert decide(evidence(refused=('payload with mass -10.5 kg',))).status == 'unknown'
 
 
 @pytest.mark.parametrize(('size', 'count'), [(1.1e-6, 1), (0.9e-6, 0)])

@@ -207,3 +207,20 @@ class Hooks(Parametric, ABC):
     def causes(self) -> int:
         """Return how many separate causes this instance stands for."""
         return max(1, self.orders().size)
+
+
+SAME = 1e-3
+"""Positions [rad] closer than this are one: no wave of an order below 3,000 fits between them."""
+
+
+def highest_order(q: Array) -> float:
+    """
+    Return the highest order [1/rev] that a joint's positions can tell, shape (N,).
+
+    Above it waves look like slower ones: positions on a grid of whole degrees show nothing beyond
+    180. Half a wave needs a position of its own, and positions that all but coincide are one.
+    """
+    apart = np.diff(np.unique(q))
+    clusters = 1 + int((apart > SAME).sum())
+    span = float(np.ptp(q)) if q.size else 0.0
+    return np.pi * (clusters - 1) / span if span > SAME else 0.0

@@ -14,7 +14,7 @@ from ..arm.channels import Shift
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
-from .hooks import Waves
+from .hooks import Waves, highest_order
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -110,7 +110,8 @@ class TransmissionRipple(Effect):
             scale].
 
         """
-        for order in range(1, MAX_ORDER + 1):
+        told = highest_order(view.joint(view.robot.index(str(joint))))
+        for order in range(1, min(MAX_ORDER, int(told)) + 1):
             yield cls(str(joint), 0.0, float(order), 0.0)
 
     @classmethod
@@ -128,7 +129,8 @@ class TransmissionRipple(Effect):
             How many numbers the measurements can hold apart.
 
         """
-        orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
+        told = int(highest_order(view.joint(view.robot.index(str(joint)))))
+        orders = np.arange(1.0, min(MAX_ORDER, most, told) + 1.0)
         zero = np.zeros(orders.size)
         return [cls(str(joint), zero, orders, zero)] if orders.size else []
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ...arrays import Array
+from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
 from .robust_spread import robust_spread
 from .unit_diagonal import unit_diagonal
@@ -135,26 +136,28 @@ def fit(
     tolerance: float = 1e-5,
 ) -> Fit:
     """
-    Return the least-squares fit of nuisance frames and the found effects' coordinates.
+    Return the most probable nuisance frames and coordinates of the found effects.
 
-    Levenberg-Marquardt on column-scaled normal equations.
+    Least squares with the priors of `prior`, by Levenberg-Marquardt on column-scaled normal
+    equations.
 
     Parameters
     ----------
     problem, model, scale
         ``model`` is the start; its known effects stay as they are.
     precision : array, shape (K,), optional
-        Prior precision of every effect coordinate, about zero, in whitened units.
+        Prior precision of every effect coordinate, about zero, in whitened units; that of
+        machines at large when left out.
     iterations : int
     tolerance : float
         Stops when the objective falls by less than this share.
 
     """
-    prior = np.zeros(coordinates(model).size) if precision is None else precision
+    prior = effect_precision(model) if precision is None else precision
     here, damping = _Point.at(problem, model, scale, prior), DAMPING
     columns, names = design(problem, model, scale)
     for _ in range(iterations):
-        normal, right = here.normal_equations(columns, prior)
+        normal, right = here.normal_equations(columns)
         there = None
         while damping < DAMPED:
             trial = stepped(problem, here.model, solve_scaled(normal, right, damping))
@@ -169,15 +172,16 @@ def fit(
         columns, names = design(problem, here.model, scale)
         if gain < tolerance:
             break
-    information, _ = here.normal_equations(columns, prior)
-    return Fit(here.model, here.residual, information, names, here.x)
+    information, _ = here.normal_equations(columns)
+    return Fit(here.model, here.residual, information, names, coordinates(here.model))
 
 
 class _Point(NamedTuple):
-    """A model on the way of a fit: its whitened residual, its coordinates, and its cost."""
+    """A model on the way of a fit: its whitened residual, its priors, and its cost."""
 
     model: Model
     residual: Array
+    ridge: Array
     x: Array
     cost: float
 
@@ -195,18 +199,19 @@ class _Point(NamedTuple):
         scale : Scale
             The noise that residuals are measured in, and the weight of every sample.
         prior : array, shape (K,)
-            Precision of every fit coordinate, one over variance.
+            Prior precision of every effect coordinate, about zero.
 
         """
-        residual, x = problem.whitened(problem.residuals(model), scale), coordinates(model)
-        return cls(model, residual, x, float(residual @ residual + prior @ x**2))
-
-    def normal_equations(self, columns: Array, prior: Array) -> tuple[Array, Array]:
-        """Return normal matrix and right-hand side of a step, the prior included."""
-        frames = np.zeros(columns.shape[0] - self.x.size)
+        residual = problem.whitened(problem.residuals(model), scale)
+        frames, off = frame_prior(problem, model)
         ridge = np.concatenate([frames, prior])
-        right = columns @ self.residual - ridge * np.concatenate([frames, self.x])
-        return columns @ columns.T + np.diag(ridge), right
+        x = np.concatenate([off, coordinates(model)])
+        return cls(model, residual, ridge, x, float(residual @ residual + ridge @ x**2))
+
+    def normal_equations(self, columns: Array) -> tuple[Array, Array]:
+        """Return normal matrix and right-hand side of a step, the priors included."""
+        right = columns @ self.residual - self.ridge * self.x
+        return columns @ columns.T + np.diag(self.ridge), right
 
 
 def solve_scaled(normal: Array, right: Array, damping: float) -> Array:

@@ -114,6 +114,22 @@ def _moved(frame: Array, step: Array, *, left: bool) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class Anchor:
+    """
+    Where the frames are believed to be.
+
+    Attributes
+    ----------
+    bases : tuple of array, shape (4, 4)
+    tool : array, shape (4, 4)
+
+    """
+
+    bases: tuple[Array, ...]
+    tool: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """
     Recordings to explain.
@@ -124,11 +140,14 @@ class Problem:
         Each with measurements inside its joint stream; see `usable`.
     align : frozenset
         Frames fitted as nuisance in every hypothesis: 'base' (one per recording), 'tool'.
+    anchor : Anchor, optional
+        Where those frames are believed to be; see `prior`.
 
     """
 
     recordings: tuple[Recording, ...]
     align: frozenset[str] = field(default_factory=frozenset)
+    anchor: Anchor | None = None
 
     @property
     def rows(self) -> tuple[int, ...]:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.fit import coordinates, design
+from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
 from ..hypotheses.starts import profile
 
@@ -73,7 +74,7 @@ def _variance(
     live = np.concatenate([np.ones(columns.shape[0] - count, bool), _free(model)])
     live &= _visible(columns, model)
     columns = columns[live]
-    ridge = np.concatenate([np.zeros(live.size - count), prior])[live]
+    ridge = np.concatenate([frame_prior(problem, model)[0], prior])[live]
     size = np.sqrt((columns**2).sum(axis=1) + ridge)
     columns /= size[:, None]
     normal = columns @ columns.T + np.diag(ridge / size**2)

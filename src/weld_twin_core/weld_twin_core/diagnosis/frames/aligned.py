@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...recording import Recording
-from ..algebra.problem import Model, Problem, frames_named, usable
+from ..algebra.problem import Anchor, Model, Problem, frames_named, usable
 from .alignment import initial_frames
 
 
@@ -43,4 +44,5 @@ def aligned(
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     problem = Problem(tuple(usable(r) for r in recordings), frames_named(align))
     model = Model(robot, tuple(robot.T_world_base for _ in recordings), tuple(known))
-    return problem, initial_frames(problem, model)
+    model = initial_frames(problem, model)
+    return replace(problem, anchor=Anchor(model.bases, model.robot.T_flange_tool)), model

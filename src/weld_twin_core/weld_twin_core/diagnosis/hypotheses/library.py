@@ -15,6 +15,7 @@ from ...effects.registry import REGISTRY
 from ...twin.features import Features, sites
 from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
+from .still_joints import REASON, hardly_moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +129,9 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
             seeds, columns = [], []
             found, trials = features[0].seeds(kind, joint, residual)
             for seed in found:
+                if hardly_moves(features, seed):
+                    absent[kind.name] = f'{REASON} ({joint})'
+                    continue
                 block = _columns(problem, features, seed, scale)
                 if block is None:
                     continue

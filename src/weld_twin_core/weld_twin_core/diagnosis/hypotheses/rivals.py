@@ -17,7 +17,7 @@ import numpy as np
 from ..algebra.fit import Fit, fit
 from ..result import Site
 from .evidence_score import Choice, evidence
-from .selection import Workspace, fitted_with, ranking
+from .selection import Workspace, fitted_with, implausible, ranking
 
 SHORTLIST = 7
 """Rivals fitted at the most; bounds the time that a slot takes."""
@@ -58,7 +58,9 @@ def rivals(
     choices = [c for c in ranked if c.unit.site not in taken and c.nats > 0.0]
     reach = max(beliefs.rival_nats, beliefs.rival_share * choices[0].nats) if choices else 0.0
     close = [c for c in choices if c.nats > choices[0].nats - reach][:SHORTLIST]
-    fits = [fitted_with(work, rest.model, c.effect(gram)) for c in close]
+    tried = [(c, fitted_with(work, rest.model, c.effect(gram))) for c in close]
+    tried = [(c, other) for c, other in tried if not implausible(other.model)]
+    close, fits = [c for c, _ in tried], [other for _, other in tried]
     # One count for all rivals: see `select`.
     count = effective(min([now, *fits], key=lambda f: f.rss))
     out = [Rival(Site(effect.name, effect.site), nats_in_place(rest, now, count, own), now)]

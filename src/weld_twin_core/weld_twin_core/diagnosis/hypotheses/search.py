@@ -8,17 +8,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from ...arrays import Array
+from ...effects.effect import Effect
+from ...effects.plausible import beyond
 from ..algebra.fit import Fit, fit, robust_fit, robust_scale
 from ..algebra.independent_rows import effective_share
+from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
 from .library import Library, build
 from .rivals import Rival, rivals
-from .selection import Workspace, backward, consolidated, forward, without_negligible
+from .selection import (
+    Workspace,
+    backward,
+    consolidated,
+    forward,
+    implausible,
+    without_negligible,
+)
 
 SEARCH_ROWS = 9000
 """Rows a search works on: what is found there is fitted again on all."""
@@ -57,6 +65,8 @@ class Search:
         Whether so many units came one by one that the selection among them was not finished.
     dense : bool
         Whether many small errors were fitted together.
+    refused : tuple of Effect
+        What would explain the rest best, but no machine has.
 
     """
 
@@ -71,6 +81,7 @@ class Search:
     slots: tuple[tuple[Rival, ...], ...]
     crowded: bool = False
     dense: bool = False
+    refused: tuple[Effect, ...] = ()
 
     @property
     def library(self) -> Library:
@@ -143,23 +154,32 @@ def search(
     chosen = _chosen(small, baseline.model, exclude, beliefs, progress)
     work, now, bare = chosen.work, chosen.now, chosen.bare_rss
     slots: tuple[tuple[Rival, ...], ...] = ()
+    refused = list(chosen.refused)
     if not chosen.crowded:
+        now = possible(work, now, refused)
         now, slots = settled(
             work, now, lambda f: effective_rows(small, f, bare, beliefs), progress
         )
     model = now.model
     final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
+    if implausible(final.model):
+        kept = [k for k, e in enumerate(final.model.found) if not beyond(model.robot, e)]
+        refused += implausible(final.model)
+        slots = tuple(slots[k] for k in kept) if slots else ()
+        less = final.model.with_found(tuple(final.model.found[k] for k in kept))
+        final, scale = robust_fit(full, less, robust_scale(full, full.residuals(less)), rounds=1)
     return Search(
         problem=full,
         scale=scale,
         baseline=baseline,
         final=final,
-        precision=np.zeros(0),
+        precision=effect_precision(final.model),
         work=work,
         small=now,
         bare_rss=bare,
         slots=slots,
         crowded=chosen.crowded,
+        refused=tuple(refused),
     )
 
 
@@ -170,6 +190,7 @@ class _Chosen(NamedTuple):
     now: Fit
     bare_rss: float
     crowded: bool
+    refused: tuple[Effect, ...]
 
 
 def _chosen(
@@ -177,6 +198,7 @@ def _chosen(
 ) -> _Chosen:
     """Return the effects chosen, with a library built anew until the choice stays."""
     work, now, bare = _workspace(small, model, exclude, beliefs)
+    refused: list[Effect] = []
     for _ in range(ROUNDS):
         before = names(model)
 
@@ -186,7 +208,8 @@ def _chosen(
         def hopeful(found: Fit, bare: float = bare) -> float:
             return effective_rows(small, found, bare, beliefs, beliefs.hope)
 
-        steps = forward(work, now, hopeful, beliefs.many, progress)
+        refused = []
+        steps = forward(work, now, hopeful, beliefs.many, progress, refused.append)
         crowded = small.recordings[0].joints.static and len(steps) >= beliefs.many
         if steps:
             now = steps[-1].fit
@@ -197,7 +220,17 @@ def _chosen(
         if crowded or names(model) == before:
             break
         work, now, bare = _workspace(small, model, exclude, beliefs)
-    return _Chosen(work, now, bare, crowded)
+    return _Chosen(work, now, bare, crowded, tuple(refused))
+
+
+def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
+    """Return the fit without what no machine has; that is added to those refused."""
+    while absurd := implausible(now.model):
+        refused += absurd
+        keys = {effect.key for effect in absurd}
+        kept = tuple(effect for effect in now.model.found if effect.key not in keys)
+        now = fit(work.problem, now.model.with_found(kept), work.scale, None, 4)
+    return now
 
 
 def settled(

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...effects.plausible import beyond
 from ..algebra.fit import Fit, design, fit
 from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
@@ -89,9 +90,10 @@ def forward(
     effective: Callable[[Fit], float],
     most: int = 40,
     tick: Callable[[str], None] = lambda text: None,
+    refused: Callable[[Effect], None] = lambda effect: None,
 ) -> list[Step]:
     """
-    Return the steps of a forward selection.
+    Return the steps of a forward selection; what no machine has does not enter.
 
     Parameters
     ----------
@@ -104,6 +106,8 @@ def forward(
         Stop after this many units.
     tick : callable
         Told what was found, for progress.
+    refused : callable
+        Told what would have explained the rest best, where no machine can have it.
 
     """
     steps: list[Step] = []
@@ -117,8 +121,10 @@ def forward(
         ranked = [c for c in ranked if c.nats > work.beliefs.enter_nats and not _repeats(c, taken)]
         if not ranked:
             break
-        best = _refined(work, now, gram, ranked, effective)
+        best, impossible = _refined(work, now, gram, ranked, effective)
         if best is None:
+            for effect in impossible:
+                refused(effect)
             break
         steps.append(best)
         taken.append(best.unit.site)
@@ -157,8 +163,12 @@ def _refined(
     gram: Gram,
     ranked: list[Choice],
     effective: Callable[[Fit], float],
-) -> Step | None:
-    """Return the best of the leading choices after a nonlinear fit of each."""
+) -> tuple[Step | None, list[Effect]]:
+    """
+    Return the best of the leading choices after a nonlinear fit of each.
+
+    Beside it, effects that would have done but that no machine has.
+    """
     best_nats = ranked[0].nats
     slack = max(work.beliefs.close_nats, work.beliefs.close_share * best_nats)
     close = [c for c in ranked if c.nats > best_nats - slack]
@@ -167,13 +177,23 @@ def _refined(
     # otherwise be allowed more rows.
     count = effective(min((f for _, f in tried), key=lambda f: f.rss))
     best: Step | None = None
+    impossible: list[Effect] = []
     for choice, result in tried:
         freedom = result.coordinates.size - now.coordinates.size
         nats = evidence(now.rss, now.rss - result.rss, freedom, count)
         nats -= float(np.log(choice.unit.trials))
-        if nats > work.beliefs.enter_nats and (best is None or nats > best.nats):
+        if nats <= work.beliefs.enter_nats:
+            continue
+        absurd = implausible(result.model)
+        impossible += absurd
+        if not absurd and (best is None or nats > best.nats):
             best = Step(choice.unit, nats, result)
-    return best
+    return best, impossible
+
+
+def implausible(model: Model) -> list[Effect]:
+    """Return the effects of a model that are beyond what a machine can have."""
+    return [effect for effect in model.found if beyond(model.robot, effect)]
 
 
 def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
@@ -214,7 +234,7 @@ def restarted(work: Workspace, now: Fit) -> Fit:
             continue
         rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
         again = fitted_with(work, rest.model, effect)
-        if again.rss < now.rss:
+        if again.rss < now.rss and not implausible(again.model):
             found = list(again.model.found)
             found.insert(k, found.pop())
             now = fit(work.problem, again.model.with_found(tuple(found)), work.scale, None, 4)
@@ -317,6 +337,6 @@ def _one_for_two(
         nats = evidence(rest.rss, rest.rss - one.rss, free, count) - float(
             np.log(choice.unit.trials)
         )
-        if nats >= wanted:
+        if nats >= wanted and not implausible(one.model):
             return one
     return None

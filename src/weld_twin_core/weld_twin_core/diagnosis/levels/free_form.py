@@ -13,8 +13,8 @@ from ...effects.effect import Effect
 from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
+from ..unseen.regions import posture_regions
 from .groups import Group, all_groups
-from .regions import posture_regions
 from .sparse_groups import choosing, chosen, rival_weights
 
 

@@ -18,17 +18,24 @@ References
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.fit import Fit, coordinates, design, fit, robust_scale, solve_scaled, stepped
+from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 
 ROUNDS = 15
 """Times that variances and noise are learned in turn; they settle within ten."""
+PULL = 0.5
+"""
+Coordinates that the belief about machines at large counts as, where the spread of one machine's is
+learned: no more than half of one, so that a handful of its own decides.
+"""
 
 
 def groups(found: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
@@ -47,7 +54,13 @@ def groups(found: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
 
 
 def learned_precision(
-    normal: Array, right: Array, rss: float, rows: int, labels: Array, scales: Array
+    normal: Array,
+    right: Array,
+    rss: float,
+    rows: int,
+    labels: Array,
+    scales: Array,
+    believed: Array | None = None,
 ) -> tuple[Array, float]:
     """
     Return the prior precision that maximises the evidence, shape (K,), and the freedom it leaves.
@@ -60,16 +73,26 @@ def learned_precision(
         Normal equations of the coordinates with the nuisance frames projected out.
     labels, scales : array, shape (K,)
         As `groups` returns them.
+    believed : array, shape (K,), optional
+        Precision of machines at large: the spread learned of this one is pulled towards it and
+        never wider, and what is fitted freely has it. Nothing is believed when left out.
 
     """
     # In units of the typical size, so that one variance serves a whole family.
     normal = normal * np.outer(scales, scales)
     right = right * scales
     tied = labels >= 0
+    pulled = 0.0 if believed is None else PULL
+    usual = np.full(scales.size, np.inf) if believed is None else 1.0 / (believed * scales**2)
+    # A group too small to be tied keeps its number, without a member.
     variance = np.ones(labels.max(initial=-1) + 1)
+    for k in np.unique(labels[tied]) if believed is not None else ():
+        variance[k] = usual[labels == k].mean()
+    typical = variance.copy()
+    most = typical if pulled else np.full(typical.size, np.inf)
     floor, noise = 1e-8, 1.0
     for _ in range(ROUNDS):
-        precision = np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 1e-9)
+        precision = _precision(tied, variance, labels, usual)
         system = normal / noise + np.diag(precision)
         system[np.diag_indices_from(system)] *= 1.0 + 1e-12
         factor = cho_factor(system, lower=True)
@@ -82,10 +105,18 @@ def learned_precision(
             mine = labels == k
             if mine.any():
                 share = max(float(determined[mine].sum()), 1e-3)
-                variance[k] = max(float((mean[mine] ** 2).sum()) / share, floor)
-    precision = np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 0.0) / scales**2
+                total = float((mean[mine] ** 2).sum()) + pulled * typical[k]
+                variance[k] = min(max(total / (share + pulled), floor), most[k])
+    precision = _precision(tied, variance, labels, usual) / scales**2
     # The fit works in whitened rows, so a prior counts against the noise actually there.
     return precision * noise, float(determined.sum())
+
+
+def _precision(tied: NDArray[np.bool_], variance: Array, labels: Array, usual: Array) -> Array:
+    """Return the precision of every coordinate in units of its typical size, shape (K,)."""
+    if not variance.size:
+        return np.asarray(1.0 / usual)
+    return np.asarray(np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 1.0 / usual))
 
 
 def shrunk_step(
@@ -138,13 +169,16 @@ def _learned(
     """Return the model after one linear step, the prior precision learned, and its freedom."""
     residual = problem.whitened(problem.residuals(model), scale)
     columns, _ = design(problem, model, scale)
+    frame_ridge, off = frame_prior(problem, model)
+    frames = frame_ridge.size
     normal, right = columns @ columns.T, columns @ residual
+    normal[:frames, :frames] += np.diag(frame_ridge)
+    right[:frames] -= frame_ridge * off
     labels, scales = groups(model.found, beliefs)
     x = coordinates(model)
-    frames = right.size - x.size
     target = _target(normal, right, float(residual @ residual), x)
     precision, freedom = learned_precision(
-        *_projected(*target, frames), residual.size, labels, scales
+        *_projected(*target, frames), residual.size, labels, scales, effect_precision(model)
     )
     ridge = np.concatenate([np.zeros(frames), precision])
     pull = ridge * np.concatenate([np.zeros(frames), x])

@@ -23,6 +23,7 @@ from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.library import families
+from ..hypotheses.still_joints import hardly_moves
 from .shrinkage import shrunk_fit, shrunk_step
 from .wave_lines import with_lines
 
@@ -70,7 +71,8 @@ def _everything(
     problem: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs
 ) -> tuple[Effect, ...]:
     """Return every effect that fits linearly, at zero unless the search has found its value."""
-    view = problem.features(model)[0].view
+    features = problem.features(model)
+    view = features[0].view
     have = {effect.key: effect for effect in model.found}
     # All joints' pairs of coordinates together stay below half the rows.
     most = problem.size // (4 * model.robot.n)
@@ -81,7 +83,8 @@ def _everything(
             continue
         for joint in sites(kind, model.robot.joint_names):
             if kind.applicable(view, joint) is None:
-                out += _small(kind, view, joint, most, beliefs, have)
+                small = _small(kind, view, joint, most, beliefs, have)
+                out += [effect for effect in small if not hardly_moves(features, effect)]
     return tuple(out)
 
 

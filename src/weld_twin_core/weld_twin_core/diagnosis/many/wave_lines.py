@@ -7,9 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...effects.hooks import highest_order
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
@@ -35,6 +37,8 @@ class _Waves:
     normal : array, shape (O, 2, 2)
     apart : float
         Half the resolution in orders that the range of motion allows.
+    positions : array, shape (N,)
+        Of the joint, all recordings together.
 
     """
 
@@ -44,6 +48,7 @@ class _Waves:
     waves: list[np.ndarray]
     normal: Array
     apart: float
+    positions: Array
 
     @classmethod
     def of(
@@ -96,9 +101,13 @@ class _Waves:
             masses.append(mass)
             waves.append(np.concatenate([sine, cosine]).astype(np.float32))
         normal += 1e-9 * np.eye(2) * np.trace(normal[0])
-        return cls(joint, columns, masses, waves, normal, float(np.ceil(np.pi / (high - low))))
+        apart = float(np.ceil(np.pi / (high - low)))
+        positions = np.concatenate([maker.view.q[:, joint] for maker in features])
+        return cls(joint, columns, masses, waves, normal, apart, positions)
 
-    def peak(self, residual: list[Array], free: Array) -> tuple[float, int, int, Array]:
+    def peak(
+        self, residual: list[Array], free: NDArray[np.bool_]
+    ) -> tuple[float, int, int, Array]:
         """
         Return the strongest order: chi-square, joint, its place among the orders, (sine, cosine).
 
@@ -161,9 +170,9 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     return model.with_found(tuple(found))
 
 
-def _free(model: Model, waves: _Waves, orders: Array) -> Array:
+def _free(model: Model, waves: _Waves, orders: Array) -> NDArray[np.bool_]:
     """Return which orders no wave of the joint is too close to, shape (O,)."""
-    free = np.ones(orders.size, bool)
+    free: NDArray[np.bool_] = orders < highest_order(waves.positions)
     for effect in model.found:
         if effect.site == model.robot.joint_names[waves.joint]:
             for order in effect.orders():

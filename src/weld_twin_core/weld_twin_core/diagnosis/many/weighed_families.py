@@ -10,6 +10,7 @@ import numpy as np
 
 from ..hypotheses.search import Search
 from ..result import Site
+from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
 
 
@@ -29,6 +30,8 @@ class WeighedFamily:
         Mean squared unseen error with everything, [m^2].
     members : tuple of (Site, float)
         Its members and how far each moves the tool, RMS [m], largest first.
+    elsewhere : float
+        ``fall`` over ``full`` on regions of posture left out, instead of stretches of time.
 
     """
 
@@ -37,6 +40,7 @@ class WeighedFamily:
     error: float
     full: float
     members: tuple[tuple[Site, float], ...]
+    elsewhere: float = 0.0
 
     @property
     def rms_m(self) -> float:
@@ -54,9 +58,13 @@ def weighed_families(found: Search, unseen: Unseen) -> tuple[WeighedFamily, ...]
     everything = list(range(len(model.found)))
     full = unseen.squares(unseen.predict(everything))
     labels = unseen.trusted_labels()
+    apart = unseen.by(posture_regions(unseen.problem))
+    whole = apart.squares(apart.predict(everything)).mean()
     out = []
     for name, index in members.items():
-        less = unseen.squares(unseen.predict([k for k in everything if k not in index]))
+        rest = [k for k in everything if k not in index]
+        less = unseen.squares(unseen.predict(rest))
+        gone = apart.squares(apart.predict(rest)).mean()
         falls = np.array([(less - full)[labels == b].mean() for b in np.unique(labels)])
         error = falls.std(ddof=1) / np.sqrt(falls.size) if falls.size > 1 else np.inf
         sites = [
@@ -65,7 +73,12 @@ def weighed_families(found: Search, unseen: Unseen) -> tuple[WeighedFamily, ...]
         sites.sort(key=lambda item: -item[1])
         out.append(
             WeighedFamily(
-                name, float(falls.mean()), float(error), float(full.mean()), tuple(sites)
+                name,
+                float(falls.mean()),
+                float(error),
+                float(full.mean()),
+                tuple(sites),
+                float(gone / max(whole, 1e-300)) - 1.0,
             )
         )
     return tuple(out)

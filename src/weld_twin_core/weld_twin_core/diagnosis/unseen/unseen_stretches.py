@@ -3,6 +3,9 @@
 """
 What models with more or fewer effects predict on stretches they were not fitted on.
 
+Stretches are those of time, or regions of posture: what carries over to the next minute need not
+carry over to where the arm has not been.
+
 The found effects are small, so around the final fit every smaller model is linear: the exact
 contribution of each effect is put back into the residual where it is left out, and the coordinates
 of those kept are fitted anew on the other stretches. Normal equations of every stretch are formed
@@ -12,9 +15,10 @@ once; a model is a choice of columns and targets.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -23,6 +27,7 @@ from scipy.linalg.lapack import dpotri
 from ...arrays import Array
 from ..algebra.fit import Fit, design
 from ..algebra.gram import Index
+from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.unit_diagonal import unit_diagonal
 
@@ -32,6 +37,8 @@ DAMPING = 1e-11
 """Of columns that repeat others, far below what a fit can tell."""
 MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""
+Rows = Any
+"""Rows of one stretch: a slice, or their numbers."""
 TRUSTED = 0.2
 """A sample of less weight is an outlier: reported, and left out of every quoted RMS."""
 TETHER = 0.3
@@ -101,17 +108,15 @@ class Unseen:
             for k in range(len(model.found))
         ]
         prior = np.zeros(columns.shape[0])
+        prior[:frames], off = frame_prior(problem, model)
         if precision.size:
             prior[frames:] = precision
-        x = np.concatenate([np.zeros(frames), fit.coordinates])
+        x = np.concatenate([off, fit.coordinates])
         # A learned prior holds a coordinate already; a tether would tell it of unseen stretches.
         tether = np.where(prior > 0.0, 0.0, np.concatenate([np.zeros(frames), _tether(model)]))
         labels = problem.block_labels(BLOCKS)
         stacked = np.array(targets)
-        bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
-        spans = list(pairwise(bounds))
-        normals = np.array([columns[:, a:b] @ columns[:, a:b].T for a, b in spans])
-        rights = np.array([columns[:, a:b] @ stacked[:, a:b].T for a, b in spans])
+        normals, rights = _sums(columns, stacked, labels)
         return cls(
             problem=problem,
             scale=scale,
@@ -124,6 +129,11 @@ class Unseen:
             normals=normals,
             rights=rights,
         )
+
+    def by(self, labels: Array) -> Unseen:
+        """Return the same with other parts left out in turn, told by a label of every row."""
+        normals, rights = _sums(self.columns, self.targets, labels)
+        return replace(self, labels=labels, normals=normals, rights=rights)
 
     @property
     def frames(self) -> int:
@@ -142,13 +152,13 @@ class Unseen:
         mix = np.ones(self.targets.shape[0])
         mix[[1 + k for k in kept]] = 0.0
         residual = mix @ self.targets
-        for b, (low, high) in enumerate(self._spans()):
+        for b, rows in enumerate(self._spans):
             inverse = self._inverses[b]
             step = inverse @ self._right(b, mix)
             if gone.size:
                 force = np.linalg.solve(inverse[np.ix_(gone, gone)], step[gone])
                 step = step - inverse[:, gone] @ force
-            residual[low:high] -= step @ self.columns[:, low:high]
+            residual[rows] -= step @ self.columns[:, rows]
         return residual
 
     @cached_property
@@ -172,11 +182,11 @@ class Unseen:
         mix[[1 + k for k in kept]] = 0.0
         target = mix @ self.targets
         factors, residual = [], target.copy()
-        for b, (low, high) in enumerate(self._spans() if index.size else ()):
+        for b, rows in enumerate(self._spans if index.size else ()):
             system, size = unit_diagonal(self._system(b, index), DAMPING)
             factor = cho_factor(system, overwrite_a=True)
             step = cho_solve(factor, self._right(b, mix)[index] / size) / size
-            residual[low:high] -= self._moved(step, index, low, high)
+            residual[rows] -= self._moved(step, index, rows)
             factors.append((factor, size))
         return Base(self, index, target, factors, residual)
 
@@ -185,10 +195,10 @@ class Unseen:
         parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in sorted(kept)]
         return np.concatenate([np.arange(self.frames), *parts]).astype(int)
 
-    def _spans(self) -> list[tuple[int, int]]:
-        """Return first and last row of every stretch."""
-        bounds = np.searchsorted(self.labels, np.arange(self.normals.shape[0] + 1))
-        return list(zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))
+    @cached_property
+    def _spans(self) -> list[Rows]:
+        """Return the rows of every stretch."""
+        return _rows_of(self.labels)
 
     @cached_property
     def _total(self) -> Array:
@@ -205,11 +215,11 @@ class Unseen:
         """Return the right-hand side of every column on all stretches but one."""
         return np.asarray((self.rights.sum(axis=0) - self.rights[b]) @ mix - self.pull)
 
-    def _moved(self, step: Array, index: Index, low: int, high: int) -> Array:
+    def _moved(self, step: Array, index: Index, rows: Rows) -> Array:
         """Return what a step of some columns takes off a stretch of rows, without a copy."""
         whole = np.zeros(self.columns.shape[0])
         whole[index] = step
-        return np.asarray(whole @ self.columns[:, low:high])
+        return np.asarray(whole @ self.columns[:, rows])
 
     def squares(self, residual: Array) -> Array:
         """Return the squared position error of every trusted sample, shape (samples,) [m^2]."""
@@ -266,14 +276,14 @@ class Base:
         own = self.unseen.columns
         if self.index.size < own.shape[0]:
             own = own[self.index]
-        spans = self.unseen._spans()
+        spans = self.unseen._spans
         both = np.concatenate([extra, self.target[None]])
-        crosses = [own[:, a:b] @ both[:, a:b].T for a, b in spans]
-        squares = [extra[:, a:b] @ both[:, a:b].T for a, b in spans]
+        crosses = [own[:, rows] @ both[:, rows].T for rows in spans]
+        squares = [extra[:, rows] @ both[:, rows].T for rows in spans]
         cross_all, square_all = sum(crosses), sum(squares)
         outs = np.tile(self.target, (len(ridges), 1))
-        for b, (low, high) in enumerate(spans):
-            here, mine = extra[:, low:high], own[:, low:high]
+        for b, rows in enumerate(spans):
+            here, mine = extra[:, rows], own[:, rows]
             cross, right = np.split(cross_all - crosses[b], [extra.shape[0]], axis=1)
             square, pull = np.split(square_all - squares[b], [extra.shape[0]], axis=1)
             right, pull = right[:, 0] - self.unseen.pull[self.index], pull[:, 0]
@@ -285,10 +295,25 @@ class Base:
                 pull = pull - cross.T @ solved[:, -1]
             eye = np.eye(here.shape[0])
             more = np.stack([np.linalg.solve(square + (r + 1e-9) * eye, pull) for r in ridges])
-            outs[:, low:high] -= more @ here
+            outs[:, rows] -= more @ here
             if self.index.size:
-                outs[:, low:high] -= (solved[:, -1] - more @ solved[:, :-1].T) @ mine
+                outs[:, rows] -= (solved[:, -1] - more @ solved[:, :-1].T) @ mine
         return list(outs)
+
+
+def _sums(columns: Array, targets: Array, labels: Array) -> tuple[Array, Array]:
+    """Return the normal equations of every part, and their right-hand sides."""
+    spans = _rows_of(labels)
+    normals = np.array([columns[:, rows] @ columns[:, rows].T for rows in spans])
+    return normals, np.array([columns[:, rows] @ targets[:, rows].T for rows in spans])
+
+
+def _rows_of(labels: Array) -> list[Rows]:
+    """Return the rows of every label, a slice each where they lie together."""
+    if (np.diff(labels) >= 0).all():
+        bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
+        return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
+    return [np.flatnonzero(labels == k) for k in range(int(labels.max()) + 1)]
 
 
 def _tether(model: Model) -> Array:

@@ -14,10 +14,14 @@ from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..result import Family, Site
 from .evidence import Evidence
-from .weighing import Weighed
+from .weighing import TINY, Weighed
 
 AT_REST = ('constant', 'angle', 'place', 'load')
 """Dependences that show without any motion."""
+_NO_KIND = (
+    'no kind of error is needed by these data more than the others: each takes the place of the '
+    'rest'
+)
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,8 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
 def _of_nothing(case: Weighed) -> Verdict:
     """Return the verdict where no effect was found."""
     told, beliefs = case.evidence, case.beliefs
+    if told.refused:
+        return Verdict('unknown', beliefs.doubted, (), (_absurd(told),))
     if case.left > beliefs.unexplained:
         return Verdict('unknown', _unknown_confidence(case), (), (_depends(told),))
     if not told.independent and told.after > beliefs.far_above * told.floor:
@@ -87,17 +93,20 @@ def _of_families(case: Weighed) -> Verdict:
     families = []
     for told in case.evidence.families or ():
         members = tuple(item for item in told.members if item[1] > beliefs.member_least_m)
-        named = told.fall > max(beliefs.family_worth * told.full, beliefs.family_sure * told.error)
+        worth = max(told.fall / max(told.full, TINY), told.elsewhere)
+        named = worth > beliefs.family_worth and told.fall > beliefs.family_sure * told.error
         if members:
             families.append(Family(told.effect, named, told.rms_m, members))
     families.sort(key=lambda family: -family.rms_m)
     sets = tuple((site,) for family in families if family.named for site, _ in family.members)
-    status = 'unknown' if case.left > beliefs.unexplained else 'identified'
-    reasons = (
+    reason = (
         'many small errors act together; members of one family are fitted jointly and only their '
-        'sum is certain',
+        'sum is certain'
     )
-    return Verdict(status, beliefs.families * case.complete, sets, reasons, tuple(families))
+    if not sets:
+        return Verdict('unknown', beliefs.doubted, (), (reason, _NO_KIND), tuple(families))
+    status = 'unknown' if case.left > beliefs.unexplained else 'identified'
+    return Verdict(status, beliefs.families * case.complete, sets, (reason,), tuple(families))
 
 
 def _incomplete(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> Verdict:
@@ -130,6 +139,8 @@ def _confidence(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> float:
 def _doubt(case: Weighed) -> str | None:
     """Return why the effects found are no plausible explanation, however well they fit."""
     told, beliefs = case.evidence, case.beliefs
+    if told.refused:
+        return _absurd(told)
     if len(told.slots) > 1 and sum(told.parts) > beliefs.cancel:
         return (
             'the effects that fit best nearly cancel each other: together they imitate a cause '
@@ -154,6 +165,14 @@ def _doubt(case: Weighed) -> str | None:
             'library'
         )
     return None
+
+
+def _absurd(evidence: Evidence) -> str:
+    """Return that only what no machine has would explain the rest."""
+    return (
+        f'what remains would be explained best by {evidence.refused[0]}: it imitates a cause that '
+        'is not in the library, or the data are not what they seem'
+    )
 
 
 def _stacked(sets: tuple[tuple[Site, ...], ...]) -> bool:

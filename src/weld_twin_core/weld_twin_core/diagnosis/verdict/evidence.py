@@ -35,6 +35,8 @@ class Evidence:
         How many separate causes every slot stands for.
     glimpsed : tuple of str
         Joints of which a wave was seen over too little of a period.
+    refused : tuple of str
+        What would explain the rest best but no machine has, in words.
     families : tuple of WeighedFamily, optional
         Where many small errors were fitted together: what each kind accounts for.
 
@@ -50,4 +52,5 @@ class Evidence:
     parts: tuple[float, ...]
     causes: tuple[int, ...] = ()
     glimpsed: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()
     families: tuple[WeighedFamily, ...] | None = None

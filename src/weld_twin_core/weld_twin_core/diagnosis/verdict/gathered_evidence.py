@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+from ...arm.robot import Robot
+from ...effects.effect import Effect
+from ...effects.plausible import beyond
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..many.weighed_families import weighed_families
-from ..result import Shrink
+from ..result import Shrink, Site
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 from .evidence import Evidence
@@ -52,6 +55,7 @@ def gathered(
         parts=_parts(unseen),
         causes=tuple(_causes(slot[0]) for slot in found.slots),
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),
+        refused=tuple(_refused(found.final.model.robot, effect) for effect in found.refused),
         families=weighed_families(found, unseen) if found.dense else None,
     )
 
@@ -61,6 +65,16 @@ def _parts(unseen: Unseen) -> tuple[float, ...]:
     parts = unseen.targets[1:]
     total = parts.sum(axis=0)
     return tuple(float(p @ p) / max(float(total @ total), 1e-300) for p in parts)
+
+
+def _refused(robot: Robot, effect: Effect) -> str:
+    """Return an effect that no machine has, with the values that say so."""
+    units = {parameter.name: parameter.unit for parameter in effect.parameters}
+    values = ', '.join(
+        f'{name} {value:.3g} {units[name]} (a machine has {limit:.3g} at most)'
+        for name, value, limit in beyond(robot, effect)
+    )
+    return f'{Site(effect.name, effect.site)} with {values}'
 
 
 def _causes(rival: Rival) -> int:

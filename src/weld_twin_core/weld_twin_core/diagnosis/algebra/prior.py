@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a fit believes before it sees data: how large errors of machines are, where frames were.
+
+Every fit is maximum a posteriori: the table of `weld_twin_core.effects.plausible` gives the
+spread of every effect coordinate about zero. A frame that is fitted has a wide spread about where
+the alignment put it, so that what the data leave open stays there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arm.rotation import rotation_vector
+from ...arrays import Array
+from ...effects.plausible import spreads
+from .problem import Model, Problem
+
+FRAME_SHIFT = 0.02
+"""Spread [m] of a frame's origin about where the alignment put it: alignment starts a fit within
+2 cm, or says so."""
+FRAME_TURN = 0.05
+"""Spread [rad] of a frame's turn: 2 cm at an arm's reach of 0.4 m."""
+
+
+def effect_precision(model: Model) -> Array:
+    """Return the prior precision of every effect coordinate about zero, shape (K,)."""
+    parts = [spreads(model.robot, effect) for effect in model.found]
+    return np.asarray(np.concatenate([np.zeros(0), *parts]) ** -2.0) if parts else np.zeros(0)
+
+
+def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
+    """
+    Return the prior precision of the frame columns, and how far the frames are off, (F,) each.
+
+    In the order of `Problem.frame_columns`; nothing is believed without an anchor.
+    """
+    pairs: list[tuple[Array, Array, bool]] = []
+    anchor = problem.anchor
+    count = 6 * (('base' in problem.align) * len(model.bases) + ('tool' in problem.align))
+    if anchor is None:
+        return np.zeros(count), np.zeros(count)
+    if 'base' in problem.align:
+        pairs += [(now, was, True) for now, was in zip(model.bases, anchor.bases, strict=True)]
+    if 'tool' in problem.align:
+        pairs.append((model.robot.T_flange_tool, anchor.tool, False))
+    sizes = np.repeat([FRAME_SHIFT, FRAME_TURN], 3)
+    off = [_offset(now, was, left) for now, was, left in pairs]
+    return np.tile(sizes**-2.0, len(pairs)), np.concatenate([np.zeros(0), *off])
+
+
+def _offset(now: Array, was: Array, left: bool) -> Array:
+    """Return the step (xyz, rotvec) that leads from one frame to another, as `Model.moved` does."""
+    one, other = now[:3, :3], was[:3, :3]
+    turn = one @ other.T if left else other.T @ one
+    return np.concatenate([now[:3, 3] - was[:3, 3], rotation_vector(turn)])

@@ -262,5 +262,7 @@ def rival_weights(
     tried = [own, *(pair for pair in _entrants(work, rest) if pair[0].group != own[0].group)]
     totals = np.array([max(float(e.sum()) for e in errors) for _, errors in tried])
     weights = (totals / max(totals.min(), 1e-300)) ** (-beliefs.group_rows / 4.0)
+    # A group that needs fewer columns to do the same is the likelier one: freedom only helps.
+    weights /= np.array([work.places[m.group].size for m, _ in tried])
     weights /= weights.sum()
     return [(m.group, float(w)) for (m, _), w in zip(tried, weights, strict=True)]

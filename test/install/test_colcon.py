@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -25,32 +26,25 @@ NODES = list(MODULES)
 pytestmark = [pytest.mark.slow, pytest.mark.cells]
 
 
+def colcon(folder: Path, *words: str) -> str:
+    """Run colcon in a workspace; return what it printed."""
+    path = f'{Path(sys.executable).parent}:{os.environ["PATH"]}'
+    done = subprocess.run(
+        [sys.executable, '-m', 'colcon', '--log-base', 'log', *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ | {'PYTHONPATH': '', 'PATH': path},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
 @pytest.fixture(scope='module')
 def workspace(tmp_path_factory) -> Path:
     """Build the four packages away from the tree; return the folder with ``install``."""
     folder = tmp_path_factory.mktemp('ws')
-    subprocess.run(
-        [
-            sys.executable,
-            '-m',
-            'colcon',
-            '--log-base',
-            'log',
-            'build',
-            '--base-paths',
-            str(ROOT / 'src'),
-            '--build-base',
-            'build',
-            '--install-base',
-            'install',
-        ],
-        cwd=folder,
-        check=True,
-        capture_output=True,
-        text=True,
-        env=os.environ
-        | {'PYTHONPATH': '', 'PATH': f'{Path(sys.executable).parent}:{os.environ["PATH"]}'},
-    )
+    colcon(folder, 'build', '--base-paths', str(ROOT / 'src'))
     return folder
 
 
@@ -122,3 +116,16 @@ def test_the_command_line_runs_as_installed(workspace, sourced):
     )
     assert out.returncode == 0, out.stderr
     assert 'franka_panda' in out.stdout
+
+
+def test_packages_bring_all_that_their_tests_need(tmp_path):
+    for name in ('weld_twin_core', 'weld_twin_msgs_py'):
+        source = tmp_path / 'src' / name
+        shutil.copytree(ROOT / 'src' / name, source, ignore=shutil.ignore_patterns('__pycache__'))
+    colcon(tmp_path, 'build')
+    told = ('--event-handlers', 'console_direct+', '--return-code-on-test-failure')
+    listed = colcon(tmp_path, 'test', *told, '--pytest-args', '--collect-only', '-q')
+    assert listed.count(' tests collected') == 2
+    core = ('--packages-select', 'weld_twin_core')
+    ran = colcon(tmp_path, 'test', *told, *core, '--pytest-args', 'test/metrics', '-q')
+    assert ' passed in ' in ran

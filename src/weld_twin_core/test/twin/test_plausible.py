@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a machine can have: every parameter has a range with a source, and files may narrow it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from weld_twin_core.effects import REGISTRY, effects_from_list
 from weld_twin_core.effects.plausible import TABLE, beyond, mass_range, plausible, ranges, spreads
 from weld_twin_core.errors import ModelError
 
-PAGE = (Path(__file__).parents[4] / 'docs' / 'plausible.md').read_text(encoding='utf-8')
 UR5 = catalog.load('ur5')
 FREE = {('transmission_ripple', 'order'), ('transmission_ripple', 'phase')}
 """Any order and any phase may be; which orders can be told is a matter of the recording."""
@@ -30,11 +27,6 @@ def test_every_parameter_of_every_cause_has_a_range_and_a_source():
     assert parameters() - FREE - NOT_OF_A_MACHINE - curves <= set(TABLE)
     assert all(each.low < each.high and each.sd > 0.0 for each in TABLE.values())
     assert all(len(each.source) >= 15 for each in TABLE.values())
-
-
-def test_the_page_lists_every_figure():
-    for effect, parameter in TABLE:
-        assert f'| `{effect}` | `{parameter}` |' in PAGE
 
 
 def test_a_robot_of_four_kilograms_payload_cannot_lack_ten():

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Regions are counted as a statistician would: against draws from the very covariance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_lab.coverage.held import inside_region
+from weld_twin_lab.coverage.table import page, summaries
+
+
+def test_nine_of_ten_draws_lie_in_their_region():
+    rng = np.random.default_rng(2)
+    half = rng.normal(size=(4000, 3, 3)) * 1e-4
+    covariance = half @ np.swapaxes(half, 1, 2)
+    sigma = rng.uniform(1e-5, 5e-5, 4000)
+    true = (half @ rng.normal(size=(4000, 3, 1)))[..., 0]
+    errors = true + sigma[:, None] * rng.normal(size=(4000, 3))
+    # 4,000 draws: 0.9 within three times sqrt(0.09 / 4000).
+    assert abs(inside_region(errors, covariance, sigma).mean() - 0.9) < 0.0143
+    assert inside_region(errors, 0.25 * covariance, 0.5 * sigma).mean() < 0.6
+
+
+def test_the_table_tells_parts_apart():
+    one = {
+        'poses': 10,
+        'held': 0.9,
+        'flagged': 0.0,
+        'held_unflagged': 0.9,
+        'mean_error_m': 1e-4,
+        'median_sigma_m': 5e-5,
+    }
+    entries = [
+        {'name': 'a', 'source': 'ur5', 'group': 'unseen', 'status': 'unknown', 'inside': one},
+        {
+            'name': 'b',
+            'source': 'ur5',
+            'group': 'unseen',
+            'status': 'unknown',
+            'inside': {**one, 'held': 0.5, 'poses': 30},
+            'outside': one,
+        },
+        {'name': 'c', 'source': 'plant', 'group': 'unseen', 'refused': 'no pose'},
+    ]
+    inside, outside = summaries(entries)
+    assert (inside['recordings'], inside['held'], inside['worst']) == (2, 0.7, 0.5)
+    assert inside['held_of_all_poses'] == 0.6
+    assert outside['held'] == 0.9
+    assert '| b | unknown | outside | 10 | 90% |' in page(entries)

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How many measured positions lie in the 90 % regions of a prediction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import Diagnosis
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.effects.setup_motion import seen_from
+from weld_twin_core.recording import Measurements, Recording
+from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
+
+HOLD = 0.9
+Mask = NDArray[np.bool_]
+
+
+def inside_region(errors: Array, covariances: Array, sigma: Array) -> Mask:
+    """
+    Return which errors lie in their 90 % region, shape (M,).
+
+    Parameters
+    ----------
+    errors : array, shape (M, 3) [m]
+        Measured minus predicted.
+    covariances : array, shape (M, 3, 3) [m^2]
+        Of the true position about the predicted one.
+    sigma : array, shape (M,) [m]
+        Noise of the instrument per axis; it comes on top.
+
+    """
+    whole = covariances + (sigma**2)[:, None, None] * np.eye(3)
+    solved = np.linalg.solve(whole, errors[..., None])[..., 0]
+    return np.asarray((errors * solved).sum(axis=1) <= chi2.ppf(HOLD, 3))
+
+
+def held(
+    diagnosis: Diagnosis,
+    train: Recording,
+    other: Recording,
+    sigma: Array,
+    good: Mask | None = None,
+) -> dict[str, Any]:
+    """
+    Return how well the regions hold on a recording that was not fitted, as plain JSON values.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of ``train``.
+    train, other : Recording
+    sigma : array, shape (M,) [m]
+        The instrument's noise at the other's measurements.
+    good : array of bool, shape (M,), optional
+        Measurements that count.
+
+    """
+    posterior, measured = diagnosis.posterior, other.measured
+    assert posterior is not None
+    assert measured is not None
+    model = diagnosis.model
+    found = seen_from(model.found, train.epoch_ns, train.span_ns, other)
+    twin = Model(model.robot, model.bases[:1], model.known, found).twin(0)
+    use = _within(other, measured) if good is None else good & _within(other, measured)
+    t = measured.t[use]
+    errors = measured.position[use] - twin.poses(other, t).position
+    covariances = pose_covariances(posterior, twin, other, t)
+    regions = inside_region(errors, covariances[:, :3, :3], sigma[use])
+    flags = flagged(posterior, other, t)
+    size = np.linalg.norm(errors, axis=1)
+    return {
+        'poses': int(t.size),
+        'held': _mean(regions),
+        'flagged': _mean(flags),
+        'held_unflagged': _mean(regions[~flags]),
+        'held_flagged': _mean(regions[flags]),
+        'mean_error_m': _mean(size),
+        'median_sigma_m': float(np.median(largest_sigma(covariances))) if t.size else None,
+        'largest_error_m': float(size.max()) if t.size else None,
+    }
+
+
+def flagged(posterior: Posterior, other: Recording, t: Array) -> Mask:
+    """Return which poses a prediction flags as outside what was recorded, shape (M,)."""
+    q, qd = other.joints.at(t)
+    warm, load = other.temperature, other.wrench
+    found = posterior.domain.outside(
+        q,
+        None if other.joints.static else qd,
+        None if load is None else load.at(t),
+        None if warm is None else warm.at(t),
+    )
+    out = np.zeros(t.size, dtype=bool)
+    for first, last, _ in found:
+        out[first : last + 1] = True
+    return out
+
+
+def _within(other: Recording, measured: Measurements) -> Mask:
+    """Return which measurements lie inside the joint stream, shape (M,)."""
+    if other.joints.static:
+        return np.ones(measured.t.size, dtype=bool)
+    ends = other.joints.t[[0, -1]]
+    return np.asarray((measured.t >= ends[0]) & (measured.t <= ends[1]))
+
+
+def _mean(values: Array | Mask) -> float | None:
+    return float(np.mean(values)) if values.size else None

@@ -6,39 +6,52 @@ The cell of the demo, in real time: generator, injector, twin, analyzer and, on 
     ros2 launch weld_twin_nodes demo.launch.py
     ros2 launch weld_twin_nodes demo.launch.py bag:=my_bag config:=my_cell.yaml
 
-Nodes of other machines neither see nor reach it unless ``discovery:=SUBNET`` is given.
+Each node waits for its listeners, the recorder among them, so that a bag is whole. Nodes of other
+machines neither see nor reach it unless ``discovery:=SUBNET`` is given; whatever includes this
+file keeps its own discovery.
 """
 
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable
+from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch.substitutions import LaunchConfiguration, NotEqualsSubstitution, PythonExpression
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 PACKAGE = 'weld_twin_nodes'
-NODES = (
-    'deviation_analyzer',
-    'forward_kinematics_twin',
-    'error_injector',
-    'trajectory_generator',
-)
+LISTENERS = {
+    'deviation_analyzer': 0,
+    'forward_kinematics_twin': 1,
+    'error_injector': 1,
+    'trajectory_generator': 2,
+}
+"""How many of these nodes take each node's main output; the recorder takes all of them."""
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return the description that `ros2 launch` runs."""
     config = str(Path(get_package_share_directory(PACKAGE)) / 'config' / 'demo.yaml')
-    parameters = [LaunchConfiguration('config')]
     bag = LaunchConfiguration('bag')
-    recorder = Node(
-        package=PACKAGE,
-        executable='recorder',
-        output='screen',
-        parameters=[*parameters, {'out': bag}],
-        condition=IfCondition(PythonExpression(["'", bag, "' != ''"])),
-    )
+    discovery = {'ROS_AUTOMATIC_DISCOVERY_RANGE': LaunchConfiguration('discovery')}
+
+    def node(name: str, own: dict[str, object], **options: object) -> Node:
+        return Node(
+            package=PACKAGE,
+            executable=name,
+            output='screen',
+            parameters=[LaunchConfiguration('config'), own],
+            additional_env=discovery,
+            **options,
+        )
+
+    def listeners(count: int) -> ParameterValue:
+        return ParameterValue(
+            PythonExpression([f"{count} + int('", bag, "' != '')"]), value_type=int
+        )
+
     return LaunchDescription(
         [
             DeclareLaunchArgument('config', default_value=config, description='parameter file'),
@@ -48,13 +61,14 @@ def generate_launch_description() -> LaunchDescription:
                 default_value='LOCALHOST',
                 description='LOCALHOST, SUBNET or OFF',
             ),
-            SetEnvironmentVariable(
-                'ROS_AUTOMATIC_DISCOVERY_RANGE', LaunchConfiguration('discovery')
+            node(
+                'recorder',
+                {'out': ParameterValue(bag, value_type=str)},
+                condition=IfCondition(NotEqualsSubstitution(LaunchConfiguration('bag'), '')),
             ),
-            recorder,
             *(
-                Node(package=PACKAGE, executable=name, output='screen', parameters=parameters)
-                for name in NODES
+                node(name, {'wait_for_subscribers': listeners(count)})
+                for name, count in LISTENERS.items()
             ),
         ]
     )

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The nodes beside a real cell: twin, analyzer, markers; recorder, live diagnosis, RViz on request.
+
+    ros2 launch weld_twin_nodes cell.launch.py robot:=ur10 pose_topic:=/tracker/pose bag:=monday
+    ros2 launch weld_twin_nodes cell.launch.py --show-args
+
+The controller gives the joint states, a tracker the measurements; nothing here moves a robot.
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition
+from launch.substitutions import EnvironmentVariable, LaunchConfiguration, NotEqualsSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+PACKAGE = 'weld_twin_nodes'
+RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+ARGUMENTS = {
+    'namespace': ('', 'namespace of all nodes and of the topics without a leading slash'),
+    'robot': ('topic', "bundled robot, robot file or URDF; 'topic': from robot_description"),
+    'base_link': ('', 'first link of the chain in a URDF'),
+    'tip_link': ('', 'last link of the chain in a URDF'),
+    'model': ('', 'effects file or diagnosis.json that the twin is to know'),
+    'joint_topic': ('joint_states', 'joint states of the controller'),
+    'pose_topic': ('measured/tool_pose', 'poses of the tracker'),
+    'point_topic': ('measured/tool_point', 'points of a tracker that gives no orientation'),
+    'wrench_topic': ('tool_wrench', 'load on the tool'),
+    'temperature_topic': ('temperature', 'temperature of the arm'),
+    'use_sim_time': ('false', 'take the time from /clock'),
+    'bag': ('', 'bag to record, if any'),
+    'align': ('', 'frames that the live diagnosis fits along: base, tool, or base,tool'),
+    'live': ('true', 'diagnose while the cell works'),
+    'rviz': ('false', 'show the cell in RViz'),
+    'config': ('', 'parameter file; empty: config/cell.yaml of this package'),
+}
+MODEL = ('base_link', 'robot', 'tip_link')
+TOPICS = {
+    'joint_states': 'joint_topic',
+    'measured/tool_point': 'point_topic',
+    'measured/tool_pose': 'pose_topic',
+    'temperature': 'temperature_topic',
+    'tool_wrench': 'wrench_topic',
+}
+NODES = {
+    'deviation_analyzer': (*MODEL,),
+    'deviation_markers': (*MODEL,),
+    'forward_kinematics_twin': (*MODEL, 'model'),
+    'live_diagnosis': (*MODEL, 'align', 'model'),
+    'recorder': (),
+}
+"""Nodes, and the arguments each takes as a parameter of the same name."""
+CONDITIONS = {
+    'live_diagnosis': IfCondition(LaunchConfiguration('live')),
+    'recorder': IfCondition(NotEqualsSubstitution(LaunchConfiguration('bag'), '')),
+}
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the description that `ros2 launch` runs."""
+    config = Path(get_package_share_directory(PACKAGE)) / 'config'
+    declared = [
+        DeclareLaunchArgument(
+            name,
+            default_value=str(config / 'cell.yaml') if name == 'config' else default,
+            description=meaning,
+        )
+        for name, (default, meaning) in ARGUMENTS.items()
+    ]
+    discovery = DeclareLaunchArgument(
+        'discovery',
+        default_value=EnvironmentVariable(RANGE, default_value='SUBNET'),
+        description='LOCALHOST, SUBNET or OFF, for these nodes alone',
+    )
+    rviz = Node(
+        package='rviz2',
+        executable='rviz2',
+        arguments=['-d', str(config / 'cell.rviz')],
+        additional_env={RANGE: LaunchConfiguration('discovery')},
+        condition=IfCondition(LaunchConfiguration('rviz')),
+    )
+    return LaunchDescription([*declared, discovery, *map(_node, NODES), rviz])
+
+
+def _node(name: str) -> Node:
+    """Return a node with the arguments that are its parameters."""
+    own: dict[str, ParameterValue] = {
+        key: ParameterValue(LaunchConfiguration(key), value_type=str) for key in NODES[name]
+    }
+    own['use_sim_time'] = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
+    if name == 'recorder':
+        own['out'] = ParameterValue(LaunchConfiguration('bag'), value_type=str)
+    return Node(
+        package=PACKAGE,
+        executable=name,
+        namespace=LaunchConfiguration('namespace'),
+        output='screen',
+        parameters=[LaunchConfiguration('config'), own],
+        remappings=[(topic, LaunchConfiguration(key)) for topic, key in TOPICS.items()],
+        additional_env={RANGE: LaunchConfiguration('discovery')},
+        condition=CONDITIONS.get(name),
+    )

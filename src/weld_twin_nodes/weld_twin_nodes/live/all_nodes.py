@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The nodes there are, by name, and what each takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from importlib import import_module
+from inspect import getdoc
+from typing import TYPE_CHECKING
+
+from weld_twin_core.errors import DataError
+
+if TYPE_CHECKING:
+    from .cell_node import CellNode
+    from .settings import Setting
+
+MODULES = {
+    'trajectory_generator': 'weld_twin_nodes.live.trajectory_generator',
+    'error_injector': 'weld_twin_nodes.live.error_injector',
+    'forward_kinematics_twin': 'weld_twin_nodes.live.forward_kinematics_twin',
+    'deviation_analyzer': 'weld_twin_nodes.live.deviation_analyzer',
+    'recorder': 'weld_twin_nodes.live.recorder',
+    'live_diagnosis': 'weld_twin_nodes.live.live_diagnosis',
+    'deviation_markers': 'weld_twin_nodes.live.deviation_markers',
+}
+ROS_OWN = ('use_sim_time', 'start_type_description_service')
+"""Parameters that every node of ROS 2 takes; so are those that begin with ``qos_overrides``."""
+
+
+def node_class(name: str) -> type[CellNode]:
+    """Return the class of a node by its name, which is that of its file."""
+    module = import_module(MODULES[name])
+    return next(
+        item
+        for item in vars(module).values()
+        if isinstance(item, type) and item.__module__ == module.__name__ and hasattr(item, 'usage')
+    )
+
+
+def refuse_unknown(given: Iterable[str], own: Iterable[str]) -> None:
+    """
+    Refuse parameters that no node of this package has: a mistyped one would be passed over.
+
+    A parameter file may hold those of the other nodes too.
+
+    Raises
+    ------
+    DataError
+        There is one; the message names the one that was meant, if it is like one.
+
+    """
+    known = {*own, *ROS_OWN}
+    odd = [name for name in given if name not in known and not name.startswith('qos_overrides')]
+    if not odd:
+        return
+    others = {item.name for name in MODULES for item in node_class(name).every_setting()}
+    for name in odd:
+        if name in others:
+            continue
+        like = get_close_matches(name, known, n=1)
+        hint = f"; did you mean '{like[0]}'?" if like else f'; there are {", ".join(sorted(known))}'
+        raise DataError(f"no parameter is called '{name}'{hint}")
+
+
+def usage(kind: type[CellNode], name: str) -> str:
+    """Return what a node does and its parameters, as ``--help`` prints them."""
+    lines = [
+        f'usage: {name} [--help] [--ros-args -p PARAMETER:=VALUE ... -r FROM:=TO ...]',
+        '',
+        getdoc(kind) or '',
+        '',
+        'parameters:',
+    ]
+    for item in kind.every_setting():
+        lines.append(f'  {item.name} ({_value(item)}{_range(item)})')
+        lines.append(f'      {item.description}')
+    return '\n'.join(lines)
+
+
+def _value(item: Setting) -> str:
+    if isinstance(item.default, bool):
+        return str(item.default).lower()
+    if isinstance(item.default, list):
+        return 'a list of texts'
+    return repr(item.default) if isinstance(item.default, str) else f'{item.default}'
+
+
+def _range(item: Setting) -> str:
+    if item.low is None or item.high is None:
+        return ''
+    return f', {item.low:g} to {item.high:g}'

@@ -18,20 +18,16 @@ import yaml
 
 from weld_twin_core.errors import TwinError
 
-MODULES = {
-    'trajectory_generator': 'weld_twin_nodes.live.trajectory_generator',
-    'error_injector': 'weld_twin_nodes.live.error_injector',
-    'forward_kinematics_twin': 'weld_twin_nodes.live.forward_kinematics_twin',
-    'deviation_analyzer': 'weld_twin_nodes.live.deviation_analyzer',
-    'recorder': 'weld_twin_nodes.live.recorder',
-    'live_diagnosis': 'weld_twin_nodes.live.live_diagnosis',
-    'deviation_markers': 'weld_twin_nodes.live.deviation_markers',
-}
+from ..live.all_nodes import MODULES
+
 GRACE = 20.0
 """Seconds a process has to end after SIGINT before it is killed."""
 AGAIN = 1.0
 """Seconds after which it is told again."""
 LOOK = 0.02
+
+
+__all__ = ['MODULES', 'NodeProcess', 'stop_all']
 
 
 class NodeProcess:

@@ -8,13 +8,11 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module
 from inspect import getdoc
-from typing import TYPE_CHECKING
+from typing import Any
 
 from weld_twin_core.errors import DataError
 
-if TYPE_CHECKING:
-    from .cell_node import CellNode
-    from .settings import Setting
+from .settings import Setting
 
 MODULES = {
     'trajectory_generator': 'weld_twin_nodes.live.trajectory_generator',
@@ -29,13 +27,15 @@ ROS_OWN = ('use_sim_time', 'start_type_description_service')
 """Parameters that every node of ROS 2 takes; so are those that begin with ``qos_overrides``."""
 
 
-def node_class(name: str) -> type[CellNode]:
+def node_class(name: str) -> Any:
     """Return the class of a node by its name, which is that of its file."""
     module = import_module(MODULES[name])
     return next(
         item
         for item in vars(module).values()
-        if isinstance(item, type) and item.__module__ == module.__name__ and hasattr(item, 'usage')
+        if isinstance(item, type)
+        and item.__module__ == module.__name__
+        and hasattr(item, 'every_setting')
     )
 
 
@@ -60,11 +60,13 @@ def refuse_unknown(given: Iterable[str], own: Iterable[str]) -> None:
         if name in others:
             continue
         like = get_close_matches(name, known, n=1)
-        hint = f"; did you mean '{like[0]}'?" if like else f'; there are {", ".join(sorted(known))}'
+        hint = (
+            f"; did you mean '{like[0]}'?" if like else f'; there are {", ".join(sorted(known))}'
+        )
         raise DataError(f"no parameter is called '{name}'{hint}")
 
 
-def usage(kind: type[CellNode], name: str) -> str:
+def usage(kind: Any, name: str) -> str:
     """Return what a node does and its parameters, as ``--help`` prints them."""
     lines = [
         f'usage: {name} [--help] [--ros-args -p PARAMETER:=VALUE ... -r FROM:=TO ...]',

@@ -21,6 +21,7 @@ from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, VOLATILE, Topic
 
 from . import qos_events
+from .all_nodes import refuse_unknown
 from .health import Health, Input
 from .outputs import Output
 from .partners import unheard_publishers, unreached_subscribers
@@ -82,8 +83,9 @@ class CellNode(Node):
         self._waiting: list[Callable[[], None]] = []
         self._partners: list[Callable[[], list[str]]] = []
         self._unmatched: list[str] = []
-        for item in (*SHARED, *self.settings):
+        for item in self.every_setting():
             self.declare_parameter(item.name, item.default, item.descriptor())
+        refuse_unknown(self._parameter_overrides, [item.name for item in self.every_setting()])
         self.health = Health(self.get_fully_qualified_name(), self.setting('stale_after'))
         self.take_robot_name('')
         self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
@@ -94,6 +96,11 @@ class CellNode(Node):
             ),
             post_callback=self._jumped,
         )
+
+    @classmethod
+    def every_setting(cls) -> tuple[Setting, ...]:
+        """Return the parameters of this kind of node."""
+        return (*SHARED, *cls.settings)
 
     def get_logger(self) -> RcutilsLogger:
         """Return the logger of this node."""

@@ -8,6 +8,7 @@ import gc
 import signal
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import rclpy
 from rclpy.exceptions import (
@@ -21,9 +22,11 @@ from rclpy.task import Future
 
 from weld_twin_core.errors import TwinError
 
+from .all_nodes import usage
 from .cell_node import CellNode
 
 USAGE_ERROR = 2
+HELP = ('--help', '-h')
 LOOP = 0.25
 """Seconds of one turn of the loop; also how late an end may be noticed."""
 
@@ -79,7 +82,16 @@ def spin(node: CellNode, stop: Stop) -> None:
 
 
 def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
-    """Run a node until it is done or stopped; return the exit code, 2 for unusable settings."""
+    """
+    Run a node until it is done or stopped; return the exit code, 2 for unusable settings.
+
+    With ``--help`` it prints what the node takes instead.
+    """
+    words = sys.argv[1:] if args is None else args
+    if any(word in HELP for word in words):
+        file = sys.modules[make.__module__].__file__ or 'node'
+        print(usage(make, Path(file).stem))
+        return 0
     stop = Stop()
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node = None

@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Starting nodes: what they take, what they refuse, and the launch files that start them."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+from weld_twin_nodes.live.all_nodes import MODULES, node_class
+
+PACKAGE = Path(__file__).parents[2]
+LAUNCH = ('cell', 'demo')
+
+
+def started(name, *words):
+    return subprocess.run(
+        [sys.executable, '-m', MODULES[name], *words], capture_output=True, text=True, timeout=60
+    )
+
+
+def test_a_mistyped_parameter_is_refused_with_the_one_that_was_meant():
+    result = started('forward_kinematics_twin', '--ros-args', '-p', 'rbot:=ur5')
+    assert result.returncode == 2
+    assert result.stderr.strip() == (
+        "weld_twin: no parameter is called 'rbot'; did you mean 'robot'?"
+    )
+
+
+def test_a_parameter_of_another_node_may_be_in_a_file_for_all(cell, tmp_path):
+    process = cell.start('recorder', out=str(tmp_path / 'bag'), robot='ur5', seed=3)
+    cell.trigger('/recorder/counts')
+    assert process.code is None
+
+
+@pytest.mark.parametrize('name', MODULES)
+def test_help_names_every_parameter_with_its_unit_and_ends(name):
+    result = started(name, '--help')
+    assert result.returncode == 0
+    assert result.stdout.startswith(f'usage: {name} ')
+    for item in node_class(name).every_setting():
+        assert f'\n  {item.name} (' in result.stdout
+        assert item.description in result.stdout
+    assert result.stderr == ''
+
+
+def tree_of(name):
+    return ast.parse((PACKAGE / 'launch' / f'{name}.launch.py').read_text())
+
+
+def constant(tree, name):
+    """Return the value of a name that a launch file assigns at its top."""
+    for item in tree.body:
+        if isinstance(item, ast.Assign) and item.targets[0].id == name:
+            return item.value
+    raise AssertionError(name)
+
+
+def test_the_launch_files_start_nodes_there_are():
+    assert set(ast.literal_eval(constant(tree_of('demo'), 'LISTENERS'))) <= set(MODULES)
+    nodes = constant(tree_of('cell'), 'NODES')
+    assert {key.value for key in nodes.keys} <= set(MODULES)
+
+
+def test_the_cell_hands_each_node_only_parameters_it_has():
+    tree = tree_of('cell')
+    shared = ast.literal_eval(constant(tree, 'MODEL'))
+    arguments = ast.literal_eval(constant(tree, 'ARGUMENTS'))
+    nodes = constant(tree, 'NODES')
+    for name, taken in zip(nodes.keys, nodes.values, strict=True):
+        own = [e.value for e in taken.elts if isinstance(e, ast.Constant)]
+        if any(isinstance(e, ast.Starred) for e in taken.elts):
+            own += shared
+        known = {item.name for item in node_class(name.value).every_setting()}
+        assert set(own) <= known, name.value
+        assert set(own) <= set(arguments)
+    assert set(ast.literal_eval(constant(tree, 'TOPICS')).values()) <= set(arguments)
+
+
+@pytest.mark.parametrize('name', LAUNCH)
+def test_a_launch_file_sets_nothing_for_whoever_includes_it(name):
+    called = {
+        node.func.id
+        for node in ast.walk(tree_of(name))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    }
+    assert 'SetEnvironmentVariable' not in called
+    assert 'additional_env' in (PACKAGE / 'launch' / f'{name}.launch.py').read_text()
+
+
+@pytest.mark.parametrize('name', LAUNCH)
+def test_the_parameter_files_name_parameters_there_are(name):
+    sections = yaml.safe_load((PACKAGE / 'config' / f'{name}.yaml').read_text())
+    every = {item.name for node in MODULES for item in node_class(node).every_setting()}
+    for section, content in sections.items():
+        node = section.rpartition('/')[2]
+        known = every if node == '**' else {i.name for i in node_class(node).every_setting()}
+        assert set(content['ros__parameters']) <= known, section
+
+
+@pytest.mark.parametrize('name', LAUNCH)
+def test_launch_describes_it_and_keeps_the_environment(name):
+    pytest.importorskip('launch_ros.actions', reason='launch_ros is not on this machine')
+    import launch
+    from launch.launch_description_sources import PythonLaunchDescriptionSource
+
+    before = dict(os.environ)
+    source = PythonLaunchDescriptionSource(str(PACKAGE / 'launch' / f'{name}.launch.py'))
+    description = source.get_launch_description(launch.LaunchContext())
+    assert len(description.entities) > len(MODULES) - 2
+    assert dict(os.environ) == before

@@ -21,8 +21,8 @@ class ChannelError(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return the parameter on the channel."""
-        site = (self.channel, view.robot.index(str(self.site)))
-        return single(site, self.number(self.parameters[0].name), view)
+        channel = (self.channel, view.robot.index(str(self.site)))
+        return single(channel, self.number(self.parameters[0].name), view)
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return one: the displacement is the parameter."""

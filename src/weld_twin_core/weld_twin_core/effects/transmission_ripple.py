@@ -83,10 +83,10 @@ class TransmissionRipple(Effect):
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return d/d amplitude of every order, None for the orders, d/d phase of every order."""
-        site = ('q', view.robot.index(self.joint))
+        channel = ('q', view.robot.index(self.joint))
         terms = list(self._terms(view))
-        amplitude: list[Shift | None] = [{site: np.sin(angle)} for _, _, angle in terms]
-        phase: list[Shift | None] = [{site: a * np.cos(angle)} for a, _, angle in terms]
+        amplitude: list[Shift | None] = [{channel: np.sin(angle)} for _, _, angle in terms]
+        phase: list[Shift | None] = [{channel: a * np.cos(angle)} for a, _, angle in terms]
         return amplitude + [None] * len(terms) + phase
 
     def slope(self, view: View) -> Shift:
@@ -166,9 +166,9 @@ class TransmissionRipple(Effect):
 
     def atoms(self, view: View) -> list[Shift]:
         """Return sine and cosine of every order, so that amplitude and phase become linear."""
-        site = ('q', view.robot.index(self.joint))
-        theta = view.joint(site[1])
-        return [{site: f(n * theta)} for n in self.orders() for f in (np.sin, np.cos)]
+        channel = ('q', view.robot.index(self.joint))
+        theta = view.joint(channel[1])
+        return [{channel: f(n * theta)} for n in self.orders() for f in (np.sin, np.cos)]
 
     def from_atoms(self, coefficients: Array) -> TransmissionRipple:
         """Return amplitude and phase of sine and cosine coefficients, pairs in `atoms` order."""

@@ -118,6 +118,6 @@ class Features:
         return seeds, kind.trials(view, joint) or float(len(seeds))
 
 
-def sites(kind: type[Effect], joints: Sequence[str]) -> Sequence[str | None]:
+def joints_of(kind: type[Effect], joints: Sequence[str]) -> Sequence[str | None]:
     """Return the joints an effect can sit on, or one None for effects of the whole robot."""
     return joints if kind.of in ('joint', 'link') else (None,)

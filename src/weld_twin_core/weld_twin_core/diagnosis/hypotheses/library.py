@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
-from ...twin.features import Features, sites
+from ...twin.features import Features, joints_of
 from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
 from .still_joints import REASON, hardly_moves
@@ -82,8 +82,8 @@ class Library:
         return None
 
 
-def families(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]]:
-    """Return the families that may be a cause, in the order of their stages."""
+def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]]:
+    """Return the kinds of effect that may be a cause, in the order of their stages."""
     kinds = [
         kind
         for kind in REGISTRY.values()
@@ -120,8 +120,8 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
     fixed = np.arange(count)
     units: list[Unit] = []
     absent = dict.fromkeys(exclude, 'excluded by the user')
-    for kind in families(exclude, problem.align):
-        for joint in sites(kind, model.robot.joint_names):
+    for kind in candidate_kinds(exclude, problem.align):
+        for joint in joints_of(kind, model.robot.joint_names):
             reason = _applicable(kind, joint, features)
             if reason is not None:
                 absent[kind.name] = reason

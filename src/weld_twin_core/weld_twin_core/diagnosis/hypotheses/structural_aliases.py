@@ -19,7 +19,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ...recording import JointMotion, Recording
-from ...twin.features import Features, sites
+from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
 from ..algebra.fit import fit
 from ..beliefs import Beliefs
@@ -90,7 +90,7 @@ def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> It
         kind = REGISTRY[name]
         if kind.fitted_with in align:
             continue
-        for joint in sites(kind, robot.joint_names):
+        for joint in joints_of(kind, robot.joint_names):
             yield kind(**({'joint': joint} if joint is not None else {}))
 
 

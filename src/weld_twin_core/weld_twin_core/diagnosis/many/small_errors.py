@@ -17,12 +17,12 @@ import numpy as np
 from ...arrays import Array
 from ...effects import REGISTRY
 from ...effects.effect import Effect, Stage, View
-from ...twin.features import sites
+from ...twin.features import joints_of
 from ..algebra.fit import Fit, robust_scale
 from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
-from ..hypotheses.library import families
+from ..hypotheses.library import candidate_kinds
 from ..hypotheses.still_joints import hardly_moves
 from .shrinkage import shrunk_fit, shrunk_step
 from .wave_lines import with_lines
@@ -77,11 +77,11 @@ def _everything(
     # All joints' pairs of coordinates together stay below half the rows.
     most = problem.size // (4 * model.robot.n)
     out: list[Effect] = []
-    for kind in families(exclude, problem.align):
+    for kind in candidate_kinds(exclude, problem.align):
         if kind.stage in (Stage.SERVO, Stage.CLOCK) or not kind.common:
             out += [e for e in model.found if e.name == kind.name]
             continue
-        for joint in sites(kind, model.robot.joint_names):
+        for joint in joints_of(kind, model.robot.joint_names):
             if kind.applicable(view, joint) is None:
                 small = _small(kind, view, joint, most, beliefs, have)
                 out += [effect for effect in small if not hardly_moves(features, effect)]

@@ -24,7 +24,7 @@ def gathered(
     unseen: Unseen,
     leftover: Structure,
     shrink: Shrink,
-    noise: NoiseFloor,
+    floor: NoiseFloor,
     beliefs: Beliefs,
 ) -> Evidence:
     """
@@ -39,7 +39,7 @@ def gathered(
         What generic columns still find beside it.
     shrink : Shrink
         On held-out recordings or on stretches taking their turn.
-    noise : NoiseFloor
+    floor : NoiseFloor
     beliefs : Beliefs
 
     """
@@ -49,9 +49,9 @@ def gathered(
         structure=leftover,
         gap=shrink.rms_before_m,
         after=shrink.rms_after_m,
-        floor=noise.rms_m,
+        floor=floor.rms_m,
         fitted=unseen.rms(unseen.predict(everything)),
-        independent=noise.independent,
+        independent=floor.independent,
         parts=_parts(unseen),
         causes=tuple(_causes(slot[0]) for slot in found.slots),
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),

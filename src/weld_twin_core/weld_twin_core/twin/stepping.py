@@ -107,8 +107,10 @@ class LiveTwin:
 
         """
         q = self._checked(t, q)
-        step = self._command.since_before(t, q)
-        qd = step if qd is None else np.asarray(qd, dtype=np.float64)
+        if qd is None:
+            qd = self._command.since_before(t, q)
+        else:
+            self._command.remember(t, q)
         if not self.twin.effects:
             return q.copy(), self._nominal(q)
         view = self._remembered(t, self._view(t, q, qd, wrench, temperature, wrench_frame))
@@ -185,14 +187,15 @@ class LiveTwin:
         effects = in_series(self.twin.effects)
         if not effects:
             return view
-        command = view.q
-        for _, effect in effects:
+        q = view.q
+        for k, (_, effect) in enumerate(effects):
             key = (seen[effect.key], *effect.key)
             seen[effect.key] += 1
-            shift, self._states[key] = effect.run(view, self._states.get(key))
-            view = replace(view, q=added(view.q, shift))
-        moved = self._moved.since_before(t, (view.q - command)[0])
-        return replace(view, qd=view.qd + moved)
+            now = replace(view, q=q) if k else view
+            shift, self._states[key] = effect.run(now, self._states.get(key))
+            q = added(q, shift)
+        moved = self._moved.since_before(t, (q - view.q)[0])
+        return replace(view, q=q, qd=view.qd + moved)
 
 
 class Rate:
@@ -201,9 +204,14 @@ class Rate:
     def __init__(self) -> None:
         self._before: tuple[float, Array] | None = None
 
+    def remember(self, t: float, values: Array) -> None:
+        """Take values whose rate is not asked for."""
+        self._before = t, values.copy()
+
     def since_before(self, t: float, values: Array) -> Array:
         """Return the rate since the call before, shape as values [1/s]; zero at the first."""
-        before, self._before = self._before, (t, values.copy())
+        before = self._before
+        self.remember(t, values)
         if before is None or t <= before[0]:
             return np.zeros_like(values)
         return (values - before[1]) / (t - before[0])

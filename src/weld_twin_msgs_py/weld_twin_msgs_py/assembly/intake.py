@@ -17,7 +17,7 @@ from weld_twin_core.arrays import Array
 
 from ..messages import from_messages
 from .frame_names import MeasuringFrame, WrenchFrame
-from .joint_states import JointStates
+from .joint_states import JointSample, JointStates
 from .stamp_order import Forward
 
 
@@ -122,13 +122,21 @@ class Intake:
             self.measuring_frame.take(message.header.frame_id)
         return Taken(stamp, row, self._orders[role].restarted_at(stamp))
 
-    def _joints(self, message: Any) -> Taken | None:
+    def joint_sample(self, message: Any) -> tuple[JointSample, bool] | None:
+        """Return the sample of a joint state, and whether it begins a new run; as `take`."""
         sample = self.joints.take(message)
         if sample is None:
             return None
-        qd = np.full(sample.q.size, nan) if sample.qd is None else sample.qd
-        restarted = self._orders[Role.JOINTS].restarted_at(sample.stamp)
-        return Taken(sample.stamp, np.concatenate([sample.q, qd]), restarted)
+        return sample, self._orders[Role.JOINTS].restarted_at(sample.stamp)
+
+    def _joints(self, message: Any) -> Taken | None:
+        taken = self.joint_sample(message)
+        if taken is None:
+            return None
+        (stamp, q, qd), restarted = taken
+        row = np.empty(2 * q.size)
+        row[: q.size], row[q.size :] = q, nan if qd is None else qd
+        return Taken(stamp, row, restarted)
 
     def _wrench_row(self, message: Any) -> Array:
         row = from_messages.wrench(message)

@@ -88,7 +88,8 @@ class JointStates:
 
         """
         stamp = from_messages.stamp_ns(message)
-        if message.name is self._usual:  # the decoder repeats the very object
+        # A node's decoder repeats the very object, which is quicker than to compare the names.
+        if message.name is self._usual or message.name == self._usual:
             quick = self._quick(stamp, message)
             if quick is not None:
                 return quick
@@ -109,16 +110,16 @@ class JointStates:
     def _quick(self, stamp: int, message: Any) -> JointSample | None:
         """Return the sample of a message with the names of the last one, None if in doubt."""
         position, velocity, count = message.position, message.velocity, len(message.name)
-        if len(position) != count or len(velocity) != count:
+        if len(position) != count or len(velocity) not in (0, count):
             return None
         q = [position[k] for k in self._index]
-        qd = [velocity[k] for k in self._index]
+        qd = [velocity[k] for k in self._index] if len(velocity) else []
         for value, (low, high) in zip(q, self._ranges, strict=True):
             if not low <= value <= high:
                 return None
         if not (isfinite(sum(q)) and isfinite(sum(qd))):
             return None
-        return JointSample(stamp, np.array(q), np.array(qd))
+        return JointSample(stamp, np.array(q), np.array(qd) if qd else None)
 
     def _check(self, q: Array) -> None:
         """Refuse what lies beyond the limits; the robot has the sentence."""

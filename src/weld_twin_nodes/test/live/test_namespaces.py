@@ -25,6 +25,7 @@ from weld_twin_msgs_py.messages.topics import (
     TopicNames,
 )
 from weld_twin_msgs_py.robots import write_urdf
+from weld_twin_nodes.cli.main import main
 from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.error_injector import ErrorInjector
@@ -71,7 +72,7 @@ def two(cell, tmp_path):
     return cell, recorders
 
 
-def test_two_robots_in_namespaces_are_recorded_and_told_apart(two, tmp_path):
+def test_two_robots_in_namespaces_are_recorded_and_told_apart(two, tmp_path, capsys):
     two, recorders = two
     heard = two.collect(DIAGNOSTICS.name)
     deviations = {name: two.collect(f'/{name}/deviation', Vector3Stamped) for name in ROBOTS}
@@ -105,7 +106,7 @@ def test_two_robots_in_namespaces_are_recorded_and_told_apart(two, tmp_path):
         two.wait(lambda wanted=wanted: wanted <= told_of(heard), f'the health of {node}')
     for node in recorders:
         two.remove(node)
-    told_apart_in_bags(tmp_path, run)
+    told_apart_in_bags(tmp_path, run, capsys)
 
 
 def told_of(heard):
@@ -113,11 +114,13 @@ def told_of(heard):
     return {(s.name, s.hardware_id) for message in heard.messages for s in message.status}
 
 
-def told_apart_in_bags(tmp_path, run):
+def told_apart_in_bags(tmp_path, run, capsys):
     for name, robot in ROBOTS.items():
         with BagReader(tmp_path / name) as bag:
             spaces = {topic.split('/')[1] for topic, (_, count) in bag.topics.items() if count}
         assert spaces - {'diagnostics'} == {name}
+        assert main(['info', str(tmp_path / name), '--namespace', name]) == 0
+        assert f'/{name}/measured/tool_pose' in capsys.readouterr().out
         back = read_recording(tmp_path / name, load(robot), TopicNames.within(name))
         assert (back.joints.t.size, back.measured.t.size) == (run.t.size, run.t.size)
 

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from weld_twin_core.arrays import Array
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
@@ -112,22 +110,21 @@ class JointStream:
             The message cannot be used; nothing has changed then.
 
         """
-        taken = self._intake.take(Role.JOINTS, message)
+        taken = self._intake.joint_sample(message)
         if taken is None:
             return None
-        stamp, row, restarted = taken
+        (stamp, q, qd), restarted = taken
         if restarted:
             self._forget()
         if self._epoch is None:
             self._epoch = stamp
-        n = self.twin.robot.n
         wrench, frame = self._wrench.at(stamp), self._intake.wrench_frame.meaning
         warm = self._temperature.at(stamp)
         temperature = None if warm is None else float(warm[0])
         joints, poses = self._live.step(
             (stamp - self._epoch) * 1e-9,
-            row[:n],
-            None if np.isnan(row[n:]).any() else row[n:],
+            q,
+            qd,
             wrench,
             temperature,
             frame,

@@ -35,6 +35,7 @@ from scipy.linalg import qr, solve_triangular
 from ..arm.bulk.buffers import aligned, unbuffered
 from ..arm.bulk.half_angle import sincos
 from ..arm.robot import Robot
+from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from ..errors import ModelError
 
@@ -99,6 +100,8 @@ class SeamDraws:
         self.robot = robot
         features = _features(q[:, 1:SPLIT]), _features(q[:, SPLIT:])
         self._count = len(q)
+        turn = rotation_matrix(q[:, :1] * np.array([0.0, 0.0, 1.0]))
+        self._first = robot.T_world_base[:3, :3] @ turn
         self.samples: NDArray[np.int_] = np.arange(len(q))
         self.spread: Array | None = None
         self.remainder = 0.0
@@ -132,6 +135,32 @@ class SeamDraws:
             for part, squares in self._squares(draws, None):
                 np.sqrt(squares, out=out[part])
         return out
+
+    def deviations(self, draws: DhDraws) -> Array:
+        """
+        Return deviations of the tool point from the nominal one in the world, (D, N, 3) [m].
+
+        Parameters
+        ----------
+        draws : DhDraws, shape (D, n) each
+
+        """
+        out = np.empty((len(draws.theta), self._count, 3))
+        with unbuffered():
+            for start in range(0, len(out), BLOCK):
+                part = slice(start, start + BLOCK)
+                away = self._away(DhDraws(*(values[part] for values in draws)))
+                out[part] = np.einsum('nij,jdn->dni', self._first, away, optimize=True)
+        return out
+
+    def _away(self, draws: DhDraws) -> Array:
+        """Return deviations before the first joint's turn, shape (3, D, N), of a few draws."""
+        if self.spread is None:
+            near, far = self._pieces(draws)
+            memory = aligned(5, 3 * len(draws.theta) * self._count)
+            return self._points(near, far, memory) - self._nominal
+        few = self._carried(draws) - self._nominal
+        return np.asarray((self.spread @ few).transpose(0, 2, 1))
 
     def _squares(
         self, draws: DhDraws, determining: _Determining | None

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Array, readonly
 from ..errors import ModelError
+from .dh_draws import DhStudy, dh_study
 from .expansion import CHUNK, Expansion, expand, expandable
 from .outcome import Outcomes, joined, outcomes
 from .seam_study import Study
@@ -36,6 +37,8 @@ class Model:
     error : float
         Largest difference of a deviation to the exact twin, relative to the largest deviation of
         its run, over the runs compared; 0 for exact runs.
+    fast : DhStudy, optional
+        Runs draws of nothing but DH values exactly.
 
     """
 
@@ -43,6 +46,7 @@ class Model:
     tolerances: tuple[Tolerance, ...]
     expansion: Expansion | None
     error: float
+    fast: DhStudy | None = None
 
     def __call__(self, draws: Array) -> Outcomes:
         """Return what runs come to, draws shape (D, P)."""
@@ -52,9 +56,14 @@ class Model:
         rows = max(1, CHUNK // self.study.samples)
         parts = []
         for start in range(0, len(wanted), rows):
-            off = exact_deviations(self.study, self.tolerances, wanted[start : start + rows])
-            parts.append(outcomes(np.moveaxis(off, -1, 0), self.study.length))
+            parts.append(outcomes(self._exact(wanted[start : start + rows]), self.study.length))
         return joined(parts)
+
+    def _exact(self, draws: Array) -> Array:
+        """Return deviations, components first, shape (3, D, N) [m]."""
+        if self.fast is not None:
+            return self.fast.deviations(draws)
+        return np.moveaxis(exact_deviations(self.study, self.tolerances, draws), -1, 0)
 
     def at_probabilities(self, unit: Array) -> Outcomes:
         """Return what runs come to at probabilities of every tolerance, shape (D, P)."""
@@ -72,7 +81,8 @@ def model(
     study : Study
     tolerances : sequence of Tolerance
     exact : bool
-        Run every draw through the exact twin.
+        Run every draw exactly: those of nothing but DH values by `kernels.draws`, all others
+        through the twin.
     seed : int
         Chooses the runs on which the expansion is compared.
 
@@ -85,11 +95,11 @@ def model(
     if not tolerances:
         raise ModelError('a study needs at least one tolerance')
     if exact or not expandable(tolerances):
-        return Model(study, tuple(tolerances), None, 0.0)
+        return Model(study, tuple(tolerances), None, 0.0, dh_study(study, tolerances))
     expansion = expand(study, tolerances)
     error = _disagreement(expansion, np.random.default_rng(seed))
     if error > _AGREED:
-        return Model(study, tuple(tolerances), None, 0.0)
+        return Model(study, tuple(tolerances), None, 0.0, dh_study(study, tolerances))
     return Model(study, tuple(tolerances), expansion, error)
 
 

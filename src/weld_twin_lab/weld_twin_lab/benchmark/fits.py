@@ -15,10 +15,10 @@ from weld_twin_core.arm.channels import Channel
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import left_jacobian, rotation_matrix
 from weld_twin_core.arrays import Array
-from weld_twin_core.kernels.calibration import calibrate, linearised, minimal_channels, moved
 from weld_twin_core.motion.inverse import solve_path
 
 from .arms import SIZE, arm_of, random_positions, smooth_motion
+from .calibration import calibrate, linearised, minimal_channels, moved
 from .kinematics import OWN
 from .race import Contender, Workload
 

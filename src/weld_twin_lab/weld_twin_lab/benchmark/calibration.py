@@ -24,11 +24,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 
-from ..arm.bulk import BulkKernel
-from ..arm.channels import Channel
-from ..arm.robot import Robot
-from ..arm.rotation import rotation_matrix, transform
-from ..arrays import Array
+from weld_twin_core.arm.bulk import BulkKernel
+from weld_twin_core.arm.channels import Channel
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import rotation_matrix, transform
+from weld_twin_core.arrays import Array
 
 SETTLED = 1e-12
 """Step [m, rad] that ends the iteration."""

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from weld_twin_core.arm import chain
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import angle_between, rotation_matrix, transform
-from weld_twin_core.kernels.calibration import calibrate, linearised, minimal_channels
+from weld_twin_lab.benchmark.calibration import calibrate, linearised, minimal_channels
 
 EXACT = 1e-13
 KEYS = ('theta', 'd', 'a', 'alpha')

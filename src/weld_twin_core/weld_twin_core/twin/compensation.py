@@ -122,19 +122,28 @@ def compensate(
 
     """
     acting = tuple(e for e in effects if _commandable(e))
-    real, nominal = Twin(robot, acting), Twin(robot)
-    wanted, first = nominal.poses(recording), real.poses(recording)
+    real = Twin(robot, acting)
+    wanted, first = Twin(robot).poses(recording), real.poses(recording)
     before = _missing(wanted, first)
-    motion = recording.joints
     goal = wanted if trust is None else _part_way(first, before, trust)
-    coupled = any(isinstance(effect, MemoryEffect) for effect in acting)
+    q = _solved(real, recording, goal, rounds)
+    motion = _commands(recording.joints, q)
+    after = _missing(wanted, real.poses(replace(recording, joints=motion)))
+    left_out = tuple(e for e in effects if not _commandable(e))
+    return Compensation(motion, -before, -after, left_out)
+
+
+def _solved(real: Twin, recording: Recording, goal: Poses, rounds: int) -> Array:
+    """Return the joint positions, shape (N, n), that put the real tool where it is to be."""
+    motion = recording.joints
+    coupled = any(isinstance(effect, MemoryEffect) for effect in real.effects)
     q, share = motion.q, np.ones((motion.t.size, 1))
-    error = _missing(goal, first)
+    error = _missing(goal, real.poses(recording))
     for _ in range(rounds):
         live = (np.abs(error).max(axis=1, keepdims=True) > _CLOSED) & (share > _LEAST_SHARE)
         if not live.any():
             break
-        step = least_step(chain_jacobian(robot, frames(robot, q)), error, _SINGULAR)
+        step = least_step(chain_jacobian(real.robot, frames(real.robot, q)), error, _SINGULAR)
         trial = replace(recording, joints=_commands(motion, q + share * step))
         left = _missing(goal, real.poses(trial))
         helps = np.linalg.norm(left, axis=1) < np.linalg.norm(error, axis=1)
@@ -143,11 +152,7 @@ def compensate(
         q = np.where(helps[:, None], trial.joints.q, q)
         error = np.where(helps[:, None], left, error)
         share = np.where(helps[:, None], share, 0.5 * share)
-    left_out = tuple(e for e in effects if not _commandable(e))
-    if trust is not None:
-        final = replace(recording, joints=_commands(motion, q))
-        error = _missing(wanted, real.poses(final))
-    return Compensation(_commands(motion, q), -before, -error, left_out)
+    return np.asarray(q)
 
 
 def _part_way(start: Poses, missing: Array, share: Array) -> Poses:

@@ -16,6 +16,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects.setup_motion import seen_from
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
+from weld_twin_core.twin.twin import Twin
 
 HOLD = 0.9
 Mask = NDArray[np.bool_]
@@ -64,9 +65,7 @@ def held(
     posterior, measured = diagnosis.posterior, other.measured
     assert posterior is not None
     assert measured is not None
-    model = diagnosis.model
-    found = seen_from(model.found, train.epoch_ns, train.span_ns, other)
-    twin = Model(model.robot, model.bases[:1], model.known, found).twin(0)
+    twin = _twin(diagnosis.model, train, other)
     use = _within(other, measured) if good is None else good & _within(other, measured)
     t = measured.t[use]
     errors = measured.position[use] - twin.poses(other, t).position
@@ -84,6 +83,12 @@ def held(
         'median_sigma_m': float(np.median(largest_sigma(covariances))) if t.size else None,
         'largest_error_m': float(size.max()) if t.size else None,
     }
+
+
+def _twin(model: Model, train: Recording, other: Recording) -> Twin:
+    """Return the model of a recording for another."""
+    found = seen_from(model.found, train.epoch_ns, train.span_ns, other)
+    return Model(model.robot, model.bases[:1], model.known, found).twin(0)
 
 
 def flagged(posterior: Posterior, other: Recording, t: Array) -> Mask:

@@ -400,6 +400,19 @@ def test_where_it_was_measured_the_twin_is_sure_within_the_noise(cell, found, tm
     assert json.loads((out / 'prediction.json').read_text()) == {'outside': []}
 
 
+def test_the_table_of_a_prediction_has_columns_for_sigma(cell, found, tmp_path):
+    model, table = found / 'diagnosis.json', tmp_path / 'poses.csv'
+    words = ('--robot', 'ur5', '--model', model, '--out', tmp_path / 'p', '--table', table)
+    assert run('predict', cell / 'second', *words) == 0
+    rows = list(csv.DictReader(table.open()))
+    _, position, covariance = covariances(tmp_path / 'p')
+    got = np.array([[float(row[f'{axis}_m']) for axis in 'xyz'] for row in rows])
+    np.testing.assert_allclose(got, position, atol=1e-8)
+    sigma = np.array([[float(row[f'sigma_{axis}_m']) for axis in 'xyz'] for row in rows])
+    np.testing.assert_allclose(sigma**2, covariance[:, range(3), range(3)], rtol=1e-6)
+    assert {row['outside'] for row in rows} <= {'0', '1'}
+
+
 def test_a_joint_taken_beyond_what_was_recorded_is_told_with_its_time(cell, found, tmp_path):
     data = json.loads((found / 'diagnosis.json').read_text())
     high = data['posterior']['recorded']['joints'][3]['measured'][-1][1]

@@ -112,18 +112,9 @@ def allowed(
 
     """
     recordings = problem.recordings
-    problem, scale = _thinned(problem, scale)
-    scale = replace(
-        scale,
-        position=max(scale.position, LEAST),
-        orientation=max(scale.orientation, LEAST_TURN * LEAST),
-    )
-    effects = plausible_arm.directions(model.robot, model.found)
-    frames = tuple(frame for frame in ('base', 'tool') if frame in problem.align)
-    knots = plausible_arm.fine_knots([_joints(r) for r in problem.recordings])
-    what = Directions(frames, len(problem.recordings), effects, knots)
-    rows = _rows(problem, model, scale, what)
-    prior = _prior(what, model)
+    problem, scale = _thinned(problem, _noisy(scale))
+    what = _directions(problem, model)
+    rows, prior = _rows(problem, model, scale, what), _prior(what, model)
     width, noise = learned(rows, prior, _expected(problem, scale))
     mean, covariance = conditioned(rows, prior, width, noise)
     unseen = _unseen(problem, model, scale, precision, rows)
@@ -132,17 +123,34 @@ def allowed(
         return conditioned(rows.kept(keep), prior, width, noise)
 
     left = leftover(problem, scale, unseen, given, floor)
-    ends = what.count - np.cumsum([k.size for k in reversed(knots)])[::-1]
-    rest = plausible_arm.discrepancy(model.robot, left, width[ends])
+    ends = what.count - np.cumsum([k.size for k in reversed(what.knots)])[::-1]
     posterior = Posterior(
         what,
         mean,
         covariance,
-        rest,
+        plausible_arm.discrepancy(model.robot, left, width[ends]),
         Domain.of(recordings, model.robot),
         left_open(problem, model, scale),
     )
     return _with_usual_sigma(posterior, model, problem)
+
+
+def _noisy(scale: Scale) -> Scale:
+    """Return a scale with some noise at least."""
+    return replace(
+        scale,
+        position=max(scale.position, LEAST),
+        orientation=max(scale.orientation, LEAST_TURN * LEAST),
+    )
+
+
+def _directions(problem: Problem, model: Model) -> Directions:
+    return Directions(
+        tuple(frame for frame in ('base', 'tool') if frame in problem.align),
+        len(problem.recordings),
+        plausible_arm.directions(model.robot, model.found),
+        plausible_arm.fine_knots([_joints(r) for r in problem.recordings]),
+    )
 
 
 def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> Posterior:

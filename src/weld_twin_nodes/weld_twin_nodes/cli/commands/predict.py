@@ -25,6 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='N',
         help='where the set-up moved between the recordings of the diagnosis: which of them',
     )
+    parser.add_argument(
+        '--table', metavar='FILE.csv', help='the poses as a table too, with standard deviations'
+    )
     add_bag_output(parser)
     add_topics(parser)
 
@@ -34,12 +37,15 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.bags import read_recording
 
     from ...offline.prediction import predictor, told_sureness, write_prediction
+    from ...offline.prediction_table import write_prediction_table
 
     robot = robot_of(args)
     recording = read_recording(args.bag, robot, topics_of(args))
     model = predictor(robot, args.model, args.bag, recording, args.setup)
     made = {'model': str(args.model)}
     got = write_prediction(args.out, model, recording, storage=args.storage, provenance=made)
+    if args.table:
+        write_prediction_table(args.table, model, recording)
     line = f'{args.out}: {recording.joints.t.size} poses with {len(model.twin.effects)} effects'
     if got.rms_m is not None:
         line += f'; measured minus twin RMS {got.rms_m * 1e3:.4f} mm'

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import signal
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -222,3 +224,55 @@ def test_a_recorder_in_a_namespace_records_its_own_cell(cell, tmp_path):
     cell.remove(node)
     with BagReader(tmp_path / 'bag') as reader:
         assert reader.topics['/left/joint_states'][1] == 3
+
+
+def test_a_played_bag_is_recorded_whole_and_counted(cell, tmp_path):
+    process = recorder(cell, tmp_path)
+    bag = Path(__file__).parents[4] / 'bags/elbow_play'
+    words = [str(bag), '--rate', '8', '--wait', '60', '--topics', '/joint_states', '/deviation']
+    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'play', *words])
+    cell.wait(lambda: player.code is not None, 'the bag to be played', limit=120.0)
+    assert finish(cell, process) == 0
+    told = provenance(tmp_path / 'bag')['completeness']
+    with BagReader(bag) as reader:
+        for topic in ('/joint_states', '/deviation'):
+            count = reader.topics[topic][1]
+            assert told[topic] == {'sent': count, 'recorded': count, 'missing': 0}
+
+
+def test_a_player_says_whom_nobody_listens_to(cell):
+    bag = Path(__file__).parents[4] / 'bags/elbow_play'
+    words = [str(bag), '--rate', '100', '--wait', '0.5', '--topics', '/deviation']
+    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'play', *words])
+    assert player.end(60.0) == 0
+    assert 'waited 0.5 s for 1 subscribers of /deviation; playing without' in player.log
+
+
+LISTENERS = {
+    'deviation_analyzer': 0,
+    'forward_kinematics_twin': 1,
+    'error_injector': 1,
+    'trajectory_generator': 2,
+}
+"""Of the main outputs without the recorder, as demo.launch.py has them."""
+
+
+@pytest.mark.parametrize('way', ['launched', 'by hand'])
+def test_a_cell_is_recorded_from_the_first_to_the_last_message(cell, tmp_path, way):
+    process = cell.start('recorder', out=str(tmp_path / 'bag'), reliable_inputs=way == 'launched')
+    motion = {'profile': 'aggressive', 'playback': 4.0, 'exit_when_done': True}
+    for name, count in LISTENERS.items():
+        own = motion if name == 'trajectory_generator' else {}
+        if way == 'launched':
+            own = {**own, 'wait_for_subscribers': count + 1, 'reliable_inputs': True}
+        cell.start(name, **own)
+    generator = cell.processes[-1]
+    cell.wait(lambda: generator.code is not None, 'the motion to end', limit=120.0)
+    assert finish(cell, process) == 0
+    told = provenance(tmp_path / 'bag')['completeness']
+    sent = told['/joint_states']['sent']
+    assert sent > 100
+    for topic in ('/actual/joint_states', '/measured/tool_pose', '/twin/tool_pose'):
+        assert told[topic] == {'sent': sent, 'recorded': sent, 'missing': 0}, process.log
+    assert told['/deviation']['missing'] == told['/joint_states']['missing'] == 0
+    assert bag_info(tmp_path / 'bag').incomplete == ()

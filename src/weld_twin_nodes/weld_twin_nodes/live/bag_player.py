@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import rclpy
 from rclpy.duration import Duration
@@ -18,14 +18,19 @@ from rosgraph_msgs.msg import Clock
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BagReader
+from weld_twin_msgs_py.bags.reader import has_header
 from weld_twin_msgs_py.messages.to_messages import ros_messages
-from weld_twin_msgs_py.messages.topics import BY_NAME, RELIABLE, Qos, Topic
+from weld_twin_msgs_py.messages.topics import BY_NAME, DIAGNOSTICS, RELIABLE, Qos, Topic
+
+from .health import Health
+from .outputs import Output
 
 CLOCK = '/clock'
 SETTLE = 0.2
 """Seconds for the other side to see us, and for a clock that was set back to be noticed."""
 LOOK = 0.02
 ACKNOWLEDGED = 5.0
+TELL_EVERY = 1.0
 
 
 class Playing(NamedTuple):
@@ -70,16 +75,20 @@ def play(bag: Path | str, how: Playing, tell: Callable[[str], None]) -> int:
     if not 0.0 < how.rate < float('inf'):
         raise DataError(f'the rate must be positive, got {how.rate:g}')
     with BagReader(bag) as reader, _node() as node:
-        publishers = _publishers(node, reader, how, tell)
-        ticker = _Ticker(node, how) if how.clock else None
-        _await(publishers, how)
+        outputs = _outputs(node, reader, how, tell)
+        clock = _Ticker(node, how) if how.clock else None
+        teller = _Teller(node, outputs.values())
+        _await(node, outputs, how, tell)
         count = rounds = 0
-        while how.loop == 0 or rounds < how.loop:
-            count += _once(reader, publishers, how.rate, ticker)
-            rounds += 1
-            for publisher in publishers.values():
-                publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED))
-            time.sleep(SETTLE)
+        try:
+            while how.loop == 0 or rounds < how.loop:
+                count += _once(reader, outputs, how.rate, clock, teller)
+                rounds += 1
+                for output in outputs.values():
+                    output.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED))
+                time.sleep(SETTLE)
+        finally:
+            teller.tell()
         return count
 
 
@@ -110,9 +119,36 @@ class _Ticker:
         self.next = time.monotonic() + self._period
 
 
-def _publishers(
+class _Teller:
+    """Tells on /diagnostics what was published, so that a recorder knows what it lacks."""
+
+    def __init__(self, node: Node, outputs: Iterable[Output]) -> None:
+        self._health = Health(node.get_fully_qualified_name(), float('inf'))
+        self._health.outputs.extend(outputs)
+        self._publisher = node.create_publisher(
+            DIAGNOSTICS.message_class(), DIAGNOSTICS.name, DIAGNOSTICS.offered.to_rclpy()
+        )
+        self._messages = ros_messages()
+        self._next = 0.0
+
+    def now_and_then(self) -> None:
+        """Tell, unless it was told within the last second."""
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + TELL_EVERY
+            self._publish()
+
+    def tell(self) -> None:
+        """Tell the last word, and stay until it is heard."""
+        self._publish()
+        self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED))
+
+    def _publish(self) -> None:
+        self._publisher.publish(self._messages.statuses(time.time_ns(), self._health.statuses()))
+
+
+def _outputs(
     node: Node, reader: BagReader, how: Playing, tell: Callable[[str], None]
-) -> dict[str, Any]:
+) -> dict[str, Output]:
     wanted = [name if name.startswith('/') else f'/{name}' for name in how.topics]
     missing = [name for name in wanted if name not in reader.topics]
     if missing:
@@ -127,24 +163,44 @@ def _publishers(
         except (ImportError, AttributeError):
             tell(f'{name}: the type {kind} is not installed here; it is left out')
             continue
-        out[name] = node.create_publisher(message, name, qos.to_rclpy())
+        publisher = node.create_publisher(message, name, qos.to_rclpy())
+        out[name] = Output(publisher, stamped=has_header(kind))
     return out
 
 
-def _await(publishers: dict[str, Any], how: Playing) -> None:
+def _await(
+    node: Node, outputs: dict[str, Output], how: Playing, tell: Callable[[str], None]
+) -> None:
+    """Wait for the subscribers; say whom nobody listens to when the time is over."""
     end = time.monotonic() + how.wait
-    while time.monotonic() < end and any(
-        publisher.get_subscription_count() < how.subscribers for publisher in publishers.values()
-    ):
+
+    def lacking() -> list[str]:
+        return [
+            name
+            for name, output in outputs.items()
+            if output.get_subscription_count()
+            < max(how.subscribers, node.count_subscribers(output.topic))
+        ]
+
+    while time.monotonic() < end and lacking():
         time.sleep(LOOK)
+    if lacking():
+        tell(
+            f'waited {how.wait:g} s for {how.subscribers} subscribers of '
+            f'{", ".join(lacking())}; playing without'
+        )
     time.sleep(SETTLE)
 
 
 def _once(
-    reader: BagReader, publishers: dict[str, Any], rate: float, ticker: _Ticker | None
+    reader: BagReader,
+    outputs: dict[str, Output],
+    rate: float,
+    ticker: _Ticker | None,
+    teller: _Teller,
 ) -> int:
     begin, first, count = 0.0, None, 0
-    for topic, _, log_ns, data in reader.raw(list(publishers)):
+    for topic, _, log_ns, data in reader.raw(list(outputs)):
         if first is None:
             first = log_ns
             if ticker is not None:
@@ -156,6 +212,7 @@ def _once(
             if ticker is not None and now >= ticker.next:
                 ticker.tick(first + round((now - begin) * rate * 1e9))
             time.sleep(min(due - now, LOOK if ticker is None else max(ticker.next - now, 0.0)))
-        publishers[topic].publish(bytes(data))
+        outputs[topic].publish(bytes(data))
+        teller.now_and_then()
         count += 1
     return count

@@ -10,7 +10,7 @@ from math import inf, isfinite
 
 from weld_twin_msgs_py.messages.to_messages import Status
 
-from .outputs import NODE, RUN, SENT, Output
+from .outputs import NODE, REACHED, RUN, SENT, Output, reached
 from .outputs import told as sent_so_far
 
 OK, WARN, ERROR, STALE = range(4)
@@ -127,6 +127,7 @@ class Health:
                 'told': self._said_in_all,
                 **{f'remark_{k}': sentence for k, sentence in enumerate(self.remarks)},
                 SENT: sent_so_far(self.outputs),
+                REACHED: reached(self.outputs),
                 RUN: self._run,
                 NODE: self._node,
             },

@@ -1,29 +1,70 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""When a node that speaks first may begin: its listeners are there and know it."""
+"""When a node that speaks first may begin: the nodes beside it are there and reach each other."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import DIAGNOSTICS
+
+from .all_nodes import MODULES
 from .cell_node import CellNode
+from .outputs import NODE, read_reached
 
 QUIET = 1.0
 """
 Seconds without a change on the graph after which nobody else is taken to be coming. Nodes that
 are started together appear within some tenths of a second of each other.
 """
-LOOK_EVERY = 0.02
+LOOK_EVERY = 0.05
+
+
+class Neighbours:
+    """
+    What the nodes of the project tell of their inputs and of the subscriptions they reach.
+
+    The graph a node sees is its own: that two others have not found each other yet, only they know.
+    """
+
+    def __init__(self) -> None:
+        self._inputs: dict[str, set[str]] = {}
+        self._reached: dict[str, dict[str, int]] = {}
+
+    def take(self, message: Any) -> None:
+        """Take a node's health."""
+        statuses = from_messages.diagnostics(message)
+        for values in statuses.values():
+            node = values.get(NODE, '')
+            if node:
+                names = [name.partition(': ') for name in statuses]
+                self._inputs[node] = {
+                    topic for owner, _, topic in names if topic and owner == node
+                }
+                self._reached[node] = read_reached(values)
+
+    def apart(self, there: Collection[str]) -> list[str]:
+        """Return whose word or whose listeners are still to come, among the nodes there are."""
+        known = [node for node in there if node.rpartition('/')[2] in MODULES]
+        out = [f'{node} to tell of itself' for node in known if node not in self._inputs]
+        for node, reached in self._reached.items():
+            for topic, count in reached.items() if node in there else ():
+                wanted = [o for o, takes in self._inputs.items() if topic in takes and o in there]
+                if count < len(wanted):
+                    out.append(f'{node} to reach {" and ".join(wanted)} on {topic}')
+        return out
 
 
 class Meeting:
     """
     Runs an action once, when the listeners of a node are there.
 
-    With ``wait_for_subscribers`` it waits for that many, without for a graph that has at least
-    one listener and no longer changes. Either wait has an end, at which it says what is missing.
+    With ``wait_for_subscribers`` it waits for that many. Without, for a graph that has at least
+    one listener and no longer changes, on which the nodes of the project reach each other. Either
+    wait has an end, at which it says what is missing.
 
     Parameters
     ----------
@@ -38,6 +79,13 @@ class Meeting:
         self._node, self._within, self._action = node, within, action
         self._begun = self._changed = time.monotonic()
         self._seen: Any = None
+        self._neighbours = Neighbours()
+        self._health = node.create_subscription(
+            DIAGNOSTICS.message_class(),
+            DIAGNOSTICS.name,
+            self._neighbours.take,
+            DIAGNOSTICS.requested.to_rclpy(),
+        )
         self._timer = node.every(LOOK_EVERY, self._look)
         self._told = False
 
@@ -57,6 +105,7 @@ class Meeting:
             self._node.health.say(sentence)
         self._node.health.lasting.pop('waiting', None)
         self._timer.cancel()
+        self._node.destroy_subscription(self._health)
         self._action()
 
     def _missing(self, now: float) -> str:
@@ -70,6 +119,10 @@ class Meeting:
             self._seen, self._changed = seen, now
         if not any(node.listeners().values()):
             return f'somebody to listen to {" or ".join(node.listeners())}'
+        there = {f'{space.rstrip("/")}/{name}' for name, space in seen[0]}
+        apart = self._neighbours.apart(there)
+        if apart:
+            return ', '.join(apart)
         if node.unmatched() or now - self._changed < QUIET:
             return 'the listeners to be complete'
         return ''

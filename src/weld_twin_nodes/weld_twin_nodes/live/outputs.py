@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 from rclpy.duration import Duration
 
-SENT, RUN, NODE = 'sent', 'run', 'node'
-"""Keys of a node's health: what it sent by topic, a number of its own for every start, and its
-name with the namespace."""
+SENT, REACHED, RUN, NODE = 'sent', 'reached', 'run', 'node'
+"""Keys of a node's health: what it sent by topic, how many subscriptions it reaches by topic, a
+number of its own for every start, and its name with the namespace."""
 CDR_HEADER = 4
 """Bytes before the first field of a serialised message."""
 
@@ -98,6 +98,19 @@ def header_stamp(message: Any) -> int:
 def told(outputs: Iterable[Output]) -> str:
     """Return what outputs have sent, as the text that a node's health carries."""
     return json.dumps({output.topic: list(output.sent) for output in outputs})
+
+
+def reached(outputs: Iterable[Output]) -> str:
+    """Return how many subscriptions outputs reach, as the text that a node's health carries."""
+    return json.dumps({output.topic: output.get_subscription_count() for output in outputs})
+
+
+def read_reached(values: Mapping[str, str]) -> dict[str, int]:
+    """Return how many subscriptions a node reaches, by topic; empty for anybody else's health."""
+    try:
+        return {str(topic): int(count) for topic, count in json.loads(values[REACHED]).items()}
+    except (KeyError, ValueError, TypeError, AttributeError):
+        return {}
 
 
 def read_told(values: Mapping[str, str]) -> dict[str, Sent]:

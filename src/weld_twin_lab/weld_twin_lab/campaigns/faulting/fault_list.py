@@ -242,6 +242,32 @@ def _zero_pose(bench: Bench, _: int) -> Any:
     return message
 
 
+def _elsewhere(bench: Bench, _: int) -> Any:
+    return bench.make.pose(bench.stamp + 1, np.full(3, 2.0), np.eye(3), 'tracker')
+
+
+def _minute_ahead(bench: Bench, _: int) -> Any:
+    return bench.make.pose(bench.stamp + 60 * S + 1, np.full(3, 2.0), np.eye(3), 'world')
+
+
+def _other_type(bench: Bench) -> None:
+    """A driver publishes something else under the name of the wrench."""
+    publisher = bench.cell.node.create_publisher(
+        TEMPERATURE.message_class(), TOOL_WRENCH.name, TOOL_WRENCH.offered.to_rclpy()
+    )
+    bench.run(LONG)
+    bench.cell.node.destroy_publisher(publisher)
+
+
+def _other_namespace(bench: Bench) -> None:
+    """The controller comes up in a namespace that the nodes are not in."""
+    publisher = bench.cell.node.create_publisher(
+        JOINT_STATES.message_class(), f'/left{JOINT_STATES.name}', JOINT_STATES.offered.to_rclpy()
+    )
+    bench.run(LONG, lambda _: publisher.publish(bench.joint_state()))
+    bench.cell.node.destroy_publisher(publisher)
+
+
 JOINT_FAULTS = (
     Fault('NaN position', _third(_set('position', 2, float('nan')))),
     Fault('infinite position', _third(_set('position', 0, float('inf')))),
@@ -280,6 +306,18 @@ OTHER_FAULTS = (
         _beside(MEASURED_POSE, lambda b, k: np.random.default_rng(k).bytes(99)),
         ('deviation_analyzer', 'deviation_markers', 'live_diagnosis', 'recorder'),
     ),
+    Fault(
+        'measurements in another frame',
+        _beside(MEASURED_POSE, _elsewhere),
+        ('deviation_analyzer', 'live_diagnosis'),
+    ),
+    Fault(
+        'measurements a minute ahead of the others',
+        _beside(MEASURED_POSE, _minute_ahead),
+        ('deviation_analyzer', 'live_diagnosis'),
+    ),
+    Fault('a publisher of another type', _other_type),
+    Fault('joint states in another namespace', _other_namespace),
     Fault('the clock goes back by a minute', _clock(-60 * S)),
     Fault('the clock goes on by an hour', _clock(HOUR), ()),
     Fault('the clock stands still', _frozen, ()),

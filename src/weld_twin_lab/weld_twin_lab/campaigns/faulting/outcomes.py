@@ -132,12 +132,8 @@ def _wrong(bench: Bench, node: str) -> int:
 
 
 def _foreign(message: Any) -> bool:
-    """Tell whether the campaign itself published a bad pose, one nanosecond beside the beat."""
-    position = message.pose.position
-    return message.header.stamp.nanosec % 10 == 1 and (
-        not np.isfinite([position.x, position.y, position.z]).all()
-        or message.pose.orientation.w == 0.0
-    )
+    """Tell whether the campaign itself published a pose, one nanosecond beside the beat."""
+    return bool(message.header.stamp.nanosec % 10 == 1)
 
 
 def _right(bench: Bench, message: Any) -> bool:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,19 +58,25 @@ def curved(found: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     ----------
     found : Search
     verdict : Verdict
-        Effects that an 'unknown' names beyond doubt stay, and so does the set-up's own motion.
+        Effects that an 'unknown' names beyond doubt stay beside the curves, unless curves alone
+        predict better; the set-up's own motion always stays.
     beliefs : Beliefs
 
     """
     if found.dense:
         return None
+    setup = [e for e in found.final.model.found if not e.cause]
+    alone = _beside(found, setup, beliefs)
     sure = {site for group in verdict.sets for site in group}
-    unknown = verdict.status == 'unknown'
-    kept = [
-        e
-        for e in found.final.model.found
-        if not e.cause or (unknown and Site(e.name, e.site) in sure)
-    ]
+    named = [e for e in found.final.model.found if Site(e.name, e.site) in sure]
+    if verdict.status != 'unknown' or not named:
+        return alone
+    beside = _beside(found, [*setup, *named], beliefs)
+    tried = [way for way in (beside, alone) if way is not None]
+    return min(tried, key=lambda way: way.rms_m, default=None)
+
+
+def _beside(found: Search, kept: Sequence[Effect], beliefs: Beliefs) -> Curved | None:
     small = found.problem.thinned(ROWS)
     start = found.baseline.model.with_found(tuple(kept))
     bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)

@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..beliefs import Beliefs
+from ..result import Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
@@ -19,6 +22,8 @@ def held_against(
     """
     Return the verdict, or 'unknown' where a free form predicts clearly better than the names.
 
+    What an 'unknown' names beside is withdrawn where curves alone predict better.
+
     Parameters
     ----------
     verdict : Verdict
@@ -28,8 +33,12 @@ def held_against(
     beliefs : Beliefs
 
     """
-    if rival is None or verdict.status == 'unknown':
+    if rival is None:
         return verdict
+    if verdict.status == 'unknown':
+        kept = {Site(effect.name, effect.site) for effect in rival.kept}
+        stays = all(group[0] in kept for group in verdict.sets)
+        return verdict if stays else replace(verdict, sets=())
     before = named.squares(named.predict(range(len(named.parts))))
     after = rival.unseen.squares(rival.unseen.predict(range(len(rival.unseen.parts))))
     gain = 1.0 - float(after.mean() / max(float(before.mean()), 1e-300))

@@ -45,7 +45,7 @@ class EffectStages:
     """
 
     robot: Robot
-    effects: tuple[Effect, ...] = ()
+    effects: Sequence[Effect] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'effects', tuple(self.effects))

@@ -103,7 +103,7 @@ class LiveDiagnosis(CellNode):
         if recording is not None:
             self._begun, self._seen = now, self._window.last
             twin = self._twin
-            self._worker.start(Job(recording, twin.robot, twin.effects, self._align))
+            self._worker.start(Job(recording, twin.robot, tuple(twin.effects), self._align))
 
     def _tell(self, result: Finding | str | None) -> None:
         if isinstance(result, str):

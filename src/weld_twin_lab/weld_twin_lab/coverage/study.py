@@ -15,7 +15,7 @@ from weld_twin_core import __version__
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
-from weld_twin_core.errors import TwinError
+from weld_twin_core.errors import DataError, TwinError
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.whole_files import write_text
@@ -29,7 +29,7 @@ from ..transfer.splits import TUNED_ON, Split, splits
 from .held import held
 from .table import page
 
-RESULTS, TABLE = 'coverage.json', 'coverage.md'
+RESULTS, TABLE, PARTS = 'coverage.json', 'coverage.md', 'parts'
 SCHEMA = 'weld_twin/coverage/1'
 HOME = {'ur5': 0, 'ur10': 1}
 """Rows before this one are left out: the UR10's first is its home pose, far from the rest."""
@@ -44,12 +44,14 @@ def study(
     """
     Try the regions of all splits, and of sealed cases where there are any, and write the results.
 
+    Each recording's result is kept as soon as it is there; a run that was stopped goes on.
+
     Parameters
     ----------
     ur5, ur10 : Path
         Directories with the published tables.
     out : Path
-        Exists and is empty.
+        Keeps a file per recording.
     cases : Path, optional
         Directory with ``cases`` and ``truths`` as ``weld-twin blind make`` writes them.
     tell : callable
@@ -58,21 +60,45 @@ def study(
     Raises
     ------
     DataError
-        Data are missing or cannot be read.
+        Data are missing or cannot be read, or ``out`` holds something else.
 
     """
+    _refuse_foreign(out)
+    (out / PARTS).mkdir(parents=True, exist_ok=True)
     entries = []
     for robot, directory in (('ur5', ur5), ('ur10', ur10)):
         for split in splits(robot, tables(robot, directory)[0].recording, HOME[robot]):
-            tell(split.name)
-            entries.append(_of_split(split))
-    for name in [] if cases is None else _names(cases / 'cases'):
-        tell(name)
-        entries.append(of_case(cases / 'cases' / name, cases / 'truths' / name))  # type: ignore[operator]
+            entries.append(_kept(out, split.name, lambda s=split: _of_split(s), tell))  # type: ignore[misc]
+    if cases is not None:
+        for name in _names(cases / 'cases'):
+            pair = (cases / 'cases' / name, cases / 'truths' / name)
+            entries.append(_kept(out, name, lambda p=pair: of_case(*p), tell))  # type: ignore[misc]
     result = {'schema': SCHEMA, 'version': __version__, 'entries': entries}
-    write_text(out / TABLE, page(entries))
-    write_text(out / RESULTS, json.dumps(result, indent=1, allow_nan=False) + '\n')
+    write_text(out / TABLE, page(entries), overwrite=True)
+    text = json.dumps(result, indent=1, allow_nan=False) + '\n'
+    write_text(out / RESULTS, text, overwrite=True)
     return result
+
+
+def _kept(out: Path, name: str, work: Callable[[], dict[str, Any]], tell: Tell) -> dict[str, Any]:
+    """Return the result of one recording, from its file where there is one."""
+    path = out / PARTS / f'{name}.json'
+    if path.is_file():
+        kept: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
+        return kept
+    tell(name)
+    entry = work()
+    write_text(path, json.dumps(entry, indent=1, allow_nan=False) + '\n', overwrite=True)
+    return entry
+
+
+def _refuse_foreign(out: Path) -> None:
+    """Refuse a directory that holds something else."""
+    if not out.exists():
+        return
+    ours = out.is_dir() and all(p.name in (RESULTS, TABLE, PARTS) for p in out.iterdir())
+    if not ours:
+        raise DataError(f"'{out}' holds something else already; choose another place")
 
 
 def _of_split(split: Split) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 """Predictions that say how sure they are: do nine of ten measured positions lie in 90 % regions?
 
 Poor recordings of two measured arms, judged on poses inside and outside of them, and sealed cases
-of the plant where they are given. Writes coverage.json and coverage.md.
+of the plant where they are given. Writes coverage.json, coverage.md and a file per recording; a run
+that was interrupted goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -30,16 +31,13 @@ def run(args: argparse.Namespace) -> int:
     """Try all regions and print what they hold."""
     import sys
 
-    from weld_twin_nodes.offline.output_directory import new_directory
-
-    from ...coverage.study import RESULTS, study
+    from ...coverage.study import study
     from ...coverage.table import summary_table
 
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
     cases = None if args.cases is None else Path(args.cases)
-    with new_directory(args.out, mark=RESULTS) as place:
-        result = study(Path(args.ur5), Path(args.ur10), place, cases, tell)
+    result = study(Path(args.ur5), Path(args.ur10), Path(args.out), cases, tell)
     print(summary_table(result['entries']))
     return 0

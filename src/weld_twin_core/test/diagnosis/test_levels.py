@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.levels.regions import posture_regions
 from weld_twin_core.diagnosis.levels.sparse_groups import Folds, steadiness
+from weld_twin_core.diagnosis.unseen.regions import posture_regions
 from weld_twin_core.effects.curve import basis
 from weld_twin_core.effects.joint_curve import JointCurve
 

@@ -271,6 +271,29 @@ def test_a_robot_that_is_not_there_is_named(spec, words):
         load_robot(spec)
 
 
+SIBLINGS = """<robot name="arm">
+<link name="base_link"/><link name="base"/><link name="arm_base"/><link name="tool0"/>
+<joint name="beside" type="fixed"><origin xyz="0 0 0.1" rpy="0 0 3.141592653589793"/>
+<parent link="base_link"/><child link="base"/></joint>
+<joint name="below" type="fixed"><origin xyz="0 0 0.2"/>
+<parent link="base_link"/><child link="arm_base"/></joint>
+<joint name="turn" type="revolute"><origin xyz="1 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" velocity="1" effort="1"/>
+<parent link="arm_base"/><child link="tool0"/></joint></robot>"""
+
+
+def test_the_base_may_be_fixed_beside_the_chain(tmp_path):
+    (tmp_path / 'arm.urdf').write_text(SIBLINGS)
+    below = load_robot(str(tmp_path / 'arm.urdf'), 'base_link', 'tool0')
+    beside = load_robot(str(tmp_path / 'arm.urdf'), 'base', 'tool0')
+    np.testing.assert_allclose(forward(below, [0.3])[:3, 3], [1.0, 0.0, 0.2], atol=1e-12)
+    np.testing.assert_allclose(forward(beside, [0.3])[:3, 3], [-1.0, 0.0, 0.1], atol=1e-12)
+    half_turn = np.diag([-1.0, -1.0, 1.0])
+    np.testing.assert_allclose(
+        forward(beside, [0.3])[:3, :3], half_turn @ forward(below, [0.3])[:3, :3], atol=1e-12
+    )
+
+
 def test_base_and_tip_links_belong_to_a_urdf():
     with pytest.raises(ModelError, match="'ur5' is no URDF, so it has no base link"):
         load_robot('ur5', tip_link='tool0')

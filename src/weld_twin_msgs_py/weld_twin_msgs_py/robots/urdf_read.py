@@ -31,7 +31,8 @@ def read_urdf(
     ----------
     path : Path or str
     base_link, tip_link : str, optional
-        Left out: the root, and the only leaf or ``tool0``.
+        Left out: the root, and the only leaf or ``tool0``. The base may also be a link that is
+        fixed beside the chain, as ``base`` of a UR arm is.
 
     Raises
     ------
@@ -61,7 +62,9 @@ def _of_tree(tree: Tree, path: Path | str, base_link: str | None, tip_link: str 
     try:
         base = _base(tree, base_link)
         tip = _tip(tree, base, tip_link)
-        robot = _robot(tree, _chain(tree, base, tip), base, f'URDF {Path(path).name}')
+        start, T_base_start = _start(tree, base, tip)
+        chain = _chain(tree, start, tip)
+        robot = _robot(tree, chain, base, T_base_start, f'URDF {Path(path).name}')
         refuse_wrong_units(robot)
     except ModelError as error:
         raise ModelError(f"URDF '{path}': {error}") from None
@@ -94,6 +97,27 @@ def _known(tree: Tree, link: str, end: str) -> str:
     return link
 
 
+def _start(tree: Tree, base: str, tip: str) -> tuple[str, Array]:
+    """
+    Return the link above both base and tip that is fixed to the base, and where it is in the base.
+
+    The description of a UR arm has 'base' and the arm side by side below 'base_link'.
+    """
+    above, link = {tip}, tip
+    while link in tree.above and tree.above[link].parent not in above:
+        link = tree.above[link].parent
+        above.add(link)
+    T_base_link, link = np.eye(4), base
+    for _ in tree.links:
+        if link in above:
+            return link, T_base_link
+        joint = tree.above.get(link)
+        if joint is None or joint.kind != 'fixed':
+            break
+        T_base_link, link = T_base_link @ inverse(joint.T_parent_joint), joint.parent
+    return base, np.eye(4)
+
+
 def _chain(tree: Tree, base: str, tip: str) -> list[Joint]:
     """Return the joints from base to tip."""
     joints: list[Joint] = []
@@ -115,9 +139,9 @@ def _chain(tree: Tree, base: str, tip: str) -> list[Joint]:
     return joints
 
 
-def _robot(tree: Tree, chain: list[Joint], base: str, source: str) -> Robot:
+def _robot(tree: Tree, chain: list[Joint], base: str, T_base_start: Array, source: str) -> Robot:
     moving = [joint for joint in chain if joint.kind in MOVABLE]
-    T = np.eye(4)
+    T = T_base_start
     axes: list[Axis] = []
     carried: list[list[tuple[float, Array]]] = []
     on_chain = {joint.name for joint in chain}

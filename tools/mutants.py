@@ -33,8 +33,10 @@ from types import CodeType, ModuleType
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = [ROOT / 'src' / name for name in ('weld_twin_core', 'weld_twin_msgs_py')]
-VERDICT = 'weld_twin_core.diagnosis.verdict'
-MODULES = (f'{VERDICT}.decision', f'{VERDICT}.weighing', 'weld_twin_core.diagnosis.beliefs')
+DIAGNOSIS = 'weld_twin_core.diagnosis'
+MODULES = tuple(
+    f'{DIAGNOSIS}.{name}' for name in ('verdict.decision', 'verdict.weighing', 'beliefs')
+)
 TESTS = ('src/weld_twin_core/test/diagnosis/test_decision.py',)
 LEAST = 0.9
 """Share to catch: 33 of 37 kinds were the goal when this began."""
@@ -150,11 +152,13 @@ def prepare(modules: Sequence[str]) -> None:
         sys.path.insert(0, str(place))
     import pytest  # noqa: F401
 
-    importlib.import_module('weld_twin_core.diagnosis')
-    # What imports a broken module must be imported anew with it.
-    rooms = {name.rpartition('.')[0] for name in modules}
-    for name in [n for n in sys.modules if n.startswith('weld_twin_core.diagnosis')]:
-        if rooms:
+    for name in modules:
+        importlib.import_module(name)
+    # The rooms of what will be broken are imported anew; what lies outside of them only hands
+    # objects on, and stays.
+    rooms = {name.rpartition('.')[0] for name in modules} - {DIAGNOSIS}
+    for name in list(sys.modules):
+        if name in modules or name.rpartition('.')[0] in rooms:
             del sys.modules[name]
 
 

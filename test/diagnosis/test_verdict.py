@@ -63,7 +63,7 @@ def test_what_stands_above_an_independent_floor_is_unknown():
 
 
 def test_a_floor_taken_from_the_model_itself_proves_nothing():
-    shared = Evidence((), NOTHING_LEFT, 3.5e-5, 1.8e-4, 3.5e-5, 1.8e-4, False, ())
+    shared = Evidence((), NOTHING_LEFT, 3.5e-5, 5e-5, 3.5e-5, 5e-5, False, ())
     verdict = decide(shared)
     assert verdict.status == 'none'
     assert verdict.confidence < 0.8

@@ -172,7 +172,7 @@ def main() -> int:
     modules, tests = args.module or MODULES, args.tests or TESTS
     os.chdir(ROOT)
     prepare(modules)
-    caught, total, kinds = 0, 0, []
+    caught, total = 0, 0
     for name in modules:
         file = next(
             path
@@ -184,12 +184,10 @@ def main() -> int:
             mutant, words = broken(tree, number, beliefs)
             total += 1
             if survives(name, mutant, file, tests):
-                kinds.append(f'{name.rpartition(".")[2]}, {words}')
+                print(f'survives: {name.rpartition(".")[2]}, {words}', flush=True)
             else:
                 caught += 1
     print(f'{caught} of {total} mutants caught ({caught / max(total, 1):.0%})')
-    for words in kinds:
-        print(f'  survives: {words}')
     return int(caught < args.least * total)
 
 

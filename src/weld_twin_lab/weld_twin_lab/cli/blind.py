@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import argparse
 from importlib import import_module
-from inspect import getdoc
+
+from weld_twin_nodes.cli.options import add_command
 
 JOBS = ('make', 'diagnose', 'score', 'run', 'semi-real', 'recovery')
 
@@ -20,14 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     jobs = parser.add_subparsers(required=True, metavar='JOB', dest='job')
     for name in JOBS:
         module = import_module(f'weld_twin_lab.cli.blind_jobs.{name.replace("-", "_")}')
-        text = getdoc(module) or ''
-        job = jobs.add_parser(
-            name,
-            help=text.partition('\n')[0].replace('%', '%%'),
-            description=text,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        module.add_arguments(job)
+        add_command(jobs, name, module)
 
 
 def run(args: argparse.Namespace) -> int:

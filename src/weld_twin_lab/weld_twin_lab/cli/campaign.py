@@ -10,8 +10,9 @@ from __future__ import annotations
 import argparse
 import time
 from importlib import import_module
-from inspect import getdoc
 from typing import Any
+
+from weld_twin_nodes.cli.options import add_command
 
 FAILED = 1
 """Exit code of a campaign that ran and did not pass."""
@@ -24,14 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     jobs = parser.add_subparsers(required=True, metavar='CAMPAIGN', dest='campaign')
     for name in campaigns.names():
         module = import_module(f'{campaigns.__name__}.{name}')
-        text = getdoc(module) or ''
-        job = jobs.add_parser(
-            name,
-            help=text.partition('\n')[0].replace('%', '%%'),
-            description=text,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        module.add_arguments(job)
+        job = add_command(jobs, name, module)
         job.add_argument(
             '--out',
             required=True,

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import argparse
 from importlib import import_module
-from inspect import getdoc
 from pkgutil import iter_modules
+
+from weld_twin_nodes.cli.options import add_command
 
 from . import lab_jobs
 
@@ -32,14 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     subparsers = parser.add_subparsers(required=True, metavar='PROOF', dest='proof')
     for name, path in sorted(proofs().items()):
         module = import_module(path)
-        text = getdoc(module) or ''
-        proof = subparsers.add_parser(
-            name,
-            help=text.partition('\n')[0].replace('%', '%%'),
-            description=text,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        module.add_arguments(proof)
+        add_command(subparsers, name, module)
 
 
 def run(args: argparse.Namespace) -> int:

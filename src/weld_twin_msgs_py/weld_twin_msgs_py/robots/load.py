@@ -13,8 +13,8 @@ from weld_twin_core.errors import ModelError
 
 from ..files.whole_files import write_text
 from ..files.yaml_file import read_yaml, yaml_text
-from .plausible import refuse_wrong_units
 from .urdf_read import read_urdf
+from .wrong_units import refuse_wrong_units
 
 YAML_SUFFIXES = ('.yaml', '.yml')
 URDF_SUFFIXES = ('.urdf', '.xml')

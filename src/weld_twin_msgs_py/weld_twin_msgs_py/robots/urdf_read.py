@@ -13,8 +13,8 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
 from .axes_to_dh import Axis, dh_rows, inverse
-from .plausible import refuse_wrong_units
 from .urdf_tree import MOVABLE, Joint, Tree, parse_tree, read_tree
+from .wrong_units import refuse_wrong_units
 
 
 def read_urdf(

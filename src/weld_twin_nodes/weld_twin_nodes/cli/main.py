@@ -10,8 +10,9 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import entry_points
-from inspect import getdoc
 from pathlib import Path
+
+from .options import add_command
 
 USAGE_ERROR = 2
 """Exit code where the user can do something about it."""
@@ -86,14 +87,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         )
     for name in [chosen] if chosen in commands else commands:
         module = import_module(commands[name])
-        text = getdoc(module) or ''
-        sub = subparsers.add_parser(
-            name,
-            help=text.partition('\n')[0].replace('%', '%%'),
-            description=text,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        module.add_arguments(sub)
+        sub = add_command(subparsers, name, module)
         sub.set_defaults(run=module.run)
     return parser
 

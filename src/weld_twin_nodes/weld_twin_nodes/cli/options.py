@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from inspect import getdoc
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -58,3 +60,27 @@ def add_bag_output(parser: argparse.ArgumentParser) -> None:
     """Add the options of a command that writes a bag."""
     parser.add_argument('--out', required=True, metavar='BAG', help='bag to write; must not exist')
     parser.add_argument('--storage', choices=('mcap', 'sqlite3'), default='mcap')
+
+
+def add_command(subparsers: Any, name: str, module: ModuleType) -> argparse.ArgumentParser:
+    """
+    Add a subcommand whose help is the module's docstring, with the module's own options.
+
+    Parameters
+    ----------
+    subparsers : what ``add_subparsers`` returned
+    name : str
+        As the user types it.
+    module : module
+        With ``add_arguments(parser)``; the first line of its docstring is the short help.
+
+    """
+    text = getdoc(module) or ''
+    parser: argparse.ArgumentParser = subparsers.add_parser(
+        name,
+        help=text.partition('\n')[0].replace('%', '%%'),
+        description=text,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    module.add_arguments(parser)
+    return parser

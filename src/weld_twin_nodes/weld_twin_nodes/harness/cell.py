@@ -33,8 +33,8 @@ from weld_twin_msgs_py.messages.topics import BY_NAME, JOINT_STATES, Topic
 
 from ..live.pacing import Pump
 from ..offline.seam_motion import stamps
-from .domain import own_domain
 from .process import NodeProcess, stop_all
+from .ros_domain import own_domain
 from .tap import Tap
 
 DEEP = 20_000

@@ -15,7 +15,6 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -27,6 +26,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
 
 from .content_hash import digest
+from .environment import environment
 
 Plain = Any
 """What JSON can hold."""
@@ -163,7 +163,7 @@ class Cores:
         if self._pool is None:
             context = multiprocessing.get_context('spawn')
             self._pool = ProcessPoolExecutor(self._workers, mp_context=context)
-        with _one_thread():
+        with environment(**dict.fromkeys(_THREADS, '1')):
             futures: dict[Future[str], int] = {
                 self._pool.submit(call, task.function, task.arguments): k
                 for k, task in enumerate(tasks)
@@ -242,18 +242,3 @@ def _connected(address: str) -> tuple[Any, Callable[..., Any]]:
         return Client(address, timeout='10s'), as_completed
     except (OSError, ValueError) as error:
         raise DataError(f"no Dask scheduler answers at '{address}': {error}") from None
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Have processes that start within use one thread each."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, '1'))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

@@ -24,7 +24,7 @@ from ..channels import Channel
 from ..robot import Robot
 from .buffers import aligned, unbuffered
 from .half_angle import DEGREE, HalfAngle
-from .regions import ROWS, Division, Region
+from .screw_regions import ROWS, Division, Region
 from .weights import on_half_angles
 
 BLOCK = 1504

@@ -4,8 +4,7 @@
 
 from math import pi
 
-DEGREE = pi / 180.0
-"""Radians."""
+from .rows_in_degrees import joints
 
 _ROWS = (
     (0.0, -pi / 2, 0.29, 0.0, -165.0, 165.0, 250.0),
@@ -22,20 +21,7 @@ DATA = {
     'source': 'ABB, "Product specification IRB 120", 3HAC035960: geometry, range, speed; masses '
     'and centres from the URDF of ROS-Industrial (abb_irb120_support), where they were taken from '
     'solid models; acceleration is an estimate (full speed in 0.25 s)',
-    'joints': [
-        {
-            'name': f'joint_{k}',
-            'a': a,
-            'alpha': alpha,
-            'd': d,
-            'theta_offset': theta,
-            'lower': lower * DEGREE,
-            'upper': upper * DEGREE,
-            'max_velocity': speed * DEGREE,
-            'max_acceleration': 4.0 * speed * DEGREE,
-        }
-        for k, (a, alpha, d, theta, lower, upper, speed) in enumerate(_ROWS, 1)
-    ],
+    'joints': joints('joint_', _ROWS),
     'links': [
         {'mass': 3.067, 'com': [9.8e-05, 0.05159, -0.00012]},
         {'mass': 3.909, 'com': [-0.16876, 0.00078, -0.00212]},

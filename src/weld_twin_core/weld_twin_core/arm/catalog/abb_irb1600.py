@@ -4,8 +4,7 @@
 
 from math import pi
 
-DEGREE = pi / 180.0
-"""Radians."""
+from .rows_in_degrees import joints
 
 _ROWS = (
     (0.15, -pi / 2, 0.4865, 0.0, -180.0, 180.0, 150.0),
@@ -23,20 +22,7 @@ DATA = {
     'the URDF of ROS-Industrial (abb_irb1600_support); ABB publishes the mass of the whole arm '
     'only (250 kg), so link masses and centres are an estimate; acceleration is an estimate '
     '(full speed in 0.25 s)',
-    'joints': [
-        {
-            'name': f'joint_{k}',
-            'a': a,
-            'alpha': alpha,
-            'd': d,
-            'theta_offset': theta,
-            'lower': lower * DEGREE,
-            'upper': upper * DEGREE,
-            'max_velocity': speed * DEGREE,
-            'max_acceleration': 4.0 * speed * DEGREE,
-        }
-        for k, (a, alpha, d, theta, lower, upper, speed) in enumerate(_ROWS, 1)
-    ],
+    'joints': joints('joint_', _ROWS),
     'links': [
         {'mass': 80.0, 'com': [-0.1, 0.1865, 0.0]},
         {'mass': 40.0, 'com': [-0.2415, 0.0, 0.0]},

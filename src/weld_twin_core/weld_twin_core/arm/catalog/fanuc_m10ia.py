@@ -9,8 +9,7 @@ ground (its J3 is the joint 3 of this model minus J2). The base is at the floor.
 
 from math import pi
 
-DEGREE = pi / 180.0
-"""Radians."""
+from .rows_in_degrees import joints
 
 _ROWS = (
     (0.15, -pi / 2, 0.45, 0.0, -180.0, 180.0, 210.0),
@@ -28,20 +27,7 @@ DATA = {
     'the URDF of ROS-Industrial (fanuc_m10ia_support); Fanuc publishes the mass of the whole arm '
     'only (130 kg), so link masses and centres are an estimate; acceleration is an estimate '
     '(full speed in 0.25 s)',
-    'joints': [
-        {
-            'name': f'joint_{k}',
-            'a': a,
-            'alpha': alpha,
-            'd': d,
-            'theta_offset': theta,
-            'lower': lower * DEGREE,
-            'upper': upper * DEGREE,
-            'max_velocity': speed * DEGREE,
-            'max_acceleration': 4.0 * speed * DEGREE,
-        }
-        for k, (a, alpha, d, theta, lower, upper, speed) in enumerate(_ROWS, 1)
-    ],
+    'joints': joints('joint_', _ROWS),
     'links': [
         {'mass': 45.0, 'com': [-0.1, 0.15, 0.0]},
         {'mass': 20.0, 'com': [-0.31, 0.0, 0.0]},

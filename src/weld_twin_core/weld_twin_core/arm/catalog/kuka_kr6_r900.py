@@ -9,8 +9,7 @@ half turn in ``tool`` makes the tool frame KUKA's $FLANGE. A tool of one's own g
 
 from math import pi
 
-DEGREE = pi / 180.0
-"""Radians."""
+from .rows_in_degrees import joints
 
 _ROWS = (
     (0.0, pi, -0.4, 0.0, -170.0, 170.0, 360.0),
@@ -30,20 +29,7 @@ DATA = {
     'arm only (52 kg), so link masses and centres are an estimate; acceleration is an estimate '
     '(full speed in 0.25 s)',
     'tool': {'quat_xyzw': [1.0, 0.0, 0.0, 0.0]},
-    'joints': [
-        {
-            'name': f'joint_a{k}',
-            'a': a,
-            'alpha': alpha,
-            'd': d,
-            'theta_offset': theta,
-            'lower': lower * DEGREE,
-            'upper': upper * DEGREE,
-            'max_velocity': speed * DEGREE,
-            'max_acceleration': 4.0 * speed * DEGREE,
-        }
-        for k, (a, alpha, d, theta, lower, upper, speed) in enumerate(_ROWS, 1)
-    ],
+    'joints': joints('joint_a', _ROWS),
     'links': [
         {'mass': 14.0, 'com': [0.0, 0.0, 0.1]},
         {'mass': 10.0, 'com': [0.215, 0.0, 0.0]},

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import add_pool, runner_of
+from .job_options import add_pool, runner_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import add_draw, add_pool, kinds_of, runner_of, spans_of
+from .job_options import add_draw, add_pool, kinds_of, runner_of, spans_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

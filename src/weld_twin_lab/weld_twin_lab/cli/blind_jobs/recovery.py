@@ -11,7 +11,7 @@ import argparse
 import json
 from pathlib import Path
 
-from .options import add_pool, runner_of
+from .job_options import add_pool, runner_of
 
 RESULT, TABLE, STORE = 'recovery.json', 'recovery.md', 'done'
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import add_pool, runner_of
+from .job_options import add_pool, runner_of
 from .score import print_score
 
 

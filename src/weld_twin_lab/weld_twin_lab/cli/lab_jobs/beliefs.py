@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..blind_jobs.options import add_pool, runner_of
+from ..blind_jobs.job_options import add_pool, runner_of
 
 RESULT, TABLE, STORE = 'beliefs.json', 'beliefs.md', 'done'
 REFITTED = 10

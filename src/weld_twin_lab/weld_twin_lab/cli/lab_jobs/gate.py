@@ -12,7 +12,7 @@ import argparse
 import json
 from pathlib import Path
 
-from ..blind_jobs.options import add_pool, runner_of
+from ..blind_jobs.job_options import add_pool, runner_of
 
 RESULT = 'gate.json'
 MISSED = 1

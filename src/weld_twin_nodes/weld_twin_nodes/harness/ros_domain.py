@@ -13,6 +13,8 @@ from pathlib import Path
 
 from weld_twin_core.errors import TwinError
 
+from ..offline.environment import environment
+
 DOMAINS = range(1, 102)
 """Domains whose ports stay clear of those Linux hands out by itself."""
 
@@ -40,23 +42,7 @@ def own_domain() -> Iterator[int]:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 continue
-            with _environment(
-                ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST'
-            ):
+            with environment(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST'):
                 yield domain
             return
     raise TwinError(f'all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use here')
-
-
-@contextmanager
-def _environment(**values: str) -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import weld_twin_core as wt
 from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_nodes.cli import main
@@ -96,4 +97,16 @@ def test_the_files_that_contributing_names_exist():
             places = [ROOT, inside, inside / inside.name, inside / inside.name / room, lab]
             if 'NAME.md' not in name and not any((place / name).exists() for place in places):
                 missing.append(path)
+    assert missing == []
+
+
+def test_the_reference_has_every_public_name():
+    pages = ''.join(path.read_text() for path in (ROOT / 'docs/reference').glob('*.md'))
+    rooms = {'catalog': 'arm.catalog', 'paths': 'motion.paths', 'profiles': 'motion.profiles'}
+    rooms['rotation'] = 'arm.rotation'
+    missing = [
+        name
+        for name in wt.__all__
+        if not re.search(rf'weld_twin_core\.{rooms.get(name, name)}$', pages, re.M)
+    ]
     assert missing == []

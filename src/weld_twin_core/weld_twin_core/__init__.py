@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # what tools see; at run time `__getattr__` finds the same by
     from .arm.chain import jacobian as jacobian
     from .arm.dynamics import gravity_torque as gravity_torque
     from .arm.robot import Robot as Robot
+    from .diagnosis import Beliefs as Beliefs
     from .diagnosis import Diagnosis as Diagnosis
     from .diagnosis import diagnose as diagnose
     from .effects import Effect as Effect
@@ -73,6 +74,7 @@ if TYPE_CHECKING:  # what tools see; at run time `__getattr__` finds the same by
     from .twin.twin import Twin as Twin
 
 __all__ = [
+    'Beliefs',
     'Compensation',
     'DataError',
     'DeviationMetrics',
@@ -136,7 +138,7 @@ _HOMES = {
     'arm.chain': ('forward', 'jacobian'),
     'arm.dynamics': ('gravity_torque',),
     'arm.robot': ('Robot',),
-    'diagnosis': ('Diagnosis', 'diagnose'),
+    'diagnosis': ('Beliefs', 'Diagnosis', 'diagnose'),
     'effects': ('Effect', 'MemoryEffect', 'Parameter', 'Stage', 'View', 'effect_from_mapping')
     + ('effects_from_list', 'register'),
     'errors': ('DataError', 'ModelError', 'PathError', 'ReachError', 'TwinError'),

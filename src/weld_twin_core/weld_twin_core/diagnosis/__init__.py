@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
 
+from .beliefs import Beliefs
 from .pipeline import diagnose
 from .result import (
     Candidate,
@@ -18,6 +19,7 @@ from .result import (
 )
 
 __all__ = [
+    'Beliefs',
     'Candidate',
     'Check',
     'Diagnosis',

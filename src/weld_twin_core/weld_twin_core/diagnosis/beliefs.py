@@ -43,6 +43,15 @@ class Beliefs:
     judgement, `weld-twin lab beliefs` shows what hangs on it: it moves every number by 25 % both
     ways on sealed development cases; docs/results/beliefs/beliefs.md keeps the last table. The
     numbers by which data are refused as unsound lie with the checks, in `soundness`.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> import weld_twin_core as wt
+    >>> careful = replace(wt.Beliefs(), sure=0.95)  # name a cause alone only from 95 % on
+    >>> careful.sure
+    0.95
+
     """
 
     # Which effects are found -----------------------------------------------------------------

@@ -100,6 +100,9 @@ def compensate(
         Its joints are the nominal commands; wrench and temperature are used where effects do.
     rounds : int
         Most Newton rounds.
+    trust : array, shape (N,), optional
+        Share of the way that each sample is moved, between 0 and 1, such as less where the model
+        was never measured; left out, all of it.
 
     Returns
     -------

@@ -33,42 +33,43 @@ LISTENERS = {
 
 def generate_launch_description() -> LaunchDescription:
     """Return the description that `ros2 launch` runs."""
-    config = str(Path(get_package_share_directory(PACKAGE)) / 'config' / 'demo.yaml')
+    config = Path(get_package_share_directory(PACKAGE)) / 'config' / 'demo.yaml'
+    arguments = {
+        'config': (str(config), 'parameter file'),
+        'bag': ('', 'bag to record, if any'),
+        'discovery': ('LOCALHOST', 'LOCALHOST, SUBNET or OFF'),
+    }
     bag = LaunchConfiguration('bag')
-    discovery = {'ROS_AUTOMATIC_DISCOVERY_RANGE': LaunchConfiguration('discovery')}
-
-    def node(name: str, own: dict[str, object], **options: object) -> Node:
-        return Node(
-            package=PACKAGE,
-            executable=name,
-            output='screen',
-            parameters=[LaunchConfiguration('config'), own],
-            additional_env=discovery,
-            **options,
-        )
-
-    def listeners(count: int) -> ParameterValue:
-        return ParameterValue(
-            PythonExpression([f"{count} + int('", bag, "' != '')"]), value_type=int
-        )
-
+    recorder = _node(
+        'recorder',
+        {'out': ParameterValue(bag, value_type=str)},
+        condition=IfCondition(NotEqualsSubstitution(bag, '')),
+    )
     return LaunchDescription(
         [
-            DeclareLaunchArgument('config', default_value=config, description='parameter file'),
-            DeclareLaunchArgument('bag', default_value='', description='bag to record, if any'),
-            DeclareLaunchArgument(
-                'discovery',
-                default_value='LOCALHOST',
-                description='LOCALHOST, SUBNET or OFF',
-            ),
-            node(
-                'recorder',
-                {'out': ParameterValue(bag, value_type=str)},
-                condition=IfCondition(NotEqualsSubstitution(LaunchConfiguration('bag'), '')),
-            ),
             *(
-                node(name, {'wait_for_subscribers': listeners(count)})
-                for name, count in LISTENERS.items()
+                DeclareLaunchArgument(name, default_value=default, description=meaning)
+                for name, (default, meaning) in arguments.items()
             ),
+            recorder,
+            *(_node(name, {'wait_for_subscribers': _listeners(name)}) for name in LISTENERS),
         ]
     )
+
+
+def _node(name: str, own: dict[str, ParameterValue], **options: IfCondition) -> Node:
+    """Return a node with its own parameters over those of the file."""
+    return Node(
+        package=PACKAGE,
+        executable=name,
+        output='screen',
+        parameters=[LaunchConfiguration('config'), own],
+        additional_env={'ROS_AUTOMATIC_DISCOVERY_RANGE': LaunchConfiguration('discovery')},
+        **options,
+    )
+
+
+def _listeners(name: str) -> ParameterValue:
+    """Return how many take a node's main output, the recorder among them where there is one."""
+    recorded = ["int('", LaunchConfiguration('bag'), "' != '')"]
+    return ParameterValue(PythonExpression([f'{LISTENERS[name]} + ', *recorded]), value_type=int)

@@ -110,6 +110,27 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
 
     """
     names = TopicNames() if topics is None else topics
+    found, made = _found(path, names)
+    used = [t for t in found if t.use and t.start_ns is not None]
+    timed = used or [t for t in found if t.start_ns is not None]
+    start = min((t.start_ns for t in timed if t.start_ns is not None), default=0)
+    end = max((t.end_ns for t in timed if t.end_ns is not None), default=0)
+    missing, notes = _judge(names, {t.use: t for t in used}, found)
+    lacking = (*never_recorded(made), *(uneven_ends(_ends(found)) if not missing else ()))
+    return BagInfo(
+        Path(path),
+        tuple(found),
+        start,
+        (end - start) * 1e-9,
+        missing,
+        (*lacking, *notes),
+        made,
+        lacking,
+    )
+
+
+def _found(path: Path | str, names: TopicNames) -> tuple[list[TopicInfo], dict[str, Any]]:
+    """Return the topics of a bag and what its writer said of it."""
     stamps: dict[str, array[int]] = {}
     unstamped: dict[str, int] = {}
     headers: set[str] = set()
@@ -129,22 +150,7 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
             for name, (kind, _) in sorted(bag.topics.items())
         ]
         made = bag.provenance
-    used = [t for t in found if t.use and t.start_ns is not None]
-    timed = used or [t for t in found if t.start_ns is not None]
-    start = min((t.start_ns for t in timed if t.start_ns is not None), default=0)
-    end = max((t.end_ns for t in timed if t.end_ns is not None), default=0)
-    missing, notes = _judge(names, {t.use: t for t in used}, found)
-    lacking = (*never_recorded(made), *(uneven_ends(_ends(found)) if not missing else ()))
-    return BagInfo(
-        Path(path),
-        tuple(found),
-        start,
-        (end - start) * 1e-9,
-        missing,
-        (*lacking, *notes),
-        made,
-        lacking,
-    )
+    return found, made
 
 
 def _ends(found: list[TopicInfo]) -> dict[str, Ends]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -79,7 +80,7 @@ def read_recording(path: Path | str, robot: Robot, topics: TopicNames | None = N
             f'{robot.name!r}: {", ".join(robot.joint_names)}'
         )
     samples = {role: stream.samples() for role, stream in streams.items()}
-    recording = assembled(
+    whole = assembled(
         _name(Path(path)),
         robot,
         samples,
@@ -87,8 +88,14 @@ def read_recording(path: Path | str, robot: Robot, topics: TopicNames | None = N
         static=bool(made['static']) if 'static' in made else None,
         notes=_notes(names, streams, intake, bool(points)),
     )
+    return _with_what_is_missing(whole, made, _ends(names, samples))
+
+
+def _with_what_is_missing(
+    recording: Recording, made: Mapping[str, Any], ends: Mapping[str, Ends]
+) -> Recording:
     lacking = never_recorded(made)
-    uneven = () if recording.joints.static else uneven_ends(_ends(names, samples))
+    uneven = () if recording.joints.static else uneven_ends(ends)
     return replace(recording, incomplete=(*lacking, *uneven), notes=(*recording.notes, *lacking))
 
 

@@ -15,13 +15,14 @@ from mcap.reader import make_reader
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64MultiArray, String
 
 from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.bags import BagReader, bag_info, provenance
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES
+from weld_twin_msgs_py.robots import write_urdf
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.cell_node import CellNode
@@ -276,3 +277,15 @@ def test_a_cell_is_recorded_from_the_first_to_the_last_message(cell, tmp_path, w
         assert told[topic] == {'sent': sent, 'recorded': sent, 'missing': 0}, process.log
     assert told['/deviation']['missing'] == told['/joint_states']['missing'] == 0
     assert bag_info(tmp_path / 'bag').incomplete == ()
+
+
+def test_the_description_of_the_cell_is_recorded_and_tells_the_robot(cell, tmp_path):
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    description = cell.node.create_publisher(String, '/robot_description', latched)
+    write_urdf(tmp_path / 'arm.urdf', ROBOT)
+    description.publish(String(data=(tmp_path / 'arm.urdf').read_text()))
+    process = recorder(cell, tmp_path)
+    cell.wait_recorded({'/robot_description': 1})
+    assert finish(cell, process) == 0
+    noted = provenance(tmp_path / 'bag')['robot']
+    assert tuple(joint['name'] for joint in noted['joints']) == ROBOT.joint_names

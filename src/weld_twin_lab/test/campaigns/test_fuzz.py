@@ -62,7 +62,7 @@ def test_the_samples_the_broken_files_are_made_of_are_right(name, tmp_path):
     for k, seed in enumerate(kind.seeds):
         path = tmp_path / f'sample{k}{kind.suffix}'
         path.write_bytes(seed)
-        kind.read(path)
+        assert kind.read(path) is not None
 
 
 def test_a_topic_whose_type_is_no_text_makes_a_damaged_bag(tmp_path):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 from ..arm.robot import Robot
 from ..effects.effect import Effect
@@ -14,6 +15,7 @@ from .algebra.problem import frames_named
 from .answer.answer import answer
 from .answer.refusal import refusal
 from .beliefs import Beliefs
+from .frames.open_directions import held
 from .hypotheses.search import search
 from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.carried import carried
@@ -137,6 +139,8 @@ def _explained(
     verdict = held_against(verdict, unseen, rival, beliefs)
     progress('held against curves without a formula')
     found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)
+    final = held(found.final, found.problem, found.scale, found.precision, examined.given.robot)
+    found = replace(found, final=final)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
     return answer(

@@ -24,8 +24,9 @@ def left_open(posterior: Posterior) -> list[str]:
     """Return the directions that the recordings left open, in one sentence or none."""
     if not posterior.left_open:
         return []
-    many = 'directions are' if len(posterior.left_open) > 1 else 'direction is'
+    count = len(posterior.left_open)
+    named = 'direction of the frames is' if count == 1 else 'directions of the frames are'
     return [
-        f'{len(posterior.left_open)} {many} left open by the recordings and as it was given, or '
-        f'nearly: {"; ".join(posterior.left_open)}.'
+        f'{count} {named} left open by the recordings, and as given as far as the data bear that: '
+        f'{"; ".join(posterior.left_open)}.'
     ]

@@ -46,11 +46,11 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     if 'tool' in problem.align:
         pairs.append((model.robot.T_flange_tool, anchor.tool, False))
     sizes = np.repeat([FRAME_SHIFT, FRAME_TURN], 3)
-    off = [_offset(now, was, left) for now, was, left in pairs]
+    off = [frame_offset(now, was, left=left) for now, was, left in pairs]
     return np.tile(sizes**-2.0, len(pairs)), np.concatenate([np.zeros(0), *off])
 
 
-def _offset(now: Array, was: Array, left: bool) -> Array:
+def frame_offset(now: Array, was: Array, *, left: bool) -> Array:
     """Return the step (xyz, rotvec) that leads from one frame to another, as `Model.moved` does."""
     one, other = now[:3, :3], was[:3, :3]
     turn = one @ other.T if left else other.T @ one

@@ -130,7 +130,7 @@ def allowed(
         covariance,
         plausible_arm.discrepancy(model.robot, left, width[ends]),
         Domain.of(recordings, model.robot),
-        left_open(problem, model, scale),
+        left_open(problem, model),
     )
     return _with_usual_sigma(posterior, model, problem)
 

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Directions of the aligned frames that the recordings hardly show: they go back to what was given.
+
+A seam without a turn of the tool cannot tell a lower base from a longer tool. A fit puts both
+somewhere, and wrongly by millimetres where an effect was not yet in the model. Where the given
+frames explain the recordings as well, they stand.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arrays import Array
+from ..algebra.fit import Fit, coordinates, design, fit, stepped
+from ..algebra.independent_rows import effective_share
+from ..algebra.prior import frame_offset
+from ..algebra.problem import Model, Problem, Scale
+
+VISIBLE = (1e-3, 5e-3)
+"""A frame error [m, rad] that the data should show."""
+NEAR = (0.1, 0.3)
+"""A base this near to the given one [m, rad] was meant to be there; farther off the measuring frame
+is another, and says nothing."""
+WORSE = 4.0
+"""Chi-square per direction that the given frames may cost: two standard deviations."""
+ROUNDS = 3
+ROWS = 3000
+"""Rows from which directions are taken."""
+
+
+class Open(NamedTuple):
+    """
+    Directions that the data hardly show.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the frame columns, as `Problem.frame_columns` gives them.
+    vectors : array, shape (F, k)
+        Columns are steps of the frames [m, rad].
+
+    """
+
+    names: list[str]
+    vectors: Array
+
+
+def open_directions(problem: Problem, model: Model) -> Open:
+    """Return the directions of the aligned frames in which a visible error would not show."""
+    problem = problem.thinned(ROWS)
+    parts, names = problem.frame_columns(problem.features(model))
+    if not names:
+        return Open(names, np.zeros((0, 0)))
+    columns = problem.whitened(parts, problem.unit_scale())
+    size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in names])
+    scaled = columns * size[:, None]
+    strength, vectors = np.linalg.eigh(scaled @ scaled.T)
+    return Open(names, size[:, None] * vectors[:, strength < 1.0])
+
+
+def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Robot) -> Fit:
+    """
+    Return the fit with the open directions as they were given, where the data bear that.
+
+    Parameters
+    ----------
+    found : Fit
+    problem, scale : Problem, Scale
+    precision : array, shape (K,)
+        Prior precision of the found effects' coordinates; may be empty.
+    given : Robot
+        With the frames that were given.
+
+    """
+    free = open_directions(problem, found.model)
+    if not free.vectors.size:
+        return found
+    off, weight = _off(problem, found.model, given)
+    back = np.linalg.lstsq(weight[:, None] * free.vectors, -weight * off, rcond=1e-9)[0]
+    step = np.concatenate([free.vectors @ back, np.zeros(found.coordinates.size)])
+    model = stepped(problem, found.model, step)
+    for _ in range(ROUNDS):
+        model = stepped(problem, model, _closed_step(problem, model, scale, precision, free))
+    residual = problem.whitened(problem.residuals(model), scale)
+    share = effective_share(found.residual, problem.rows, problem.samples)
+    most = WORSE * free.vectors.shape[1] / share * found.rss / max(found.residual.size, 1)
+    if residual @ residual > found.rss + most:
+        return found
+    return fit(problem, model, scale, precision if precision.size else None, iterations=0)
+
+
+def _off(problem: Problem, model: Model, given: Robot) -> tuple[Array, Array]:
+    """Return how far frames are from the given ones, shape (F,), and what of it counts."""
+    sizes = np.repeat(1.0 / np.array(VISIBLE), 3)
+    off, weight = [np.zeros(0)], [np.zeros(0)]
+    if 'base' in problem.align:
+        for base in model.bases:
+            away = frame_offset(base, given.T_world_base, left=True)
+            near = np.linalg.norm(away[:3]) < NEAR[0] and np.linalg.norm(away[3:]) < NEAR[1]
+            off.append(away)
+            weight.append(sizes * float(near))
+    if 'tool' in problem.align:
+        off.append(frame_offset(model.robot.T_flange_tool, given.T_flange_tool, left=False))
+        weight.append(sizes)
+    return np.concatenate(off), np.concatenate(weight)
+
+
+def _closed_step(
+    problem: Problem, model: Model, scale: Scale, precision: Array, free: Open
+) -> Array:
+    """Return a least-squares step, shape (P,), that leaves the open directions where they are."""
+    columns, _ = design(problem, model, scale)
+    residual = problem.whitened(problem.residuals(model), scale)
+    frames, x = len(free.names), coordinates(model)
+    size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in free.names])
+    span, _, _ = np.linalg.svd(free.vectors / size[:, None])
+    closed = size[:, None] * span[:, free.vectors.shape[1] :]
+    allowed = np.zeros((columns.shape[0], closed.shape[1] + x.size))
+    allowed[:frames, : closed.shape[1]] = closed
+    allowed[frames:, closed.shape[1] :] = np.eye(x.size)
+    mixed = allowed.T @ columns
+    ridge = np.zeros(mixed.shape[0])
+    pull = np.zeros(mixed.shape[0])
+    if precision.size:
+        ridge[closed.shape[1] :] = precision
+        pull[closed.shape[1] :] = precision * x
+    norm = np.sqrt((mixed**2).sum(axis=1) + ridge)
+    norm[norm == 0.0] = 1.0
+    unit = mixed / norm[:, None]
+    system = unit @ unit.T + np.diag(ridge / norm**2 + 1e-11)
+    return np.asarray(allowed @ (np.linalg.solve(system, (mixed @ residual - pull) / norm) / norm))

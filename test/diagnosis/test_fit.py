@@ -10,9 +10,15 @@ from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, shaken, tiny
 from scipy.optimize import least_squares
 from scipy.stats import chi2, norm
 
-from weld_twin_core.diagnosis.algebra.fit import design, fit, robust_fit, robust_scale, stepped
+from weld_twin_core.diagnosis.algebra.fit import (
+    TRUSTED,
+    design,
+    fit,
+    robust_fit,
+    robust_scale,
+    stepped,
+)
 from weld_twin_core.diagnosis.algebra.problem import Problem
-from weld_twin_core.diagnosis.unseen.unseen_stretches import TRUSTED
 
 CASES = {
     'geometry': (

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
-from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.fit import TRUSTED, fit, trusted
 from weld_twin_core.diagnosis.algebra.problem import Scale
-from weld_twin_core.diagnosis.unseen.unseen_stretches import TRUSTED, Unseen
+from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 
 TRUE = (
     effect('joint_offset', joint='elbow_joint', offset=6e-4),
@@ -133,7 +133,7 @@ def test_the_error_on_unseen_stretches_exceeds_that_of_the_fit():
 
 def test_squared_errors_are_metres_of_the_trusted_samples_whatever_their_weight():
     problem, model = tiny((), count=30)
-    weights = np.linspace(0.05, 1.0, 30)
+    weights = np.append(0.05, np.linspace(0.3, 1.0, 29))
     scale = Scale(SIGMA, SIGMA_TURN, (weights,))
     found = fit(problem, model, scale)
     unseen = Unseen.of(problem, scale, found, np.zeros(0))
@@ -142,6 +142,15 @@ def test_squared_errors_are_metres_of_the_trusted_samples_whatever_their_weight(
     np.testing.assert_allclose(unseen.squares(found.residual), expected, rtol=1e-9)
     assert unseen.rms(found.residual) == pytest.approx(np.sqrt(expected.mean()))
     assert unseen.trusted_labels().size == expected.size
+
+
+def test_what_many_samples_do_is_no_outlier():
+    weights = np.append(np.full(20, 0.01), np.ones(80))
+    weights[:2] = 0.001, 0.002
+    (kept,) = trusted((weights,))
+    assert np.flatnonzero(~kept).tolist() == [0, 1]
+    assert not trusted((np.append(0.01, np.ones(29)),))[0][0]
+    assert trusted((np.full(7, 0.01),))[0].all()
 
 
 def test_stretches_never_span_two_recordings():

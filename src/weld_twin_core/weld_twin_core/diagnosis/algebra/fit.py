@@ -4,22 +4,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ...arrays import Array
 from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
-from .robust_spread import robust_spread
+from .robust_spread import measured_axes, robust_spread
 from .unit_diagonal import unit_diagonal
 
 DAMPING, DAMPED = 1e-9, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
 HUBER = 3.0
 """A sample this many robust deviations off starts to lose weight."""
+TRUSTED = 0.2
+"""A sample of less weight is an outlier: reported, and left out of every quoted RMS."""
+SET_ASIDE = 0.02
+"""Share of the samples that may be outliers; beyond that they are structure."""
 LEAST_TURN = 0.5
 """
 Least noise of orientation per noise of position [rad/m]: no probe is wider than some metres.
@@ -259,7 +265,7 @@ def robust_scale(
 
     """
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
-    position = np.concatenate([r[:3].ravel() for r in residuals])
+    position = np.concatenate([measured_axes(r[:3]).ravel() for r in residuals])
     turn = np.concatenate([r[3:].ravel() for r in residuals])
     sigma = robust_spread(position) / lost
     sigma_turn = robust_spread(turn) / lost if turn.size else 1.0
@@ -274,6 +280,19 @@ def robust_scale(
             off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)
         weights.append(np.minimum(1.0, (HUBER / np.maximum(off, 1e-12)) ** 2))
     return Scale(sigma, sigma_turn, tuple(weights))
+
+
+def trusted(weights: Sequence[Array]) -> list[NDArray[np.bool_]]:
+    """
+    Return which samples count in every quoted figure, (M,) per recording.
+
+    All but outliers, and of those no more than `SET_ASIDE` (or one) are left out, the farthest: what
+    many samples do is structure, and must show in what is left.
+    """
+    every = np.concatenate(list(weights)) if weights else np.zeros(0)
+    aside = max(1, int(SET_ASIDE * every.size))
+    few = float(np.sort(every)[aside]) if every.size > aside else 0.0
+    return [weight >= min(TRUSTED, few) for weight in weights]
 
 
 def robust_fit(

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array
 from .problem import Problem
-from .robust_spread import robust_spread
+from .robust_spread import measured_axes, robust_spread
 
 SAME_STATION = 2e-3
 """Stations closer than this in every joint [rad, m] are repeats of one pose."""
@@ -55,7 +55,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
     estimates = []
     independent = True
     for recording, part in zip(problem.recordings, residuals, strict=True):
-        position = part[:3]
+        position = measured_axes(part[:3])
         left = robust_spread(position)
         static = recording.joints.static
         direct = _repeats(recording.joints.q, position) if static else _differences(position)
@@ -63,7 +63,10 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
             sigma = recording.measured.sigma
             direct = None if sigma is None else float(np.median(sigma))
             independent = False
-        estimates.append((left if direct is None else min(direct, left), part.shape[1]))
+        # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
+        share = float(np.sqrt(position.shape[0] / 3.0))
+        least = left if direct is None else min(direct, left)
+        estimates.append((share * least, part.shape[1]))
     values, counts = zip(*estimates, strict=True)
     return NoiseFloor(float(np.average(values, weights=counts)), independent)
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..algebra.fit import trusted
 from ..hypotheses.search import Search
 from ..result import Gap, Traces
-from ..unseen.unseen_stretches import TRUSTED
 
 
 def gap(found: Search, floor: float) -> Gap:
@@ -24,7 +24,7 @@ def gap(found: Search, floor: float) -> Gap:
 
     """
     parts = found.problem.residuals(found.baseline.model)
-    good = [w >= TRUSTED for w in found.scale.weights]
+    good = trusted(found.scale.weights)
     distance = np.concatenate(
         [np.linalg.norm(p[:3, g], axis=0) for p, g in zip(parts, good, strict=True)]
     )
@@ -52,5 +52,5 @@ def traces(found: Search) -> Traces:
         measured=tuple(r.measured.position for r in recordings if r.measured is not None),
         before=tuple(p[:3].T for p in before),
         after=tuple(p[:3].T for p in after),
-        trusted=tuple(w >= TRUSTED for w in found.scale.weights),
+        trusted=tuple(trusted(found.scale.weights)),
     )

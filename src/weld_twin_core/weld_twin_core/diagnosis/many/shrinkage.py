@@ -19,11 +19,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...errors import DataError
 from ..algebra.fit import Fit, coordinates, design, fit, robust_scale, solve_scaled, stepped
 from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import Model, Problem, Scale
@@ -31,6 +32,8 @@ from ..beliefs import Beliefs
 
 ROUNDS = 15
 """Times that variances and noise are learned in turn; they settle within ten."""
+JITTER = (1e-12, 1e-9, 1e-6, 1e-3, 1.0)
+"""Shares added to a diagonal, the least that is enough: a few stations repeat their columns."""
 PULL = 0.5
 """
 Coordinates that the belief about machines at large counts as, where the spread of one machine's is
@@ -94,8 +97,7 @@ def learned_precision(
     for _ in range(ROUNDS):
         precision = _precision(tied, variance, labels, usual)
         system = normal / noise + np.diag(precision)
-        system[np.diag_indices_from(system)] *= 1.0 + 1e-12
-        factor = cho_factor(system, lower=True)
+        factor = _factor(system)
         mean = cho_solve(factor, right / noise)
         spread = (np.tril(dtrtri(factor[0], lower=1)[0]) ** 2).sum(axis=0)
         determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
@@ -110,6 +112,21 @@ def learned_precision(
     precision = _precision(tied, variance, labels, usual) / scales**2
     # The fit works in whitened rows, so a prior counts against the noise actually there.
     return precision * noise, float(determined.sum())
+
+
+def _factor(system: Array) -> tuple[Array, bool]:
+    """Return the Cholesky factor, with as much on the diagonal as columns that repeat need."""
+    each = np.diag_indices_from(system)
+    size = np.abs(system[each])
+    for more in JITTER:
+        damped = system.copy()
+        damped[each] += more * (size + more * size.max(initial=1.0))
+        try:
+            factor: tuple[Array, bool] = cho_factor(damped, lower=True)
+        except LinAlgError:
+            continue
+        return factor
+    raise DataError('the measurements say so little that no errors can be fitted together')
 
 
 def _precision(tied: NDArray[np.bool_], variance: Array, labels: Array, usual: Array) -> Array:

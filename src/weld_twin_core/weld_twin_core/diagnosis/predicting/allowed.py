@@ -216,7 +216,8 @@ def _turns(problem: Problem, model: Model, scale: Scale) -> Array:
     parts = []
     for k, maker in enumerate(problem.features(model)):
         columns = [maker.column(('q', int(i)))[: problem.rows[k]] for i in joints]
-        parts.append(np.reshape(columns, (joints.size, problem.rows[k], -1)))
+        shape = (joints.size, problem.rows[k], problem.samples[k])
+        parts.append(np.reshape(columns, shape))
     return problem.whitened(parts, scale)
 
 

@@ -12,13 +12,13 @@ import numpy as np
 from ...arrays import Array
 from ...effects.setup_motion import of_the_robot, seen_from
 from ...recording import Recording
-from ..algebra.fit import fit, robust_scale
+from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Shrink
 from .regions import posture_regions
-from .unseen_stretches import TRUSTED, Unseen
+from .unseen_stretches import Unseen
 
 LARGE = 300
 
@@ -131,7 +131,7 @@ def _on_bags(
             )
             pair.append((parts[0][:3] ** 2).sum(axis=0))
             # What is an outlier shows best against the better model, which comes last.
-            good = robust_scale(problem, parts).weights[0] >= TRUSTED
+            good = trusted(robust_scale(problem, parts).weights)[0]
         before.append(pair[0][good])
         after.append(pair[1][good])
         stretch = np.arange(good.sum()) * 8 // max(int(good.sum()), 1)

@@ -25,7 +25,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotri
 
 from ...arrays import Array
-from ..algebra.fit import Fit, design
+from ..algebra.fit import Fit, design, trusted
 from ..algebra.gram import Index
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
@@ -39,8 +39,6 @@ MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""
 Rows = Any
 """Rows of one stretch: a slice, or their numbers."""
-TRUSTED = 0.2
-"""A sample of less weight is an outlier: reported, and left out of every quoted RMS."""
 TETHER = 0.3
 """A coordinate moves about this share of its size when the stretches that show it are left out."""
 
@@ -249,7 +247,8 @@ class Unseen:
     def _weighted(self, values: Array) -> list[tuple[Array, Array]]:
         """Return the rows of trusted samples, (m, c), and their weights, one per recording."""
         parts = zip(self.problem.by_sample(values), self.scale.weights, strict=True)
-        return [(part[w >= TRUSTED], w[w >= TRUSTED]) for part, w in parts]
+        good = trusted(self.scale.weights)
+        return [(part[g], w[g]) for (part, w), g in zip(parts, good, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)

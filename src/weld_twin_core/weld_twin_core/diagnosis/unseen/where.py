@@ -8,10 +8,11 @@ import numpy as np
 
 from ...arrays import Array
 from ...twin.features import Features
+from ..algebra.fit import trusted
 from ..algebra.problem import Model, Problem
 from ..hypotheses.search import Search
 from ..result import Where
-from .unseen_stretches import TRUSTED, Unseen
+from .unseen_stretches import Unseen
 
 REGRESSORS = (
     'constant',
@@ -59,7 +60,7 @@ def locate(found: Search, final: Unseen) -> Where:
         }
         regimes = _map_regimes(shares)
     ordered = sorted(joints.items(), key=lambda item: -item[1])
-    good = [weight >= TRUSTED for weight in final.scale.weights]
+    good = trusted(final.scale.weights)
     return Where(
         joints=tuple(ordered),
         regimes=regimes,
@@ -166,12 +167,12 @@ def _path(
     out = []
     parts = problem.residuals(model)
     total = sum(float((part[:3, g] ** 2).sum()) for part, g in zip(parts, good, strict=True))
-    for recording, part, trusted in zip(problem.recordings, parts, good, strict=True):
+    for recording, part, kept in zip(problem.recordings, parts, good, strict=True):
         assert recording.measured is not None
         squares = (part[:3] ** 2).sum(axis=0)
         count = max(1, round(STRETCHES * squares.size / max(sum(problem.samples), 1)))
         for stretch in np.array_split(np.arange(squares.size), count):
-            index = stretch[trusted[stretch]]
+            index = stretch[kept[stretch]]
             if index.size:
                 t = recording.measured.t[index]
                 share = float(squares[index].sum()) / max(total, 1e-300)
@@ -187,7 +188,7 @@ def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[s
     Along is the direction of travel; stations have none and count as across.
     """
     sums = np.zeros(3)
-    for recording, part, maker, trusted in zip(
+    for recording, part, maker, kept in zip(
         problem.recordings, problem.residuals(model), problem.features(model), good, strict=True
     ):
         error, poses = part[:3].T, maker.run.poses
@@ -199,8 +200,8 @@ def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[s
         along = np.where(size > 1e-6, travel / np.maximum(size, 1e-12), 0.0)
         normal = normal - along * (normal * along).sum(axis=1, keepdims=True)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-        a, c = (error * along).sum(axis=1)[trusted], (error * normal).sum(axis=1)[trusted]
-        across = np.maximum((error[trusted] ** 2).sum(axis=1) - a**2 - c**2, 0.0)
+        a, c = (error * along).sum(axis=1)[kept], (error * normal).sum(axis=1)[kept]
+        across = np.maximum((error[kept] ** 2).sum(axis=1) - a**2 - c**2, 0.0)
         sums += [float((a**2).sum()), float(across.sum()), float((c**2).sum())]
     rms = np.sqrt(sums / max(sum(int(g.sum()) for g in good), 1))
     return {'along_m': float(rms[0]), 'across_m': float(rms[1]), 'normal_m': float(rms[2])}

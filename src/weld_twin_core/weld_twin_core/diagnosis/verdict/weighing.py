@@ -45,7 +45,8 @@ class Weighed:
     def rise(self) -> float:
         """Return by what share of an independent floor what remains stands above it."""
         told = self.evidence
-        return max(told.after / told.floor - 1.0, 0.0) if told.independent else 0.0
+        floor = max(told.floor, np.sqrt(TINY))
+        return float(max(told.after / floor - 1.0, 0.0)) if told.independent else 0.0
 
     @property
     def share(self) -> float:

@@ -103,10 +103,11 @@ def test_the_files_that_contributing_names_exist():
 def test_the_reference_has_every_public_name():
     pages = ''.join(path.read_text() for path in (ROOT / 'docs/reference').glob('*.md'))
     rooms = {'catalog': 'arm.catalog', 'paths': 'motion.paths', 'profiles': 'motion.profiles'}
-    rooms['rotation'] = 'arm.rotation'
+    rooms |= {'rotation': 'arm.rotation'}
+    rooms |= {name: 'errors' for name in wt.__all__ if name.endswith('Error')}
     missing = [
         name
         for name in wt.__all__
-        if not re.search(rf'weld_twin_core\.{rooms.get(name, name)}$', pages, re.M)
+        if not re.search(rf'weld_twin_core\.(\w+\.)*{rooms.get(name, name)}$', pages, re.M)
     ]
     assert missing == []

@@ -27,6 +27,8 @@ ARGUMENTS = {
     'base_link': ('', 'first link of the chain in a URDF'),
     'tip_link': ('', 'last link of the chain in a URDF'),
     'model': ('', 'effects file or diagnosis.json that the twin is to know'),
+    'measuring_frame': ('', 'frame that measurements must be given in; empty: the first seen'),
+    'base_frame': ('', "name of the robot's base in what is published; empty: base"),
     'joint_topic': ('joint_states', 'joint states of the controller'),
     'pose_topic': ('measured/tool_pose', 'poses of the tracker'),
     'point_topic': ('measured/tool_point', 'points of a tracker that gives no orientation'),
@@ -39,7 +41,7 @@ ARGUMENTS = {
     'rviz': ('false', 'show the cell in RViz'),
     'config': ('', 'parameter file; empty: config/cell.yaml of this package'),
 }
-MODEL = ('base_link', 'robot', 'tip_link')
+MODEL = ('base_frame', 'base_link', 'measuring_frame', 'robot', 'tip_link')
 TOPICS = {
     'joint_states': 'joint_topic',
     'measured/tool_point': 'point_topic',

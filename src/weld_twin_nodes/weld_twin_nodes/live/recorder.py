@@ -107,6 +107,8 @@ class Recorder(CellNode):
         )
         self.create_service(Trigger, '~/counts', self._tell)
         self.every(LOOK_EVERY, self._look)
+        names = ', '.join([*self._topics, *(f'{name} when it appears' for name in self._untyped)])
+        self.get_logger().info(f'recording into {self.setting("out")}: {names}')
 
     # Taking in -------------------------------------------------------------------------------
 

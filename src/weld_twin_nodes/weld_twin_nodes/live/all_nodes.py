@@ -76,20 +76,30 @@ def usage(kind: Any, name: str) -> str:
         'parameters:',
     ]
     for item in kind.every_setting():
-        lines.append(f'  {item.name} ({_value(item)}{_range(item)})')
+        limits = f', {range_of(item)}' if range_of(item) else ''
+        lines.append(f'  {item.name} ({value_of(item)}{limits})')
         lines.append(f'      {item.description}')
     return '\n'.join(lines)
 
 
-def _value(item: Setting) -> str:
+def value_of(item: Setting) -> str:
+    """Return the default of a parameter in words."""
     if isinstance(item.default, bool):
         return str(item.default).lower()
     if isinstance(item.default, list):
-        return 'a list of texts'
-    return repr(item.default) if isinstance(item.default, str) else f'{item.default}'
+        return '[' + ', '.join(str(value) for value in item.default) + ']'
+    if isinstance(item.default, str):
+        return repr(item.default)
+    return f'{item.default:g}' if isinstance(item.default, float) else _untyped(item.default)
 
 
-def _range(item: Setting) -> str:
+def _untyped(default: object) -> str:
+    """Return a whole number, or what stands for a parameter without a value."""
+    return str(default) if isinstance(default, int) else 'not set'
+
+
+def range_of(item: Setting) -> str:
+    """Return the range of a parameter in words, empty where it has none."""
     if item.low is None or item.high is None:
         return ''
-    return f', {item.low:g} to {item.high:g}'
+    return f'{item.low:g} to {item.high:g}'

@@ -42,8 +42,11 @@ def table(result: Mapping[str, Any]) -> str:
         f'Every belief of a diagnosis, moved by {move} % down and up, one at a time. The cases '
         f'are sealed under `{result["seal"][:16]}`. Beliefs that act in the verdict are decided '
         f'anew on {late["cases"]} cases, of which {late["right"]} are right and '
-        f'{late["sure_and_wrong"]} sure and wrong as the beliefs stand. The others need new fits, '
-        f'made on {early["cases"]} of these cases, of which {early["right"]} are right and '
-        f'{early["sure_and_wrong"]} sure and wrong.'
+        f'{late["sure_and_wrong"]} sure and wrong as the beliefs stand.'
     )
+    if early['cases']:
+        intro += (
+            f' The others need new fits, made on {early["cases"]} of these cases, of which '
+            f'{early["right"]} are right and {early["sure_and_wrong"]} sure and wrong.'
+        )
     return f'{intro}\n\n{markdown.table(HEAD, *rows)}\n'

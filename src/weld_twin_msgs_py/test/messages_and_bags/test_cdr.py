@@ -14,7 +14,12 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_read import READERS, JointStateDecoder, decoder
-from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder, PoseEncoder, Vector3Encoder
+from weld_twin_msgs_py.messages.cdr_write import (
+    JointStateEncoder,
+    PoseCovarianceEncoder,
+    PoseEncoder,
+    Vector3Encoder,
+)
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.typestore import TYPES, decode
 
@@ -117,6 +122,21 @@ def test_an_encoded_pose_is_the_message_rosbags_reads(frame):
     assert from_messages.stamp_ns(message) == NS
     np.testing.assert_array_equal(position, [1.0, -2.0, 3e-9])
     np.testing.assert_allclose(rotation, TURN, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize('frame', ['', 'world', 'base_link_inertia'])
+def test_an_encoded_pose_with_covariance_is_the_message_rosbags_reads(frame):
+    covariance = np.arange(36.0).reshape(6, 6) * 1e-9
+    data = PoseCovarianceEncoder(frame)(NS, np.array([1.0, -2.0, 3e-9]), TURN, covariance)
+    message = decode(data, 'geometry_msgs/msg/PoseWithCovarianceStamped')
+    inner = message.pose.pose
+    assert (message.header.frame_id, from_messages.stamp_ns(message)) == (frame, NS)
+    assert (inner.position.x, inner.position.y, inner.position.z) == (1.0, -2.0, 3e-9)
+    turned = Rotation.from_quat(
+        [inner.orientation.x, inner.orientation.y, inner.orientation.z, inner.orientation.w]
+    )
+    np.testing.assert_allclose(turned.as_matrix(), TURN, atol=1e-15)
+    np.testing.assert_array_equal(message.pose.covariance, covariance.ravel())
 
 
 def test_an_encoded_vector_is_the_message_rosbags_reads():

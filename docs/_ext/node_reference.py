@@ -48,7 +48,7 @@ class Topics(Directive):
         rows = [
             (t.name, t.meaning, t.type.replace('/msg', ''), _quality(t.requested)) for t in TOPICS
         ]
-        return [page_table(('topic', 'meaning', 'type', 'requested as'), rows)]
+        return [page_table(('topic', 'meaning', 'type', 'requested as'), rows, 'sentences')]
 
 
 def _quality(qos: Qos) -> str:
@@ -61,17 +61,18 @@ def _section(name: str, text: str, settings: tuple[Setting, ...]) -> nodes.secti
     section += nodes.title(text=name)
     section += nodes.paragraph(text=text.strip().partition('\n\n')[0])
     section += page_table(
-        ('parameter', 'default', 'meaning', 'range', 'while running'),
+        ('parameter', 'meaning', 'default', 'range', 'while running'),
         [
             (
                 s.name,
-                repr(s.default),
                 s.description,
+                repr(s.default),
                 '' if s.low is None else f'{s.low:g} to {s.high:g}',
                 'may change' if s.live else '',
             )
             for s in settings
         ],
+        'sentences',
     )
     return section
 

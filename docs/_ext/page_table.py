@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from docutils import nodes
 
 
-def page_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> nodes.table:
+def page_table(header: Sequence[str], rows: Iterable[Sequence[str]], *classes: str) -> nodes.table:
     """
     Return a table.
 
@@ -18,6 +18,8 @@ def page_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> nodes.ta
     header : sequence of str
     rows : iterable of sequence of str
         As many cells each as the header has.
+    classes : str
+        Classes for the style sheet; 'sentences' gives the second column room.
 
     """
     group = nodes.tgroup(cols=len(header))
@@ -26,7 +28,7 @@ def page_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> nodes.ta
     head += _row(header)
     body += [_row(row) for row in rows]
     group += [head, body]
-    table = nodes.table()
+    table = nodes.table(classes=list(classes))
     table += group
     return table
 

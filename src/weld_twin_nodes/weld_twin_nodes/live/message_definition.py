@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
@@ -52,12 +54,20 @@ def _gather(kind: str, parts: dict[str, str], read: Callable[[str], str]) -> Non
 
 def _installed(kind: str) -> str:
     package, _, name = kind.split('/')
-    try:
-        return Path(get_package_share_directory(package), 'msg', f'{name}.msg').read_text()
-    except (PackageNotFoundError, OSError):
-        raise DataError(
-            f'the definition of {kind} is not installed here; install the package {package}'
-        ) from None
+    for share in _shares(package):
+        file = Path(share, 'msg', f'{name}.msg')
+        if file.is_file():
+            return file.read_text(encoding='utf-8')
+    raise DataError(
+        f'the definition of {kind} is not installed here; install the package {package}'
+    )
+
+
+def _shares(package: str) -> Iterator[str]:
+    """Yield where a package may keep its files; wheels keep them without telling the index."""
+    with suppress(PackageNotFoundError, LookupError, OSError):
+        yield get_package_share_directory(package)
+    yield f'{sys.prefix}/share/{package}'
 
 
 def _short(kind: str) -> str:

@@ -15,6 +15,7 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags.segment import Channel
@@ -24,7 +25,7 @@ from .message_definition import definition
 
 NANOSECONDS = 1_000_000_000
 UNTOLD = 'RIHS01_' + 64 * '0'
-"""Hash of a type whose publishers left before they were asked for it."""
+"""Hash of a type that nobody could be asked for any more."""
 
 
 def offered_channel(topic: str, kind: str, publishers: Sequence[Any]) -> Channel:
@@ -37,15 +38,24 @@ def offered_channel(topic: str, kind: str, publishers: Sequence[Any]) -> Channel
     publishers : sequence of rclpy TopicEndpointInfo
 
     """
-    digest = next((str(info.topic_type_hash) for info in publishers), UNTOLD)
+    digest = next((str(info.topic_type_hash) for info in publishers), '')
     text = ''
     if kind not in TYPES.types:
         try:
             text = definition(kind)
+            digest = digest or type_hash(kind, text)
         except DataError:  # the messages are worth keeping without
             text = '# the definition of this type was not installed where it was recorded\n'
+            digest = digest or UNTOLD
     qos = tuple(_profile(info.qos_profile) for info in publishers)
     return Channel(topic, kind, text, digest, qos)
+
+
+def type_hash(kind: str, text: str) -> str:
+    """Return the hash of a type by its definition."""
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(text, kind))
+    return store.hash_rihs01(kind)
 
 
 def _profile(offered: Any) -> Qos:

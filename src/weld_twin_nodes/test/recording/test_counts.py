@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What nodes tell of their messages, who is still to be met, and types nobody here knows."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+from rosbags.highlevel import AnyReader
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
+from weld_twin_msgs_py.bags.segment import Channel
+from weld_twin_msgs_py.messages.to_messages import Status, bag_messages
+from weld_twin_msgs_py.messages.typestore import TYPES
+from weld_twin_nodes.live.completeness import NEW, SentBook, shortfall
+from weld_twin_nodes.live.meeting import Neighbours
+from weld_twin_nodes.live.message_definition import definition
+from weld_twin_nodes.live.outputs import Sent
+
+TWIN, INJECTOR = '/forward_kinematics_twin', '/error_injector'
+
+
+def health(node, run='1', sent=None, **reached):
+    values = {'sent': json.dumps(sent or {}), 'reached': json.dumps(reached), 'run': run}
+    return {**values, 'node': node}
+
+
+def test_the_last_word_of_every_start_of_every_node_counts():
+    book = SentBook()
+    book.take(health('/a', '1', {'/x': [10, 100, 900]}), 0.0)
+    book.take(health('/a', '1', {'/x': [20, 100, 1900]}), 1.0)
+    book.take(health('/a', '2', {'/x': [5, 2000, 2400]}), 2.0)
+    book.take(health('/b', '1', {'/x': [3, 50, 60], '/y': [1, None, None]}), 2.0)
+    assert book.sent('/x') == Sent(28, 50, 2400)
+    assert book.sent('/y') == Sent(1)
+    assert book.sent('/z') is None
+
+
+@pytest.mark.parametrize('values', [{}, {'sent': 'x'}, {'sent': '[1]'}, {'sent': '{"/x": 3}'}])
+def test_health_of_somebody_else_counts_nothing(values):
+    book = SentBook()
+    book.take(values, 0.0)
+    assert book.sent('/x') is None
+    assert Neighbours().apart(['/somebody']) == []
+
+
+def test_a_node_is_waited_for_until_it_has_told_or_never_will():
+    book = SentBook()
+    book.meet('/new', 10.0)
+    assert book.silent_since(10.5, 10.5) == ['/new']
+    assert book.silent_since(10.5, 10.5 + NEW) == []  # a driver of somebody else
+    book.take(health('/new', sent={'/x': [1, 1, 1]}), 10.2)
+    assert book.silent_since(10.5, 20.0) == ['/new']
+    book.take(health('/new', sent={'/x': [2, 1, 2]}), 10.6)
+    assert book.silent_since(10.5, 20.0) == []
+
+
+@pytest.mark.parametrize(
+    ('recorded', 'where'),
+    [
+        (Sent(9, 20, 100), 'at the start'),
+        (Sent(9, 10, 90), 'at the end'),
+        (Sent(8, 20, 90), 'at both ends'),
+        (Sent(9, 10, 100), 'in between'),
+        (Sent(0), 'from the first to the last'),
+    ],
+)
+def test_where_messages_are_missing_shows_in_the_stamps(recorded, where):
+    found = shortfall(Sent(10, 10, 100), recorded)
+    assert found is not None
+    assert found.where == where
+    assert found.to_mapping()['missing'] == 10 - recorded.number
+
+
+def test_nothing_is_missing_where_all_is_there_or_nobody_told():
+    assert shortfall(Sent(10, 10, 100), Sent(10, 10, 100)) is None
+    assert shortfall(Sent(10), Sent(12)) is None  # somebody else publishes there too
+    assert shortfall(None, Sent(3)) is None
+
+
+def told(neighbours, node, inputs=(), **reached):
+    make = bag_messages()
+    own = Status(node, 0, '', {**health(node), 'reached': json.dumps(reached)})
+    others = [Status(f'{node}: {topic}', 0, '', {}) for topic in inputs]
+    neighbours.take(make.statuses(1, [own, *others]))
+
+
+def test_nodes_have_met_when_each_reaches_all_who_listen():
+    there, neighbours = [TWIN, INJECTOR, '/recorder', '/driver'], Neighbours()
+    assert neighbours.apart(there) == [
+        f'{node} to tell of itself' for node in (TWIN, INJECTOR, '/recorder')
+    ]
+    told(neighbours, '/recorder', ['/pose', '/joints'])
+    told(neighbours, INJECTOR, ['/joints'])
+    told(neighbours, TWIN, ['/joints'], **{'/pose': 0})
+    assert neighbours.apart(there) == [f'{TWIN} to reach /recorder on /pose']
+    told(neighbours, TWIN, ['/joints'], **{'/pose': 1})
+    assert neighbours.apart(there) == []
+    assert neighbours.apart([INJECTOR]) == []
+
+
+def test_the_definition_of_a_type_holds_all_it_is_made_of():
+    for kind in ('sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'):
+        store = get_typestore(Stores.EMPTY)
+        store.register(get_types_from_msg(definition(kind), kind))
+        assert store.hash_rihs01(kind) == TYPES.hash_rihs01(kind)
+    with pytest.raises(DataError, match='install the package their_msgs'):
+        definition('their_msgs/msg/Arc')
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_a_type_no_bag_here_knows_is_written_with_its_definition(tmp_path, storage):
+    bag = BackgroundBag(
+        GrowingBag(tmp_path / 'bag', storage=storage), flush_every=0.1, most_bytes=10_000
+    )
+    kind, data = 'their_msgs/msg/Arc', b'\0\1\0\0' + b'\0' * 8
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg('float64 current\n', kind))
+    digest = store.hash_rihs01(kind)
+    bag.announce(Channel('/arc', kind, 'float64 current\n', digest))
+    assert bag.put('/arc', kind, data, 7)
+    bag.close()
+    with AnyReader([tmp_path / 'bag']) as reader:
+        (connection,) = reader.connections
+        assert connection.digest == digest
+        assert [raw for _, _, raw in reader.messages()] == [data]

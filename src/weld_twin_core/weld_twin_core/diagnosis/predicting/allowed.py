@@ -128,7 +128,7 @@ def allowed(
         what,
         mean,
         covariance,
-        plausible_arm.discrepancy(model.robot, left, width[ends]),
+        plausible_arm.discrepancy(model.robot, left, width[ends], model.found),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
     )

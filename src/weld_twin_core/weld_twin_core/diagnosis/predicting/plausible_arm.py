@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...effects.frame_curve import FrameCurve
+from ...effects.joint_curve import JointCurve
 from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
 from ...effects.transmission_ripple import TransmissionRipple
@@ -58,9 +60,14 @@ def directions(robot: Robot, found: Sequence[Effect]) -> tuple[Effect, ...]:
     for effect in found:
         if isinstance(effect, TransmissionRipple):
             out += _finer(effect)
-        elif effect.cause and effect.key not in {e.key for e in out}:
+        elif _counts(effect) and effect.key not in {e.key for e in out}:
             out.append(effect)
     return tuple(e for e in out if e.coordinates().size)
+
+
+def _counts(effect: Effect) -> bool:
+    """Return whether an effect goes along to other motions: all but how one set-up moved."""
+    return effect.cause or isinstance(effect, JointCurve | FrameCurve)
 
 
 def _at(found: Sequence[Effect], name: str, joint: str | None) -> Effect:
@@ -159,7 +166,7 @@ def fine_knots(motions: Sequence[Array]) -> tuple[Array, ...]:
     return tuple(out)
 
 
-def discrepancy(robot: Robot, rest: Rest, fine: Array) -> Discrepancy:
+def discrepancy(robot: Robot, rest: Rest, fine: Array, found: Sequence[Effect]) -> Discrepancy:
     """
     Return what no parameter explains, with gears as uneven where they were not seen.
 
@@ -170,8 +177,17 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array) -> Discrepancy:
         What is left over where it was recorded.
     fine : array, shape (n,)
         Height of every joint's fine curve.
+    found : sequence of Effect
+        A curve without a formula among them says nothing beyond its ends, so that the joint may
+        be off by as much as that there.
 
     """
+    fine = np.array(fine)
+    for effect in found:
+        if isinstance(effect, JointCurve) and (effect.over, effect.channel) == ('angle', 'q'):
+            height = float(np.sqrt(np.mean(np.square(effect.values))))
+            joint = robot.index(effect.joint)
+            fine[joint] = max(fine[joint], height)
     turning = np.where(robot.prismatic, 0.0, 1.0)
     return Discrepancy(
         rest.position, rest.orientation, rest.gear * turning, fine * turning, SPACING

@@ -81,7 +81,21 @@ def weighed(out: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
 
 
 def nats_in_place(rest: Fit, full: Fit, count: float, choice: Choice | None = None) -> float:
-    """Return the evidence of a fit in the place of an effect, by the rule that holds for all."""
+    """
+    Return the evidence of a fit in the place of an effect, by the rule that holds for all.
+
+    Parameters
+    ----------
+    rest : Fit
+        The fit without the effect.
+    full : Fit
+        The fit with it, or with another in its place.
+    count : float
+        Number of independent rows.
+    choice : Choice or None
+        The choice in its place, whose number of trials counts; none, and one is counted.
+
+    """
     freedom = float(full.coordinates.size - rest.coordinates.size)
     trials = 1.0
     if choice is not None:

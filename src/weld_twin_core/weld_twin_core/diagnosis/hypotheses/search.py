@@ -224,7 +224,19 @@ def _chosen(
 
 
 def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
-    """Return the fit without what no machine has; that is added to those refused."""
+    """
+    Return the fit without what no machine has; that is added to those refused.
+
+    Parameters
+    ----------
+    work : Workspace
+        The problem with its library, multiplied out.
+    now : Fit
+        The fit so far.
+    refused : list of Effect
+        Those refused so far; more are added to it.
+
+    """
     while absurd := implausible(now.model):
         refused += absurd
         keys = {effect.key for effect in absurd}

@@ -11,7 +11,7 @@ from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.many.shrinkage import groups
-from weld_twin_core.diagnosis.many.wave_lines import _Waves, with_lines
+from weld_twin_core.diagnosis.many.wave_lines import Waves, with_lines
 from weld_twin_core.diagnosis.many.weighed_families import weighed_families
 from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
@@ -60,7 +60,7 @@ def test_the_score_of_a_line_is_the_fall_of_least_squares(turned):
     problem, model = tiny((ripple('elbow_joint', 150.0, 1e-4, 0.3),), count=120, turned=turned)
     scale = known_scale(problem)
     features = problem.features(model)
-    waves = _Waves.of(problem, features, scale, ELBOW, np.array([150.0]), 1.0)
+    waves = Waves.of(problem, features, scale, ELBOW, np.array([150.0]), 1.0)
     chi, joint, _, step = waves.peak(problem.residuals(model), np.ones(1, bool))
     columns, target = by_differences(problem, model, 150.0), rows(problem.residuals(model)[0])
     solved, left, *_ = np.linalg.lstsq(columns, target, rcond=None)
@@ -92,7 +92,7 @@ def test_a_joint_that_hardly_moves_has_no_waves():
     travel = np.ptp(features[0].view.q, axis=0)
     for joint in np.flatnonzero(travel < 1.0):
         assert (
-            _Waves.of(problem, features, known_scale(problem), int(joint), np.ones(1), 1.0) is None
+            Waves.of(problem, features, known_scale(problem), int(joint), np.ones(1), 1.0) is None
         )
     assert (travel < 1.0).any()
 

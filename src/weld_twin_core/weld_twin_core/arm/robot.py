@@ -268,19 +268,6 @@ class Robot:
     @classmethod
     def _from_rows(cls, name: str, rows: Sequence[Any], data: Mapping[str, Any]) -> Robot:
         def column(key: str, default: Any = 0.0, rows: Sequence[Any] = rows) -> Any:
-            """
-            Return one key of every row, or its default.
-
-            Parameters
-            ----------
-            key : str
-                Name of the key.
-            default : any
-                What a row without the key has.
-            rows : sequence of mapping
-                Left out, the joints.
-
-            """
             return [row.get(key, default) for row in rows]
 
         links = data.get('links')

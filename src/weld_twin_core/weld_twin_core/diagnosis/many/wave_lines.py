@@ -21,7 +21,7 @@ LINES = 40
 
 
 @dataclass(frozen=True, eq=False)
-class _Waves:
+class Waves:
     """
     Sine and cosine of every order of one joint, and what never changes from look to look.
 
@@ -59,7 +59,7 @@ class _Waves:
         joint: int,
         orders: Array,
         least: float,
-    ) -> _Waves | None:
+    ) -> Waves | None:
         """
         Return the waves of a joint, or None when it travels less than ``least`` [rad].
 
@@ -149,7 +149,7 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     features = problem.features(model)
     orders = np.arange(kinds[0].dense + 1.0, kinds[0].highest + 1.0)
     each = [
-        _Waves.of(problem, features, scale, i, orders, beliefs.wave_range)
+        Waves.of(problem, features, scale, i, orders, beliefs.wave_range)
         for i in range(model.robot.n)
     ]
     waves = {w.joint: w for w in each if w is not None}
@@ -170,7 +170,7 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     return model.with_found(tuple(found))
 
 
-def _free(model: Model, waves: _Waves, orders: Array) -> NDArray[np.bool_]:
+def _free(model: Model, waves: Waves, orders: Array) -> NDArray[np.bool_]:
     """Return which orders no wave of the joint is too close to, shape (O,)."""
     free: NDArray[np.bool_] = orders < highest_order(waves.positions)
     for effect in model.found:

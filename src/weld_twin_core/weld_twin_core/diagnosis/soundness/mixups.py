@@ -61,8 +61,8 @@ def _unravelled(shot: Snapshot, start: Arm) -> tuple[list[Suspicion], Arm]:
         found: list[Suspicion] = []
         arm, trial, look = start, shot, first
         while arm.off > 1.0 and len(found) < MOST:
-            best, undone, rest = _best(trial, look(trial.robot))
-            if best is None or rest.off > WORTH * arm.off:
+            best, undone, rest = _best(trial, arm, look(trial.robot))
+            if best is None:
                 break
             found.append(best)
             trial, arm, look = undone, rest, suspicions
@@ -71,17 +71,23 @@ def _unravelled(shot: Snapshot, start: Arm) -> tuple[list[Suspicion], Arm]:
     return [], start
 
 
-def _best(shot: Snapshot, tries: Iterable[Suspicion]) -> tuple[Suspicion | None, Snapshot, Arm]:
+def _best(
+    shot: Snapshot, before: Arm, tries: Iterable[Suspicion]
+) -> tuple[Suspicion | None, Snapshot, Arm]:
     """Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best."""
     tried = [(suspicion, shot.mended(suspicion.mend)) for suspicion in tries]
-    rough = [trial.rough_gap() for _, trial in tried]
-    best: tuple[Suspicion | None, Snapshot, Arm] | None = None
-    for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
-        suspicion, trial = tried[k]
-        arm = trial.arm()
-        if best is None or arm.off < WORTH * best[2].off:
-            best = (suspicion, trial, arm)
-    return best or (None, shot, shot.arm())
+    best: tuple[Suspicion | None, Snapshot, Arm] = (None, shot, before)
+    # Without orientations a quick fit may end beside the tool vector: then from many starts.
+    for thorough in (False,) if shot.turned else (False, True):
+        rough = [trial.rough_gap(thorough=thorough) for _, trial in tried]
+        for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
+            suspicion, trial = tried[k]
+            arm = trial.arm()
+            if arm.off < WORTH * best[2].off:
+                best = (suspicion, trial, arm)
+        if best[2].off < before.off / EXPLAINED:
+            break
+    return best
 
 
 # Frames ----------------------------------------------------------------------------------------

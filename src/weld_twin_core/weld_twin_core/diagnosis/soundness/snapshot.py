@@ -67,9 +67,14 @@ class Snapshot:
         out = [r.with_measured(replace(measured(r), rotation=turn)) for r, turn in pairs]
         return replace(self, recordings=tuple(out))
 
-    def rough_gap(self) -> float:
-        """Return the median gap [m] after a quick fit of both frames."""
-        return gap(self.problem, rough_frames(self.problem, self.model))
+    @property
+    def turned(self) -> bool:
+        """Return whether every recording has orientations."""
+        return all(measured(r).rotation is not None for r in self.recordings)
+
+    def rough_gap(self, *, thorough: bool = False) -> float:
+        """Return the median gap [m] after a quick fit of both frames; thorough: many starts."""
+        return gap(self.problem, rough_frames(self.problem, self.model, thorough=thorough))
 
     def framed(self) -> Model:
         """Return the model with both frames fitted."""

@@ -65,6 +65,21 @@ def setup_step(cell):
         cell.base = cell.textbook.frame(cell.robot.T_world_base, SMALL, TURN, 'left')
 
 
+def joint_slip(cell):
+    if cell.t >= 2.0:
+        cell.q[1] += 2e-3
+
+
+def instrument_knock(cell):
+    if cell.t >= 2.0:
+        cell.base = cell.textbook.frame(cell.robot.T_world_base, SMALL, TURN, 'left')
+
+
+def tool_slip(cell):
+    if cell.t >= 2.0:
+        cell.tool = cell.textbook.frame(cell.robot.T_flange_tool, SMALL, TURN, 'right')
+
+
 def tool_pose(cell):
     cell.tool = cell.textbook.frame(cell.robot.T_flange_tool, SMALL, TURN, 'right')
 
@@ -166,6 +181,9 @@ DEFINITIONS = {
         setup_settling,
     ),
     'setup_step': ({'xyz': SMALL, 'rotvec': TURN, 'time': 2.0}, setup_step),
+    'instrument_knock': ({'xyz': SMALL, 'rotvec': TURN, 'time': 2.0}, instrument_knock),
+    'tool_slip': ({'xyz': SMALL, 'rotvec': TURN, 'time': 2.0}, tool_slip),
+    'joint_slip': ({'joint': 'j1', 'offset': 2e-3, 'time': 2.0}, joint_slip),
     'tool_pose': ({'xyz': SMALL, 'rotvec': TURN}, tool_pose),
     'joint_curve': (
         {'joint': 'j1', 'values': [1e-3, -2e-3, 4e-3], 'knots': [-2.0, 0.5, 2.5]},

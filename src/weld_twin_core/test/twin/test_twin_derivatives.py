@@ -20,6 +20,9 @@ ENTRIES = {
     'tool_pose': {'xyz': [1e-3, 2e-3, 0.1], 'rotvec': [1e-2, 0.2, 0.1]},
     'setup_settling': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time_constant': 2.0},
     'setup_step': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
+    'instrument_knock': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
+    'tool_slip': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
+    'joint_slip': {'joint': 'j1', 'offset': 1e-3, 'time': 1.0},
     'gear_ratio': {'joint': 'j1', 'scale': 1e-3},
     'joint_curve': {
         'joint': 'j1',

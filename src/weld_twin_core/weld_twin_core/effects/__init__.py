@@ -24,10 +24,12 @@ from .drift import Drift
 from .effect import Effect, MemoryEffect
 from .frame_curve import FrameCurve
 from .gear_ratio import GearRatio
+from .instrument_knock import InstrumentKnock
 from .joint_compliance import JointCompliance
 from .joint_coupling import JointCoupling
 from .joint_curve import JointCurve
 from .joint_offset import JointOffset
+from .joint_slip import JointSlip
 from .link_length import LinkLength
 from .link_offset import LinkOffset
 from .link_twist import LinkTwist
@@ -42,6 +44,7 @@ from .setup_step import SetupStep
 from .thermal_growth import ThermalGrowth
 from .time_delay import TimeDelay
 from .tool_pose import ToolPose
+from .tool_slip import ToolSlip
 from .transmission_ripple import TransmissionRipple
 from .vibration import Vibration
 from .view import Parameter, Stage, View
@@ -56,10 +59,12 @@ __all__ = [
     'Effect',
     'FrameCurve',
     'GearRatio',
+    'InstrumentKnock',
     'JointCompliance',
     'JointCoupling',
     'JointCurve',
     'JointOffset',
+    'JointSlip',
     'LinkLength',
     'LinkOffset',
     'LinkTwist',
@@ -76,6 +81,7 @@ __all__ = [
     'ThermalGrowth',
     'TimeDelay',
     'ToolPose',
+    'ToolSlip',
     'TransmissionRipple',
     'Vibration',
     'View',

@@ -63,6 +63,8 @@ class Hooks(Parametric, ABC):
     """The frame it is an error of, 'base' or 'tool': no cause where that frame is fitted."""
     of_setup: ClassVar[bool] = False
     """Whether it belongs to one set-up and not to the robot."""
+    dated: ClassVar[bool] = False
+    """Whether it sets in at an instant, and is a cause only where the data checks found one."""
     common: ClassVar[bool] = True
     """Whether every arm has a little of it, so that a fit of many small errors takes it along."""
     waves: ClassVar[Waves | None] = None
@@ -98,6 +100,10 @@ class Hooks(Parametric, ABC):
         if cls.of in ('joint', 'link'):
             values['joint'] = joint
         return cls(**values)
+
+    def lasting(self) -> Any:
+        """Return what is left of it for the robot ever after; None for what a set-up had."""
+        return None if self.of_setup else self
 
     # The twin: derivatives through effects that act later ---------------------------------------
 

@@ -162,10 +162,18 @@ TABLE: dict[tuple[str, str], Plausible] = {
     ('setup_settling', 'rotvec'): _even(1e-3, 2e-2, 'derived: a millimetre on a metre'),
     ('setup_step', 'xyz'): _even(5e-3, 0.1, 'derived: a knock'),
     ('setup_step', 'rotvec'): _even(5e-3, 0.1, 'derived: a knock'),
+    ('instrument_knock', 'xyz'): _even(5e-3, 0.1, 'derived: a knock'),
+    ('instrument_knock', 'rotvec'): _even(5e-3, 0.1, 'derived: a knock'),
+    ('tool_slip', 'xyz'): _even(5e-3, 0.05, 'derived: a holder or a nest that gave way'),
+    ('tool_slip', 'rotvec'): _even(2e-2, 0.4, 'derived: a holder that gave way'),
+    ('joint_slip', 'offset'): _even(
+        5e-3, 0.13, 'derived: a tooth of a belt or the mark of a mastering; see joint_offset'
+    ),
 }
 """By effect and parameter."""
 PRISMATIC: dict[tuple[str, str], Plausible] = {
     ('joint_offset', 'offset'): _even(5e-3, 0.1, 'derived: a reference switch, by hand'),
+    ('joint_slip', 'offset'): _even(5e-3, 0.1, 'derived: a tooth of a belt or a rack'),
     ('transmission_ripple', 'amplitude'): _even(
         2e-5, 1e-3, 'derived: a turn of a screw repeats within hundredths of a millimetre'
     ),

@@ -11,11 +11,12 @@ from ..recording import Recording
 from .effect import Effect
 from .setup_settling import SetupSettling
 from .setup_step import SetupStep
+from .sudden import Sudden
 
 
 def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return the effects without those of one set-up."""
-    return tuple(e for e in effects if not e.of_setup)
+    """Return what is left of the effects for the robot ever after, without those of one set-up."""
+    return tuple(e for e in (effect.lasting() for effect in effects) if e is not None)
 
 
 def seen_from(
@@ -45,4 +46,6 @@ def _recounted(effect: Effect, later: float) -> Effect:
         return replace(effect, start=effect.start - later)
     if isinstance(effect, SetupStep):
         return replace(effect, time=effect.time - later)
+    if isinstance(effect, Sudden):
+        return effect.recounted(later)
     return effect

@@ -34,6 +34,7 @@ BEYOND_COMMANDS = frozenset(
         'drift',
         'setup_step',
         'setup_settling',
+        'instrument_knock',
     }
 )
 """Effects of the measurement, or new in every run: no joint command mends them."""

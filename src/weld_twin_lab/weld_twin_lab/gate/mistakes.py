@@ -21,6 +21,8 @@ Made = tuple[Robot, Recording, str]
 """The robot as told, the recording with the mistake, and what was done."""
 VISIBLE = 0.05
 """Range [rad, m] from which a joint's reading is worth swapping or turning round."""
+LARGEST_SLIP = 0.03
+"""Slip [rad, m] of a joint beyond which it is a crash and not a slip."""
 MOVING_ONLY = frozenset({'zero_velocities', 'clock'})
 """Kinds that stations in a table cannot have."""
 
@@ -224,6 +226,8 @@ def joint_slipped(sound: Sound, rng: np.random.Generator) -> Made:
     if lever < 0.02:
         raise Hidden('the joint does not move the tool')
     slip[i] = float(rng.uniform(5e-4, 5e-3)) / lever * float(rng.choice([-1.0, 1.0]))
+    if abs(slip[i]) > LARGEST_SLIP:
+        raise Hidden('the joint would have to slip by more than any does')
     turn = _frame_of(sound, seen, q)
     moved = np.where(after[:, None], (_tip(robot, q + slip) - _tip(robot, q)) @ turn.T, 0.0)
     rotation = seen.rotation

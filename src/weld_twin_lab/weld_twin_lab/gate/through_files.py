@@ -19,7 +19,7 @@ from weld_twin_msgs_py.tables import read_table
 def as_bag(recording: Recording, robot: Robot, folder: Path) -> Recording:
     """Return the recording after it was a bag in the folder."""
     write_recording(folder / 'bag', recording, robot)
-    return read_recording(folder / 'bag', robot)
+    return read_recording(folder / 'bag', robot, one_clock=False)
 
 
 def as_table(recording: Recording, robot: Robot, folder: Path) -> Recording:

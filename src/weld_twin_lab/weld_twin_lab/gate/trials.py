@@ -42,7 +42,7 @@ def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> di
         'what': said,
         **_plain(sound),
         **found,
-        'right': kind in found['kinds'],
+        'right': kind in (*found['kinds'], *found['dated']),
     }
 
 
@@ -86,9 +86,13 @@ def _looked(
             read = WAYS[way](recording, robot, Path(folder))
             examined = examine(Given((read,), robot, frozenset(align)))
         except DataError as error:
-            return {'kinds': ['refused'], 'sentences': [str(error)], 'seconds': 0.0}
+            return {'kinds': ['refused'], 'dated': [], 'sentences': [str(error)], 'seconds': 0.0}
     return {
         'kinds': sorted({item.kind for item in examined.unsound}),
-        'sentences': [item.sentence for item in examined.unsound],
+        'dated': sorted({slip.kind for slip in examined.slips}),
+        'sentences': [
+            *(item.sentence for item in examined.unsound),
+            *(slip.sentence(read) for slip in examined.slips),
+        ],
         'seconds': time.perf_counter() - begin,
     }

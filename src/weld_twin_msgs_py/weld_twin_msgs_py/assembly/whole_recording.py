@@ -46,6 +46,7 @@ def assembled(
     *,
     wrench_frame: str = 'tool',
     static: bool | None = False,
+    one_clock: bool = True,
     notes: tuple[str, ...] = (),
 ) -> Recording:
     """
@@ -61,6 +62,8 @@ def assembled(
         'tool' or 'base'.
     static : bool, optional
         Whether the joint states are stations at rest; None looks at the stamps.
+    one_clock : bool
+        Refuse measurements that have no time in common with the joint states.
     notes : tuple of str
         What is to be said of the streams.
 
@@ -78,7 +81,7 @@ def assembled(
     if static:
         motion = JointMotion(motion.t, motion.q, static=True)
         notes += (f'{motion.t.size} static stations: the motion between them is not known',)
-    elif measured is not None:
+    elif measured is not None and one_clock:
         _refuse_apart(motion, measured)
     wrench = streams.get(Role.WRENCH)
     if wrench is not None and not static:

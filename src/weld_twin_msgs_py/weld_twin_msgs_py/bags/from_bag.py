@@ -41,7 +41,13 @@ TYPES = {
 """Message types from which each role is read."""
 
 
-def read_recording(path: Path | str, robot: Robot, topics: TopicNames | None = None) -> Recording:
+def read_recording(
+    path: Path | str,
+    robot: Robot,
+    topics: TopicNames | None = None,
+    *,
+    one_clock: bool = True,
+) -> Recording:
     """
     Read a bag in one pass.
 
@@ -59,6 +65,8 @@ def read_recording(path: Path | str, robot: Robot, topics: TopicNames | None = N
         Its joint names pick the columns.
     topics : TopicNames, optional
         What the topics are called in this bag.
+    one_clock : bool
+        Refuse measurements that have no time in common with the joint states.
 
     Raises
     ------
@@ -86,6 +94,7 @@ def read_recording(path: Path | str, robot: Robot, topics: TopicNames | None = N
         samples,
         wrench_frame=intake.wrench_frame.meaning,
         static=bool(made['static']) if 'static' in made else None,
+        one_clock=one_clock,
         notes=_notes(names, streams, intake, bool(points)),
     )
     return _with_what_is_missing(whole, made, _ends(names, samples))

@@ -11,6 +11,7 @@ from pathlib import Path
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import Effect
+from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.twin.corrected import corrected, joint_offsets
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
@@ -82,7 +83,7 @@ def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
 
 def _causes(model: Model) -> tuple[Effect, ...]:
     """Return the effects of robot and cell; how a set-up moved is of no use elsewhere."""
-    return tuple(effect for effect in model.known + model.found if effect.cause)
+    return of_the_robot([effect for effect in model.known + model.found if effect.cause])
 
 
 def _write_effects(path: Path, notes: Sequence[str], effects: Sequence[Effect]) -> None:

@@ -35,6 +35,9 @@ CAUSES = {
     'measurement_scale': 'scale error of the instrument',
     'setup_step': 'moved set-up',
     'setup_settling': 'settling set-up',
+    'joint_slip': 'slip',
+    'tool_slip': 'slipped tool or reflector',
+    'instrument_knock': 'knocked instrument or base',
     'joint_curve': 'curve without a name',
     'frame_curve': 'motion without a name',
 }

@@ -217,6 +217,30 @@ def _setup_settling(effect: Effect, robot: Robot) -> str:
     )
 
 
+def _joint_slip(effect: Effect, robot: Robot) -> str:
+    at = robot.index(str(effect.site))
+    size = _value(effect, 'offset')
+    far = f'{size * 1e3:+.3g} mm' if robot.prismatic[at] else radians(size)
+    return (
+        f'See to the belt, coupling and encoder of {effect.site}: it slipped by {far} at '
+        f'{_value(effect, "time"):.4g}; then master it again.'
+    )
+
+
+def _tool_slip(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Fasten the tool or the reflector: it moved by {frame(effect.vector()[:6])} at '
+        f'{_value(effect, "time"):.4g}; measure its centre point again.'
+    )
+
+
+def _instrument_knock(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Fasten the instrument and the base: one moved by {frame(effect.vector()[:6])} at '
+        f'{_value(effect, "time"):.4g}; measure what came before and after apart.'
+    )
+
+
 _SENTENCES: dict[str, Sentence] = {
     'joint_offset': _joint_offset,
     'link_length': _row('da', 'a', 'it is off by'),
@@ -241,4 +265,7 @@ _SENTENCES: dict[str, Sentence] = {
     'measurement_scale': _measurement_scale,
     'setup_step': _setup_step,
     'setup_settling': _setup_settling,
+    'joint_slip': _joint_slip,
+    'tool_slip': _tool_slip,
+    'instrument_knock': _instrument_knock,
 }

@@ -142,12 +142,15 @@ class Problem:
         Frames fitted as nuisance in every hypothesis: 'base' (one per recording), 'tool'.
     anchor : Anchor, optional
         Where those frames are believed to be; see `prior`.
+    dated : tuple of Effect
+        What may have set in at an instant that was found: hypotheses beside the library's.
 
     """
 
     recordings: tuple[Recording, ...]
     align: frozenset[str] = field(default_factory=frozenset)
     anchor: Anchor | None = None
+    dated: tuple[Effect, ...] = ()
 
     @property
     def rows(self) -> tuple[int, ...]:

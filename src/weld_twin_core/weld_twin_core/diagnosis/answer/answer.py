@@ -75,5 +75,5 @@ def answer(
         posterior=posterior,
         causes=told,
         shares=shares,
-        unsound=examined.unsound,
+        unsound=examined.told(found.final.model.found),
     )

@@ -87,7 +87,10 @@ def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[
     kinds = [
         kind
         for kind in REGISTRY.values()
-        if kind.cause and kind.name not in exclude and kind.fitted_with not in align
+        if kind.cause
+        and not kind.dated
+        and kind.name not in exclude
+        and kind.fitted_with not in align
     ]
     return sorted(kinds, key=lambda kind: (kind.stage, kind.name))
 
@@ -141,6 +144,14 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
                 blocks.append(block)
             if seeds:
                 units.append(Unit(kind.name, joint, tuple(seeds), tuple(columns), trials))
+    for sudden in problem.dated:
+        block = None if sudden.name in exclude else _columns(problem, features, sudden, scale)
+        if block is not None:
+            own = np.arange(count, count + block.shape[0])
+            count += block.shape[0]
+            blocks.append(block)
+            instants = float(sum(problem.samples))
+            units.append(Unit(sudden.name, sudden.site, (sudden,), (own,), instants))
     return Library(np.concatenate(blocks), fixed, tuple(units), absent)
 
 

@@ -85,7 +85,7 @@ def _everything(
             if kind.applicable(view, joint) is None:
                 small = _small(kind, view, joint, most, beliefs, have)
                 out += [effect for effect in small if not hardly_moves(features, effect)]
-    return tuple(out)
+    return (*out, *(e for e in model.found if e.dated))
 
 
 def _small(
@@ -122,7 +122,7 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
         The numbers that decide.
 
     """
-    for kind in [kind for kind in REGISTRY.values() if kind.of_setup]:
+    for kind in [kind for kind in REGISTRY.values() if kind.of_setup and not kind.dated]:
         features = problem.features(model)
         residual = problem.whitened(problem.residuals(model), scale)
         frames = problem.whitened(problem.frame_columns(features)[0], scale)

@@ -21,9 +21,12 @@ from ...twin.features import Features
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
+from .mending import measured
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
 WIDE = 0.9
+MOST_ROWS = 18000
+"""Rows on which changes in time are looked for: three thousand poses, enough for any instant."""
 DEAD = 1e-18
 """Share of the largest squared column below which a column is rounding."""
 LOOSE = (3e-3, 1e-2)
@@ -42,9 +45,9 @@ class BaseChange:
         What the base does to every sample, whitened.
     basis : array, shape (M, c, P)
         Orthonormal over all rows: what frames and arm can explain.
-    joints : array, shape (M, c, n)
-        What the joints do to every sample, whitened.
-    metres : array, shape (M, 3, 6)
+    joints, tools : array, shape (M, c, n) and (M, c, 6)
+        What the joints and the tool do to every sample, whitened.
+    metres, joint_metres, tool_metres : array, shape (M, 3, 6), (M, 3, n) and (M, 3, 6)
         The columns of the positions, not whitened, for the size of a change.
     rows, samples : tuple of int
         Components and samples of every recording.
@@ -55,7 +58,10 @@ class BaseChange:
     columns: Array
     basis: Array
     joints: Array
+    tools: Array
     metres: Array
+    joint_metres: Array
+    tool_metres: Array
     rows: tuple[int, ...]
     samples: tuple[int, ...]
 
@@ -73,44 +79,74 @@ class BaseChange:
     @property
     def of_joints(self) -> BaseChange:
         """Return the same with joints that change in place of the base."""
-        return replace(self, columns=self.joints)
+        return replace(self, columns=self.joints, metres=self.joint_metres)
+
+    def of_joint(self, index: int) -> BaseChange:
+        """Return the same with one joint that changes in place of the base."""
+        one = slice(index, index + 1)
+        columns, metres = self.joints[:, :, one], self.joint_metres[:, :, one]
+        return replace(self, columns=columns, metres=metres)
+
+    @property
+    def of_tool(self) -> BaseChange:
+        """Return the same with the tool that changes; where only points are seen it cannot turn."""
+        seen = 6 if 6 in self.rows else 3
+        columns, metres = self.tools[:, :, :seen], self.tool_metres[:, :, :seen]
+        return replace(self, columns=columns, metres=metres)
+
+    @cached_property
+    def _terms(self) -> tuple[Array, Array, Array]:
+        """Return every sample's share of right hand side (M, i), overlap (M, p, i), normal."""
+        turned = np.swapaxes(self.columns, 1, 2)
+        right = np.matmul(turned, self.residual[:, :, None])[:, :, 0]
+        overlap = np.matmul(np.swapaxes(self.basis, 1, 2), self.columns)
+        return right, overlap, np.matmul(turned, self.columns)
+
+    def _new(self, shape: Array) -> Array:
+        """Return orthonormal rows that a change in this shape of time adds to the basis."""
+        flat = _flat(self.columns * shape[:, None, None])
+        return _orthonormal(_projected(flat, _flat(self.basis)))
+
+    def _left(self, more: Array) -> Array:
+        left = self.residual.reshape(-1)
+        return np.asarray((left - more @ (more.T @ left)).reshape(self.residual.shape))
 
     def without(self, shape: Array) -> BaseChange:
         """Return the same with a change of the base in this shape of time, (M,), fitted too."""
-        rows = self.columns * shape[:, None, None]
-        fixed = self.basis.reshape(-1, self.basis.shape[2])
-        flat = _projected(rows.reshape(fixed.shape[0], -1), fixed)
-        more = _orthonormal(flat).reshape(*rows.shape[:2], -1)
-        strength = np.einsum('mcp,mc', more, self.residual)
-        left = self.residual - np.einsum('mcp,p->mc', more, strength)
-        return replace(self, residual=left, basis=np.concatenate([self.basis, more], axis=2))
+        more = self._new(shape)
+        basis = np.concatenate([_flat(self.basis), more], axis=1)
+        basis = basis.reshape(*self.residual.shape, -1)
+        return replace(self, residual=self._left(more), basis=basis)
+
+    def past(self, changed: BaseChange, shape: Array) -> BaseChange:
+        """Return the same after another thing changed in this shape of time, (M,)."""
+        after = changed.without(shape)
+        return replace(self, residual=after.residual, basis=after.basis)
 
     def gain(self, shape: Array) -> float:
         """Return the sum of squares that a change in this shape of time, (M,), explains."""
-        right, motion = self._fitted(shape)
-        return float(right @ motion)
+        return float(self.gains(shape[None])[0])
 
-    def _fitted(self, shape: Array) -> tuple[Array, Array]:
-        rows = self.columns * shape[:, None, None]
-        right = np.einsum('mci,mc', rows, self.residual)
-        overlap = np.einsum('mcp,mci->pi', self.basis, rows)
-        normal = np.einsum('mci,mcj', rows, rows) - overlap.T @ overlap
-        return right, _solve(normal, right)
+    def gains(self, shapes: Array) -> Array:
+        """Return the gain of a change in each of several shapes of time, (S, M)."""
+        right, overlap, normal = self._terms
+        return _gained(*_summed(shapes, right, overlap, normal))
+
+    def _fitted(self, shape: Array) -> Array:
+        right, overlap, normal = self._terms
+        right, normal = _summed(shape[None], right, overlap, normal)
+        return _solve(normal[0], right[0])
 
     def step_gains(self, k: int) -> Array:
         """Return the gain of a step before every sample of recording k, shape (M_k,)."""
         mine = self.recording == k
-        rows, left, basis = self.columns[mine], self.residual[mine], self.basis[mine]
-        right = _after(np.einsum('mci,mc->mi', rows, left))
-        overlap = _after(np.einsum('mcp,mci->mpi', basis, rows))
-        normal = _after(np.einsum('mci,mcj->mij', rows, rows))
-        normal -= np.einsum('mpi,mpj->mij', overlap, overlap)
-        return np.array([float(r @ _solve(n, r)) for n, r in zip(normal, right, strict=True)])
+        right, overlap, normal = (_after(term[mine]) for term in self._terms)
+        return _gained(right, normal - np.matmul(np.swapaxes(overlap, 1, 2), overlap))
 
     def size(self, shape: Array) -> float:
         """Return the RMS motion [m] of the measured points for the fitted change."""
         active = np.abs(shape) > 0.05 * np.abs(shape).max()
-        moved = self.metres[active] @ self._fitted(shape)[1]
+        moved = self.metres[active] @ self._fitted(shape)
         return float(np.sqrt((moved**2).sum(axis=1).mean()))
 
     def nats(self, shape: Array) -> float:
@@ -120,7 +156,7 @@ class BaseChange:
         Noise of positions and of turns, and how many rows are independent, are those the change
         leaves: a step by itself makes residuals that hang together.
         """
-        after = self.without(shape)
+        after = replace(self, residual=self._left(self._new(shape)))
         total, fall = 0.0, 0.0
         for part in (slice(0, 3), slice(3, 6)):
             before, left = (float((c.residual[:, part] ** 2).sum()) for c in (self, after))
@@ -161,10 +197,33 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
         bases = [base * (number == k)[:, None, None] for k in range(len(parts))]
     constant = np.concatenate([*bases, tool], axis=2)
     basis = _basis(arm.reshape(left.size, -1), constant.reshape(left.size, -1))
-    metres = np.concatenate([frame[:, :3].transpose(2, 1, 0) for frame in frames])
+    metres, joint_metres, tool_metres = (
+        np.concatenate([part[:, :3].transpose(2, 1, 0) for part in each])
+        for each in (frames, joints, tools)
+    )
     left = _projected(left.reshape(-1, 1), basis).reshape(left.shape[:2])
     basis = basis.reshape(*left.shape, -1)
-    return BaseChange(left, base, basis, joint, metres, problem.rows, problem.samples)
+    return BaseChange(
+        residual=left,
+        columns=base,
+        basis=basis,
+        joints=joint,
+        tools=tool,
+        metres=metres,
+        joint_metres=joint_metres,
+        tool_metres=tool_metres,
+        rows=problem.rows,
+        samples=problem.samples,
+    )
+
+
+def thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]:
+    """Return fewer measurements and their residuals, where there are too many."""
+    few = problem.thinned(MOST_ROWS)
+    out = []
+    for whole, thin, part in zip(problem.recordings, few.recordings, parts, strict=True):
+        out.append(part[:, np.isin(measured(whole).t, measured(thin).t)])
+    return few, out
 
 
 def _scale(parts: list[Array]) -> Scale:
@@ -249,14 +308,38 @@ def _projected(columns: Array, basis: Array) -> Array:
     return np.asarray(columns - basis @ (basis.T @ columns))
 
 
+def _flat(columns: Array) -> Array:
+    """Return (M, c, P) columns as (rows, P)."""
+    return columns.reshape(-1, columns.shape[2])
+
+
 def _after(terms: Array) -> Array:
     """Return sums over each sample and all later ones."""
     return np.asarray(np.cumsum(terms[::-1], axis=0)[::-1])
 
 
+def _summed(shapes: Array, right: Array, overlap: Array, normal: Array) -> tuple[Array, Array]:
+    """Return right hand sides (S, i) and normal matrices (S, i, i) of several shapes, (S, M)."""
+    count, size = shapes.shape[0], right.shape[1]
+    across = (shapes @ overlap.reshape(len(overlap), -1)).reshape(count, -1, size)
+    own = (shapes**2 @ normal.reshape(len(normal), -1)).reshape(count, size, size)
+    return shapes @ right, own - np.matmul(np.swapaxes(across, 1, 2), across)
+
+
+def _gained(right: Array, normal: Array) -> Array:
+    """Return what each of several changes explains, shape (S,)."""
+    mass = np.diagonal(normal, axis1=1, axis2=2)
+    live = mass > DEAD * max(float(mass.max(initial=0.0)), 1e-300)
+    size = np.where(live, np.sqrt(np.maximum(mass, 0.0)), np.inf)
+    scaled = normal / (size[:, :, None] * size[:, None, :]) + 1e-6 * np.eye(mass.shape[1])
+    unit = (right / size)[:, :, None]
+    return np.asarray((unit * np.linalg.solve(scaled, unit)).sum(axis=(1, 2)))
+
+
 def _solve(normal: Array, right: Array) -> Array:
     # A direction that nothing moves in (an axis with exact zeros across) stays at zero.
     mass = np.diag(normal)
-    size = np.where(mass > DEAD * mass.max(), np.sqrt(np.maximum(mass, 0.0)), np.inf)
+    live = mass > DEAD * max(float(mass.max(initial=0.0)), 1e-300)
+    size = np.where(live, np.sqrt(np.maximum(mass, 0.0)), np.inf)
     scaled = normal / np.outer(size, size) + 1e-6 * np.eye(len(size))
     return np.asarray(np.linalg.solve(scaled, right / size) / size)

@@ -15,9 +15,11 @@ from .richness import motion
 from .setup_change import setup
 from .source import source
 from .stamp_regularity import stamps
+from .stuck import stuck
 
 CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
+    'readings': (stuck, 'No reading stands still while the tool moves.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
     'orientation': (orientation, 'Orientations turn as the joints say.'),
     'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),

@@ -15,8 +15,11 @@ from ...arrays import Array
 from ...recording import Recording
 from ..algebra.problem import Model, Problem
 from ..frames.alignment import refined
+from .base_change import BaseChange, base_change, thinned
 from .lag import Lag, lag
+from .lengths import length
 from .mending import Mend
+from .slips import Slip, slips
 from .snapshot import Snapshot, measured, snapshot
 
 ENOUGH = 30
@@ -25,6 +28,13 @@ HINT = 0.8
 """What the gap must fall to for a lag to be looked into, and"""
 EXPLAINED = 0.35
 """for it to be believed once the frames are fitted with it."""
+
+
+LARGEST = 0.99
+"""Quantile of the gaps that stands for the largest; a few may be outliers."""
+
+
+__all__ = ['Case', 'Checker', 'Finding', 'Mistake', 'distance', 'length', 'listed']
 
 
 class Mistake(NamedTuple):
@@ -122,6 +132,18 @@ class Case:
         return self._motions(self.lags)
 
     @cached_property
+    def change(self) -> tuple[Problem, BaseChange]:
+        """Return fewer measurements, and what a change in time would explain of their residuals."""
+        problem, parts = thinned(self.problem, self.residuals)
+        return problem, base_change(parts, problem, self.model)
+
+    @cached_property
+    def slips(self) -> list[Slip]:
+        """Return what gave way at an instant."""
+        most = max(float(np.quantile(distance(part), LARGEST)) for part in self.residuals)
+        return slips(*self.change, self.model.robot.joint_names, most)
+
+    @cached_property
     def snapshot(self) -> Snapshot:
         """Return a few samples of every recording as stations, for trials."""
         return snapshot(self.problem, self.model, self.motions)
@@ -133,13 +155,6 @@ Checker = Callable[[Case], Sequence[Finding]]
 def distance(part: Array) -> Array:
     """Return the length of the position part of a residual, shape (M,) [m]."""
     return np.asarray(np.linalg.norm(part[:3], axis=0))
-
-
-def length(value: float) -> str:
-    """Return a length [m] as people read it."""
-    if value >= 1.0:
-        return f'{value:.3g} m'
-    return f'{value * 1e3:.3g} mm' if value >= 1e-4 else f'{value * 1e6:.3g} um'
 
 
 def listed(names: Sequence[str]) -> str:

@@ -21,6 +21,7 @@ from ..result import Check, Unsound
 from .checks import CHECKS
 from .evidence import Case, Mistake
 from .mending import Given
+from .slips import Slip
 from .streams import streams, velocities_checked
 
 ROUNDS = 4
@@ -44,6 +45,8 @@ class Examined:
     unsound : tuple of Unsound
     mistakes : tuple of Mistake
         Those that were undone.
+    slips : tuple of Slip
+        What gave way at an instant: causes that ``posed`` offers the search.
 
     """
 
@@ -52,6 +55,13 @@ class Examined:
     checks: tuple[Check, ...]
     unsound: tuple[Unsound, ...]
     mistakes: tuple[Mistake, ...]
+    slips: tuple[Slip, ...] = ()
+
+    def told(self, found: Sequence[Effect]) -> tuple[Unsound, ...]:
+        """Return the mistakes, and the slips that a fit has among what it found."""
+        kept = {effect.key for effect in found}
+        own = [_told(slip, self.given) for slip in self.slips if slip.effect().key in kept]
+        return (*self.unsound, *own)
 
     def mended(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
         """Return other recordings of the same cell after the same corrections."""
@@ -81,13 +91,14 @@ def examine(given: Given, known: Sequence[Effect] = (), *, apply: bool = False) 
 
     """
     trial, mistakes, checks = given, list[Mistake](), list[Check]()
+    dated: tuple[Slip, ...] = ()
     posed: tuple[Problem, Model] | None = None
     for _ in range(ROUNDS):
         found = streams(trial)
         posed = None
         if not found:
             posed = aligned(trial.recordings, trial.robot, trial.align, _kept(known, given, trial))
-            checks, found = _checked(*posed)
+            checks, found, dated = _checked(*posed)
         told = {mistake.sentence for mistake in mistakes}
         fresh = [mistake for mistake in found if mistake.sentence not in told]
         mistakes += fresh
@@ -98,13 +109,15 @@ def examine(given: Given, known: Sequence[Effect] = (), *, apply: bool = False) 
                 trial = mistake.mend(trial)
     done = apply and posed is not None and all(m.mend is not None for m in mistakes)
     if posed is not None:
-        posed = posed[0], replace(posed[1], mended=tuple(m.sentence for m in mistakes))
+        problem = replace(posed[0], dated=tuple(slip.effect() for slip in dated))
+        posed = problem, replace(posed[1], mended=tuple(m.sentence for m in mistakes))
     return Examined(
         trial if done else given,
         posed if done or not mistakes else None,
         (*(Check('mended' if done else 'gate', 'unsound', m.sentence) for m in mistakes), *checks),
         tuple(Unsound(m.kind, m.at, m.sentence, m.remedy, done) for m in mistakes),
         tuple(mistakes) if done else (),
+        dated,
     )
 
 
@@ -113,8 +126,10 @@ def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, 
     return tuple(known) if trial.robot.joint_names == given.robot.joint_names else ()
 
 
-def _checked(problem: Problem, model: Model) -> tuple[list[Check], list[Mistake]]:
-    """Return what the checks say, and the mistakes among it; the first mistake ends them."""
+def _checked(
+    problem: Problem, model: Model
+) -> tuple[list[Check], list[Mistake], tuple[Slip, ...]]:
+    """Return what the checks say, the mistakes among it, and what gave way; a mistake ends it."""
     if problem.align:
         model = refined(problem.thinned(FIT_ROWS), model)
     case = Case(problem, model)
@@ -123,6 +138,19 @@ def _checked(problem: Problem, model: Model) -> tuple[list[Check], list[Mistake]
         found = list(look(case))
         mistakes = [f.mistake for f in found if f.mistake is not None]
         if mistakes:
-            return out, mistakes
+            return out, mistakes, ()
         out += [Check(name, f.level, f.sentence) for f in found] or [Check(name, 'ok', passed)]
-    return out, []
+    if len(problem.recordings) > 1:
+        return out, [_undated(slip, problem) for slip in case.slips], ()
+    return out, [], tuple(case.slips)
+
+
+def _told(slip: Slip, given: Given) -> Unsound:
+    recording = given.recordings[slip.recording]
+    return Unsound(slip.kind, slip.at, slip.sentence(recording), slip.remedy, applied=True)
+
+
+def _undated(slip: Slip, problem: Problem) -> Mistake:
+    """Return what gave way in one of several recordings: their effects count one time for all."""
+    sentence = slip.sentence(problem.recordings[slip.recording])
+    return Mistake(slip.kind, slip.at, sentence, slip.remedy, None)

@@ -40,28 +40,29 @@ Spread of what the zeros [rad], lengths [m] and twists [rad] of a plausible arm 
 Wide on purpose: arms as delivered are off by tenths of a milliradian to some milliradians and by
 tenths of a millimetre (the two arms of docs/real_robots.md: 2 to 3 mm at the tool in all).
 """
-OFFSET_MOST, LINK_MOST, TWIST_MOST = 0.09, 6e-3, 0.03
+OFFSET_MOST, LINK_MOST, TWIST_MOST = 0.13, 6e-3, 0.03
 """
 Errors [rad, m, rad] beyond which a number is no arm's error but another number.
 
-A zero lost by one tooth or one mastering notch is off by less than 5 degrees; links are machined
-to hundredths of a millimetre, and those of sibling arms differ by 5 to 30 mm.
+Arms mastered on wrong marks were up to 7 degrees off (see `effects.plausible`); links are machined
+to hundredths of a millimetre, and those of sibling arms differ by 5 to 30 mm. Links count together,
+by the root of the sum of their squares: a sibling differs in several of them.
 """
 SOFT = 2e-4, 4e-4
 """Noise [m, rad] that trial fits assume at least, so that the spreads above have weight."""
 
 FAR = 0.05
 """
-Median gap [m] from which given frames are not off but another instrument's.
+Median gap [m] from which given frames are looked at: below, they are plausible in any case.
 
-A frame that was measured is off by millimetres; 50 mm at the tool is a frame that never was.
+Whether they are a cause then is for `effects.plausible`, `base_pose` and `tool_pose`, to say.
 """
 TURNED = 0.035
 """Angle [rad] within which a base is turned by a quarter or half turn, and not by anything."""
 BESIDE = 0.1
 """Distance [m] within which a turned base still stands where it was given."""
 
-LATE = 0.1
+LATE = 0.2
 """
 Lag [s] from which stamps are of another clock.
 
@@ -79,9 +80,44 @@ STILL_SPEED = 1e-12
 """Velocity [rad/s, m/s] below which a stream says zero; sensors at rest show noise, not zero."""
 MOVED = 0.02
 """Motion [rad, m] in a stream from which zero velocities cannot be true."""
+STUCK_LEAST, STUCK_STATIONS = 0.5, 4
+"""Shortest stretch, in s or in stations, in which readings that stand still are looked at."""
+STUCK_AFTER = 0.3
+"""Seconds that an arm may go on after its command stands still: lag and settling."""
+STUCK_FAR = 2e-3
+"""Motion or gap [m] at the tool that no standing arm has; play and springs are smaller."""
+STUCK_EXPLAINED = 4.0
+"""Factor by which the gap there is larger than elsewhere, and than with the joint set free."""
 LIKE_LENGTH = 0.8
 """
 Share of the longer stream that the shorter one must last for the two to have begun together.
 
 Streams of one recording are started by one command and differ by seconds of some tens.
 """
+
+DATED, DATED_MOVING = 6.0, 20.0
+"""
+Nats by which a step must beat no step, on stations and on a moving arm.
+
+The residuals of a moving arm hang together however good the model; see `setup_change`.
+"""
+MARGIN = 10.0
+"""Nats by which a step must beat every smooth change of anything."""
+NEARLY = 0.9
+"""Share of what a step of more numbers explains that one of fewer must explain to be taken."""
+DATED_SIZE = 2.0
+"""
+A step this many times as large as the largest gaps did not happen: whatever is aligned, one side
+of it keeps half.
+"""
+DATED_SHARE = 0.25
+"""
+Share of the squares that frames and a plausible arm leave which a step must explain.
+
+Something that gave way is the main thing there is to see; effects that no formula holds exactly
+leave small steps here and there.
+"""
+ENDS = 0.05
+"""Share of a recording at its ends in which a step cannot be told from the end's own troubles."""
+MOST_SLIPS = 4
+"""So many changes in time are taken out in turn."""

@@ -10,8 +10,10 @@ from functools import partial
 
 import numpy as np
 
+from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.joint_offset import JointOffset
+from ...effects.plausible import plausible
 from ..algebra.problem import Model
 from ..frames.alignment import initial_frames, refined
 from .evidence import Case, Finding, Mistake, length, listed
@@ -42,7 +44,7 @@ def mixups(case: Case) -> Sequence[Finding]:
     found, rest = _unravelled(shot, arm)
     if found:
         return [Finding.of(_undone(each, arm, rest)) for each in found]
-    return _beyond(case, arm) or _frames(case, gap(shot.problem, shot.model))
+    return _beyond(case, shot, arm) or _frames(case, gap(shot.problem, shot.model))
 
 
 # Mix-ups ---------------------------------------------------------------------------------------
@@ -106,8 +108,24 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
         model = refined(problem, initial_frames(problem, shot.model))
         left = gap(problem, model)
         if left < max(UNEXPLAINED, before / EXPLAINED):
+            if _plausible(shot.robot, model):
+                return ()
             return [Finding.of(_framed(shot, model, frozenset(more - given), before, left))]
     return ()
+
+
+def _plausible(robot: Robot, model: Model) -> bool:
+    """Return whether fitted frames are off the given ones by no more than a cause may be."""
+    pairs = [('base_pose', np.linalg.inv(robot.T_world_base) @ base) for base in model.bases] + [
+        ('tool_pose', np.linalg.inv(robot.T_flange_tool) @ model.robot.T_flange_tool)
+    ]
+    for effect, off in pairs:
+        turn = float(np.arccos(np.clip(0.5 * (np.trace(off[:3, :3]) - 1.0), -1.0, 1.0)))
+        if np.linalg.norm(off[:3, 3]) > plausible(robot, effect, 'xyz').high:
+            return False
+        if turn > plausible(robot, effect, 'rotvec').high:
+            return False
+    return True
 
 
 def _framed(
@@ -157,7 +175,7 @@ def _quarter_turn(given: Array, fitted: Array) -> tuple[int, Array] | None:
 # Nothing known ---------------------------------------------------------------------------------
 
 
-def _beyond(case: Case, arm: Arm) -> Sequence[Finding]:
+def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """No mix-up explains it: another robot, a zero that is far off, or something else."""
     if arm.gap > UNEXPLAINED:
         words = (
@@ -170,7 +188,8 @@ def _beyond(case: Case, arm: Arm) -> Sequence[Finding]:
             'measurements and joint positions of one row belong together'
         )
         return [Finding.of(Mistake('other', (), words, remedy, None))]
-    if arm.gap > LARGE:
+    # Links and zeros bend to whatever else is wrong; only what explains the gap is believed.
+    if arm.gap > LARGE or arm.gap > gap(shot.problem, shot.framed()) / EXPLAINED or case.slips:
         return ()
     worst = int(arm.strain.argmax())
     effect = arm.model.found[worst]

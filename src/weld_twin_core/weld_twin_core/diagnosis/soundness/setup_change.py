@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..algebra.problem import Model, Problem
-from .base_change import BaseChange, base_change
+from .base_change import BaseChange, base_change, thinned
 from .evidence import Case, Finding, distance, length
+from .smooth_shapes import CONSTANTS, other_shapes
 from .snapshot import measured
 
 SURE = 6.0
@@ -23,7 +24,6 @@ SURE_MOVING = 20.0
 MARGIN = 10.0
 """Nats by which a step must beat every smooth change, and a settling every other."""
 MOST = 4
-MOST_ROWS = 18000
 SEEN = 2.0
 """
 A change this many times as large as the largest gaps did not happen: whatever is aligned, one side
@@ -32,8 +32,6 @@ of a step keeps half of it. A strong shake makes such steps that other columns u
 LARGEST = 0.99
 EDGE = 0.05
 """A step nearer to an end of a recording or another step, as a share, is not looked for."""
-CONSTANTS = np.geomspace(0.05, 0.7, 7)
-"""Time constants of settling, as shares of the recording."""
 SLOW = 2.0
 """Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
 NEIGHBOURS = np.geomspace(0.8, 1.25, 7)
@@ -58,15 +56,15 @@ class Settling(NamedTuple):
 
 
 def setup(case: Case) -> Sequence[Finding]:
-    """Return steps and settling of the set-up in what the aligned model leaves."""
-    found = changes(case.residuals, case.problem, case.model)
+    """Return steps and settling of the set-up; those that are dated are causes, and told there."""
+    found = changes_of(*case.change)
     most = SEEN * max(float(np.quantile(distance(part), LARGEST)) for part in case.residuals)
     return [
         Finding('warning', _moved(case, each))
         if isinstance(each, Step)
         else Finding('note', _settled(case, each))
         for each in found
-        if each.size < most
+        if each.size < most and not (isinstance(each, Step) and case.slips)
     ]
 
 
@@ -120,12 +118,16 @@ def changes(parts: list[Array], problem: Problem, model: Model) -> list[Step | S
     model : Model
 
     """
-    problem, parts = _thinned(problem, parts)
-    change = base_change(parts, problem, model)
+    problem, parts = thinned(problem, parts)
+    return changes_of(problem, base_change(parts, problem, model))
+
+
+def changes_of(problem: Problem, change: BaseChange) -> list[Step | Settling]:
+    """Return the same where what a change would explain is known already."""
     out: list[Step | Settling] = []
     taken: list[_Trial] = []
     for _ in range(MOST):
-        trials = [t for k in range(len(parts)) for t in _trials(change, problem, k, taken)]
+        trials = [t for k in range(len(problem.rows)) for t in _trials(change, problem, k, taken)]
         best = max(trials, key=lambda trial: trial.nats, default=None)
         if best is None:
             break
@@ -199,9 +201,7 @@ def _smooth(change: BaseChange, mine: NDArray[np.bool_], age: Array) -> tuple[fl
 
     rough = max(CONSTANTS, key=gain)
     best = max(rough * NEIGHBOURS, key=gain)
-    waves = [wave(n * np.pi * age) for n in (1, 2) for wave in (np.sin, np.cos)]
-    late = [np.exp(-(1.0 - age) / c) for c in CONSTANTS]
-    return float(best), [age, age**2, *late, *waves]
+    return float(best), other_shapes(age)
 
 
 def _age(problem: Problem, k: int) -> Array:
@@ -214,14 +214,6 @@ def _placed(shape: NDArray[Any], mine: NDArray[np.bool_]) -> Array:
     out = np.zeros(mine.size)
     out[mine] = shape
     return out
-
-
-def _thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]:
-    few = problem.thinned(MOST_ROWS)
-    out = []
-    for whole, thin, part in zip(problem.recordings, few.recordings, parts, strict=True):
-        out.append(part[:, np.isin(measured(whole).t, measured(thin).t)])
-    return few, out
 
 
 def _moved(case: Case, step: Step) -> str:

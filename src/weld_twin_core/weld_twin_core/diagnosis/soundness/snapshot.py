@@ -129,8 +129,14 @@ class Arm(NamedTuple):
 
     @property
     def off(self) -> float:
-        """Return how much is wrong: the gap or the strain in units of their limits, the worse."""
-        return max(self.gap / LARGE, float(self.strain.max()))
+        """
+        Return how much is wrong: the gap or the strain in units of their limits, the worst.
+
+        Lengths of links count together: those of another arm differ in several.
+        """
+        lengths = np.array([e.name in ('link_length', 'link_offset') for e in self.model.found])
+        together = float(np.sqrt((self.strain[lengths] ** 2).sum()))
+        return max(self.gap / LARGE, together, float(self.strain.max()))
 
 
 def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:

@@ -104,7 +104,8 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
         recordings = []
         for path in (*args.bags, *args.holdout):
             tell(f'reading {path}')
-            recordings.append(read_recording(path, twin.robot, topics))
+            # Two clocks are for the checks of the data to name.
+            recordings.append(read_recording(path, twin.robot, topics, one_clock=False))
         count = len(args.bags)
         return diagnose(
             _bounded(recordings[:count]),

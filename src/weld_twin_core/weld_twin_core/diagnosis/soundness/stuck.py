@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Do readings of joints stand still, to the last digit, while the tool goes on?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
+from ...recording import JointMotion, Recording
+from ..algebra.problem import Model
+from .evidence import Case, Finding, Mistake, distance, length
+from .limits import STUCK_AFTER, STUCK_EXPLAINED, STUCK_FAR, STUCK_LEAST, STUCK_STATIONS
+from .snapshot import measured
+
+ROUNDS = 12
+"""Newton steps that find where a joint really stood; it may have gone on by a radian."""
+STEP = 1e-5
+"""Step [rad, m] of the derivative by a joint's position."""
+LONGEST_STEP = 0.3
+"""Longest Newton step [rad, m]: farther, the derivative means nothing."""
+
+
+def stuck(case: Case) -> Sequence[Finding]:
+    """Return stretches in which a joint's reading stands still and the tool says it moved."""
+    out: list[Finding] = []
+    for k, recording in enumerate(case.recordings):
+        found = (
+            _whole(recording)
+            or max(_joints(case, k), key=lambda pair: pair[0], default=(0.0, None))[1]
+        )
+        if found is not None:
+            out.append(Finding.of(found))
+    return out
+
+
+def _whole(recording: Recording) -> Mistake | None:
+    """Return that all joints stand still together while the measured tool moves."""
+    seen = measured(recording)
+    for start, end in _runs(recording.joints.q, recording.joints):
+        inside = _inside(recording, start, end)
+        if inside.sum() < 2:
+            continue
+        way = float(np.ptp(seen.position[inside], axis=0).max())
+        if way > STUCK_FAR:
+            sentence = (
+                f'The joint positions of {recording.name} stand still {_when(recording, start, end)}'
+                f' while the tool moves by {length(way)}.'
+            )
+            return Mistake('joints_stuck', (), sentence, REMEDY, None)
+    return None
+
+
+REMEDY = 'See to the driver that publishes the joint states, and measure again'
+
+
+def _joints(case: Case, k: int) -> Iterator[tuple[float, Mistake]]:
+    """Yield joints whose own motion would explain the gap while their reading stands still."""
+    recording, off = case.recordings[k], distance(case.residuals[k])
+    for i, name in enumerate(case.model.robot.joint_names):
+        for start, end in _runs(recording.joints.q[:, i : i + 1], recording.joints):
+            inside = _inside(recording, start, end)
+            if inside.sum() < 2 or inside.all():
+                continue
+            gap, rest = float(np.median(off[inside])), float(np.median(off[~inside]))
+            if gap < max(STUCK_FAR, STUCK_EXPLAINED * rest):
+                continue
+            left = _freed(case.model, recording, k, i, inside)
+            if left > gap / STUCK_EXPLAINED:
+                continue
+            sentence = (
+                f'The reading of joint {name!r} of {recording.name} stands still '
+                f'{_when(recording, start, end)} while the joint moves: the gap there is '
+                f'{length(gap)}, and {length(left)} with the joint set free.'
+            )
+            yield gap / left, Mistake('joints_stuck', (name,), sentence, REMEDY, None)
+
+
+def _runs(q: Array, joints: JointMotion) -> list[tuple[int, int]]:
+    """Return first and last sample of every stretch in which q (N, m) does not change at all."""
+    still = np.r_[False, (np.diff(q, axis=0) == 0.0).all(axis=1), False]
+    edges = np.flatnonzero(np.diff(still.astype(int)))
+    out = []
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        enough = (
+            end - start >= STUCK_STATIONS
+            if joints.static
+            else joints.t[end] - joints.t[start] > STUCK_LEAST
+        )
+        if enough:
+            out.append((int(start), int(end)))
+    return out
+
+
+def _inside(recording: Recording, start: int, end: int) -> NDArray[np.bool_]:
+    """Return which measurements lie in a stretch, bool (M,); after a stop the arm settles."""
+    joints, t = recording.joints, measured(recording).t
+    after = 0.0 if joints.static else STUCK_AFTER
+    return np.asarray((t >= joints.t[start] + after) & (t <= joints.t[end]), dtype=bool)
+
+
+def _freed(model: Model, recording: Recording, k: int, i: int, inside: NDArray[np.bool_]) -> float:
+    """Return the median gap [m] when joint i may stand anywhere at every measurement."""
+    seen = measured(recording).take(inside)
+    q = np.array(recording.joints.at(seen.t)[0])
+    twin = model.twin(k)
+
+    def tip(positions: Array) -> Array:
+        motion = JointMotion(seen.t, positions, static=True)
+        still = replace(recording, joints=motion, measured=seen)
+        return twin.poses(still, seen.t).position
+
+    nudge = np.zeros(q.shape[1])
+    nudge[i] = STEP
+    for _ in range(ROUNDS):
+        here = tip(q)
+        column = (tip(q + nudge) - here) / STEP
+        pull = ((seen.position - here) * column).sum(axis=1)
+        step = pull / np.maximum((column**2).sum(axis=1), 1e-12)
+        q[:, i] += np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+    return float(np.median(np.linalg.norm(seen.position - tip(q), axis=1)))
+
+
+def _when(recording: Recording, start: int, end: int) -> str:
+    t = recording.joints.t
+    if recording.joints.static:
+        return f'from station {start} to {end}'
+    return f'from t = {t[start]:.4g} to {t[end]:.4g} s'

@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tool slip: the tool slips in its holder, or the reflector in its nest, at an instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .registry import register
+from .sudden import SuddenFrame
+from .view import Value
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class ToolSlip(SuddenFrame):
+    """The tool is displaced by xyz of the flange and turned by rotvec from ``time`` [s] on."""
+
+    xyz: Value = (0.0, 0.0, 0.0)
+    rotvec: Value = (0.0, 0.0, 0.0)
+    time: float = 0.0
+
+    name = 'tool_slip'
+    place = 'tool'
+    of_setup = True
+    channel = 'tool'

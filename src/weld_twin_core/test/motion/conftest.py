@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""References for planning: Pinocchio models from DH tables, and the makers' joint axes."""
+"""References: Pinocchio models from DH tables, the makers' joint axes, helpers of this folder."""
 
+import sys
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm import catalog
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 # Joint axes at position zero, as in the makers' drawings: point on the axis [m] and direction;
 # then the flange's position and its z and x axes.
@@ -69,9 +73,13 @@ DRAWINGS = {
 }
 
 
-@pytest.fixture(params=catalog.names())
+# One of each build, for the tests that plan: the others are tested as models, in test_catalog.
+BUILDS = (*DRAWINGS, 'ur5', 'ur10', 'franka_panda')
+
+
+@pytest.fixture(params=BUILDS)
 def robot(request):
-    """Return each bundled robot in turn."""
+    """Return an arm of each build in turn."""
     return catalog.load(request.param)
 
 
@@ -129,7 +137,8 @@ def _pinocchio_model(name):
             after = move('Tz', robot.d[i]) * twist
         placement = before * move('Rz', robot.theta[i])
         parent = model.addJoint(parent, pin.JointModelRZ(), placement, robot.joint_names[i])
-        inertia = pin.Inertia(robot.mass[i], after.act(robot.com[i]), 0.01 * np.eye(3))
+        mass, com = (0.0, np.zeros(3)) if robot.mass is None else (robot.mass[i], robot.com[i])
+        inertia = pin.Inertia(mass, after.act(com), 0.01 * np.eye(3))
         model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
         before = after
     tip = before * pin.SE3(robot.T_flange_tool)

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from source_chains import CHAINS, chain_poses
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import (
@@ -27,6 +28,12 @@ URDFS = {
     'ur10': (f'{UR}/ur10_robot.urdf', 'tool0', True),
     'franka_panda': ('panda_description/urdf/panda.urdf', 'panda_link8', False),
 }
+
+
+@pytest.fixture(params=catalog.names())
+def robot(request):
+    """Return each bundled robot in turn."""
+    return catalog.load(request.param)
 
 
 @pytest.fixture
@@ -55,11 +62,14 @@ def test_an_unknown_name_is_refused_with_the_known_ones():
         catalog.load('ur7')
 
 
-def test_every_robot_names_its_source_and_has_limits_and_masses(robot):
+def test_every_robot_names_its_source_and_has_limits_and_says_where_masses_are_missing(robot):
     assert len(robot.source) > 50
     for limit in (robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration):
         assert np.isfinite(limit).all()
-    assert (robot.mass > 0.0).all()
+    if robot.mass is None:
+        assert 'no source of link masses' in robot.source
+    else:
+        assert (robot.mass > 0.0).all()
 
 
 def test_the_file_form_round_trips(robot):
@@ -128,6 +138,38 @@ def test_the_flange_is_where_the_makers_joint_axes_put_it(name, drawing, configu
     robot = catalog.load(name)
     for q in configurations(robot):
         np.testing.assert_allclose(forward(robot, q), drawing(name, q), atol=1e-12)
+
+
+@pytest.mark.parametrize('name', CHAINS)
+def test_the_flange_is_where_the_joints_of_the_source_put_it(name, configurations):
+    robot = catalog.load(name)
+    for q in configurations(robot):
+        np.testing.assert_allclose(forward(robot, q), chain_poses(name, q)[-1], atol=1e-9)
+
+
+def test_the_gravity_torque_of_the_iiwa_is_the_slope_of_the_energy_of_its_urdf(configurations):
+    robot = catalog.load('kuka_iiwa14')
+    masses = [5.289529, 5.688888, 3.461245, 4.122995, 1.563756, 2.457878, 0.265331]
+    centres = [
+        (0.0, -0.033795, 0.132404, 1.0),
+        (0.000136, 0.047548, 0.076322, 1.0),
+        (0.0, 0.034913, 0.123108, 1.0),
+        (0.0, -0.039793, 0.086944, 1.0),
+        (0.0, -0.029824, 0.076267, 1.0),
+        (0.0, 0.07102, 0.00495, 1.0),
+        (3e-06, -2e-06, 0.013782, 1.0),
+    ]
+
+    def energy(q):
+        links = chain_poses('kuka_iiwa14', q)
+        heights = [(link @ c)[2] for link, c in zip(links, centres, strict=False)]
+        return np.linalg.norm(robot.gravity) * np.dot(masses, heights)
+
+    step = 1e-5
+    for q in configurations(robot):
+        moves = step * np.eye(robot.n)
+        slope = [(energy(q + move) - energy(q - move)) / (2.0 * step) for move in moves]
+        np.testing.assert_allclose(gravity_torque(robot, q), -np.array(slope), atol=1e-6)
 
 
 def test_the_kuka_stands_upright_at_its_cannon_position():

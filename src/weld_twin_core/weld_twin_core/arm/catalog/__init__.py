@@ -28,6 +28,23 @@ _NAMES = (
     'abb_irb1600',
     'fanuc_m10ia',
     'franka_panda',
+    'ur3e',
+    'ur5e',
+    'ur10e',
+    'ur16e',
+    'ur20',
+    'yaskawa_ma1440',
+    'yaskawa_ma2010',
+    'yaskawa_ar2010',
+    'fanuc_m10id12',
+    'fanuc_m20id25',
+    'abb_irb2600_12_165',
+    'abb_irb4600_40_255',
+    'staubli_tx2_90l',
+    'kuka_iiwa14',
+    'kuka_kr16_2',
+    'kuka_kr16_r1610_2',
+    'mecademic_meca500',
 )
 
 

@@ -14,7 +14,9 @@ TO_FULL_SPEED = 0.25
 """Seconds: an estimate, as these makers do not publish acceleration."""
 
 
-def joints(name: str, rows: Iterable[tuple[float, ...]]) -> list[dict[str, Any]]:
+def joints(
+    name: str, rows: Iterable[tuple[float, ...]], letters: str = ''
+) -> list[dict[str, Any]]:
     """
     Return the joints of a robot file.
 
@@ -25,11 +27,14 @@ def joints(name: str, rows: Iterable[tuple[float, ...]]) -> list[dict[str, Any]]
     rows : iterable of tuple
         a [m], alpha [rad], d [m], theta at zero [rad], lower [deg], upper [deg] and speed [deg/s]
         of each joint.
+    letters : str, optional
+        One for each joint, after its number (Yaskawa's S, L, U, R, B, T).
 
     """
+    ends = [f'_{letter}' for letter in letters] or None
     return [
         {
-            'name': f'{name}{k}',
+            'name': f'{name}{k}{ends[k - 1] if ends else ""}',
             'a': a,
             'alpha': alpha,
             'd': d,

@@ -21,6 +21,14 @@ VOLATILE = 'volatile'
 LATCHED = 'transient_local'
 
 
+DEEP = 5000
+"""
+Samples of a stream that are kept for a reader that lacks some: five seconds at 1 kHz. Fast DDS
+tells every 3 s what was sent, and a reader asks then for what was lost on the way or came before
+it knew the writer; of a thousand kept, the first of a quick run were gone by then.
+"""
+
+
 @dataclass(frozen=True)
 class Qos:
     """Quality of service: keep the last ``depth`` samples; for latecomers too where latched."""
@@ -100,49 +108,49 @@ def _latched(name: str, kind: str, meaning: str) -> Topic:
 JOINT_STATES = _stream(
     '/joint_states',
     'sensor_msgs/msg/JointState',
-    1000,
+    DEEP,
     'commanded joint motion: position [rad or m], velocity where known',
 )
 ACTUAL_JOINT_STATES = _result(
     '/actual/joint_states',
     'sensor_msgs/msg/JointState',
-    1000,
+    DEEP,
     'joint motion with the joint-space effects in it',
 )
 MEASURED_POSE = _stream(
     '/measured/tool_pose',
     'geometry_msgs/msg/PoseStamped',
-    1000,
+    DEEP,
     'where the tool really is, in the measuring frame [m]',
 )
 MEASURED_POINT = _stream(
     '/measured/tool_point',
     'geometry_msgs/msg/PointStamped',
-    1000,
+    DEEP,
     'the same from an instrument that gives no orientation [m]',
 )
 MEASURED_SIGMA = _stream(
     '/measured/sigma',
     'geometry_msgs/msg/Vector3Stamped',
-    1000,
+    DEEP,
     'standard deviation of the measured position of the same stamp, per axis [m]',
 )
 TWIN_POSE = _result(
     '/twin/tool_pose',
     'geometry_msgs/msg/PoseStamped',
-    1000,
+    DEEP,
     'where the twin says the tool is [m]',
 )
 TWIN_COVARIANCE = _result(
     '/twin/tool_pose_with_covariance',
     'geometry_msgs/msg/PoseWithCovarianceStamped',
-    1000,
+    DEEP,
     'the same pose and how sure it is: of the true pose, turns about the world axes [m^2, rad^2]',
 )
 DEVIATION = _result(
     '/deviation',
     'geometry_msgs/msg/Vector3Stamped',
-    1000,
+    DEEP,
     'measured minus twin in the base frame, at the stamp of the measurement [m]',
 )
 DEVIATION_METRICS = _result(

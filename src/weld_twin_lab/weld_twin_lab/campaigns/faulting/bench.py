@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,8 @@ RATE = 100.0
 """Joint states a second."""
 S = 1_000_000_000
 """Nanoseconds."""
+HISTORY = 1000
+"""Messages a controller keeps; an empty one is in the way of reliable readers until it has left."""
 LISTENERS = 4
 """Twin, injector, live diagnosis and recorder take joint states."""
 SURE = {'use_sim_time': True, 'reliable_inputs': True}
@@ -77,10 +80,9 @@ class Bench:
         self.processes[name] = self.cell.start(name, **SURE, **NODES[name], **parameters)
 
     def publisher(self, topic: Topic) -> Any:
-        """Return one more publisher of a topic."""
-        return self.cell.node.create_publisher(
-            topic.message_class(), topic.name, topic.offered.to_rclpy()
-        )
+        """Return one more publisher of a topic, with the short history of a controller."""
+        qos = replace(topic.offered, depth=HISTORY)
+        return self.cell.node.create_publisher(topic.message_class(), topic.name, qos.to_rclpy())
 
     def ready(self) -> None:
         """Wait until all nodes listen and know who listens to them."""

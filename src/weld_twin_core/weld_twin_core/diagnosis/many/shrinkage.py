@@ -34,11 +34,6 @@ ROUNDS = 15
 """Times that variances and noise are learned in turn; they settle within ten."""
 JITTER = (1e-12, 1e-9, 1e-6, 1e-3, 1.0)
 """Shares added to a diagonal, the least that is enough: a few stations repeat their columns."""
-PULL = 0.5
-"""
-Coordinates that the belief about machines at large counts as, where the spread of one machine's is
-learned: no more than half of one, so that a handful of its own decides.
-"""
 
 
 def groups(found: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
@@ -77,22 +72,20 @@ def learned_precision(
     labels, scales : array, shape (K,)
         As `groups` returns them.
     believed : array, shape (K,), optional
-        Precision of machines at large: the spread learned of this one is pulled towards it and
-        never wider, and what is fitted freely has it. Nothing is believed when left out.
+        Precision of machines at large: the spread learned of this one starts there and is never
+        wider, and what is fitted freely has it. Nothing is believed when left out.
 
     """
     # In units of the typical size, so that one variance serves a whole family.
     normal = normal * np.outer(scales, scales)
     right = right * scales
     tied = labels >= 0
-    pulled = 0.0 if believed is None else PULL
     usual = np.full(scales.size, np.inf) if believed is None else 1.0 / (believed * scales**2)
     # A group too small to be tied keeps its number, without a member.
     variance = np.ones(labels.max(initial=-1) + 1)
     for k in np.unique(labels[tied]) if believed is not None else ():
         variance[k] = usual[labels == k].mean()
-    typical = variance.copy()
-    most = typical if pulled else np.full(typical.size, np.inf)
+    most = np.full(variance.size, np.inf) if believed is None else variance.copy()
     floor, noise = 1e-8, 1.0
     for _ in range(ROUNDS):
         precision = _precision(tied, variance, labels, usual)
@@ -107,8 +100,7 @@ def learned_precision(
             mine = labels == k
             if mine.any():
                 share = max(float(determined[mine].sum()), 1e-3)
-                total = float((mean[mine] ** 2).sum()) + pulled * typical[k]
-                variance[k] = min(max(total / (share + pulled), floor), most[k])
+                variance[k] = min(max(float((mean[mine] ** 2).sum()) / share, floor), most[k])
     precision = _precision(tied, variance, labels, usual) / scales**2
     # The fit works in whitened rows, so a prior counts against the noise actually there.
     return precision * noise, float(determined.sum())

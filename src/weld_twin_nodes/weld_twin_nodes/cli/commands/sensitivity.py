@@ -73,7 +73,12 @@ def _add_question(group: argparse._ArgumentGroup) -> None:
         help='draw figure 6 to 14, posture or recorded, and nothing else; may be given again',
     )
     add('--claims', action='store_true', help='measure the claims of the paper')
-    add('--claims-robots', nargs='+', metavar='R', help='robots of the claims (default: all)')
+    add(
+        '--claims-robots',
+        nargs='+',
+        metavar='R',
+        help='robots of the claims (default: seven builds)',
+    )
 
 
 def _add_seam(group: argparse._ArgumentGroup) -> None:

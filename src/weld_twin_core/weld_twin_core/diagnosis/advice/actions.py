@@ -241,6 +241,20 @@ def _instrument_knock(effect: Effect, robot: Robot) -> str:
     )
 
 
+def _joint_curve(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Look at {effect.site}: it is off by a curve over the {effect.on} that no known effect '
+        'gives; until that is found, compensate the motion with the curve.'
+    )
+
+
+def _frame_curve(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Look at the {effect.at}: it moves over the {effect.on} in a way that no known effect '
+        'gives; until that is found, compensate the motion with the curve.'
+    )
+
+
 _SENTENCES: dict[str, Sentence] = {
     'joint_offset': _joint_offset,
     'link_length': _row('da', 'a', 'it is off by'),
@@ -265,6 +279,8 @@ _SENTENCES: dict[str, Sentence] = {
     'measurement_scale': _measurement_scale,
     'setup_step': _setup_step,
     'setup_settling': _setup_settling,
+    'joint_curve': _joint_curve,
+    'frame_curve': _frame_curve,
     'joint_slip': _joint_slip,
     'tool_slip': _tool_slip,
     'instrument_knock': _instrument_knock,

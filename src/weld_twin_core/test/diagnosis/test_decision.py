@@ -439,12 +439,21 @@ def test_families_are_told_largest_first_and_what_they_account_for():
     assert of_families(family('link_twist', -1e-10)).families[0].rms_m == 0.0
 
 
-@pytest.mark.parametrize(('left', 'status'), [(0.049, 'identified'), (0.051, 'unknown')])
+@pytest.mark.parametrize(('left', 'status'), [(0.0395, 'identified'), (0.051, 'unknown')])
 def test_families_are_no_explanation_while_structure_remains(left, status):
     verdict = of_families(family('link_length', 1e-9), structure=left_over(left))
     assert verdict.status == status
     assert verdict.confidence == pytest.approx(0.75 / (1.0 + (left / 0.05) ** 3), rel=1e-6)
     assert 'only their sum is certain' in verdict.reasons[0]
+
+
+@pytest.mark.parametrize('left', [0.0398, 0.049])
+def test_families_more_likely_wrong_than_right_are_not_named(left):
+    verdict = of_families(family('link_length', 1e-9), structure=left_over(left))
+    assert verdict.status == 'unknown'
+    assert verdict.sets == ()
+    assert verdict.confidence == pytest.approx(0.75)
+    assert 'imitate' in verdict.reasons[0]
 
 
 def test_families_that_leave_nothing_are_believed_three_in_four():

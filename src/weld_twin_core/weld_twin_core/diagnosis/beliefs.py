@@ -273,6 +273,10 @@ class Beliefs:
     """Belief in 'none' where nothing on the recordings shows the noise by itself and what
     remains is not spread as noise is. Moved: nothing changes."""
 
+    likelier: float = _verdict(0.5)
+    """Probability below which families are more likely wrong than right, and are not named. By the
+    meaning of a probability."""
+
     families: float = _verdict(0.75)
     """Belief in the families named where nothing is left: dozens of errors at once are seldom
     put together on purpose. Moved: nothing changes."""

@@ -82,7 +82,9 @@ class Hooks(Parametric, ABC):
     @property
     def at(self) -> str:
         """Return where it sits: the name of its joint, or its `place`."""
-        return str(self.site) if self.place == 'joint' else self.place
+        if self.place != 'joint':
+            return self.place
+        return 'base' if self.site is None else str(self.site)
 
     @property
     def on(self) -> str:

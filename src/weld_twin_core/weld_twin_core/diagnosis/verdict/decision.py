@@ -16,6 +16,10 @@ from ..result import Family, Site
 from .evidence import Evidence
 from .weighing import TINY, Weighed
 
+_MANY_IMITATE = (
+    'many small errors together fit best, but leave so much that they rather imitate a cause that '
+    'is not in the library'
+)
 AT_REST = ('constant', 'angle', 'place', 'load')
 """Dependences that show without any motion."""
 _NO_KIND = (
@@ -105,8 +109,12 @@ def _of_families(case: Weighed) -> Verdict:
     )
     if not sets:
         return Verdict('unknown', beliefs.doubted, (), (reason, _NO_KIND), tuple(families))
+    sure = beliefs.families * case.complete
+    if case.left <= beliefs.unexplained and sure < beliefs.likelier:
+        # As likely as not something else: members are kept in the model, and none is named.
+        return Verdict('unknown', beliefs.doubted, (), (_MANY_IMITATE,), tuple(families))
     status = 'unknown' if case.left > beliefs.unexplained else 'identified'
-    return Verdict(status, beliefs.families * case.complete, sets, (reason,), tuple(families))
+    return Verdict(status, sure, sets, (reason,), tuple(families))
 
 
 def _incomplete(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> Verdict:

@@ -156,14 +156,14 @@ DEVIATION = _result(
 DEVIATION_METRICS = _result(
     '/deviation/metrics',
     'diagnostic_msgs/msg/DiagnosticArray',
-    10,
+    DEEP,
     'D(t), D_norm, D_cum, RMS, max, samples, dropped',
     steady=False,
 )
 DIAGNOSIS = _result(
     '/diagnosis',
     'diagnostic_msgs/msg/DiagnosticArray',
-    10,
+    DEEP,
     'verdict over the last minute: status, effects found, gap before and after',
     steady=False,
 )

@@ -33,10 +33,11 @@ READY_EVERY = 0.02
 """Seconds between two looks at whether the listeners are there."""
 HEALTH_EVERY = 1.0
 """Seconds between two health messages."""
-LAST_WORDS = 4.0
+LAST_WORDS = 8.0
 """
 Seconds an ending node waits in all until its subscribers have everything. Acknowledgements take
-milliseconds; what was lost on the way is sent again within the 3 s of Fast DDS's heartbeat.
+milliseconds; what was lost on the way is sent again with Fast DDS's heartbeat, every 3 s, and on a
+busy machine the first of them may be lost too.
 """
 KNOWN = 2.0
 """

@@ -268,6 +268,9 @@ def test_a_cell_is_recorded_from_the_first_to_the_last_message(cell, tmp_path, w
         own = motion if name == 'trajectory_generator' else {}
         if way == 'launched':
             own = {**own, 'wait_for_subscribers': count + 1, 'reliable_inputs': True}
+        elif own:  # by hand the motion is started last, when the other nodes are there
+            there = {'recorder', *LISTENERS} - {name}
+            cell.wait(lambda wanted=there: wanted <= set(cell.node.get_node_names()), 'the nodes')
         cell.start(name, **own)
     generator = cell.processes[-1]
     cell.wait(lambda: generator.code is not None, 'the motion to end', limit=120.0)

@@ -28,6 +28,7 @@ include_patterns = [
     'docs/*.md',
     'docs/reference/*.md',
     'docs/results/blind/scores.md',
+    'docs/results/coverage/coverage.md',
     'docs/results/sensitivity/README.md',
     'examples/*.ipynb',
     'bags/README.md',

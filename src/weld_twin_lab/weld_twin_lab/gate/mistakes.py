@@ -118,10 +118,10 @@ def sign(sound: Sound, rng: np.random.Generator) -> Made:
 def constant_angle(sound: Sound, rng: np.random.Generator) -> Made:
     """Count a joint from another zero, by a quarter or half turn."""
     i = _inner(sound, rng)
-    if i == 0:
-        raise Hidden('the zero of joint 1 is the turn of the base')
     turn = np.zeros(sound.robot.n)
     turn[i] = np.radians(float(rng.choice([90.0, -90.0, 180.0])))
+    if i == 0 and turn[i] > 2.0:
+        raise Hidden('half a turn of joint 1 is half a turn of the base')
     joints = sound.recording.joints
     made = _with_q(sound.recording, joints.q + turn, joints.qd)
     return sound.robot, made, f'{sound.robot.joint_names[i]} {np.degrees(turn[i]):+.0f}'

@@ -114,8 +114,11 @@ def _poorer(taken: Take, poor: str, rng: np.random.Generator) -> Take:
         count = int(rng.integers(15, 40))
         wrench = None if command.wrench is None else command.wrench[:count]
         warm = None if command.temperature is None else command.temperature[:count]
-        command = replace(command, t=command.t[:count], wrench=wrench, temperature=warm)
-        q = q[:count]
+        return taken._replace(
+            command=replace(
+                command, t=command.t[:count], q=q[:count], wrench=wrench, temperature=warm
+            )
+        )
     return taken._replace(command=replace(command, q=q))
 
 

@@ -43,17 +43,17 @@ def mixups(case: Case) -> Sequence[Finding]:
         return _frames(case, gap(shot.problem, shot.model))
     found, rest = _unravelled(shot, arm)
     if found:
-        return [Finding.of(_undone(each, arm, rest)) for each in found]
+        return [Finding.of(_mistake(each, arm.gap, rest.gap)) for each in found]
     return _beyond(case, shot, arm) or _frames(case, gap(shot.problem, shot.model))
 
 
 # Mix-ups ---------------------------------------------------------------------------------------
 
 
-def _undone(suspicion: Suspicion, before: Arm, after: Arm) -> Mistake:
+def _mistake(suspicion: Suspicion, before: float, after: float) -> Mistake:
     words = f'{suspicion.words[0].upper()}{suspicion.words[1:]}'
-    if after.gap < before.gap:
-        words += f'; undone, the gap falls from {length(before.gap)} to {length(after.gap)}'
+    if after < before:
+        words += f'; undone, the gap falls from {length(before)} to {length(after)}'
     return Mistake(suspicion.kind, suspicion.at, f'{words}.', suspicion.remedy, suspicion.mend)
 
 
@@ -110,8 +110,21 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
         if left < max(UNEXPLAINED, before / EXPLAINED):
             if _plausible(shot.robot, model):
                 return ()
-            return [Finding.of(_framed(shot, model, frozenset(more - given), before, left))]
+            framed = _framed(shot, model, frozenset(more - given), before, left)
+            own = None if framed.kind == 'base_turned' else _within(shot, before, left)
+            return [Finding.of(own or framed)]
     return ()
+
+
+def _within(shot: Snapshot, before: float, left: float) -> Mistake | None:
+    """Return the mix-up that explains as much in the frames as they were given."""
+    most = max(LARGE, 2.0 * left)
+    for suspicion in suspicions(shot.robot):
+        trial = shot.mended(suspicion.mend)
+        undone = gap(trial.problem, trial.model)
+        if undone < min(most, before / EXPLAINED):
+            return _mistake(suspicion, before, undone)
+    return None
 
 
 def _plausible(robot: Robot, model: Model) -> bool:
@@ -133,19 +146,18 @@ def _framed(
 ) -> Mistake:
     turn = None
     if more == {'base'}:
-        turn = _quarter_turn(shot.robot.T_world_base, model.bases[0])
+        turn = _half_turn(shot.robot.T_world_base, model.bases[0])
     falls = f'the gap falls from {length(before)} to {length(left)}'
     if turn is not None:
-        angle, matrix = turn
         return Mistake(
             'base_turned',
             ('base',),
-            f'The base of the robot stands turned by {angle} degrees about its z axis against '
+            'The base of the robot stands turned by 180 degrees about its z axis against '
             f'the frame that was given; turned back, {falls}.',
             'Use the axes of the robot base that the controller counts in (for a UR: base or '
             'base_link), or add the half turn to the base frame; a joint 1 whose zero is off by '
             'as much would look the same',
-            partial(base_turned, turn=matrix),
+            partial(base_turned, turn=turn),
         )
     names = listed(sorted(more))
     return Mistake(
@@ -159,17 +171,14 @@ def _framed(
     )
 
 
-def _quarter_turn(given: Array, fitted: Array) -> tuple[int, Array] | None:
-    """Return by how many degrees about its z axis a base is turned, if by quarters and nearby."""
+def _half_turn(given: Array, fitted: Array) -> Array | None:
+    """Return by how many degrees about its z axis a base is turned, if by half and nearby."""
     off = np.linalg.inv(given) @ fitted
     if np.linalg.norm(off[:3, 3]) > BESIDE:
         return None
-    for angle, c, s in ((180, -1.0, 0.0), (90, 0.0, 1.0), (-90, 0.0, -1.0)):
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        cosine = 0.5 * (np.trace(turn.T @ off[:3, :3]) - 1.0)
-        if np.arccos(np.clip(cosine, -1.0, 1.0)) < TURNED:
-            return angle, turn
-    return None
+    turn = np.diag([-1.0, -1.0, 1.0])
+    cosine = 0.5 * (np.trace(turn @ off[:3, :3]) - 1.0)
+    return turn if np.arccos(np.clip(cosine, -1.0, 1.0)) < TURNED else None
 
 
 # Nothing known ---------------------------------------------------------------------------------

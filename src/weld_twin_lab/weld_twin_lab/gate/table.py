@@ -21,7 +21,7 @@ def result(
     """Return shares named by kind, complaints, what went wrong, and whether the goals are met."""
     named = {kind: _share([m for m in mistakes if m['kind'] == kind]) for kind in KINDS}
     complaints = [s for s in sound if not s['right']]
-    goals = [n['named'] >= GOAL_NAMED * n['trials'] for n in named.values()]
+    goals = [n['named'] >= GOAL_NAMED * n['trials'] for n in named.values() if n['trials']]
     return {
         'seed': seed,
         'named': named,

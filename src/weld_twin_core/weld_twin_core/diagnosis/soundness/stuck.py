@@ -99,8 +99,11 @@ def _runs(q: Array, joints: JointMotion) -> list[tuple[int, int]]:
 def _inside(recording: Recording, start: int, end: int) -> NDArray[np.bool_]:
     """Return which measurements lie in a stretch, bool (M,); after a stop the arm settles."""
     joints, t = recording.joints, measured(recording).t
-    after = 0.0 if joints.static else STUCK_AFTER
-    return np.asarray((t >= joints.t[start] + after) & (t <= joints.t[end]), dtype=bool)
+    # Between the last still sample and the next the stream is already on its way.
+    first, last = joints.t[start], joints.t[end]
+    if not joints.static:
+        first, last = first + STUCK_AFTER, joints.t[end - 1]
+    return np.asarray((t >= first) & (t <= last), dtype=bool)
 
 
 def _freed(model: Model, recording: Recording, k: int, i: int, inside: NDArray[np.bool_]) -> float:

@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Mistakes of data and set-up by kind: named, placed, undone; what gave way is dated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measured_cells import anywhere, moving, recorded, rejointed, remeasured, stations
+
+from weld_twin_core.arm.fingerprint import fingerprint
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.soundness import Given, examine
+from weld_twin_core.effects import JointOffset, effects_from_list
+from weld_twin_core.effects.setup_motion import of_the_robot
+from weld_twin_core.recording import JointMotion
+
+
+@pytest.fixture
+def cell(ur5, rng):
+    """Return the robot measured from somewhere else, at stations."""
+    real = ur5.with_frames(base=anywhere(rng, 2.0), tool=anywhere(rng, 0.1))
+    return recorded(real, stations(ur5, rng), rng)
+
+
+@pytest.fixture
+def run(ur5, rng):
+    """Return the same robot in motion, points only, in its own frame."""
+    return recorded(ur5, moving(ur5, rng), rng, points=True)
+
+
+def seen(robot, recording, align=('base', 'tool'), apply=False):
+    return examine(Given((recording,), robot, frozenset(align)), apply=apply)
+
+
+def only(robot, recording, align=('base', 'tool')):
+    """Return kind and place of the one mistake that is found, and see that it can be undone."""
+    (item,) = seen(robot, recording, align).unsound
+    mended = seen(robot, recording, align, apply=True)
+    assert mended.posed is not None and all(i.applied for i in mended.unsound)
+    assert mended.posed[1].mended == tuple(i.sentence for i in mended.unsound)
+    return item.kind, item.at
+
+
+def test_one_joint_in_degrees_among_radians(ur5, cell):
+    q = cell.joints.q * np.where(np.arange(6) == 3, np.degrees(1.0), 1.0)
+    assert only(ur5, rejointed(cell, q)) == ('units', ('wrist_1_joint',))
+
+
+def test_one_joint_in_degrees_believed_for_all(ur5, cell):
+    q = cell.joints.q * np.where(np.arange(6) == 3, 1.0, np.radians(1.0))
+    assert only(ur5, rejointed(cell, q)) == ('units', ('wrist_1_joint',))
+
+
+@pytest.mark.parametrize('factor', [[1e3, 1, 1], [1, 1e-3, 1e-3]])
+def test_one_axis_in_millimetres(ur5, cell, factor):
+    bad = remeasured(cell, position=cell.measured.position * factor)
+    assert only(ur5, bad) == ('units', ('instrument',))
+
+
+def test_joint_3_counted_against_the_ground(ur5, cell):
+    q = np.array(cell.joints.q)
+    q[:, 2] += q[:, 1]
+    assert only(ur5, rejointed(cell, q)) == (
+        'coupled_axes',
+        ('shoulder_lift_joint', 'elbow_joint'),
+    )
+
+
+def test_a_base_turned_by_half_a_turn_where_it_is_not_fitted(ur5, run):
+    bad = remeasured(run, position=run.measured.position * [-1, -1, 1])
+    assert only(ur5, bad, align=()) == ('base_turned', ('base',))
+    assert not seen(ur5, bad, align=('base',)).unsound
+
+
+def test_joint_1_off_by_a_quarter_turn_is_not_a_base_that_stands_elsewhere(ur5, run):
+    bad = rejointed(run, run.joints.q + [np.pi / 2, 0, 0, 0, 0, 0])
+    assert only(ur5, bad, align=()) == ('constant_angle', ('shoulder_pan_joint',))
+
+
+def test_a_sibling_that_is_not_bundled_is_another_robot(ur5, cell):
+    sibling = replace(ur5, a=ur5.a * [1, 1.04, 1.0, 1, 1, 1], d=ur5.d * [1, 1, 1, 1.1, 1, 1])
+    (item,) = seen(sibling, cell).unsound
+    assert item.kind == 'other_robot' and seen(sibling, cell, apply=True).posed is None
+    assert fingerprint(sibling) != fingerprint(ur5)
+    assert fingerprint(replace(ur5, theta=ur5.theta + 2 * np.pi)) == fingerprint(ur5)
+
+
+def test_velocities_of_one_joint_that_are_zero_while_it_moves(ur5, rng):
+    motion = moving(ur5, rng)
+    qd = np.gradient(motion.q, motion.t, axis=0)
+    qd[:, 4] = 0.0
+    bad = recorded(ur5, JointMotion(motion.t, motion.q, qd), rng)
+    assert only(ur5, bad) == ('zero_velocities', ('wrist_2_joint',))
+
+
+def test_measurements_of_another_epoch_are_brought_back(ur5, run):
+    late = remeasured(run, t=run.measured.t + 5000.0)
+    found = seen(ur5, late, align=(), apply=True)
+    assert {item.kind for item in found.unsound} == {'clock'}
+    assert found.posed is not None
+    t = found.given.recordings[0].measured.t
+    assert np.abs(t - run.measured.t).max() < 0.02
+
+
+@pytest.mark.parametrize('which', [[3], [0, 1, 2, 3, 4, 5]])
+@pytest.mark.parametrize('kind', [moving, stations])
+def test_readings_that_stand_still_while_the_tool_moves(ur5, rng, which, kind):
+    good = recorded(ur5, kind(ur5, rng), rng)
+    q = np.array(good.joints.q)
+    start, end = int(0.4 * len(q)), int(0.6 * len(q))
+    q[start:end, which] = q[start, which]
+    (item,) = seen(ur5, rejointed(good, q)).unsound
+    assert item.kind == 'joints_stuck'
+    assert item.at == (('wrist_1_joint',) if len(which) == 1 else ())
+
+
+def test_a_joint_that_rests_is_not_stuck(ur5, rng):
+    motion = moving(ur5, rng)
+    q = np.insert(motion.q, 900, np.tile(motion.q[900], (400, 1)), axis=0)
+    q[:, 3] = q[0, 3]
+    held = recorded(ur5, JointMotion(np.arange(len(q)) / 125.0, q), rng)
+    assert not seen(ur5, held).unsound
+
+
+SLIPS = {
+    'joint_slipped': ({'effect': 'joint_slip', 'joint': 'elbow_joint', 'offset': 1.5e-3}, 4e-4),
+    'reflector_jumped': ({'effect': 'tool_slip', 'xyz': [1e-3, -5e-4, 0.0]}, 4e-4),
+    'instrument_knocked': ({'effect': 'instrument_knock', 'xyz': [1e-3, 5e-4, 8e-4]}, 4e-4),
+}
+
+
+@pytest.mark.parametrize('kind', SLIPS)
+def test_what_gave_way_is_dated_and_named_as_a_cause(ur5, rng, kind):
+    entry, _ = SLIPS[kind]
+    effects = effects_from_list([{**entry, 'time': 60.5}], ur5)
+    robot = ur5.with_frames(tool=anywhere(rng, 0.1))
+    bad = recorded(robot, stations(ur5, rng), rng, effects)
+    (slip,) = seen(robot, bad).slips
+    assert slip.kind == kind and slip.time == 60.5
+    found = diagnose([bad], robot, align='base,tool')
+    assert [(u.kind, u.applied) for u in found.unsound] == [(kind, True)]
+    named = {(f.effect.name, f.effect.site) for f in found.effects}
+    assert (entry['effect'], entry.get('joint')) in named
+    assert found.shrink.rms_after_m < 0.2 * found.shrink.rms_before_m
+
+
+def test_sound_recordings_have_nothing_that_gave_way(ur5, cell, run):
+    for recording, align in ((cell, ('base', 'tool')), (run, ())):
+        found = seen(ur5, recording, align)
+        assert found.posed is not None and not found.slips and not found.unsound
+
+
+def test_a_slip_stays_with_the_robot_and_a_knock_with_its_set_up(ur5):
+    entries = [{**entry, 'time': 5.0} for entry, _ in SLIPS.values()]
+    left = of_the_robot(effects_from_list(entries, ur5))
+    assert [type(effect) for effect in left] == [JointOffset]
+    assert left[0].offset == 1.5e-3

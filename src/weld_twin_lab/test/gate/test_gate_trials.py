@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The proof of the gate: mistakes are what they say, and the command measures them."""
+
+import json
+
+import numpy as np
+import pytest
+
+from weld_twin_core.diagnosis.result import MISTAKES
+from weld_twin_core.twin.twin import Twin
+from weld_twin_lab.gate import sound
+from weld_twin_lab.gate.mistakes import KINDS, Hidden
+from weld_twin_lab.gate.table import result
+from weld_twin_nodes.cli import main
+
+pytest.importorskip('mujoco', reason='cases are simulated with MuJoCo')
+
+
+@pytest.fixture(scope='module')
+def recording():
+    return sound.draw(np.random.default_rng(4), rich=True)
+
+
+def test_every_kind_of_mistake_that_is_documented_is_made():
+    assert set(KINDS) == set(MISTAKES)
+
+
+@pytest.mark.parametrize('kind', [k for k in KINDS if k not in ('zero_velocities', 'clock')])
+def test_a_mistake_opens_a_gap_that_the_sound_recording_has_not(recording, kind):
+    rng = np.random.default_rng(7)
+    robot, made = recording.robot, None
+    for _ in range(20):
+        try:
+            robot, made, said = KINDS[kind](recording, rng)
+            break
+        except Hidden:
+            continue
+    if made is None:
+        pytest.skip('this recording cannot show it')
+    assert said
+    changed = not np.array_equal(made.joints.q, recording.recording.joints.q)
+    changed |= not np.array_equal(made.measured.position, recording.recording.measured.position)
+    turns = made.measured.rotation, recording.recording.measured.rotation
+    changed |= turns[0] is not None and not np.array_equal(*turns)
+    other = Twin(robot).poses(made, made.measured.t).position
+    same = Twin(recording.robot).poses(made, made.measured.t).position
+    assert changed or not np.allclose(other, same)
+
+
+def test_the_same_draw_is_the_same_recording():
+    first, second = (sound.draw(np.random.default_rng(9)) for _ in range(2))
+    assert first.told == second.told
+    assert np.array_equal(first.recording.measured.position, second.recording.measured.position)
+
+
+def test_one_miss_in_ten_or_one_complaint_fails_the_proof():
+    def trials(named, count=10):
+        return [
+            {'kind': kind, 'way': 'bag', 'right': kind != 'sign' or k < named}
+            for kind in KINDS
+            for k in range(count)
+        ]
+
+    quiet, loud = [{'right': True}], [{'right': False}]
+    assert result(trials(10), quiet, 1)['passed']
+    assert not result(trials(9), quiet, 1)['passed']
+    assert not result(trials(10), loud, 1)['passed']
+
+
+@pytest.mark.slow
+def test_the_command_names_mistakes_and_spares_the_sound(tmp_path, capsys):
+    words = ('lab', 'gate', '--out', str(tmp_path), '--draws', '1', '--sound', '2')
+    assert main([*words, '--kinds', 'base_turned,units', '--workers', '1', '--seed', '3']) in (
+        0,
+        1,
+    )
+    content = json.loads((tmp_path / 'gate.json').read_text())
+    assert content['named']['units'] == {
+        'trials': 2,
+        'named': 2,
+        'bag': {'trials': 1, 'named': 1},
+        'table': {'trials': 1, 'named': 1},
+    }
+    assert content['sound'] == {'trials': 2, 'complaints': 0}
+    assert 'base_turned' in capsys.readouterr().out
+
+
+def test_an_unknown_mistake_is_refused(tmp_path, capsys):
+    assert main(['lab', 'gate', '--out', str(tmp_path / 'x'), '--kinds', 'gremlins']) == 2
+    assert 'there is no mistake' in capsys.readouterr().err

@@ -120,6 +120,8 @@ def constant_angle(sound: Sound, rng: np.random.Generator) -> Made:
     i = _inner(sound, rng)
     turn = np.zeros(sound.robot.n)
     turn[i] = np.radians(float(rng.choice([90.0, -90.0, 180.0])))
+    if i == sound.robot.n - 3 and turn[i] > 2.0 and 'tool' in sound.align:
+        raise Hidden('half a turn before the wrist is its middle joint turned round')
     if i == 0 and turn[i] > 2.0:
         raise Hidden('half a turn of joint 1 is half a turn of the base')
     joints = sound.recording.joints

@@ -18,13 +18,14 @@ from ..frames.alignment import refined
 from .base_change import BaseChange, base_change, thinned
 from .lag import Lag, lag
 from .lengths import length
+from .limits import LATE_LEFT
 from .mending import Mend
 from .slips import Slip, slips
 from .snapshot import Snapshot, measured, snapshot
 
 ENOUGH = 30
 """Joint states from which a motion has a shape in time."""
-HINT = 0.8
+HINT = 0.9
 """What the gap must fall to for a lag to be looked into, and"""
 EXPLAINED = 0.35
 """for it to be believed once the frames are fitted with it."""
@@ -103,7 +104,9 @@ class Case:
         again = self._lags(refined(replace(shot.problem, align=self.problem.align), shot.model))
         return [
             new
-            if old is not None and new is not None and new.after < EXPLAINED * old.before
+            if old is not None
+            and new is not None
+            and new.after < min(EXPLAINED * old.before, LATE_LEFT)
             else None
             for old, new in zip(late, again, strict=True)
         ]

@@ -24,6 +24,10 @@ Factor by which undoing a mistake must bring down what is wrong.
 Undoing a real one brings centimetres to the noise (factors of 100 and more); undoing one that is
 not there by chance never did better than 2 on sound recordings.
 """
+EXPLAINED_IMPOSSIBLE = 2.0
+"""The same factor where undoing it also brings joints back into their range."""
+BEYOND = 1.0
+"""Reading [rad, m] beyond a joint's range that no controller gives, whatever its zero."""
 WORTH = 0.7
 """A further mistake must bring what is wrong below this share of what it was."""
 MOST = 3
@@ -40,7 +44,7 @@ Spread of what the zeros [rad], lengths [m] and twists [rad] of a plausible arm 
 Wide on purpose: arms as delivered are off by tenths of a milliradian to some milliradians and by
 tenths of a millimetre (the two arms of docs/real_robots.md: 2 to 3 mm at the tool in all).
 """
-OFFSET_MOST, LINK_MOST, TWIST_MOST = 0.13, 6e-3, 0.03
+OFFSET_MOST, LINK_MOST, TWIST_MOST = 0.13, 8e-3, 0.03
 """
 Errors [rad, m, rad] beyond which a number is no arm's error but another number.
 
@@ -69,6 +73,8 @@ Lag [s] from which stamps are of another clock.
 Streams through one computer are tens of milliseconds apart, drives lag by as much (the servo axis
 of EMPS: 6.5 ms); clocks that nobody synchronised are off by anything.
 """
+LATE_LEFT = 1e-2
+"""Gap [m] that a lag must leave at most: more, and something else is wrong that a lag imitates."""
 RATE = 1e-4
 """
 Rate at which two clocks may run apart.
@@ -105,17 +111,16 @@ MARGIN = 10.0
 """Nats by which a step must beat every smooth change of anything."""
 NEARLY = 0.9
 """Share of what a step of more numbers explains that one of fewer must explain to be taken."""
-DATED_SIZE = 2.0
+DATED_SIZE = 2.5
 """
-A step this many times as large as the largest gaps did not happen: whatever is aligned, one side
-of it keeps half.
+A step this many times as large as the largest gaps did not happen: one frame that is fitted takes
+up half of it, base and tool together a little more.
 """
-DATED_SHARE = 0.25
+DATED_SHARE = 0.1
 """
 Share of the squares that frames and a plausible arm leave which a step must explain.
 
-Something that gave way is the main thing there is to see; effects that no formula holds exactly
-leave small steps here and there.
+Effects that no formula holds exactly leave small steps here and there; what gave way is seen.
 """
 ENDS = 0.05
 """Share of a recording at its ends in which a step cannot be told from the end's own troubles."""

@@ -20,6 +20,7 @@ from .evidence import Case, Finding, Mistake, length, listed
 from .limits import (
     BESIDE,
     EXPLAINED,
+    EXPLAINED_IMPOSSIBLE,
     FAR,
     LARGE,
     MOST,
@@ -41,7 +42,7 @@ def mixups(case: Case) -> Sequence[Finding]:
     arm = shot.arm()
     if arm.off < 1.0:
         return _frames(case, gap(shot.problem, shot.model))
-    found, rest = _unravelled(shot, arm)
+    found, rest = _unravelled(shot, arm, case.problem.align)
     if found:
         return [Finding.of(_mistake(each, arm.gap, rest.gap)) for each in found]
     return _beyond(case, shot, arm) or _frames(case, gap(shot.problem, shot.model))
@@ -57,39 +58,56 @@ def _mistake(suspicion: Suspicion, before: float, after: float) -> Mistake:
     return Mistake(suspicion.kind, suspicion.at, f'{words}.', suspicion.remedy, suspicion.mend)
 
 
-def _unravelled(shot: Snapshot, start: Arm) -> tuple[list[Suspicion], Arm]:
+def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list[Suspicion], Arm]:
     """Return the fewest mix-ups that explain the gap, and the arm without them."""
     for first in (suspicions, doubles):
         found: list[Suspicion] = []
         arm, trial, look = start, shot, first
         while arm.off > 1.0 and len(found) < MOST:
-            best, undone, rest = _best(trial, arm, look(trial.robot))
+            best, undone, rest = _best(trial, arm, look(trial.robot), align)
             if best is None:
                 break
             found.append(best)
             trial, arm, look = undone, rest, suspicions
-        if arm.off < start.off / EXPLAINED:
+        factor = EXPLAINED if shot.possible or not trial.possible else EXPLAINED_IMPOSSIBLE
+        if found and (arm.off < start.off / factor or _as_given(shot, trial, start, align)):
             return found, arm
     return [], start
 
 
+def _as_given(shot: Snapshot, trial: Snapshot, start: Arm, align: frozenset[str]) -> bool:
+    """
+    Return whether a trial leaves less in the frames as given than all freedom does without it.
+
+    On short motions free frames and a bent arm take up much of any mistake.
+    """
+    left = trial.gap_with(align)
+    return left < WORTH * start.gap and left < shot.gap_with(align) / EXPLAINED
+
+
 def _best(
-    shot: Snapshot, before: Arm, tries: Iterable[Suspicion]
+    shot: Snapshot, before: Arm, tries: Iterable[Suspicion], align: frozenset[str]
 ) -> tuple[Suspicion | None, Snapshot, Arm]:
-    """Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best."""
+    """
+    Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best.
+
+    Of those that do as well, the one that leaves the frames as they were given: a wrist turned
+    round by half a turn of its outer joints is one whose middle joint counts the other way.
+    """
     tried = [(suspicion, shot.mended(suspicion.mend)) for suspicion in tries]
-    best: tuple[Suspicion | None, Snapshot, Arm] = (None, shot, before)
+    fitted: list[tuple[Suspicion, Snapshot, Arm]] = []
     # Without orientations a quick fit may end beside the tool vector: then from many starts.
     for thorough in (False,) if shot.turned else (False, True):
         rough = [trial.rough_gap(thorough=thorough) for _, trial in tried]
         for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
-            suspicion, trial = tried[k]
-            arm = trial.arm()
-            if arm.off < WORTH * best[2].off:
-                best = (suspicion, trial, arm)
-        if best[2].off < before.off / EXPLAINED:
+            fitted.append((*tried[k], tried[k][1].arm()))
+        least = min(arm.off for _, _, arm in fitted)
+        if least < before.off / EXPLAINED:
             break
-    return best
+    if least > WORTH * before.off:
+        return None, shot, before
+    alike = [each for each in fitted if WORTH * each[2].off <= least]
+    return min(alike, key=lambda each: each[1].gap_with(align)) if len(alike) > 1 else alike[0]
 
 
 # Frames ----------------------------------------------------------------------------------------
@@ -111,17 +129,16 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
             if _plausible(shot.robot, model):
                 return ()
             framed = _framed(shot, model, frozenset(more - given), before, left)
-            own = None if framed.kind == 'base_turned' else _within(shot, before, left)
+            own = None if framed.kind == 'base_turned' else _within(shot, before, left, given)
             return [Finding.of(own or framed)]
     return ()
 
 
-def _within(shot: Snapshot, before: float, left: float) -> Mistake | None:
-    """Return the mix-up that explains as much in the frames as they were given."""
+def _within(shot: Snapshot, before: float, left: float, align: frozenset[str]) -> Mistake | None:
+    """Return the mix-up that explains as much with no more frames fitted than were to be."""
     most = max(LARGE, 2.0 * left)
     for suspicion in suspicions(shot.robot):
-        trial = shot.mended(suspicion.mend)
-        undone = gap(trial.problem, trial.model)
+        undone = shot.mended(suspicion.mend).gap_with(align)
         if undone < min(most, before / EXPLAINED):
             return _mistake(suspicion, before, undone)
     return None

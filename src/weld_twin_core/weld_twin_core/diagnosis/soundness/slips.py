@@ -176,7 +176,10 @@ class _Seen:
     def _smooth(self, k: int) -> Iterator[_Trial]:
         t = measured(self.problem.recordings[k]).t
         age = (t - t[0]) / max(float(np.ptp(t)), 1e-9)
-        shapes = np.array([self._placed(shape, k) for shape in smooth_shapes(age)])
+        possible = smooth_shapes(age)
+        if len(self.problem.recordings) > 1:  # moved between recordings, not within one
+            possible.append(np.ones(t.size))
+        shapes = np.array([self._placed(shape, k) for shape in possible])
         for _, _, changed in self._kinds:
             shape = shapes[int(changed.gains(shapes).argmax())]
             yield _Trial(changed.nats(shape), changed, shape)

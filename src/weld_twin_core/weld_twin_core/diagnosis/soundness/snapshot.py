@@ -18,8 +18,9 @@ from ...effects.link_twist import LinkTwist
 from ...recording import JointMotion, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
-from ..frames.alignment import refined, rough_frames
+from ..frames.alignment import initial_frames, refined, rough_frames
 from .limits import (
+    BEYOND,
     LARGE,
     LINK_MOST,
     LINK_SPREAD,
@@ -72,9 +73,23 @@ class Snapshot:
         """Return whether every recording has orientations."""
         return all(measured(r).rotation is not None for r in self.recordings)
 
+    @property
+    def possible(self) -> bool:
+        """Return whether no joint is read far beyond its range."""
+        reads = np.concatenate([r.joints.q for r in self.recordings])
+        low, high = self.robot.lower - BEYOND, self.robot.upper + BEYOND
+        return bool(((reads >= low) & (reads <= high)).all())
+
     def rough_gap(self, *, thorough: bool = False) -> float:
         """Return the median gap [m] after a quick fit of both frames; thorough: many starts."""
         return gap(self.problem, rough_frames(self.problem, self.model, thorough=thorough))
+
+    def gap_with(self, align: frozenset[str]) -> float:
+        """Return the median gap [m] with only these frames fitted."""
+        problem = replace(self.problem, align=align)
+        if not align:
+            return gap(problem, self.model)
+        return gap(problem, refined(problem, initial_frames(problem, self.model)))
 
     def framed(self) -> Model:
         """Return the model with both frames fitted."""

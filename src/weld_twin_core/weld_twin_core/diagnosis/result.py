@@ -74,6 +74,8 @@ class Unsound:
         What is wrong, and what to do about it.
     applied : bool
         Whether the remedy was made and the diagnosis went on with mended data.
+    alike : tuple of (str, tuple of str)
+        Kinds and places of other mistakes that would explain the data as well.
 
     """
 
@@ -82,10 +84,12 @@ class Unsound:
     sentence: str
     remedy: str
     applied: bool = False
+    alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``unsound``."""
-        return {**vars(self), 'at': list(self.at)}
+        alike = [{'kind': kind, 'at': list(at)} for kind, at in self.alike]
+        return {**vars(self), 'at': list(self.at), 'alike': alike}
 
 
 @dataclass(frozen=True)

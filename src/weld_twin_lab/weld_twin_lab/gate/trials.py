@@ -42,7 +42,7 @@ def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> di
         'what': said,
         **_plain(sound),
         **found,
-        'right': kind in (*found['kinds'], *found['dated']),
+        'right': kind in (*found['kinds'], *found['alike'], *found['dated']),
     }
 
 
@@ -86,9 +86,16 @@ def _looked(
             read = WAYS[way](recording, robot, Path(folder))
             examined = examine(Given((read,), robot, frozenset(align)))
         except DataError as error:
-            return {'kinds': ['refused'], 'dated': [], 'sentences': [str(error)], 'seconds': 0.0}
+            return {
+                'kinds': ['refused'],
+                'alike': [],
+                'dated': [],
+                'sentences': [str(error)],
+                'seconds': 0.0,
+            }
     return {
         'kinds': sorted({item.kind for item in examined.unsound}),
+        'alike': sorted({kind for item in examined.unsound for kind, _ in item.alike}),
         'dated': sorted({slip.kind for slip in examined.slips}),
         'sentences': [
             *(item.sentence for item in examined.unsound),

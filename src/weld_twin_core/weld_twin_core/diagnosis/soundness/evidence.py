@@ -43,7 +43,7 @@ class Mistake(NamedTuple):
     A mistake in data or set-up; see `weld_twin_core.diagnosis.result.Unsound`.
 
     ``mend`` undoes it, None where nothing can; ``of_all`` tells that other recordings of the cell
-    have it too.
+    have it too; ``alike`` are kinds and places that would explain the data as well.
     """
 
     kind: str
@@ -52,6 +52,7 @@ class Mistake(NamedTuple):
     remedy: str
     mend: Mend | None
     of_all: bool = True
+    alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 class Finding(NamedTuple):

@@ -55,7 +55,16 @@ def _mistake(suspicion: Suspicion, before: float, after: float) -> Mistake:
     words = f'{suspicion.words[0].upper()}{suspicion.words[1:]}'
     if after < before:
         words += f'; undone, the gap falls from {length(before)} to {length(after)}'
-    return Mistake(suspicion.kind, suspicion.at, f'{words}.', suspicion.remedy, suspicion.mend)
+    if suspicion.alike:
+        words += f'. As well it may be that {" or that ".join(s.words for s in suspicion.alike)}'
+    return Mistake(
+        suspicion.kind,
+        suspicion.at,
+        f'{words}.',
+        suspicion.remedy,
+        suspicion.mend,
+        alike=tuple((s.kind, s.at) for s in suspicion.alike),
+    )
 
 
 def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list[Suspicion], Arm]:
@@ -107,7 +116,16 @@ def _best(
     if least > WORTH * before.off:
         return None, shot, before
     alike = [each for each in fitted if WORTH * each[2].off <= least]
-    return min(alike, key=lambda each: each[1].gap_with(align)) if len(alike) > 1 else alike[0]
+    gaps = [each[1].gap_with(align) for each in alike] if len(alike) > 1 else [0.0]
+    first = int(np.argmin(gaps))
+    others = [
+        each[0]
+        for each, left in zip(alike, gaps, strict=True)
+        if WORTH * left <= gaps[first] and each is not alike[first]
+    ]
+    best, trial, arm = alike[first]
+    unlike = {other.words: other for other in others if other.words != best.words}
+    return replace(best, alike=tuple(unlike.values())), trial, arm
 
 
 # Frames ----------------------------------------------------------------------------------------

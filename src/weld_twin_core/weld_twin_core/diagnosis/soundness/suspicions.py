@@ -39,6 +39,8 @@ class Suspicion:
         What to mend, in the imperative.
     mend : callable
         Undoes it.
+    alike : tuple of Suspicion
+        Others that would explain the data as well.
 
     """
 
@@ -47,6 +49,7 @@ class Suspicion:
     words: str
     remedy: str
     mend: Mend
+    alike: tuple[Suspicion, ...] = ()
 
 
 def suspicions(robot: Robot) -> Iterator[Suspicion]:

@@ -57,14 +57,21 @@ def test_the_same_draw_is_the_same_recording():
 def test_one_miss_in_ten_or_one_complaint_fails_the_proof():
     def trials(named, count=10):
         return [
-            {'kind': kind, 'way': 'bag', 'right': kind != 'sign' or k < named}
+            {
+                'kind': kind,
+                'way': 'bag',
+                'right': kind != 'sign' or k < named,
+                'only_alike': kind == 'sign' and k >= named,
+            }
             for kind in KINDS
             for k in range(count)
         ]
 
     quiet, loud = [{'right': True}], [{'right': False}]
     assert result(trials(10), quiet, 1)['passed']
-    assert not result(trials(9), quiet, 1)['passed']
+    missed = result(trials(9), quiet, 1)
+    assert not missed['passed'], 'to stand among the alike is not to be named'
+    assert missed['named']['sign']['only_alike'] == 1
     assert not result(trials(10), loud, 1)['passed']
 
 
@@ -79,8 +86,9 @@ def test_the_command_names_mistakes_and_spares_the_sound(tmp_path, capsys):
     assert content['named']['units'] == {
         'trials': 2,
         'named': 2,
-        'bag': {'trials': 1, 'named': 1},
-        'table': {'trials': 1, 'named': 1},
+        'only_alike': 0,
+        'bag': {'trials': 1, 'named': 1, 'only_alike': 0},
+        'table': {'trials': 1, 'named': 1, 'only_alike': 0},
     }
     assert content['sound'] == {'trials': 2, 'complaints': 0}
     assert 'base_turned' in capsys.readouterr().out

@@ -53,7 +53,7 @@ def test_no_traceback_and_nothing_absurd(draw):
 
 
 @pytest.mark.filterwarnings('ignore')
-@pytest.mark.parametrize('seed', [10, 40, 107, 108])
+@pytest.mark.parametrize('seed', [10, 40, 107, 108, 1084])
 def test_draws_that_once_ended_in_a_traceback(seed):
     assert tried(drawn(seed))['traceback'] is None
 

@@ -15,10 +15,17 @@ GOAL_NAMED = 0.95
 """Least share of the mistakes of every kind that must be named."""
 
 
+HEADS = ('mistake', 'bags', 'tables', 'named first', 'only among the alike')
+
+
 def result(
     mistakes: Sequence[Mapping[str, Any]], sound: Sequence[Mapping[str, Any]], seed: int
 ) -> dict[str, Any]:
-    """Return shares named by kind, complaints, what went wrong, and whether the goals are met."""
+    """
+    Return shares named by kind, complaints, what went wrong, and whether the goals are met.
+
+    What stands only among the alike of another mistake is counted beside, and not as named.
+    """
     named = {kind: _share([m for m in mistakes if m['kind'] == kind]) for kind in KINDS}
     complaints = [s for s in sound if not s['right']]
     goals = [n['named'] >= GOAL_NAMED * n['trials'] for n in named.values() if n['trials']]
@@ -36,6 +43,7 @@ def _share(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     out: dict[str, Any] = {
         'trials': len(trials),
         'named': sum(bool(t['right']) for t in trials),
+        'only_alike': sum(bool(t['only_alike']) for t in trials),
     }
     for way in sorted({str(t['way']) for t in trials}):
         mine = [t for t in trials if t['way'] == way]
@@ -46,11 +54,16 @@ def _share(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def table(content: Mapping[str, Any]) -> str:
     """Return the result as a Markdown table."""
     rows = [
-        [kind, *(_cell(found.get(way)) for way in ('bag', 'table')), _cell(found)]
+        [
+            kind,
+            *(_cell(found.get(way)) for way in ('bag', 'table')),
+            _cell(found),
+            found['only_alike'] or '-',
+        ]
         for kind, found in content['named'].items()
     ]
     sound = content['sound']
-    made = markdown.table(('mistake', 'bags', 'tables', 'named'), *rows)
+    made = markdown.table(HEADS, *rows)
     return f'{made}\nsound recordings: {sound["complaints"]} complaints on {sound["trials"]}\n'
 
 

@@ -29,12 +29,14 @@ def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> di
     """
     Return whether the gate named a mistake of a kind, drawn by number, in a bag or a table.
 
+    A mistake that only stands among those that are alike is not named, and counted apart.
     ``engine`` only tells the results of one version of the core from those of another.
     """
     drawn = [seed, list(KINDS).index(kind), list(WAYS).index(way), number]
     rng = np.random.default_rng(drawn)
     sound, (robot, recording, said) = _made(kind, way, rng)
     found = _looked(recording, robot, sound.align, way)
+    right = kind in (*found['kinds'], *found['dated'])
     return {
         'kind': kind,
         'way': way,
@@ -42,7 +44,8 @@ def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> di
         'what': said,
         **_plain(sound),
         **found,
-        'right': kind in (*found['kinds'], *found['alike'], *found['dated']),
+        'right': right,
+        'only_alike': not right and kind in found['alike'],
     }
 
 

@@ -220,6 +220,8 @@ def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
         return None
     most = max(trial.gain for trial in trials)
     enough = [trial for trial in trials if trial.gain > NEARLY * most]
+    if not enough:  # nothing to explain, so no number explains it
+        return None
     fewest = min(trial.changed.columns.shape[2] for trial in enough)
     return max((t for t in enough if t.changed.columns.shape[2] == fewest), key=_nats)
 

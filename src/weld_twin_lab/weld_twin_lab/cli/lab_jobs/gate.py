@@ -14,14 +14,16 @@ from pathlib import Path
 
 from ..blind_jobs.job_options import add_pool, runner_of
 
-RESULT = 'gate.json'
+RESULT, TABLE = 'gate.json', 'gate.md'
 MISSED = 1
 """Exit code where a goal was not met."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('--out', required=True, metavar='OUT', help='directory for gate.json')
+    parser.add_argument(
+        '--out', required=True, metavar='OUT', help='directory for gate.json and gate.md'
+    )
     parser.add_argument('--seed', type=int, default=20, metavar='S')
     parser.add_argument(
         '--draws', type=int, default=10, metavar='N', help='of every kind, as bag and as table'
@@ -65,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
     content = result(found[: len(wrong)], found[len(wrong) :], args.seed)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / RESULT, json.dumps(content, indent=1) + '\n', overwrite=True)
-    print(table(content))
+    told = table(content)
+    write_text(out / TABLE, told, overwrite=True)
+    print(told)
     print(f'gate: {"passed" if content["passed"] else "FAILED"}, {out / RESULT}')
     return 0 if content['passed'] else MISSED

@@ -18,6 +18,7 @@ class AxisParallelism(ChannelError):
     dbeta: Value = 0.0
 
     name = 'axis_parallelism'
+    everywhere = True
     depends_on = 'constant'
     of = 'link'
     stage = Stage.LINK

@@ -48,6 +48,7 @@ class Backlash(MemoryEffect):
     form: str = 'play'
 
     name = 'backlash'
+    demand = 2
     depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY

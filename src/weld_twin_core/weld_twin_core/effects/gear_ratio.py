@@ -19,6 +19,9 @@ class GearRatio(Effect):
     scale: Value = 0.0
 
     name = 'gear_ratio'
+    everywhere = True
+    by_motion = True
+    demand = 2
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT

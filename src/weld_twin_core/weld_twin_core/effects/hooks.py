@@ -67,8 +67,16 @@ class Hooks(Parametric, ABC):
     """Whether it sets in at an instant, and is a cause only where the data checks found one."""
     common: ClassVar[bool] = True
     """Whether every arm has a little of it, so that a fit of many small errors takes it along."""
+    demand: ClassVar[int] = 0
+    """What it asks of stations before a fit of many small errors takes it along: 0 as little as
+    the geometry, 1 more of them, 2 a great many."""
+    by_motion: ClassVar[bool] = False
+    """Whether a joint must move for it to be told from a constant."""
+    everywhere: ClassVar[bool] = False
+    """Whether a prediction allows for it on every joint, or clock, where it was not found."""
     waves: ClassVar[Waves | None] = None
-    """Set by an effect that is a sum of waves in its joint's angle; it gives `orders` too."""
+    """Set by an effect that is a sum of waves in its joint's angle; it also gives `orders` and
+    `with_orders`."""
 
     @abstractmethod
     def gradient(self, view: View) -> list[Shift | None]:
@@ -102,6 +110,11 @@ class Hooks(Parametric, ABC):
         if cls.of in ('joint', 'link'):
             values['joint'] = joint
         return cls(**values)
+
+    @property
+    def moved_by(self) -> str | None:
+        """Return the joint that must move for it to be seen; None where none has to."""
+        return self.site if self.by_motion else None
 
     def lasting(self) -> Any:
         """Return what is left of it for the robot ever after; None for what a set-up had."""
@@ -206,8 +219,8 @@ class Hooks(Parametric, ABC):
         """Return the orders of the waves that this instance is a sum of, in cycles per turn."""
         return np.zeros(0)
 
-    def with_order(self: H, order: float) -> H:
-        """Return the instance with a wave of one more order, of no size yet."""
+    def with_orders(self: H, orders: Array) -> H:
+        """Return its waves of these orders and no others, shape (K,); new ones of no size yet."""
         return self
 
     # The verdict --------------------------------------------------------------------------------
@@ -215,6 +228,12 @@ class Hooks(Parametric, ABC):
     def causes(self) -> int:
         """Return how many separate causes this instance stands for."""
         return max(1, self.orders().size)
+
+    # The prediction -----------------------------------------------------------------------------
+
+    def off_outside(self) -> float:
+        """Return how far its joint may be off where nothing was recorded, [rad or m]."""
+        return 0.0
 
 
 SAME = 1e-3

@@ -19,6 +19,8 @@ class JointCompliance(Effect):
     compliance: Value = 0.0
 
     name = 'joint_compliance'
+    everywhere = True
+    by_motion = True
     depends_on = 'load'
     of = 'joint'
     stage = Stage.ELASTIC

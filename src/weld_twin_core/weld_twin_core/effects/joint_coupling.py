@@ -26,11 +26,18 @@ class JointCoupling(Effect):
     ratio: Value = 0.0
 
     name = 'joint_coupling'
+    by_motion = True
+    demand = 2
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
     parameters = (Parameter('ratio', '-', typical=3e-4),)
     options = ('source',)
+
+    @property
+    def moved_by(self) -> str:
+        """Return the source: its angle is what comes through."""
+        return self.source or self.joint
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown source, and a joint coupled with itself."""

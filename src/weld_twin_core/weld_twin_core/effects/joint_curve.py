@@ -38,6 +38,7 @@ class JointCurve(Effect):
     channel: str = 'q'
 
     name = 'joint_curve'
+    by_motion = True
     of = 'joint'
     stage = Stage.LINK
     cause = False
@@ -65,6 +66,12 @@ class JointCurve(Effect):
 
     def _site(self, view: View) -> tuple[str, int]:
         return self.channel, view.robot.index(self.joint)
+
+    def off_outside(self) -> float:
+        """Return the RMS of a curve over the angle: no formula says how it goes on beyond."""
+        if (self.over, self.channel) != ('angle', 'q'):
+            return 0.0
+        return float(np.sqrt(np.mean(np.square(self.values))))
 
     def displace(self, view: View) -> Shift:
         """Return the curve on the channel."""

@@ -18,6 +18,7 @@ class JointOffset(ChannelError):
     offset: Value = 0.0
 
     name = 'joint_offset'
+    everywhere = True
     depends_on = 'constant'
     of = 'joint'
     stage = Stage.JOINT

@@ -18,6 +18,7 @@ class LinkLength(ChannelError):
     da: Value = 0.0
 
     name = 'link_length'
+    everywhere = True
     depends_on = 'constant'
     of = 'link'
     stage = Stage.LINK

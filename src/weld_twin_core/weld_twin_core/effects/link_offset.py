@@ -18,6 +18,7 @@ class LinkOffset(ChannelError):
     dd: Value = 0.0
 
     name = 'link_offset'
+    everywhere = True
     depends_on = 'constant'
     of = 'link'
     stage = Stage.LINK

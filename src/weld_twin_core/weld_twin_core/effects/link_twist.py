@@ -18,6 +18,7 @@ class LinkTwist(ChannelError):
     dalpha: Value = 0.0
 
     name = 'link_twist'
+    everywhere = True
     depends_on = 'constant'
     of = 'link'
     stage = Stage.LINK

@@ -35,6 +35,7 @@ class Quantization(Effect):
     step: Value = 0.0
 
     name = 'quantization'
+    by_motion = True
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT

@@ -35,6 +35,7 @@ class ThermalGrowth(Effect):
     warmup: Sequence[float] | None = None
 
     name = 'thermal_growth'
+    demand = 1
     depends_on = 'temperature'
     of = 'links'
     stage = Stage.LINK

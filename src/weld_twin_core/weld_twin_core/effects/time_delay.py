@@ -18,6 +18,7 @@ class TimeDelay(Effect):
     delay: Value = 0.0
 
     name = 'time_delay'
+    everywhere = True
     depends_on = 'speed'
     place = 'clock'
     of = 'robot'

@@ -43,6 +43,9 @@ class TransmissionRipple(Effect):
     phase: Value = 0.0
 
     name = 'transmission_ripple'
+    everywhere = True
+    by_motion = True
+    demand = 1
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
@@ -143,9 +146,20 @@ class TransmissionRipple(Effect):
         """Return the orders, in cycles per turn."""
         return np.atleast_1d(np.asarray(self.order, dtype=np.float64))
 
-    def with_order(self, order: float) -> TransmissionRipple:
-        """Return the ripple with one more order."""
-        return self.joined(TransmissionRipple(self.joint, 0.0, order, 0.0))
+    def with_orders(self, orders: Array) -> TransmissionRipple:
+        """
+        Return the ripple of these orders and no others.
+
+        Parameters
+        ----------
+        orders : array, shape (K,)
+            In cycles per turn; those that the ripple does not have yet are of no size.
+
+        """
+        own, pairs = self.orders(), self.coordinates().reshape(-1, 2)
+        wanted = [pairs[own == order].sum(axis=0) for order in orders]
+        like = TransmissionRipple(self.joint, np.zeros(len(wanted)), orders, 0.0)
+        return like.from_atoms(np.array(wanted))
 
     def joined(self, other: TransmissionRipple) -> TransmissionRipple:
         """Return the orders of both in one ripple."""

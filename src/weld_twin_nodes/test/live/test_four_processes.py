@@ -59,28 +59,29 @@ def run_cell(folder, plan, robot, effects, seed=7):
             wait_for_subscribers=3,
             **sure,
         )
-        delayed = 1 if 'time_delay' in effects else 0
-        cell.wait(
-            lambda: (
-                bool(metrics.messages)
-                and from_messages.metrics(metrics.last)['samples'] >= plan.motion.t.size - delayed
-            ),
-            'the last metrics',
-        )
-        n = plan.motion.t.size
-        cell.wait_recorded(
-            {
-                '/joint_states': n,
-                '/actual/joint_states': n,
-                '/measured/tool_pose': n,
-                '/twin/tool_pose': n,
-                '/deviation': n - delayed,
-                '/deviation/metrics': len(metrics),
-            }
-        )
+        n, delayed = plan.motion.t.size, 1 if 'time_delay' in effects else 0
+        _wait_for_all(cell, metrics, n, n - delayed)
         recorder.interrupt()
         assert recorder.end() == 0
     return folder / 'live'
+
+
+def _wait_for_all(cell, metrics, samples, pairs):
+    """Wait until the last metrics are out and the recorder has everything."""
+    cell.wait(
+        lambda: bool(metrics.messages) and from_messages.metrics(metrics.last)['samples'] >= pairs,
+        'the last metrics',
+    )
+    cell.wait_recorded(
+        {
+            '/joint_states': samples,
+            '/actual/joint_states': samples,
+            '/measured/tool_pose': samples,
+            '/twin/tool_pose': samples,
+            '/deviation': pairs,
+            '/deviation/metrics': len(metrics),
+        }
+    )
 
 
 def content(path):

@@ -38,6 +38,11 @@ REGRESSORS = (
     'time',
 )
 NOISE = 2e-5
+CHECKS = (
+    Check('units', 'ok', 'Joint angles are in rad and lengths in m.'),
+    Check('clocks', 'note', 'The two clocks agree within 0.4 ms.'),
+    Check('outliers', 'warning', '3 of 1234 measurements lie far off and count little.'),
+)
 
 
 def rms(parts):
@@ -89,17 +94,7 @@ def diagnosis(status, robot, true, believed, recordings, **changes):
         gap=Gap(before, 0.9 * before, 2.0 * before, 4e-4, 1234, np.sqrt(3) * NOISE),
         where=_where(robot, found, lines, recordings),
         status=status,
-        effects=tuple(
-            Found(
-                e,
-                {
-                    k: _error(v)
-                    for k, v in e.to_mapping().items()
-                    if k not in ('effect', 'joint', 'order')
-                },
-            )
-            for e in found
-        ),
+        effects=tuple(Found(e, _errors(e)) for e in found),
         confidence=0.97,
         indistinguishable=tuple((Site(e.name, e.site),) for e in found),
         reasons=(),
@@ -116,17 +111,19 @@ def diagnosis(status, robot, true, believed, recordings, **changes):
         unexplained=Unexplained(after, False),
         next_experiment=None,
         actions=(),
-        checks=(
-            Check('units', 'ok', 'Joint angles are in rad and lengths in m.'),
-            Check('clocks', 'note', 'The two clocks agree within 0.4 ms.'),
-            Check('outliers', 'warning', '3 of 1234 measurements lie far off and count little.'),
-        ),
+        checks=CHECKS,
         model=Model(robot, tuple(robot.T_world_base for _ in recordings), (), found),
         traces=lines,
         absent={'cartesian_compliance': 'no tool wrench was recorded'},
         recordings=recordings,
     )
     return replace(out, **changes)
+
+
+def _errors(effect):
+    """Return standard errors of its parameters: three per cent of each."""
+    values = effect.to_mapping().items()
+    return {k: _error(v) for k, v in values if k not in ('effect', 'joint', 'order')}
 
 
 def _error(value):

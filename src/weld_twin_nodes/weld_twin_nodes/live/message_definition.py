@@ -14,10 +14,13 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from weld_twin_core.errors import DataError
 
 RULE = '=' * 80
+"""The line between the parts of a definition, as rosbag2 writes it."""
+_SIZES = (8, 16, 32, 64)
 BUILT_IN = (
-    'bool', 'byte', 'char', 'float32', 'float64', 'int8', 'uint8', 'int16', 'uint16', 'int32',
-    'uint32', 'int64', 'uint64', 'string', 'wstring',
-)  # fmt: skip
+    *('bool', 'byte', 'char', 'float32', 'float64', 'string', 'wstring'),
+    *(f'int{size}' for size in _SIZES),
+    *(f'uint{size}' for size in _SIZES),
+)
 """Primitive types of the interface definition language."""
 
 

@@ -67,20 +67,23 @@ def ur_arm(
     return {
         'name': name,
         'source': source,
-        'joints': [
-            {
-                'name': joint,
-                'a': a,
-                'alpha': alpha,
-                'd': d,
-                'lower': -2 * pi,
-                'upper': 2 * pi,
-                'max_velocity': speed,
-                'max_acceleration': acceleration,
-            }
-            for joint, (a, alpha, d), speed, acceleration in zip(
-                JOINTS, rows, speeds, accelerations, strict=True
-            )
-        ],
+        'joints': [_joint(*row) for row in zip(JOINTS, rows, speeds, accelerations, strict=True)],
         'links': [{'mass': mass, 'com': com} for mass, com in links],
+    }
+
+
+def _joint(
+    name: str, row: tuple[float, float, float], speed: float, acceleration: float
+) -> dict[str, Any]:
+    """Return a joint of the robot file; every one turns by two revolutions."""
+    a, alpha, d = row
+    return {
+        'name': name,
+        'a': a,
+        'alpha': alpha,
+        'd': d,
+        'lower': -2 * pi,
+        'upper': 2 * pi,
+        'max_velocity': speed,
+        'max_acceleration': acceleration,
     }

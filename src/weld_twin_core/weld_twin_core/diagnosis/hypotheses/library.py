@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from ...twin.features import Features, joints_of
 from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
 from .still_joints import REASON, hardly_moves
+
+EXCLUDED = 'excluded by the user'
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,40 +121,69 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
     for effect in model.found:
         parts = problem.effect_columns(features, effect, atoms=False)
         blocks.append(problem.whitened(parts, scale))
-    count = sum(block.shape[0] for block in blocks)
-    fixed = np.arange(count)
-    units: list[Unit] = []
-    absent = dict.fromkeys(exclude, 'excluded by the user')
+    making = _Making(problem, features, residual, scale, blocks, dict.fromkeys(exclude, EXCLUDED))
+    fixed = np.arange(making.count)
     for kind in candidate_kinds(exclude, problem.align):
         for joint in joints_of(kind, model.robot.joint_names):
-            reason = _applicable(kind, joint, features)
-            if reason is not None:
-                absent[kind.name] = reason
-                continue
-            seeds, columns = [], []
-            found, trials = features[0].seeds(kind, joint, residual)
-            for seed in found:
-                if hardly_moves(features, seed):
-                    absent[kind.name] = f'{REASON} ({joint})'
-                    continue
-                block = _columns(problem, features, seed, scale)
-                if block is None:
-                    continue
-                seeds.append(seed)
-                columns.append(np.arange(count, count + block.shape[0]))
-                count += block.shape[0]
-                blocks.append(block)
-            if seeds:
-                units.append(Unit(kind.name, joint, tuple(seeds), tuple(columns), trials))
+            making.add(kind, joint)
     for sudden in problem.dated:
-        block = None if sudden.name in exclude else _columns(problem, features, sudden, scale)
-        if block is not None:
-            own = np.arange(count, count + block.shape[0])
-            count += block.shape[0]
-            blocks.append(block)
-            instants = float(sum(problem.samples))
-            units.append(Unit(sudden.name, sudden.site, (sudden,), (own,), instants))
-    return Library(np.concatenate(blocks), fixed, tuple(units), absent)
+        if sudden.name not in exclude:
+            making.add_dated(sudden)
+    columns = np.concatenate(making.blocks)
+    return Library(columns, fixed, tuple(making.units), making.absent)
+
+
+@dataclass(eq=False)
+class _Making:
+    """A library in the making: the columns so far, and the units that they belong to."""
+
+    problem: Problem
+    features: list[Features]
+    pull: Array
+    scale: Scale
+    blocks: list[Array]
+    absent: dict[str, str]
+    units: list[Unit] = field(default_factory=list)
+    count: int = 0
+
+    def __post_init__(self) -> None:
+        self.count = sum(block.shape[0] for block in self.blocks)
+
+    def add(self, kind: type[Effect], joint: str | None) -> None:
+        """Add a family on a joint, or tell why it is absent."""
+        reason = _applicable(kind, joint, self.features)
+        if reason is not None:
+            self.absent[kind.name] = reason
+            return
+        seeds, columns = [], []
+        found, trials = self.features[0].seeds(kind, joint, self.pull)
+        for seed in found:
+            if hardly_moves(self.features, seed):
+                self.absent[kind.name] = f'{REASON} ({joint})'
+                continue
+            own = self._columns(seed)
+            if own is not None:
+                seeds.append(seed)
+                columns.append(own)
+        if seeds:
+            self.units.append(Unit(kind.name, joint, tuple(seeds), tuple(columns), trials))
+
+    def add_dated(self, sudden: Effect) -> None:
+        """Add what gave way at an instant that the data checks found."""
+        own = self._columns(sudden)
+        if own is not None:
+            instants = float(sum(self.problem.samples))
+            self.units.append(Unit(sudden.name, sudden.site, (sudden,), (own,), instants))
+
+    def _columns(self, seed: Effect) -> Index | None:
+        """Return the numbers of a seed's columns, now added, or None if the data hide it."""
+        block = _columns(self.problem, self.features, seed, self.scale)
+        if block is None:
+            return None
+        own = self.count + np.arange(block.shape[0])
+        self.count += block.shape[0]
+        self.blocks.append(block)
+        return own
 
 
 def _applicable(kind: type[Effect], joint: str | None, features: list[Features]) -> str | None:

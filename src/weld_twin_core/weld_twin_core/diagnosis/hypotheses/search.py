@@ -160,14 +160,13 @@ def search(
         now, slots = settled(
             work, now, lambda f: effective_rows(small, f, bare, beliefs), progress
         )
-    model = now.model
-    final, scale = robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
-    if implausible(final.model):
-        kept = [k for k, e in enumerate(final.model.found) if not beyond(model.robot, e)]
-        refused += implausible(final.model)
+    final, scale = _fitted(full, now.model)
+    if absurd := implausible(final.model):
+        refused += absurd
+        kept = [k for k, e in enumerate(final.model.found) if not beyond(final.model.robot, e)]
         slots = tuple(slots[k] for k in kept) if slots else ()
         less = final.model.with_found(tuple(final.model.found[k] for k in kept))
-        final, scale = robust_fit(full, less, robust_scale(full, full.residuals(less)), rounds=1)
+        final, scale = _fitted(full, less)
     return Search(
         problem=full,
         scale=scale,
@@ -181,6 +180,11 @@ def search(
         crowded=chosen.crowded,
         refused=tuple(refused),
     )
+
+
+def _fitted(full: Problem, model: Model) -> tuple[Fit, Scale]:
+    """Return the fit of a model that is nearly there, and its noise."""
+    return robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
 
 
 class _Chosen(NamedTuple):

@@ -15,28 +15,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from .small_errors import many_small
 
-LADDER: tuple[tuple[str, ...], ...] = (
-    (
-        'transmission_ripple',
-        'thermal_growth',
-        'gear_ratio',
-        'joint_coupling',
-        'backlash',
-    ),
-    ('gear_ratio', 'joint_coupling', 'backlash'),
-    (),
-)
-"""The kinds left out at every step, from the simplest model to the richest."""
 BEAR = (10, 30, 100)
 """
-Stations from which on each step is tried. From other draws of 15 to 120 stations of two real arms:
-with fewer, the richer step predicted the others worse, and the few could not tell.
+Stations from which on effects of each `demand` are fitted along. From other draws of 15 to 120
+stations of two real arms: with fewer, the richer step predicted the others worse, and the few
+could not tell.
 """
 PLENTY = 600
 """Stations from which on only the richest is fitted: they bear all of it, and time is saved."""
@@ -66,7 +56,7 @@ def fitted_together(
     if not found.problem.recordings[0].joints.static or stations < BEAR[0]:
         return found
     progress('many small errors at once: fitting them together')
-    steps = [step for step, least in zip(LADDER, BEAR, strict=True) if stations >= least]
+    steps = [_beyond(demand) for demand, least in enumerate(BEAR) if stations >= least]
     if stations >= PLENTY:
         steps = steps[-1:]
     best, left = found, np.inf
@@ -97,6 +87,11 @@ def _together(
     kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
     final, scale, precision = many_small(found.problem, kept, exclude, beliefs, progress)
     return replace(found, scale=scale, final=final, precision=precision, slots=(), dense=True)
+
+
+def _beyond(demand: int) -> tuple[str, ...]:
+    """Return the kinds that demand more of the stations, left out of a step."""
+    return tuple(name for name, kind in REGISTRY.items() if kind.demand > demand)
 
 
 def unseen_rms(found: Search) -> float:

@@ -32,6 +32,8 @@ from ..beliefs import Beliefs
 
 ROUNDS = 15
 """Times that variances and noise are learned in turn; they settle within ten."""
+LEAST_VARIANCE = 1e-8
+"""Least variance of a group, in typical sizes: a ten thousandth of the usual error is none."""
 JITTER = (1e-12, 1e-9, 1e-6, 1e-3, 1.0)
 """Shares added to a diagonal, the least that is enough: a few stations repeat their columns."""
 
@@ -80,13 +82,9 @@ def learned_precision(
     normal = normal * np.outer(scales, scales)
     right = right * scales
     tied = labels >= 0
-    usual = np.full(scales.size, np.inf) if believed is None else 1.0 / (believed * scales**2)
-    # A group too small to be tied keeps its number, without a member.
-    variance = np.ones(labels.max(initial=-1) + 1)
-    for k in np.unique(labels[tied]) if believed is not None else ():
-        variance[k] = usual[labels == k].mean()
-    most = np.full(variance.size, np.inf) if believed is None else variance.copy()
-    floor, noise = 1e-8, 1.0
+    usual = _usual(scales, believed)
+    variance, most = _first_variances(labels, usual)
+    noise = 1.0
     for _ in range(ROUNDS):
         precision = _precision(tied, variance, labels, usual)
         system = normal / noise + np.diag(precision)
@@ -100,10 +98,32 @@ def learned_precision(
             mine = labels == k
             if mine.any():
                 share = max(float(determined[mine].sum()), 1e-3)
-                variance[k] = min(max(float((mean[mine] ** 2).sum()) / share, floor), most[k])
+                learned = float((mean[mine] ** 2).sum()) / share
+                variance[k] = min(max(learned, LEAST_VARIANCE), most[k])
     precision = _precision(tied, variance, labels, usual) / scales**2
     # The fit works in whitened rows, so a prior counts against the noise actually there.
     return precision * noise, float(determined.sum())
+
+
+def _usual(scales: Array, believed: Array | None) -> Array:
+    """Return the variance of machines at large in typical sizes, shape (K,); inf if unknown."""
+    usual = np.full(scales.size, np.inf)
+    if believed is not None:
+        known = believed > 0.0
+        usual[known] = 1.0 / (believed[known] * scales[known] ** 2)
+    return usual
+
+
+def _first_variances(labels: Array, usual: Array) -> tuple[Array, Array]:
+    """Return the variance that every group starts from, and the most that it may have, (G,)."""
+    # A group too small to be tied keeps its number, without a member.
+    variance = np.ones(labels.max(initial=-1) + 1)
+    most = np.full(variance.size, np.inf)
+    for k in np.unique(labels[labels >= 0]):
+        most[k] = usual[labels == k].mean()
+        if np.isfinite(most[k]):
+            variance[k] = most[k]
+    return variance, most
 
 
 def _factor(system: Array) -> tuple[Array, bool]:

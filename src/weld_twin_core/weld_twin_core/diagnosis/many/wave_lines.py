@@ -182,6 +182,8 @@ def _free(model: Model, waves: Waves, orders: Array) -> NDArray[np.bool_]:
 
 def _with_order(found: list[Effect], joint: str, order: float) -> list[Effect]:
     return [
-        effect.with_order(order) if effect.waves and effect.site == joint else effect
+        effect.with_orders(np.append(effect.orders(), order))
+        if effect.waves and effect.site == joint
+        else effect
         for effect in found
     ]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,24 +13,12 @@ from numpy.typing import NDArray
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.frame_curve import FrameCurve
-from ...effects.joint_curve import JointCurve
 from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
-from ...effects.transmission_ripple import TransmissionRipple
+from ...twin.features import joints_of
 from ...twin.posterior import Discrepancy
 from .leftover import Rest
 
-EVERYWHERE = (
-    'joint_offset',
-    'link_length',
-    'link_offset',
-    'link_twist',
-    'axis_parallelism',
-    'gear_ratio',
-    'joint_compliance',
-)
-"""Families that every joint of every arm has a little of."""
 ORDERS = np.arange(1.0, 5.0)
 """Ripple orders [1/rev] that bend a joint's whole range; finer ones are part of what is left over,
 for they are as large inside as outside what was recorded."""
@@ -50,45 +39,37 @@ MOST = 24
 def directions(robot: Robot, found: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return the effects whose coordinates are uncertain, at the values found or at zero."""
     out: list[Effect] = []
-    for name in EVERYWHERE:
-        out += [_at(found, name, joint) for joint in robot.joint_names]
-    for joint, slides in zip(robot.joint_names, robot.prismatic, strict=True):
-        if not slides:
-            zero = np.zeros(ORDERS.size)
-            out.append(TransmissionRipple(joint, zero, ORDERS, zero))
-    out.append(_at(found, 'time_delay', None))
+    for kind in [kind for kind in REGISTRY.values() if kind.everywhere]:
+        for joint in joints_of(kind, robot.joint_names):
+            here = [e for e in found if (e.name, e.site) == (kind.name, joint)]
+            if kind.waves is None:
+                out += here[:1] or [_none_yet(kind, joint)]
+            elif joint is not None and not robot.prismatic[robot.index(joint)]:
+                wave = reduce(_joined, here, _none_yet(kind, joint))
+                out += [wave.with_orders(ORDERS), *_finer(wave)]
     for effect in found:
-        if isinstance(effect, TransmissionRipple):
-            out += _finer(effect)
-        elif _counts(effect) and effect.key not in {e.key for e in out}:
+        if effect.waves is None and _counts(effect) and effect.key not in {e.key for e in out}:
             out.append(effect)
     return tuple(e for e in out if e.coordinates().size)
 
 
 def _counts(effect: Effect) -> bool:
     """Return whether an effect goes along to other motions: all but how one set-up moved."""
-    return effect.cause or isinstance(effect, JointCurve | FrameCurve)
+    return effect.cause or not effect.of_setup
 
 
-def _at(found: Sequence[Effect], name: str, joint: str | None) -> Effect:
-    for effect in found:
-        if effect.name == name and effect.site == joint:
-            return effect
-    kind = REGISTRY[name]
+def _none_yet(kind: type[Effect], joint: str | None) -> Effect:
     return kind() if joint is None else kind(joint)  # type: ignore[call-arg]
 
 
-def _finer(effect: TransmissionRipple) -> list[Effect]:
-    """Return the part of a ripple that the orders of every arm do not have."""
-    orders = np.atleast_1d(np.asarray(effect.order, dtype=np.float64))
-    other = ~np.isin(orders, ORDERS)
-    if not other.any() or 2 * other.sum() > MOST:
-        return []
-    amplitude, phase = (
-        np.broadcast_to(np.asarray(v, dtype=np.float64), orders.shape)[other]
-        for v in (effect.amplitude, effect.phase)
-    )
-    return [TransmissionRipple(effect.joint, amplitude, orders[other], phase)]
+def _joined(one: Effect, other: Effect) -> Effect:
+    return one.joined(other) or other
+
+
+def _finer(wave: Effect) -> list[Effect]:
+    """Return the part of some waves that the orders of every arm do not have."""
+    other = wave.orders()[~np.isin(wave.orders(), ORDERS)]
+    return [wave.with_orders(other)] if 0 < 2 * other.size <= MOST else []
 
 
 def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
@@ -96,36 +77,18 @@ def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
     Return where the prior of every coordinate lies, counted from the fitted model, shape (K,).
 
     Small errors are counted from zero. What bends the twin (a frequency) is counted from the fit,
-    and so is the ripple of a joint that was fitted with many orders at once: their sizes were
+    and so are the waves of a joint that was fitted with many orders at once: their sizes were
     learned together there, and some of them alone must not be drawn back.
     """
-    dense = {
-        effect.joint
-        for effect in found
-        if isinstance(effect, TransmissionRipple) and np.size(effect.order) > ORDERS.size
-    }
+    dense = {(e.name, e.site) for e in found if e.orders().size > ORDERS.size}
     out = [np.zeros(0)]
     for effect in effects:
-        if isinstance(effect, TransmissionRipple):
-            out.append(
-                0.0 * effect.coordinates() if effect.joint in dense else -_low(effect, found)
-            )
-            continue
-        straight = [p.linear for p, _ in effect.components() if p.differentiable]
+        if effect.waves is not None:
+            straight = [(effect.name, effect.site) not in dense] * effect.coordinates().size
+        else:
+            straight = [p.linear for p, _ in effect.components() if p.differentiable]
         out.append(np.where(straight, -effect.coordinates(), 0.0))
     return np.concatenate(out)
-
-
-def _low(effect: TransmissionRipple, found: Sequence[Effect]) -> Array:
-    """Return what the fitted model has on the orders of a ripple, pairs as its coordinates."""
-    orders = np.atleast_1d(np.asarray(effect.order, dtype=np.float64))
-    out = np.zeros((orders.size, 2))
-    for other in found:
-        if isinstance(other, TransmissionRipple) and other.joint == effect.joint:
-            pairs = other.coordinates().reshape(-1, 2)
-            for order, pair in zip(np.atleast_1d(other.order), pairs, strict=True):
-                out[orders == order] += pair
-    return out.ravel()
 
 
 def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
@@ -135,14 +98,12 @@ def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
     A family is an effect on all joints; but every gear is as uneven as it was cut, and says
     nothing of the others.
     """
-    names = [
-        effect.name if not isinstance(effect, TransmissionRipple) else f'gear {effect.joint}'
-        for effect in effects
-    ]
-    distinct = list(dict.fromkeys(names))
+    names = [(e.name, None if e.waves is None else e.site) for e in effects]
+    gears = {name: e.waves is not None for name, e in zip(names, effects, strict=True)}
+    distinct = list(gears)
     sizes = [effect.coordinates().size for effect in effects]
     numbers = np.repeat([distinct.index(name) for name in names], sizes).astype(int)
-    return numbers, np.array([name.startswith('gear ') for name in distinct], dtype=bool)
+    return numbers, np.array(list(gears.values()), dtype=bool)
 
 
 def widths(robot: Robot, effects: Sequence[Effect]) -> Array:
@@ -184,10 +145,9 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, found: Sequence[Effect]) 
     """
     fine = np.array(fine)
     for effect in found:
-        if isinstance(effect, JointCurve) and (effect.over, effect.channel) == ('angle', 'q'):
-            height = float(np.sqrt(np.mean(np.square(effect.values))))
-            joint = robot.index(effect.joint)
-            fine[joint] = max(fine[joint], height)
+        if effect.off_outside() > 0.0:
+            joint = robot.index(str(effect.site))
+            fine[joint] = max(fine[joint], effect.off_outside())
     turning = np.where(robot.prismatic, 0.0, 1.0)
     return Discrepancy(
         rest.position, rest.orientation, rest.gear * turning, fine * turning, SPACING

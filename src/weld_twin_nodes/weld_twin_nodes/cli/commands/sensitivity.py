@@ -64,7 +64,11 @@ def _add_question(group: argparse._ArgumentGroup) -> None:
         help="tool frame in the flange [m, rotation vector rad], instead of the model's",
     )
     _add_seam(group)
-    add('--points', type=int, default=200, metavar='N', help='path points (default: 200)')
+    _add_choice(group)
+
+
+def _add_choice(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
     add(
         '--figure',
         action='append',
@@ -83,6 +87,7 @@ def _add_question(group: argparse._ArgumentGroup) -> None:
 
 def _add_seam(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
+    add('--points', type=int, default=200, metavar='N', help='path points (default: 200)')
     add(
         '--across',
         type=float,

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The diagnosis knows no effect by name: what it needs to know, it asks through the hooks."""
+
+import ast
+
+from import_graph import ROOT, imported_names, module_files
+
+from weld_twin_core.effects import REGISTRY
+
+FILES = {
+    name: file
+    for name, file in module_files(ROOT / 'src').items()
+    if name.startswith('weld_twin_core.diagnosis.')
+}
+SPEAKING = {'advice'}
+"""Rooms whose sentences are written for effects by name."""
+MAKING = {'soundness', 'levels'}
+"""Rooms that make instances of their own: what mistakes look like, and curves without formula."""
+
+
+def room(module):
+    return module.split('.')[2]
+
+
+def asking():
+    return [name for name in FILES if room(name) not in SPEAKING | MAKING]
+
+
+def test_no_effect_is_imported():
+    effects = {kind.__module__ for kind in REGISTRY.values()}
+    named = {name: imported_names(name, FILES[name]) & effects for name in asking()}
+    assert {name: found for name, found in named.items() if found} == {}
+
+
+def test_no_effect_is_spelt_out():
+    named = {}
+    for name in asking():
+        tree = ast.parse(FILES[name].read_text(encoding='utf-8'))
+        words = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
+        named[name] = {word for word in words if isinstance(word, str)} & set(REGISTRY)
+    assert {name: found for name, found in named.items() if found} == {}
+
+
+def test_the_rooms_that_may_are_still_there():
+    assert {room(name) for name in FILES} >= SPEAKING | MAKING

@@ -85,6 +85,39 @@ def test_poses_are_in_the_measuring_frame_and_deviations_in_the_axes_of_the_base
     np.testing.assert_allclose(from_messages.vector3(deviations.last), OFF, atol=1e-12)
 
 
+def feed_pairs(cell, poses, points):
+    """Publish twin poses and points that are OFF from them, all in the tracker's axes."""
+    for k in range(1, 5):
+        poses.publish(cell.messages.pose(k * S, PLACE, T[:3, :3], 'tracker'))
+        points.publish(cell.messages.point(k * S, PLACE + T[:3, :3] @ OFF, 'tracker'))
+
+
+def test_no_deviation_is_told_in_the_wrong_axes_before_the_base_is_known(cell):
+    node = cell.add(DeviationAnalyzer, reliable_inputs=True)
+    bases = cell.publisher(TWIN_BASE)
+    deviations = cell.collect('/deviation')
+    feed_pairs(cell, cell.publisher(TWIN_POSE), cell.publisher(MEASURED_POINT))
+    cell.wait(lambda: node.waiting_for_base == 4, 'pairs that wait')
+    assert len(deviations) == 0
+    bases.publish(cell.messages.pose(0, PLACE, T[:3, :3], 'tracker'))
+    cell.wait(lambda: len(deviations) == 4, 'all that waited')
+    for message in deviations.messages:
+        np.testing.assert_allclose(from_messages.vector3(message), OFF, atol=1e-12)
+
+
+def test_where_nobody_tells_the_base_it_is_where_the_robot_has_it(cell):
+    cell.add(DeviationAnalyzer, reliable_inputs=True)
+    health, deviations = HealthListener(cell.node), cell.collect('/deviation')
+    feed_pairs(cell, cell.publisher(TWIN_POSE), cell.publisher(MEASURED_POINT))
+    cell.wait(lambda: len(deviations) == 4, 'deviations')
+    axes = ROBOT.T_world_base[:3, :3].T
+    np.testing.assert_allclose(
+        from_messages.vector3(deviations.last), axes @ T[:3, :3] @ OFF, atol=1e-12
+    )
+    said = '/twin/base_pose: nothing heard; the base is taken to be where the robot has it'
+    cell.wait(lambda: said in health.values.get('/deviation_analyzer', {}).values(), said)
+
+
 def test_the_first_frame_is_taken_and_named_and_another_one_refused(cell):
     cell.add(DeviationAnalyzer, reliable_inputs=True)
     health, points = HealthListener(cell.node), cell.publisher(MEASURED_POINT)

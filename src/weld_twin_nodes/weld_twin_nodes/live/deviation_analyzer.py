@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
@@ -29,6 +30,12 @@ from .settings import Setting
 
 LOOK_EVERY = 1.0
 """Seconds between two looks at the clocks."""
+BASE_EVERY = 0.1
+"""Seconds between two looks at whether the base is told, until it is known."""
+BASE_NOBODY = 0.5
+"""Seconds that pairs wait while nobody is there to tell the base: discovery takes a tenth of it."""
+BASE_SOMEBODY = 10.0
+"""Seconds that pairs wait for one who is there: what was lost comes again within 3 s (Fast DDS)."""
 
 
 class DeviationAnalyzer(CellNode):
@@ -65,7 +72,10 @@ class DeviationAnalyzer(CellNode):
             self.setting('path_length'),
             self.setting('buffer'),
             self.setting('max_gap'),
+            base_told=True,
         )
+        self._held_since: float | None = None
+        self._base_timer = self.every(BASE_EVERY, self._look_for_base)
         self._vector = self.offer(DEVIATION)
         self._encode = Vector3Encoder(base_frame(self))
         self._frame = MeasuringFrame(self.setting('measuring_frame'))
@@ -98,7 +108,28 @@ class DeviationAnalyzer(CellNode):
 
     def _on_base(self, message: Any) -> None:
         """Give deviations in the axes that the base has by the model of the twin."""
-        self._deviations.take_base(from_messages.pose(message)[1])
+        self._base_timer.cancel()
+        self._publish(self._deviations.take_base(from_messages.pose(message)[1]))
+
+    @property
+    def waiting_for_base(self) -> int:
+        """Return how many pairs wait to be told in the axes of the base."""
+        return self._deviations.held
+
+    def _look_for_base(self) -> None:
+        """Take the robot's own base for pairs that have waited long enough for another."""
+        if not self._deviations.held:
+            return
+        now = time.monotonic()
+        if self._held_since is None:
+            self._held_since = now
+        topic = self.resolve_topic_name(TWIN_BASE.relative)
+        patience = BASE_SOMEBODY if self.count_publishers(topic) else BASE_NOBODY
+        if now - self._held_since < patience:
+            return
+        self._base_timer.cancel()
+        self.remark(f'{topic}: nothing heard; the base is taken to be where the robot has it')
+        self._publish(self._deviations.take_base())
 
     def _on_twin(self, message: Any) -> None:
         position, _ = from_messages.pose(message)

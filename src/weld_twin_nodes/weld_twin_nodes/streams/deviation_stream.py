@@ -42,11 +42,20 @@ class Deviations:
         Length of the seam; 0 takes the way the twin has gone.
     depth, max_gap
         See `Pairing`.
+    base_told : bool
+        Whether the base is yet to be told. Until it is, pairs are held back, at most ``depth``:
+        in other axes they would be other deviations.
 
     """
 
     def __init__(
-        self, robot: Robot, path_length: float = 0.0, depth: int = 2000, max_gap: float = 0.5
+        self,
+        robot: Robot,
+        path_length: float = 0.0,
+        depth: int = 2000,
+        max_gap: float = 0.5,
+        *,
+        base_told: bool = False,
     ) -> None:
         self._rotation_base_world = robot.T_world_base[:3, :3].T
         self._pairing = Pairing(depth, max_gap)
@@ -54,16 +63,35 @@ class Deviations:
         self._metrics = RunningMetrics(path_length)
         self._clocks = ClockWatch()
         self._recent: deque[float] = deque(maxlen=RECENT)
+        self._waits = base_told
+        self._held: deque[Pair] = deque(maxlen=depth)
 
-    def take_base(self, rotation: Array) -> None:
-        """Take the axes of the base in the measuring frame, shape (3, 3)."""
-        self._rotation_base_world = rotation.T
+    @property
+    def held(self) -> int:
+        """Return how many pairs wait for the base."""
+        return len(self._held)
+
+    def take_base(self, rotation: Array | None = None) -> Iterator[Deviation]:
+        """
+        Take the axes of the base in the measuring frame; yield the deviations that waited for them.
+
+        Parameters
+        ----------
+        rotation : Array, shape (3, 3), optional
+            None for those of the robot: nobody tells them.
+
+        """
+        if rotation is not None:
+            self._rotation_base_world = rotation.T
+        held, self._held, self._waits = [*self._held], deque(maxlen=self._held.maxlen), False
+        return self._each(held)
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock."""
         self._pairing.reset()
         self._clocks.reset()
         self._recent.clear()
+        self._held.clear()
         self._metrics = RunningMetrics(self._path_length)
 
     @property
@@ -106,6 +134,9 @@ class Deviations:
 
     def _each(self, pairs: list[Pair]) -> Iterator[Deviation]:
         """Work one pair at a time, so that the metrics are those up to the deviation yielded."""
+        if self._waits:
+            self._held.extend(pairs)
+            return
         for stamp, measured, twin in pairs:
             vector = self._rotation_base_world @ (measured - twin)
             self._metrics.add(vector, twin)

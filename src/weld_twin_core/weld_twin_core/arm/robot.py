@@ -267,7 +267,7 @@ class Robot:
 
     @classmethod
     def _from_rows(cls, name: str, rows: Sequence[Any], data: Mapping[str, Any]) -> Robot:
-        def column(key: str, default: Any = 0.0, rows: Sequence[Any] = rows) -> Any:
+        def column(key: str, default: Any = 0.0) -> Any:
             return [row.get(key, default) for row in rows]
 
         links = data.get('links')
@@ -292,8 +292,8 @@ class Robot:
             convention=str(data.get('convention', 'standard')),
             T_world_base=_frame(data.get('base'), 'base'),
             T_flange_tool=_frame(data.get('tool'), 'tool'),
-            mass=None if links is None else column('mass', rows=links),
-            com=None if links is None else column('com', (0.0, 0.0, 0.0), links),
+            mass=None if links is None else [link.get('mass', 0.0) for link in links],
+            com=None if links is None else [link.get('com', (0.0, 0.0, 0.0)) for link in links],
             payload_mass=float(payload.get('mass', 0.0)),
             payload_com=payload.get('com', np.zeros(3)),
             gravity=data.get('gravity', STANDARD_GRAVITY),

@@ -22,6 +22,7 @@ PEAKS = 3
 PHASE = 1.0 / 16.0
 """Periods by which neighbours on the first grid of steps differ at the far end of the travel."""
 ZOOM, ZOOMS = 16, 3
+"""Steps tried to either side at each closer look, and how many looks there are."""
 MOST = 2000
 """Steps tried at once at most, which bounds memory."""
 

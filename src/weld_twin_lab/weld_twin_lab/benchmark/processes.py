@@ -24,6 +24,7 @@ from weld_twin_msgs_py.bags import write_recording
 from .arms import smooth_motion
 
 JOINT_RATE, POSE_RATE = 125.0, 60.0
+"""Hz: those of a UR controller and of a camera system."""
 STARTS = 7
 """Starts of a process of which the median counts."""
 COMMANDS = {

@@ -21,6 +21,7 @@ from weld_twin_msgs_py.files.input_files import hashed
 from . import layout
 
 PRIVATE_DIRECTORY, PRIVATE_FILE = 0o700, 0o600
+"""Permissions by which nobody but the owner can look."""
 
 
 def digest(path: Path) -> str:

@@ -19,6 +19,7 @@ from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covaria
 from weld_twin_core.twin.twin import Twin
 
 HOLD = 0.9
+"""Share of the errors that a region promises to hold."""
 Mask = NDArray[np.bool_]
 
 

@@ -13,7 +13,6 @@ from weld_twin_msgs_py.files.markdown import table
 
 Entry = dict[str, Any]
 REGIONS = ('inside', 'outside')
-WANTED = (0.85, 0.95)
 
 
 def page(entries: Sequence[Entry]) -> str:

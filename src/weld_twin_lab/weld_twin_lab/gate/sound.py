@@ -25,6 +25,7 @@ STEPS = ('station_step', 'tool_slip')
 MOTIONS = ('seams', 'free', 'stations')
 ALIGNS = ((), ('base',), ('tool',), ('base', 'tool'))
 TRIES = 40
+"""Draws of a motion before it is given up: not every arm reaches every seam."""
 
 
 @dataclass(frozen=True, eq=False)

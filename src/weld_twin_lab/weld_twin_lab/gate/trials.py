@@ -23,6 +23,7 @@ from .through_files import as_bag, as_table
 
 WAYS = {'bag': as_bag, 'table': as_table}
 TRIES = 200
+"""Draws of a sound recording until one is found that the mistake shows in."""
 
 
 def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> dict[str, Any]:

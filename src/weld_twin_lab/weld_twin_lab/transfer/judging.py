@@ -26,6 +26,7 @@ PRODUCT, FRAMES = 'product', 'frames'
 HALVES = 60
 """Stations from which on the two halves of a split are diagnosed as well."""
 DRAWS = 2000
+"""Draws of the bootstrap; its 95 % limits then repeat to some per cent of their width."""
 
 
 def judge(split: Split) -> dict[str, Any]:

@@ -23,6 +23,7 @@ PLAIN: dict[str, tuple[str, ...]] = {
 }
 """The plain fits by name: the families that are fitted, all members of each."""
 ROUNDS = 4
+"""Gauss-Newton steps; there is no test of convergence."""
 
 
 def plain_fit(

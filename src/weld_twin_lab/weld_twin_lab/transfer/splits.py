@@ -18,15 +18,19 @@ Rows = NDArray[Any]
 """Row numbers."""
 
 COUNTS = (15, 30, 60, 120, 240)
+"""Stations that are fitted on, at random: from hardly enough to plenty."""
 LEAST = 15
 """Stations that must remain to fit on; fewer than the unknowns of a plain geometric fit."""
 KEPT_BACK = 4
 """One station in so many of a narrow region is kept back, to judge inside the region."""
 STILL = np.radians(1.0)
+"""Half the range of a joint that stands still [rad]."""
 NARROW = np.radians((2.0, 10.0))
+"""Half the ranges of joints in a narrow region [rad]."""
 OCTANTS = (0, 2, 5, 7)
 """Octants about the middle of the workspace that are fitted on: two pairs of opposite ones."""
 FIRST = 0.2
+"""Share of the recording that is fitted on where the first part has to predict the rest."""
 TUNED_ON = ('n15', 'n60', 'wrist_10deg', 'still_2', 'octant_0', 'odd')
 """
 Kinds of splits, of the UR5 alone, that thresholds of the diagnosis were looked at on.

@@ -13,6 +13,7 @@ from .hand_over import Job
 
 FAMILIES = ('joint_offset', 'link_length', 'link_twist', 'backlash', 'base_pose')
 NAMED = 3
+"""Parameters that the demo names."""
 
 
 def rank(job: Job, _: object) -> None:

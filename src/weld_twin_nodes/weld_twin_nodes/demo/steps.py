@@ -32,7 +32,9 @@ from .ranking import rank
 ROBOT = 'ur5'
 SEAM = 'polyline'
 RATE = 50.0
+"""Hz of the joint states: enough for the seam, and the demo stays short."""
 SEED = 1
+"""Of the noise; any other does as well."""
 EFFECTS = [
     {'effect': 'backlash', 'joint': 'shoulder_pan_joint', 'width': 8e-4},
     {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 3e-4},

@@ -44,6 +44,7 @@ LIMIT = 40.0
 AGAIN = 2.0
 """Seconds after which a question is asked again."""
 BURST = 50
+"""Messages sent at once, and most that are under way without an answer."""
 FIRST_STAMP = 1_000_000_000
 """Stamp of the first sample fed [ns]."""
 

@@ -25,6 +25,7 @@ GRACE = 20.0
 AGAIN = 1.0
 """Seconds after which it is told again."""
 LOOK = 0.02
+"""Seconds between two looks at whether a process has ended."""
 
 
 __all__ = ['MODULES', 'NodeProcess', 'stop_all']

@@ -24,6 +24,7 @@ ASKED = {'error_injector': 'effects', 'forward_kinematics_twin': 'twin_effects'}
 """Nodes whose parameters tell how the bag came about, and where their effects are noted."""
 QUESTIONS = ['robot', 'base_link', 'tip_link', 'model', 'effects']
 ASK_EVERY = 0.2
+"""Seconds between two looks for nodes that have not answered yet."""
 
 
 class AskedNodes:

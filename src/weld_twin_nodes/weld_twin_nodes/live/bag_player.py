@@ -29,8 +29,11 @@ CLOCK = '/clock'
 SETTLE = 0.2
 """Seconds for the other side to see us, and for a clock that was set back to be noticed."""
 LOOK = 0.02
+"""Longest sleep [s]: so late an interruption may be noticed."""
 ACKNOWLEDGED = 5.0
+"""Seconds within which reliable readers confirm what was sent; one that takes longer hangs."""
 TELL_EVERY = 1.0
+"""Seconds between two lines about progress."""
 
 
 class Playing(NamedTuple):

@@ -22,6 +22,7 @@ LONGEST = 50_000
 MOTION = 0.02
 """Range [rad or m] some joint must have travelled before a diagnosis makes sense."""
 FEWEST = 50
+"""Samples below which a window is not diagnosed: half a second at 100 Hz."""
 
 Row = tuple[int, Array]
 SIGNALS = (Role.WRENCH, Role.TEMPERATURE)

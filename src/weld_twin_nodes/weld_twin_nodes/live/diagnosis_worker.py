@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _MODULE = 'weld_twin_nodes.live.diagnosis_worker'
 _NICENESS = 10
+"""Added to that of the node: a diagnosis must not take time from the twin."""
 
 
 class Job(NamedTuple):

@@ -30,6 +30,7 @@ from .run_node import run
 from .settings import Setting
 
 LOOK_EVERY = 0.2
+"""Seconds between two looks at whether the worker has finished."""
 LEVELS = {'none': 0, 'identified': 1, 'ambiguous': 1, 'unknown': 1, 'unsound': 2}
 """Of the diagnostic message: ok, a warning, or an error where data or set-up are wrong."""
 INPUTS = {

@@ -21,6 +21,7 @@ Seconds without a change on the graph after which nobody else is taken to be com
 are started together appear within some tenths of a second of each other.
 """
 LOOK_EVERY = 0.05
+"""Seconds between two looks at who is there."""
 
 
 class Neighbours:

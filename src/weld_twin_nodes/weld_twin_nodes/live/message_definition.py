@@ -16,6 +16,7 @@ from weld_twin_core.errors import DataError
 RULE = '=' * 80
 """The line between the parts of a definition, as rosbag2 writes it."""
 _SIZES = (8, 16, 32, 64)
+"""Bits of the whole numbers there are."""
 BUILT_IN = (
     *('bool', 'byte', 'char', 'float32', 'float64', 'string', 'wstring'),
     *(f'int{size}' for size in _SIZES),

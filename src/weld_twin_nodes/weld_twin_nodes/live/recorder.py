@@ -35,7 +35,9 @@ from .settings import Setting
 
 _TEXT = decoder(ROBOT_DESCRIPTION.type)
 LOOK_EVERY = 0.2
+"""Seconds between two looks for new topics."""
 DRAIN_EVERY = 0.05
+"""Seconds between two looks at whether an ending recorder has everything."""
 TOLD_WITHIN = 5.0
 """
 Seconds an ending recorder waits for the publishers' last counts. Each tells once a second; on a

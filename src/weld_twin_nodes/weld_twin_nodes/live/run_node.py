@@ -26,6 +26,7 @@ from .all_nodes import usage
 from .cell_node import CellNode
 
 USAGE_ERROR = 2
+"""Exit code of a command that was given something wrong."""
 HELP = ('--help', '-h')
 LOOP = 0.25
 """Seconds of one turn of the loop; also how late an end may be noticed."""

@@ -16,8 +16,10 @@ from .words import DEPENDENCES, place_name, site_name
 
 _CURVES = ('joint_curve', 'frame_curve')
 _SHOWN = 4
+"""Causes in the table, largest share first; more are noise to a reader."""
 LEVEL_HEADS = ('Share of the gap', 'Where', 'Depends on', 'Name')
 _PICTURED = 6
+"""Curves that are drawn."""
 
 
 def levels_section(diagnosis: Diagnosis) -> Html | None:

@@ -13,11 +13,15 @@ from weld_twin_core.effects.joint_curve import JointCurve
 from .html import Html, tag
 
 _WIDTH, _HEIGHT = 300.0, 170.0
+"""Of a figure, in units of its view box."""
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 8.0, 10.0, 34.0
+"""Margins for the labels, in the same units."""
 _SAMPLES = 60
+"""Points of a drawn curve: one for every four units of its width."""
 _NINETY = 1.645
 """Standard deviations to either side that hold 90 % of a Gaussian."""
 _DEGREES = 180.0 / np.pi
+"""Degrees in a radian."""
 _AXES = {
     'angle': (_DEGREES, 'angle [°]'),
     'direction': (1.0, 'direction, backward to forward'),

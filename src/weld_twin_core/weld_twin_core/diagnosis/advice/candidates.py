@@ -19,6 +19,7 @@ from ..algebra.problem import Model, Problem
 
 NAME = 'next measurement'
 STATIONS = 60
+"""Stations of a proposed measurement: a judgement of what somebody is ready to measure."""
 STEP = 0.02
 """Approach of a station from either side [rad, m]."""
 REACH = 1.3
@@ -26,8 +27,11 @@ REACH = 1.3
 LEAST = 0.35
 """Half the range [rad, m] that is used at least."""
 MASS = 5.0
+"""Load [kg] hung on the flange: a judgement; springs show, and most arms can carry it."""
 LONGER = 0.2
+"""Length [m] added to the tool: a turn of 0.1 mrad then moves its tip by 0.02 mm more."""
 PRESS = 50.0
+"""Force [N] on the tool: a judgement; a hand can press so hard."""
 PASSES = (1.0, 0.5, 0.25)
 """Speeds of a sweep, as shares of the fastest."""
 FASTEST = 0.5

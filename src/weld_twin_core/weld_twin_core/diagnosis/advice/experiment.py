@@ -26,6 +26,7 @@ NOTHING = 1.0
 WORTH = 0.8
 """A cheaper measurement is taken when it decides this share of what the best one does."""
 SAMPLES = 400
+"""Samples of a candidate that are computed; neighbours of a moving arm say the same."""
 
 
 def next_experiment(

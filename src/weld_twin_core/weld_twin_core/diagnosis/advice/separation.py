@@ -30,9 +30,11 @@ from .candidates import Candidate
 ROWS = 1200
 """Rows of the data at hand that take part."""
 SAMPLES = 400
+"""Samples of a candidate that are computed; neighbours of a moving arm say the same."""
 INDEPENDENT = 0.1
 """Share of the samples of a moving arm that count: neighbours say the same."""
 LOOSE = 1e-9
+"""Share of the largest column below which a column is rounding."""
 
 Alternative = tuple[Effect, ...]
 

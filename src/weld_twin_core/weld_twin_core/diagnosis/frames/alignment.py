@@ -39,7 +39,9 @@ FLOOR = 1e-5
 TIE = 1e-6
 """Pull towards the given frames, relative; decides only what the data leave open."""
 MOST_ROWS = 3000
+"""Rows that the frames are found on: far more than their numbers need, few enough to be quick."""
 ROUNDS = 15
+"""Steps of each refinement; there is no test of convergence."""
 REACHES = (0.1, 0.4)
 """Lengths [m] of the tool vectors tried where only positions were measured."""
 

@@ -29,6 +29,7 @@ is another, and says nothing."""
 WORSE = 4.0
 """Chi-square per direction that the given frames may cost: two standard deviations."""
 ROUNDS = 3
+"""Gauss-Newton steps by which the rest follows; it starts next to where it ends."""
 ROWS = 3000
 """Rows from which directions are taken."""
 

@@ -46,6 +46,7 @@ LEAST = 1e-6
 """Least noise of a position per axis [m]: no instrument is better, and a simulated cell without
 noise would leave no digits for what is open."""
 ROUNDS = 12
+"""Times that widths and noise are learned in turn; there is no test of convergence."""
 USUAL_NOISE = 3e-5
 """What an arm and an instrument leave of a position per axis [m] before anything is known of
 them: arms repeat within 0.02 to 0.1 mm, trackers measure within 0.02 mm."""

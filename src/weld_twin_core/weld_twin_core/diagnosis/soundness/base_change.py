@@ -25,6 +25,7 @@ from .mending import measured
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
 WIDE = 0.9
+"""Quantile of the residuals that noise is taken from, as that of a Gaussian."""
 MOST_ROWS = 18000
 """Rows on which changes in time are looked for: three thousand poses, enough for any instant."""
 DEAD = 1e-18

@@ -14,8 +14,11 @@ from ..frames.alignment import nearest_rotation
 MOST_LAG = 2.0
 """Lags up to this [s] are looked at, and up to a tenth of the recording."""
 COARSE, STEP = 0.02, 0.01
+"""Spacing of the lags tried first, and of the differences that give velocities [s]."""
 SAMPLES = 300
+"""Samples compared at each lag: enough for one number, quick enough for a hundred lags."""
 ROUNDS = 6
+"""Steps from the best lag tried to the best there is."""
 APART = 0.6
 """What clocks that run apart must leave of what a constant lag leaves."""
 KEPT = 0.8

@@ -22,9 +22,11 @@ SMALL = 0.5
 ALONE = 0.4
 """A sample off its neighbours by less than this share is on the way from one to the other."""
 SEVERAL, GROSS = 3, 3.0
+"""Fewer than three outliers are told only when one is three times as far off as the limit."""
 STATION_FAR = 8.0
 """Median gaps from which a station is an outlier."""
 MANY = 0.1
+"""Share of outliers from which a note becomes a warning."""
 
 
 def outliers(case: Case) -> Sequence[Finding]:

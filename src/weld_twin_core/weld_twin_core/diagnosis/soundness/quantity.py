@@ -15,6 +15,7 @@ from .snapshot import measured
 STILL = 1e-5
 """A spread [m, rad] below which nothing moved."""
 FEW_STATIONS = 20
+"""Stations below which it is told: sixty coordinates for the some thirty of a geometric fit."""
 
 
 def quantity(case: Case) -> Sequence[Finding]:

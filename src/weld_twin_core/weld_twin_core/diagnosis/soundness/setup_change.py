@@ -24,17 +24,20 @@ SURE_MOVING = 20.0
 MARGIN = 10.0
 """Nats by which a step must beat every smooth change, and a settling every other."""
 MOST = 4
+"""Most steps that are looked for in a recording."""
 SEEN = 2.0
 """
 A change this many times as large as the largest gaps did not happen: whatever is aligned, one side
 of a step keeps half of it. A strong shake makes such steps that other columns undo.
 """
 LARGEST = 0.99
+"""Quantile of the gaps that counts as the largest; the last per cent may be outliers."""
 EDGE = 0.05
 """A step nearer to an end of a recording or another step, as a share, is not looked for."""
 SLOW = 2.0
 """Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
 NEIGHBOURS = np.geomspace(0.8, 1.25, 7)
+"""Factors on a rough time constant that are tried about it."""
 
 
 class Step(NamedTuple):

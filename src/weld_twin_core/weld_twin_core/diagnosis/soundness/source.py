@@ -16,6 +16,7 @@ from .evidence import Case, Finding
 SMOOTH = 2e-8
 """Noise of a joint position [rad, m] below which no encoder has seen it."""
 ENOUGH = 50
+"""Samples below which noise of an encoder cannot be measured."""
 
 
 def source(case: Case) -> Sequence[Finding]:

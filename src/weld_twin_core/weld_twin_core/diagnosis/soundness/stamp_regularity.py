@@ -18,8 +18,11 @@ GAP = 4.5
 MISSING = 0.2
 """Share of lost messages from which a note becomes a warning."""
 JITTER = 0.3
+"""Spread of the steps between stamps, as a share of the usual step, from which it is told."""
 GRIDS = (1e-2, 1e-3)
+"""Grids [s] that clocks are rounded to: hundredths and milliseconds."""
 ENOUGH = 20
+"""Stamps below which their steps say nothing."""
 
 
 def stamps(case: Case) -> Sequence[Finding]:

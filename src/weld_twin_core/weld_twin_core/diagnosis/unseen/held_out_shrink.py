@@ -21,6 +21,8 @@ from .regions import posture_regions
 from .unseen_stretches import Unseen
 
 LARGE = 300
+"""Coordinates above which families are ordered by how far each gets alone: trying all at every
+step costs too much."""
 
 
 def held_out_shrink(

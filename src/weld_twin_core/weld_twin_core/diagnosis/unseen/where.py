@@ -35,6 +35,7 @@ REGIME_OF = {
 }
 """The regime in which each dependence shows."""
 STRETCHES = 12
+"""Stretches of time that the gap is told for: as many as a figure can show."""
 
 
 def locate(found: Search, final: Unseen) -> Where:

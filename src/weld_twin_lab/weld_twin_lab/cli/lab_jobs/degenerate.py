@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 
 FAILED = 1
+"""Exit code when a diagnosis was worse than it may be."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

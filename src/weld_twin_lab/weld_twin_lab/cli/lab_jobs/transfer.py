@@ -13,6 +13,7 @@ import argparse
 from pathlib import Path
 
 MISSED = 1
+"""Exit code when a measure was not reached."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

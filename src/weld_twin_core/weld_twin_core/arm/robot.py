@@ -267,9 +267,6 @@ class Robot:
 
     @classmethod
     def _from_rows(cls, name: str, rows: Sequence[Any], data: Mapping[str, Any]) -> Robot:
-        def column(key: str, default: Any = 0.0) -> Any:
-            return [row.get(key, default) for row in rows]
-
         links = data.get('links')
         payload = data.get('payload') or {}
         if links is not None and len(links) != len(rows):
@@ -279,21 +276,21 @@ class Robot:
         return cls(
             name=name,
             joint_names=tuple(str(row['name']) for row in rows),
-            a=column('a'),
-            alpha=column('alpha'),
-            d=column('d'),
-            theta=column('theta_offset'),
-            beta=column('beta'),
+            a=_column(rows, 'a'),
+            alpha=_column(rows, 'alpha'),
+            d=_column(rows, 'd'),
+            theta=_column(rows, 'theta_offset'),
+            beta=_column(rows, 'beta'),
             prismatic=np.array([row.get('type', 'revolute') == 'prismatic' for row in rows]),
-            lower=column('lower', -np.inf),
-            upper=column('upper', np.inf),
-            max_velocity=column('max_velocity', np.inf),
-            max_acceleration=column('max_acceleration', np.inf),
+            lower=_column(rows, 'lower', -np.inf),
+            upper=_column(rows, 'upper', np.inf),
+            max_velocity=_column(rows, 'max_velocity', np.inf),
+            max_acceleration=_column(rows, 'max_acceleration', np.inf),
             convention=str(data.get('convention', 'standard')),
             T_world_base=_frame(data.get('base'), 'base'),
             T_flange_tool=_frame(data.get('tool'), 'tool'),
-            mass=None if links is None else [link.get('mass', 0.0) for link in links],
-            com=None if links is None else [link.get('com', (0.0, 0.0, 0.0)) for link in links],
+            mass=None if links is None else _column(links, 'mass'),
+            com=None if links is None else _column(links, 'com', (0.0, 0.0, 0.0)),
             payload_mass=float(payload.get('mass', 0.0)),
             payload_com=payload.get('com', np.zeros(3)),
             gravity=data.get('gravity', STANDARD_GRAVITY),
@@ -360,6 +357,10 @@ def _plausible(value: Any) -> dict[str, dict[str, dict[str, float]]]:
                 raise ModelError(f'plausible {effect}.{parameter}: low must be below high')
             out.setdefault(str(effect), {})[str(parameter)] = numbers
     return out
+
+
+def _column(rows: Sequence[Any], key: str, default: Any = 0.0) -> Any:
+    return [row.get(key, default) for row in rows]
 
 
 def _frame(value: Any, name: str) -> Array:

@@ -10,8 +10,10 @@ from scipy.stats import norm
 
 from weld_twin_core.diagnosis.algebra.gram import Gram
 from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
-from weld_twin_core.diagnosis.hypotheses.evidence_score import best_choice, evidence
+from weld_twin_core.diagnosis.hypotheses.choices import ranking
+from weld_twin_core.diagnosis.hypotheses.evidence_score import evidence
 from weld_twin_core.diagnosis.hypotheses.library import Unit
+from weld_twin_core.diagnosis.hypotheses.seed_systems import SeedSystems
 
 
 def wandering(rho, samples, components, seed=0):
@@ -74,19 +76,25 @@ def test_a_column_of_noise_is_rarely_worth_its_freedom():
     assert np.mean(np.array(worth) > 0.0) < 0.04
 
 
-def unit(columns, trials=1.0):
+def best(columns, y, effective, trials=1.0):
+    """Return the best choice of a base that may move, its components given as columns."""
     seed = effect('base_pose', xyz=[0, 0, 0], rotvec=[0, 0, 0])
-    return Unit('base_pose', None, (seed,), (np.arange(columns),), trials)
+    index = np.arange(len(columns))
+    unit = Unit('base_pose', None, (seed,), (index,), trials)
+    nothing = np.zeros((0, y.size))
+    products = columns @ np.concatenate([nothing, y[None]]).T
+    systems = SeedSystems.of([index], [columns @ columns.T]).beside(nothing, y, products)
+    return ranking(systems, [unit], effective)[0]
 
 
-def test_only_the_columns_that_earn_their_place_are_chosen():
+@pytest.mark.parametrize('sizes', [(0.8, -0.5), (-0.5, 0.8)])
+def test_only_the_columns_that_earn_their_place_are_chosen(sizes):
     rng = np.random.default_rng(6)
     columns = rng.normal(size=(6, 500))
-    y = 0.8 * columns[2] - 0.5 * columns[5] + rng.normal(size=500)
-    gram = Gram.of(columns, y)
-    choice = best_choice(gram, unit(6), 500.0)
+    y = sizes @ columns[[2, 5]] + rng.normal(size=500)
+    choice = best(columns, y, 500.0)
     assert sorted(choice.columns) == [2, 5]
-    vector = choice.effect(gram).vector()
+    vector = choice.effect().vector()
     expected = np.linalg.lstsq(columns[[2, 5]].T, y, rcond=None)[0]
     np.testing.assert_allclose(vector, [0, 0, expected[0], 0, 0, expected[1]], rtol=1e-8)
 
@@ -96,13 +104,41 @@ def test_columns_that_help_only_together_are_found():
     first, small = rng.normal(size=(2, 4000))
     columns = np.stack([first, first + 0.03 * small])
     y = 1.0 * (columns[1] - columns[0]) / 0.03 * 0.2 + rng.normal(size=4000)
-    choice = best_choice(Gram.of(columns, y), unit(2), 4000.0)
-    assert sorted(choice.columns) == [0, 1]
+    assert sorted(best(columns, y, 4000.0).columns) == [0, 1]
+
+
+def test_a_column_that_repeats_another_is_not_taken_twice():
+    rng = np.random.default_rng(9)
+    columns = rng.normal(size=(3, 600))
+    columns[2] = -2.0 * columns[0]
+    choice = best(columns, columns[0] + columns[1] + rng.normal(size=600), 600.0)
+    assert len(choice.columns) == 2
+    assert 1 in choice.columns
+
+
+def test_what_the_model_has_is_not_counted_again():
+    rng = np.random.default_rng(10)
+    own, columns = rng.normal(size=(2, 700)), rng.normal(size=(2, 700))
+    columns[1] = own[0] - 3.0 * own[1]
+    y = 2.0 * own[0] + 0.7 * columns[0] + rng.normal(size=700)
+    seed = effect('joint_offset', joint='elbow_joint', offset=0.0)
+    units = [Unit(str(k), None, (seed,), (np.array([k]),), 1.0) for k in range(2)]
+    squares = [columns[k : k + 1] @ columns[k : k + 1].T for k in range(2)]
+    products = columns @ np.concatenate([own, y[None]]).T
+    systems = SeedSystems.of([unit.columns[0] for unit in units], squares)
+    found = ranking(systems.beside(own, y, products), units, 700.0)
+    assert [choice.unit.family for choice in found] == ['0']
+    basis = np.vstack([own, columns[:1]]).T
+    expected = np.linalg.lstsq(basis, y, rcond=None)[0][2]
+    assert found[0].effect().offset == pytest.approx(expected, rel=1e-9)
+    left = [y - b @ np.linalg.lstsq(b, y, rcond=None)[0] for b in (own.T, basis)]
+    before, after = (r @ r for r in left)
+    assert found[0].nats == pytest.approx(evidence(before, before - after, 1.0, 700.0), rel=1e-9)
 
 
 def test_a_seed_found_among_many_pays_for_the_search():
     rng = np.random.default_rng(8)
     columns = rng.normal(size=(1, 200))
-    gram = Gram.of(columns, 0.5 * columns[0] + rng.normal(size=200))
-    free, searched = (best_choice(gram, unit(1, trials), 200.0) for trials in (1.0, 80.0))
+    y = 0.5 * columns[0] + rng.normal(size=200)
+    free, searched = (best(columns, y, 200.0, trials) for trials in (1.0, 80.0))
     assert free.nats - searched.nats == pytest.approx(np.log(80.0))

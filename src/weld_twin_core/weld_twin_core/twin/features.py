@@ -83,7 +83,10 @@ class Features:
 
     def columns(self, effect: Effect, atoms: bool = True) -> Array:
         """Return the effect's features as pose changes, shape (K, 6, M)."""
-        shifts = self.shifts(effect, atoms)
+        return self.changes(self.shifts(effect, atoms))
+
+    def changes(self, shifts: Sequence[Shift]) -> Array:
+        """Return changes of channels as changes of pose, shape (K, 6, M)."""
         channels = list({channel for shift in shifts for channel in shift})
         if len(channels) == 1 and channels[0][0] != 'tau':
             # One joint's hundred ripple orders share its column.

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from ...effects.registry import REGISTRY
 from ...twin.features import Features, joints_of
 from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
+from .atoms import Amounts, Columns, MovedJoint, Whole, amounts, gathered, moved_joint
+from .seed_systems import SeedSystems
 from .still_joints import REASON, hardly_moves
 
 EXCLUDED = 'excluded by the user'
@@ -57,24 +59,35 @@ class Unit:
 @dataclass(frozen=True, eq=False)
 class Library:
     """
-    Columns of every unit, after those of the nuisance frames and of the effects in the model.
+    Columns of every unit.
 
     Attributes
     ----------
-    columns : array, shape (P, rows)
-        Whitened.
-    fixed : array of int
-        Frames and effects already in the model; conditioned on in everything.
+    pieces : tuple of Columns
+        All columns, whitened, in the order of their numbers.
+    systems : SeedSystems
+        The normal matrix of every seed.
     units : tuple of Unit
     absent : dict
         Why a family is not considered, by name.
 
     """
 
-    columns: Array
-    fixed: Index
+    pieces: tuple[Columns, ...]
+    systems: SeedSystems
     units: tuple[Unit, ...]
     absent: dict[str, str]
+
+    def products(self, rows: Array) -> Array:
+        """Return the products of all columns with rows, shape (R, rows), as shape (P, R)."""
+        found = [piece.products(rows) for piece in self.pieces]
+        return np.concatenate([np.zeros((0, rows.shape[0])), *found])
+
+    def column(self, number: int) -> Array:
+        """Return one column, whitened, shape (rows,)."""
+        ends = np.cumsum([piece.count for piece in self.pieces])
+        k = int(np.searchsorted(ends, number, side='right'))
+        return np.asarray(self.pieces[k].written_out()[number - int(ends[k])])
 
     def unit(self, family: str, joint: str | None) -> Unit | None:
         """Return a unit by name, or None."""
@@ -117,73 +130,16 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
     residual = problem.residuals(model)[0]
     residual[:3] *= scale.weights[0] / scale.position**2
     residual[3:] *= scale.weights[0] / scale.orientation**2
-    blocks = [problem.whitened(problem.frame_columns(features)[0], scale)]
-    for effect in model.found:
-        parts = problem.effect_columns(features, effect, atoms=False)
-        blocks.append(problem.whitened(parts, scale))
-    making = _Making(problem, features, residual, scale, blocks, dict.fromkeys(exclude, EXCLUDED))
-    fixed = np.arange(making.count)
+    shelf = _Shelf(problem, scale, features, residual, dict.fromkeys(exclude, EXCLUDED))
     for kind in candidate_kinds(exclude, problem.align):
         for joint in joints_of(kind, model.robot.joint_names):
-            making.add(kind, joint)
+            shelf.add(kind, joint)
     for sudden in problem.dated:
         if sudden.name not in exclude:
-            making.add_dated(sudden)
-    columns = np.concatenate(making.blocks)
-    return Library(columns, fixed, tuple(making.units), making.absent)
-
-
-@dataclass(eq=False)
-class _Making:
-    """A library in the making: the columns so far, and the units that they belong to."""
-
-    problem: Problem
-    features: list[Features]
-    pull: Array
-    scale: Scale
-    blocks: list[Array]
-    absent: dict[str, str]
-    units: list[Unit] = field(default_factory=list)
-    count: int = 0
-
-    def __post_init__(self) -> None:
-        self.count = sum(block.shape[0] for block in self.blocks)
-
-    def add(self, kind: type[Effect], joint: str | None) -> None:
-        """Add a family on a joint, or tell why it is absent."""
-        reason = _applicable(kind, joint, self.features)
-        if reason is not None:
-            self.absent[kind.name] = reason
-            return
-        seeds, columns = [], []
-        found, trials = self.features[0].seeds(kind, joint, self.pull)
-        for seed in found:
-            if hardly_moves(self.features, seed):
-                self.absent[kind.name] = f'{REASON} ({joint})'
-                continue
-            own = self._columns(seed)
-            if own is not None:
-                seeds.append(seed)
-                columns.append(own)
-        if seeds:
-            self.units.append(Unit(kind.name, joint, tuple(seeds), tuple(columns), trials))
-
-    def add_dated(self, sudden: Effect) -> None:
-        """Add what gave way at an instant that the data checks found."""
-        own = self._columns(sudden)
-        if own is not None:
-            instants = float(sum(self.problem.samples))
-            self.units.append(Unit(sudden.name, sudden.site, (sudden,), (own,), instants))
-
-    def _columns(self, seed: Effect) -> Index | None:
-        """Return the numbers of a seed's columns, now added, or None if the data hide it."""
-        block = _columns(self.problem, self.features, seed, self.scale)
-        if block is None:
-            return None
-        own = self.count + np.arange(block.shape[0])
-        self.count += block.shape[0]
-        self.blocks.append(block)
-        return own
+            shelf.add_dated(sudden)
+    columns = [index for unit in shelf.units for index in unit.columns]
+    systems = SeedSystems.of(columns, [piece.normal() for piece in shelf.pieces])
+    return Library(tuple(gathered(shelf.pieces)), systems, tuple(shelf.units), shelf.absent)
 
 
 def _applicable(kind: type[Effect], joint: str | None, features: list[Features]) -> str | None:
@@ -191,13 +147,74 @@ def _applicable(kind: type[Effect], joint: str | None, features: list[Features])
     return None if None in reasons else reasons[0]
 
 
-def _columns(
-    problem: Problem, features: list[Features], seed: Effect, scale: Scale
-) -> Array | None:
-    """Return a seed's whitened columns, or None when the data do not show it."""
-    parts = problem.effect_columns(features, seed)
-    block = problem.whitened(parts, scale)
-    # Even a thousand times the typical effect would stay far below the noise.
-    scales = seed.coordinate_scales()
-    reach = 1e3 * float(scales.max()) if scales.size else 1.0
-    return block if np.abs(block).max(initial=0.0) * reach > 1e-2 else None
+class _Shelf:
+    """A library in the making: its columns so far, one piece for every seed, and its units."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        scale: Scale,
+        features: list[Features],
+        pull: Array,
+        absent: dict[str, str],
+    ) -> None:
+        self.problem, self.scale, self.features = problem, scale, features
+        self.pull, self.absent = pull, absent
+        self.pieces: list[Columns] = []
+        self.units: list[Unit] = []
+        self._count = 0
+        self._joints: dict[int, MovedJoint] = {}
+
+    def add(self, kind: type[Effect], joint: str | None) -> None:
+        """Add a family on a joint, or tell why it is absent."""
+        reason = _applicable(kind, joint, self.features)
+        if reason is not None:
+            self.absent[kind.name] = reason
+            return
+        found, trials = self.features[0].seeds(kind, joint, self.pull)
+        seeds = [seed for seed in found if not hardly_moves(self.features, seed)]
+        if len(seeds) < len(found):
+            self.absent[kind.name] = f'{REASON} ({joint})'
+        self._place(kind.name, joint, seeds, trials)
+
+    def add_dated(self, sudden: Effect) -> None:
+        """Add what gave way at an instant that the data checks found."""
+        self._place(sudden.name, sudden.site, [sudden], float(sum(self.problem.samples)))
+
+    def _place(
+        self, family: str, joint: str | None, seeds: Sequence[Effect], trials: float
+    ) -> None:
+        """Add the unit of those seeds that the data show."""
+        shown = [(seed, piece) for seed in seeds if (piece := self._columns(seed)) is not None]
+        columns = []
+        for _, piece in shown:
+            self.pieces.append(piece)
+            columns.append(np.arange(self._count, self._count + piece.count))
+            self._count += piece.count
+        if shown:
+            kept = tuple(seed for seed, _ in shown)
+            self.units.append(Unit(family, joint, kept, tuple(columns), trials))
+
+    def _columns(self, seed: Effect) -> Columns | None:
+        """Return a seed's whitened columns, or None when the data do not show it."""
+        shifts = [maker.shifts(seed) for maker in self.features]
+        joint = moved_joint(shifts)
+        piece: Columns
+        if joint is None:
+            parts = [
+                maker.changes(own)[:, :c]
+                for maker, own, c in zip(self.features, shifts, self.problem.rows, strict=True)
+            ]
+            piece = Whole(self.problem.whitened(parts, self.scale))
+        else:
+            piece = Amounts(self._moved(joint), amounts(shifts, joint, self.problem.samples))
+        # Even a thousand times the typical effect would stay far below the noise.
+        scales = seed.coordinate_scales()
+        reach = 1e3 * float(scales.max()) if scales.size else 1.0
+        return piece if piece.largest() * reach > 1e-2 else None
+
+    def _moved(self, joint: int) -> MovedJoint:
+        if joint not in self._joints:
+            made = MovedJoint.of(self.problem, self.features, self.scale, joint)
+            self._joints[joint] = made
+        return self._joints[joint]

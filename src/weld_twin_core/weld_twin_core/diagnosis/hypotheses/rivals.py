@@ -16,8 +16,9 @@ import numpy as np
 
 from ..algebra.fit import Fit, fit
 from ..result import Site
-from .evidence_score import Choice, evidence
-from .selection import Workspace, fitted_with, implausible, ranking
+from .choices import Choice, ranking
+from .evidence_score import evidence
+from .selection import Workspace, fitted_with, implausible
 
 SHORTLIST = 7
 """Rivals fitted at the most; bounds the time that a slot takes."""
@@ -51,14 +52,14 @@ def rivals(
     """
     effect, beliefs = now.model.found[k], work.beliefs
     rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
-    gram = work.conditioned(rest.model, rest.residual)
-    ranked = ranking(gram, work.library.units, effective(now))
+    systems = work.beside(rest.model, rest.residual)
+    ranked = ranking(systems, work.library.units, effective(now))
     own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
     taken = {(e.name, e.site) for e in now.model.found}
     choices = [c for c in ranked if c.unit.site not in taken and c.nats > 0.0]
     reach = max(beliefs.rival_nats, beliefs.rival_share * choices[0].nats) if choices else 0.0
     close = [c for c in choices if c.nats > choices[0].nats - reach][:SHORTLIST]
-    tried = [(c, fitted_with(work, rest.model, c.effect(gram))) for c in close]
+    tried = [(c, fitted_with(work, rest.model, c.effect())) for c in close]
     tried = [(c, other) for c, other in tried if not implausible(other.model)]
     close, fits = [c for c, _ in tried], [other for _, other in tried]
     # One count for all rivals: see `select`.

@@ -296,8 +296,5 @@ def _workspace(
     scale = robust_scale(problem, problem.residuals(model))
     now = fit(problem, model, scale, None, 4)
     bare = fit(problem, now.model.with_found(()), scale, None, 4).rss
-    return (
-        Workspace.of(problem, scale, build(problem, now.model, scale, exclude), beliefs),
-        now,
-        bare,
-    )
+    library = build(problem, now.model, scale, exclude)
+    return Workspace(problem, scale, library, beliefs), now, bare

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -14,11 +14,12 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.fit import Fit, design, fit
-from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
-from .evidence_score import Choice, best_choice, evidence
+from .choices import Choice, ranking
+from .evidence_score import evidence
 from .library import Library, Unit
+from .seed_systems import SeedSystems
 from .starts import searched, started
 
 SHORTLIST = 4
@@ -28,51 +29,30 @@ SHORTLIST = 4
 @dataclass(frozen=True, eq=False)
 class Workspace:
     """
-    What selection works on: the problem, its noise, the shared library, its Gram matrix, beliefs.
+    What selection works on: the problem, its noise, the shared library, and beliefs.
 
-    ``shared`` is the library's normal matrix, computed once; residuals change, columns do not.
+    The library's own products are computed once; residuals change, columns do not.
     """
 
     problem: Problem
     scale: Scale
     library: Library
     beliefs: Beliefs
-    shared: Array
 
-    @classmethod
-    def of(cls, problem: Problem, scale: Scale, library: Library, beliefs: Beliefs) -> Workspace:
+    def beside(self, model: Model, residual: Array) -> SeedSystems:
         """
-        Multiply the library out once.
+        Return the normal equations of all seeds given a model: its frames and effects fitted.
 
         Parameters
         ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
-        library : Library
-            Every family on every joint, as columns.
-        beliefs : Beliefs
-            The numbers that decide.
+        model : Model
+        residual : array, shape (rows,)
+            What the model leaves, whitened.
 
         """
-        return cls(problem, scale, library, beliefs, library.columns @ library.columns.T)
-
-    def conditioned(self, model: Model, residual: Array) -> Gram:
-        """Return the library's normal equations given a model: its frames and effects fitted."""
         own, _ = design(self.problem, model, self.scale)
-        cross = own @ self.library.columns.T
-        normal = np.block([[self.shared, cross.T], [cross, own @ own.T]])
-        right = np.concatenate([self.library.columns @ residual, own @ residual])
-        gram = Gram(
-            normal,
-            right,
-            float(residual @ residual),
-            residual.size,
-            np.maximum(np.diag(normal).copy(), 1e-300),
-        )
-        count = self.library.columns.shape[0]
-        return gram.without(np.arange(count, count + own.shape[0]))
+        products = self.library.products(np.concatenate([own, residual[None]]))
+        return self.library.systems.beside(own, residual, products)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +94,14 @@ def forward(
     now = start
     taken = [(e.name, e.site) for e in start.model.found]
     while len(steps) < most:
-        gram = work.conditioned(now.model, now.residual)
+        systems = work.beside(now.model, now.residual)
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
         # only the fit with a choice tells how many rows were independent.
-        ranked = ranking(gram, work.library.units, float(now.residual.size))
+        ranked = ranking(systems, work.library.units, float(now.residual.size))
         ranked = [c for c in ranked if c.nats > work.beliefs.enter_nats and not _repeats(c, taken)]
         if not ranked:
             break
-        best, impossible = _refined(work, now, gram, ranked, effective)
+        best, impossible = _refined(work, now, ranked, effective)
         if best is None:
             for effect in impossible:
                 refused(effect)
@@ -133,24 +113,6 @@ def forward(
     return steps
 
 
-def ranking(gram: Gram, units: Sequence[Unit], effective: float) -> list[Choice]:
-    """
-    Return every unit's best choice, most evidence first.
-
-    Parameters
-    ----------
-    gram : Gram
-        Normal equations that all hypotheses share.
-    units : sequence of Unit
-        What may enter, each as a whole.
-    effective : float
-        Number of independent rows.
-
-    """
-    found = [best_choice(gram, unit, effective) for unit in units]
-    return sorted((c for c in found if c is not None), key=lambda c: -c.nats)
-
-
 def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
     """Return whether a unit is in the model already and its kind cannot take in another."""
     kind = type(choice.unit.seeds[0])
@@ -160,7 +122,6 @@ def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
 def _refined(
     work: Workspace,
     now: Fit,
-    gram: Gram,
     ranked: list[Choice],
     effective: Callable[[Fit], float],
 ) -> tuple[Step | None, list[Effect]]:
@@ -172,7 +133,7 @@ def _refined(
     best_nats = ranked[0].nats
     slack = max(work.beliefs.close_nats, work.beliefs.close_share * best_nats)
     close = [c for c in ranked if c.nats > best_nats - slack]
-    tried = [(c, fitted_with(work, now.model, c.effect(gram))) for c in close[:SHORTLIST]]
+    tried = [(c, fitted_with(work, now.model, c.effect())) for c in close[:SHORTLIST]]
     # One count for all, that of the fit which leaves least: a worse model explains less and would
     # otherwise be allowed more rows.
     count = effective(min((f for _, f in tried), key=lambda f: f.rss))
@@ -323,16 +284,16 @@ def _one_for_two(
     work: Workspace, now: Fit, a: int, b: int, effective: Callable[[Fit], float]
 ) -> Fit | None:
     rest = fit(work.problem, now.model.without(b).without(a), work.scale, None, 4)
-    gram = work.conditioned(rest.model, rest.residual)
+    systems = work.beside(rest.model, rest.residual)
     count = effective(now)
-    ranked = ranking(gram, work.library.units, count)
+    ranked = ranking(systems, work.library.units, count)
     taken = {(e.name, e.site) for e in rest.model.found}
     freedom = now.coordinates.size - rest.coordinates.size
     wanted = evidence(rest.rss, rest.rss - now.rss, freedom, count)
     for choice in [c for c in ranked if c.unit.site not in taken][:SHORTLIST]:
         if choice.nats < wanted - work.beliefs.replacing_slack * abs(wanted):
             break
-        one = fitted_with(work, rest.model, choice.effect(gram))
+        one = fitted_with(work, rest.model, choice.effect())
         free = one.coordinates.size - rest.coordinates.size
         nats = evidence(rest.rss, rest.rss - one.rss, free, count) - float(
             np.log(choice.unit.trials)

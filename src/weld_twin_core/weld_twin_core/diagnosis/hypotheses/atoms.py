@@ -1,0 +1,205 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whitened columns of very many hypotheses, kept small.
+
+Nearly every hypothesis moves one joint, by an amount of its own at every sample. Its column is
+what that joint does to the tool, times these amounts. The two are kept apart, so that memory and
+products take one number a sample and column instead of three or six.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ...arm.channels import Shift
+from ...arrays import Array
+from ...twin.features import Features
+from ..algebra.gram import Index
+from ..algebra.problem import Problem, Scale
+
+
+class Columns(Protocol):
+    """Whitened columns, in whatever way they are kept."""
+
+    @property
+    def count(self) -> int:
+        """Return how many there are."""
+
+    def written_out(self) -> Array:
+        """Return the columns, shape (K, rows)."""
+
+    def products(self, rows: Array) -> Array:
+        """Return their products with other rows, shape (R, rows), as shape (K, R)."""
+
+    def normal(self) -> Array:
+        """Return their products with each other, shape (K, K)."""
+
+    def largest(self) -> float:
+        """Return their largest entry, by size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """
+    Columns written out.
+
+    Attributes
+    ----------
+    rows : array, shape (K, rows)
+
+    """
+
+    rows: Array
+
+    @property
+    def count(self) -> int:
+        """Return how many there are."""
+        return int(self.rows.shape[0])
+
+    def written_out(self) -> Array:
+        """Return the columns, shape (K, rows)."""
+        return self.rows
+
+    def products(self, rows: Array) -> Array:
+        """Return their products with other rows, shape (R, rows), as shape (K, R)."""
+        return np.asarray(self.rows @ rows.T)
+
+    def normal(self) -> Array:
+        """Return their products with each other, shape (K, K)."""
+        return np.asarray(self.rows @ self.rows.T)
+
+    def largest(self) -> float:
+        """Return their largest entry, by size."""
+        return float(np.abs(self.rows).max(initial=0.0))
+
+
+class MovedJoint:
+    """
+    What one joint does to the tool, whitened; all columns that move this joint share it.
+
+    Parameters
+    ----------
+    row : array, shape (rows,)
+    first : array of int, shape (samples,)
+        The first row of every sample.
+
+    """
+
+    def __init__(self, row: Array, first: Index) -> None:
+        self.row, self.first = row, first
+        self.square = self.summed(row)
+        self.most = np.maximum.reduceat(np.abs(row), first)
+
+    @classmethod
+    def of(
+        cls, problem: Problem, features: Sequence[Features], scale: Scale, joint: int
+    ) -> MovedJoint:
+        """Take the column of a joint at the features' model."""
+        parts = [
+            maker.column(('q', joint))[:c] for maker, c in zip(features, problem.rows, strict=True)
+        ]
+        sizes = np.repeat(problem.rows, problem.samples)
+        first = np.cumsum(sizes) - sizes
+        return cls(problem.whitened(parts, scale), first)
+
+    def summed(self, rows: Array) -> Array:
+        """Return the products with other rows, shape (..., rows), sample by sample."""
+        return np.asarray(np.add.reduceat(self.row * rows, self.first, axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class Amounts:
+    """
+    Columns that move one joint.
+
+    Attributes
+    ----------
+    joint : MovedJoint
+    each : array, shape (K, samples) [rad or m]
+        By how much each moves it.
+
+    """
+
+    joint: MovedJoint
+    each: Array
+
+    @property
+    def count(self) -> int:
+        """Return how many there are."""
+        return int(self.each.shape[0])
+
+    def written_out(self) -> Array:
+        """Return the columns, shape (K, rows)."""
+        last = np.append(self.joint.first[1:], self.joint.row.size)
+        return np.asarray(np.repeat(self.each, last - self.joint.first, axis=1) * self.joint.row)
+
+    def products(self, rows: Array) -> Array:
+        """Return their products with other rows, shape (R, rows), as shape (K, R)."""
+        return np.asarray(self.each @ self.joint.summed(rows).T)
+
+    def normal(self) -> Array:
+        """Return their products with each other, shape (K, K)."""
+        return np.asarray((self.each * self.joint.square) @ self.each.T)
+
+    def largest(self) -> float:
+        """Return their largest entry, by size."""
+        return float((np.abs(self.each) * self.joint.most).max(initial=0.0))
+
+
+def moved_joint(shifts: Sequence[Sequence[Shift]]) -> int | None:
+    """
+    Return the joint that is all that some features move; None where they move something else.
+
+    Parameters
+    ----------
+    shifts : sequence of sequence of mapping
+        The features of one effect in every recording; see `Features.shifts`.
+
+    """
+    channels = {channel for parts in shifts for shift in parts for channel in shift}
+    if len(channels) != 1:
+        return None
+    name, joint = channels.pop()
+    return joint if name == 'q' else None
+
+
+def amounts(shifts: Sequence[Sequence[Shift]], joint: int, samples: Sequence[int]) -> Array:
+    """Return by how much every feature moves a joint, over all recordings, shape (K, samples)."""
+    channel = ('q', joint)
+    parts = [
+        np.stack([np.broadcast_to(shift.get(channel, 0.0), (m,)) for shift in part])
+        for part, m in zip(shifts, samples, strict=True)
+    ]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+
+
+def gathered(pieces: Sequence[Columns]) -> list[Columns]:
+    """Return columns in few pieces, in the same order, so that products are few and large."""
+    out: list[Columns] = []
+    run: list[Columns] = []
+    for piece in pieces:
+        if run and not _alike(run[0], piece):
+            out.append(_joined(run))
+            run = []
+        run.append(piece)
+    return [*out, _joined(run)] if run else out
+
+
+def _alike(one: Columns, other: Columns) -> bool:
+    if isinstance(one, Amounts) and isinstance(other, Amounts):
+        return one.joint is other.joint
+    return isinstance(one, Whole) and isinstance(other, Whole)
+
+
+def _joined(run: Sequence[Columns]) -> Columns:
+    first = run[0]
+    if isinstance(first, Amounts):
+        return Amounts(
+            first.joint, np.concatenate([p.each for p in run if isinstance(p, Amounts)])
+        )
+    return Whole(np.concatenate([piece.written_out() for piece in run]))

@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Normal equations of every seed by itself: all that a ranking asks for.
+
+A ranking asks what each seed would explain beside the model, never what two seeds would explain
+together. So each seed has a small system of its own, and those of one size are one array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
+from ..algebra.gram import FLAT, Index
+from ..algebra.unit_diagonal import EMPTY, unit_diagonal
+from .evidence_score import evidences
+
+SINGULAR = 1e-11
+"""Added to the diagonal of ones, so that columns that repeat others do no harm; far above
+rounding, far below what a column must carry to be told from the others."""
+
+
+class Alike(NamedTuple):
+    """
+    Systems of seeds with the same number of columns.
+
+    Attributes
+    ----------
+    seeds : array of int, shape (S,)
+        Which, counted over the units in order.
+    columns : array of int, shape (S, K)
+    normal : array, shape (S, K, K)
+    right : array, shape (S, K)
+    size : array, shape (S, K)
+        Squared norm of every column before anything was projected out.
+
+    """
+
+    seeds: Index
+    columns: Index
+    normal: Array
+    right: Array
+    size: Array
+
+
+class Grown(NamedTuple):
+    """The columns of every seed that are worth it, bool (S, K), and their evidence, (S,)."""
+
+    chosen: NDArray[np.bool_]
+    nats: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SeedSystems:
+    """
+    Normal equations of all seeds.
+
+    Attributes
+    ----------
+    alike : tuple of Alike
+        One entry for every number of columns.
+    rss : float
+        Sum of squares of the residual.
+
+    """
+
+    alike: tuple[Alike, ...]
+    rss: float = 0.0
+
+    @classmethod
+    def of(cls, columns: Sequence[Index], normals: Sequence[Array]) -> SeedSystems:
+        """
+        Sort seeds by their number of columns.
+
+        Parameters
+        ----------
+        columns : sequence of array of int, shape (K,)
+            Column numbers of every seed.
+        normals : sequence of array, shape (K, K)
+            Products of its columns with each other.
+
+        """
+        out = []
+        for size in sorted({index.size for index in columns}):
+            seeds = np.array([k for k, index in enumerate(columns) if index.size == size])
+            normal = np.stack([normals[k] for k in seeds])
+            each = np.maximum(np.einsum('sii->si', normal), EMPTY)
+            index = np.stack([columns[k] for k in seeds])
+            out.append(Alike(seeds, index, normal, np.zeros(each.shape), each))
+        return cls(tuple(out))
+
+    def beside(self, own: Array, residual: Array, products: Array) -> SeedSystems:
+        """
+        Return the systems for a residual, with the columns of a model projected out.
+
+        Parameters
+        ----------
+        own : array, shape (P, rows)
+            The model's columns.
+        residual : array, shape (rows,)
+        products : array, shape (all columns, P + 1)
+            Products of all columns with the model's, and with the residual.
+
+        """
+        pull = own @ residual
+        rss = float(residual @ residual)
+        normal = own @ own.T
+        live = np.flatnonzero(normal.diagonal() > EMPTY)
+        scaled, size = unit_diagonal(normal[np.ix_(live, live)], 1e-12)
+        cross = products[:, live] / size
+        wanted = np.column_stack([cross.T, pull[live] / size])
+        solved = np.linalg.solve(scaled, wanted) if live.size else wanted
+        right = products[:, -1] - cross @ solved[:, -1]
+        rss = max(rss - float(pull[live] / size @ solved[:, -1]), EMPTY)
+        taken = solved[:, :-1].T
+        return replace(
+            self, rss=rss, alike=tuple(_less(a, cross, taken, right) for a in self.alike)
+        )
+
+    def grown(self, effective: float) -> list[Grown]:
+        """
+        Return which columns of every seed are worth it, for every size of seed.
+
+        Columns enter one at a time, the one that explains most first, as long as the evidence
+        grows; all together where that is worth more.
+
+        Parameters
+        ----------
+        effective : float
+            Number of independent rows.
+
+        """
+        return [_grown(each, self.rss, effective) for each in self.alike]
+
+
+def _less(alike: Alike, cross: Array, taken: Array, right: Array) -> Alike:
+    both = cross[alike.columns] @ np.swapaxes(taken[alike.columns], 1, 2)
+    return alike._replace(normal=alike.normal - both, right=right[alike.columns])
+
+
+def _grown(alike: Alike, rss: float, effective: float) -> Grown:
+    each = np.arange(alike.seeds.size)
+    live = np.einsum('sii->si', alike.normal) > FLAT * alike.size
+    left, pull = _scaled(alike, live)
+    whole = _together(left, pull, live.sum(axis=1, dtype=np.float64), rss, effective)
+    rest, chosen = live.copy(), np.zeros(live.shape, bool)
+    nats, gain = np.full(each.size, -np.inf), np.zeros(each.size)
+    for step in range(live.shape[1]):
+        falls = np.where(rest, pull**2 / np.einsum('sii->si', left), -1.0)
+        k = falls.argmax(axis=1)
+        more = falls[each, k]
+        worth = evidences(rss, gain + more, step + 1.0, effective)
+        better = (more >= 0.0) & (worth > nats)
+        if not better.any():
+            break
+        chosen[each[better], k[better]] = True
+        rest[each, k] = False
+        rest[~better] = False
+        nats, gain = np.where(better, worth, nats), np.where(better, gain + more, gain)
+        left, pull = _projected(left, pull, k)
+    all_of_them = whole > nats
+    return Grown(np.where(all_of_them[:, None], live, chosen), np.maximum(whole, nats))
+
+
+def _scaled(alike: Alike, live: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return systems with ones on the diagonal; what is not live stands by itself."""
+    unit = np.sqrt(np.where(live, np.einsum('sii->si', alike.normal), 1.0))
+    both = live[:, :, None] & live[:, None]
+    eye = np.eye(live.shape[1])
+    scaled = np.where(both, alike.normal / (unit[:, :, None] * unit[:, None]), eye)
+    return scaled + SINGULAR * eye, np.where(live, alike.right / unit, 0.0)
+
+
+def _together(scaled: Array, pull: Array, count: Array, rss: float, effective: float) -> Array:
+    """Return the evidence of all live columns of every seed at once, where there are several."""
+    gain = (pull * np.linalg.solve(scaled, pull[..., None])[..., 0]).sum(axis=1)
+    return np.where(count > 1, evidences(rss, gain, count, effective), -np.inf)
+
+
+def _projected(left: Array, pull: Array, k: Index) -> tuple[Array, Array]:
+    """Return systems with one column each, k (S,), fitted and projected out."""
+    each = np.arange(k.size)
+    row = left[each, k]
+    share = row / row[each, k][:, None]
+    pull = pull - share * pull[each, k][:, None]
+    left = left - share[:, :, None] * row[:, None]
+    diagonal = np.einsum('sii->si', left)
+    diagonal[:] = np.maximum(diagonal, SINGULAR)
+    return left, pull

@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Columns that move one joint, kept as amounts: the same as when they are written out."""
+
+import numpy as np
+import pytest
+
+from weld_twin_core.diagnosis.hypotheses.atoms import (
+    Amounts,
+    MovedJoint,
+    Whole,
+    gathered,
+    moved_joint,
+)
+
+ROWS = np.repeat([6, 3], [5, 4])
+"""Five poses of one recording and four points of another."""
+
+
+@pytest.fixture
+def columns():
+    rng = np.random.default_rng(3)
+    joint = MovedJoint(rng.normal(size=ROWS.sum()), np.cumsum(ROWS) - ROWS)
+    return Amounts(joint, rng.normal(size=(4, ROWS.size)))
+
+
+def written(columns):
+    """Return the columns by a loop over samples."""
+    ends = np.cumsum(ROWS)
+    spans = [slice(e - r, e) for e, r in zip(ends, ROWS, strict=True)]
+    out = [
+        np.concatenate([s * columns.joint.row[k] for s, k in zip(each, spans, strict=True)])
+        for each in columns.each
+    ]
+    return np.array(out)
+
+
+def test_amounts_are_the_joints_column_times_what_each_sample_moves(columns):
+    np.testing.assert_allclose(columns.written_out(), written(columns), rtol=1e-15)
+
+
+def test_products_are_those_of_the_columns_written_out(columns):
+    rows, whole = np.random.default_rng(4).normal(size=(3, ROWS.sum())), written(columns)
+    np.testing.assert_allclose(columns.products(rows), whole @ rows.T, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(columns.normal(), whole @ whole.T, rtol=1e-12, atol=1e-12)
+    assert columns.largest() == np.abs(whole).max()
+
+
+def test_pieces_of_one_joint_are_joined_and_keep_their_order(columns):
+    other = Whole(np.ones((2, ROWS.sum())))
+    pieces = [Amounts(columns.joint, columns.each[:1]), Amounts(columns.joint, columns.each[1:])]
+    joined = gathered([*pieces, other, columns])
+    assert [piece.count for piece in joined] == [4, 2, 4]
+    np.testing.assert_array_equal(joined[0].written_out(), columns.written_out())
+
+
+def test_only_what_moves_one_joint_and_nothing_else_is_kept_as_amounts():
+    one = [{('q', 2): np.ones(3)}, {('q', 2): np.zeros(3)}]
+    assert moved_joint([one, one]) == 2
+    assert moved_joint([one, [{('q', 1): np.ones(3)}]]) is None
+    assert moved_joint([[{('tau', 2): np.ones(3)}]]) is None
+    assert moved_joint([[]]) is None

@@ -25,6 +25,7 @@ from .many.fitted_together import fitted_together
 from .predicting.allowed import allowed
 from .result import Diagnosis
 from .soundness import Examined, Given, examine, refuse_reused
+from .trust.signs import signs_of_answer
 from .unseen.held_out_shrink import held_out_shrink
 from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
@@ -137,6 +138,7 @@ def _explained(
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict, beliefs)
     verdict = held_against(verdict, unseen, rival, beliefs)
+    signs = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks)
     progress('held against curves without a formula')
     found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)
     final = held(found.final, found.problem, found.scale, found.precision, examined.given.robot)
@@ -152,4 +154,5 @@ def _explained(
         examined=examined,
         posterior=posterior,
         rival=rival,
+        signs=signs,
     )

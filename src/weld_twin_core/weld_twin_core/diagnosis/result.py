@@ -336,6 +336,8 @@ class Diagnosis:
     """Where many small errors act together: what each kind accounts for, largest first."""
     evidence: object = None
     """What the verdict was drawn from, `verdict.evidence.Evidence`, to draw it anew."""
+    signs: object = None
+    """What says how far the answer can be trusted, `trust.signs.Signs`."""
     posterior: Posterior | None = None
     """The models that the recordings allow: what makes a prediction certain or not."""
     causes: tuple[Cause, ...] = ()

@@ -63,12 +63,12 @@ def achieved(
     robot = load_robot(str(cases / name / layout.ROBOT))
     model = read_model(robot, diagnosis)
     test = read_recording(truths / name / layout.TEST, robot)
-    good = _good(test, truth['outliers'])
+    good = counted(test, truth['outliers'])
     bare = Model(robot, (robot.T_world_base,), model.known)
     if truth['align']:
         train = read_recording(cases / name / layout.TRAIN, robot)
-        bare = _aligned(bare, train, truth['align'])
-    before, after = _gap(bare, test)[good], _gap(model, test)[good]
+        bare = aligned_on(bare, train, truth['align'])
+    before, after = gap_on(bare, test)[good], gap_on(model, test)[good]
     first, left = rms(before), rms(after)
     ratio, ends = left / first, np.asarray(claim['ci95'], dtype=float)
     narrow = claim['ratio'] + TO_90 * (ends - claim['ratio'])
@@ -84,20 +84,47 @@ def achieved(
     )
 
 
-def _aligned(model: Model, recording: Recording, align: list[str]) -> Model:
-    """Return the model with the frames that a diagnosis of this recording starts from."""
+def aligned_on(model: Model, recording: Recording, align: list[str]) -> Model:
+    """
+    Return the model with the frames that a diagnosis of this recording starts from.
+
+    Parameters
+    ----------
+    model : Model
+    recording : Recording
+    align : list of str
+        Frames that are fitted.
+
+    """
     problem = Problem((usable(recording),), frozenset(align))
     return refined(problem, initial_frames(problem, model))
 
 
-def _gap(model: Model, recording: Recording) -> Array:
-    """Return measured minus predicted position, shape (M, 3) [m]."""
+def gap_on(model: Model, recording: Recording) -> Array:
+    """
+    Return measured minus predicted position, shape (M, 3) [m].
+
+    Parameters
+    ----------
+    model : Model
+    recording : Recording
+
+    """
     measured = _measured(recording)
     return np.asarray(measured.position - model.twin(0).poses(recording, measured.t).position)
 
 
-def _good(recording: Recording, outliers: list[int]) -> Array:
-    """Return the samples to count: no outliers, none outside the joint stream, shape (M,)."""
+def counted(recording: Recording, outliers: list[int]) -> Array:
+    """
+    Return the samples to count: no outliers, none outside the joint stream, shape (M,).
+
+    Parameters
+    ----------
+    recording : Recording
+    outliers : list of int
+        Numbers of the samples that are none of the arm's doing.
+
+    """
     t, joints = _measured(recording).t, recording.joints
     good = (t >= joints.t[0]) & (t <= joints.t[-1])
     good[np.asarray(outliers, dtype=int)] = False

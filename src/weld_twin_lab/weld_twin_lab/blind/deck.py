@@ -8,7 +8,7 @@ Case number i depends on the seed and on i alone; asking for more cases extends 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -82,7 +82,11 @@ class Lot:
 
 
 def lots(
-    seed: int, count: int, kinds: Sequence[str] = (), constructions: Sequence[str] = ('',)
+    seed: int,
+    count: int,
+    kinds: Sequence[str] = (),
+    constructions: Sequence[str] = ('',),
+    shares: Mapping[str, int] = KINDS,
 ) -> list[Lot]:
     """
     Return what the first cases of a seed are to be.
@@ -92,9 +96,11 @@ def lots(
     seed : int
     count : int
     kinds : sequence of str
-        Only these; empty for all, in the shares of `KINDS`.
+        Only these; empty for all.
     constructions : sequence of str
         Names of the ambiguous constructions.
+    shares : mapping from str to int
+        How often each kind comes.
 
     Raises
     ------
@@ -107,7 +113,7 @@ def lots(
             raise DataError(f'there are no cases of kind {kind!r}; kinds are ' + ', '.join(KINDS))
     if count < 1 or seed < 0:
         raise DataError('the number of cases must be at least 1 and the seed not negative')
-    chosen = {kind: KINDS[kind] for kind in (kinds or KINDS)}
+    chosen = {kind: shares[kind] for kind in (kinds or shares)}
     table = {'outside': OUTSIDE, 'ambiguous': tuple(constructions)}
     pattern = [kind for kind, share in chosen.items() for _ in range(share)]
     decks = {kind: Deck(table.get(kind, FAMILIES), seed, k) for k, kind in enumerate(KINDS)}

@@ -51,7 +51,7 @@ class Judged:
         Whether family, and joint, of every cause at work are named; None where there is none.
     right : bool
         What the confidence is about: the set is exact, or nothing was to be found and nothing
-        was said, or no library knows the cause and the verdict is 'unknown'.
+        was said, or the library lacks the cause and the verdict is 'unknown'.
     breadth : float
         Mean number of sites in a set that cannot be told apart.
     z : tuple of float
@@ -99,7 +99,7 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
         {(item['effect'], item['joint']) for item in group}
         for group in verdict.get('indistinguishable', ())
     ]
-    answers = [_sites(answer) for answer in (truth['sites'], *truth['alike'])]
+    answers = answers_of(truth)
     answer = min(answers, key=lambda at: (-_share(at, groups), abs(len(groups) - len(at))))
     matched = _matched(answer, groups)
     whole = matched == len(answer)
@@ -153,11 +153,25 @@ def _right(kind: str, status: str, exact: bool, whole: bool) -> bool:
     if kind == 'none':
         return status == 'none'
     if kind in NOT_IN_LIBRARY:
-        # What gave way at an instant may be dated, and is then named.
+        # What gave way at an instant may be dated, and is then named; so may be what no motion
+        # tells from the cause, in a set with it.
         return status == 'unknown' or (exact and status in NAMING)
     if kind == SEMI_REAL:
         return whole
     return exact and status in NAMING
+
+
+def answers_of(truth: Mapping[str, Any]) -> list[list[Site]]:
+    """
+    Return every list of sites that is as right as the truth, by the library's names.
+
+    Parameters
+    ----------
+    truth : mapping
+        As `making.truth_of` gives it.
+
+    """
+    return [_sites(answer) for answer in (truth['sites'], *truth['alike'])]
 
 
 def _all(told: Any, answers: Sequence[Sequence[Site]], groups: Sequence[set[Site]]) -> bool | None:

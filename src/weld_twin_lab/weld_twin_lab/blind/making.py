@@ -38,6 +38,7 @@ from .blind_cell import (
 from .cause_sizes import FAMILIES, MOVING, Cause, site
 from .deck import STRATA, Lot, lots
 from .displacement import rms
+from .poor_motion import poorer
 from .sizing import Unseen, draw_causes, sized_together
 
 TRIES = 30
@@ -165,9 +166,20 @@ def _written(case: Case, name: str, cases: Path, truths: Path) -> dict[str, str]
     return {'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name)}
 
 
-def draw_case(lot: Lot, rng: np.random.Generator, spans: tuple[float, float] = SPANS) -> Case:
+def draw_case(
+    lot: Lot, rng: np.random.Generator, spans: tuple[float, float] = SPANS, poor: str = ''
+) -> Case:
     """
     Return a case that shows its causes as large as the lot wants them.
+
+    Parameters
+    ----------
+    lot : Lot
+    rng : Generator
+    spans : tuple of float [s]
+        Shortest and longest recording.
+    poor : str
+        How the motion diagnosed is made poor, as `poor_motion.poorer` takes it.
 
     Raises
     ------
@@ -178,7 +190,7 @@ def draw_case(lot: Lot, rng: np.random.Generator, spans: tuple[float, float] = S
     reason: Exception = Unseen(lot.kind)
     for attempt in range(TRIES):
         try:
-            return _attempt(_eased(lot, attempt), rng, spans)
+            return _attempt(_eased(lot, attempt), rng, spans, poor)
         except (Unseen, FloatingPointError) as error:
             reason = error
     raise DataError(f'no case of {", ".join(lot.families)} on {lot.robot} came about: {reason}')
@@ -194,10 +206,10 @@ def _eased(lot: Lot, attempt: int) -> Lot:
     return replace(lot, motion=motion, strata=strata)
 
 
-def _attempt(lot: Lot, rng: np.random.Generator, spans: tuple[float, float]) -> Case:
+def _attempt(lot: Lot, rng: np.random.Generator, spans: tuple[float, float], poor: str) -> Case:
     cell = draw_cell(lot.robot, lot.motion, lot.families, rng)
     span = float(rng.uniform(*spans))
-    train = take(cell, lot.motion, span, rng)
+    train = poorer(take(cell, lot.motion, span, rng), poor, rng)
     causes, alike, ratios = _causes(lot, cell, train, span, rng)
     fresh = bool(rng.random() < 0.5)
     holdout, test = (
@@ -254,32 +266,42 @@ def write_case(place: Path, name: str, case: Case) -> None:
 
 def write_truth(place: Path, name: str, case: Case) -> None:
     """Write what is sealed: the causes, and the recording that no diagnosis sees."""
-    cell, lot = case.cell, case.lot
+    cell = case.cell
     tested = record(cell, case.causes, case.test)
     write_recording(place / layout.TEST, as_recording(layout.TEST, tested), cell.robot)
+    layout.write(place / layout.TRUTH, {'salt': secrets.token_hex(16), **truth_of(name, case)})
+
+
+def truth_of(name: str, case: Case) -> dict[str, Any]:
+    """
+    Return the truth of a case in plain values.
+
+    Parameters
+    ----------
+    name : str
+    case : Case
+
+    """
+    cell, lot = case.cell, case.lot
     reachable, outliers = floor(cell, case.causes, case.test)
     every = rms(deviation(cell, case.causes, case.train)) / cell.noise if case.causes else 0.0
-    layout.write(
-        place / layout.TRUTH,
-        {
-            'name': name,
-            'salt': secrets.token_hex(16),
-            'kind': lot.kind,
-            'robot': lot.robot,
-            'motion': lot.motion,
-            'construction': lot.families[0] if case.alike else None,
-            'causes': case.causes,
-            'sites': [site(cause) for cause in case.causes],
-            'alike': case.alike,
-            'ratios': case.ratios,
-            'ratio': every,
-            'excluded': list(case.excluded),
-            'orientation': cell.tracker.orientation,
-            'sigma_m': cell.tracker.sigma,
-            'richness': cell.richness,
-            'align': list(cell.align),
-            'test': 'new motion' if case.fresh else 'same motion',
-            'floor_m': reachable,
-            'outliers': outliers,
-        },
-    )
+    return {
+        'name': name,
+        'kind': lot.kind,
+        'robot': lot.robot,
+        'motion': lot.motion,
+        'construction': lot.families[0] if case.alike else None,
+        'causes': case.causes,
+        'sites': [site(cause) for cause in case.causes],
+        'alike': case.alike,
+        'ratios': case.ratios,
+        'ratio': every,
+        'excluded': list(case.excluded),
+        'orientation': cell.tracker.orientation,
+        'sigma_m': cell.tracker.sigma,
+        'richness': cell.richness,
+        'align': list(cell.align),
+        'test': 'new motion' if case.fresh else 'same motion',
+        'floor_m': reachable,
+        'outliers': outliers,
+    }

@@ -15,9 +15,10 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 
-from ..blind.blind_cell import Cell, Take, as_recording, draw_cell, record, take
+from ..blind.blind_cell import Cell, as_recording, draw_cell, record, take
 from ..blind.cause_sizes import FAMILIES, MOVING, OUTSIDE, Cause
 from ..blind.deck import ROBOTS, STRATA
+from ..blind.poor_motion import poorer
 from ..blind.sizing import Unseen, draw_causes
 
 STEPS = ('station_step', 'tool_slip')
@@ -82,7 +83,7 @@ def _drawn(rng: np.random.Generator, rich: bool) -> Sound:
     cell = draw_cell(name, kind, families, rng)
     taken = take(cell, kind, float(rng.uniform(12.0, 40.0)), rng)
     poor = '' if rich else str(rng.choice(['', '', 'small', 'still', 'few', 'one']))
-    taken = _poorer(taken, poor, rng)
+    taken = poorer(taken, poor, rng)
     strata = [int(k) for k in rng.integers(1, len(STRATA), count)]
     causes: list[Cause] = []
     if families:
@@ -97,30 +98,6 @@ def _drawn(rng: np.random.Generator, rich: bool) -> Sound:
         'causes': causes,
     }
     return Sound(robot, recording, align, told)
-
-
-def _poorer(taken: Take, poor: str, rng: np.random.Generator) -> Take:
-    """Return the run with less motion: little of it, joints at rest, few stations, one joint."""
-    q, command = taken.command.q.copy(), taken.command
-    middle = np.median(q, axis=0)
-    if poor == 'small':
-        q = middle + float(rng.choice([0.02, 0.1, 0.3])) * (q - middle)
-    elif poor == 'still':
-        still = rng.choice(q.shape[1], int(rng.integers(1, q.shape[1] - 1)), replace=False)
-        q[:, still] = middle[still]
-    elif poor == 'one':
-        moving = int(rng.integers(q.shape[1]))
-        q = np.where(np.arange(q.shape[1]) == moving, q, middle)
-    elif poor == 'few' and command.static:
-        count = int(rng.integers(15, 40))
-        wrench = None if command.wrench is None else command.wrench[:count]
-        warm = None if command.temperature is None else command.temperature[:count]
-        return taken._replace(
-            command=replace(
-                command, t=command.t[:count], q=q[:count], wrench=wrench, temperature=warm
-            )
-        )
-    return taken._replace(command=replace(command, q=q))
 
 
 def _as_told(

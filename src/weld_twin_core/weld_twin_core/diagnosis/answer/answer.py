@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from ...twin.posterior import Posterior
 from ..advice import actions
 from ..advice.next_step import next_step
@@ -12,6 +14,9 @@ from ..levels.causes import causes
 from ..levels.curved import Curved
 from ..result import Diagnosis, Shrink
 from ..soundness import Examined
+from ..trust.model import usual_trust
+from ..trust.signs import Signs, signs_of_cause
+from ..trust.trusted import trusted
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict
@@ -29,6 +34,7 @@ def answer(
     shrink: Shrink,
     examined: Examined,
     posterior: Posterior,
+    signs: Mapping[str, float],
     rival: Curved | None = None,
 ) -> Diagnosis:
     """
@@ -46,11 +52,21 @@ def answer(
         Whether the data are sound, and what was mended.
     posterior : Posterior
         The models that the recordings allow.
+    signs : mapping from str to float
+        Of the answer: what says how far it can be trusted.
     rival : Curved or None
         What explains the gap without a formula.
 
     """
     told, shares = causes(found, unseen, verdict, rival, evidence.floor, found.work.beliefs)
+    known = Signs(
+        signs,
+        tuple(
+            signs_of_cause(cause, k, len(told), evidence.gap, evidence.floor, rival)
+            for k, cause in enumerate(told)
+        ),
+    )
+    verdict, told = trusted(verdict, told, known, usual_trust())
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
         gap=gap(found, evidence.floor),
@@ -76,4 +92,5 @@ def answer(
         causes=told,
         shares=shares,
         unsound=examined.told(found.final.model.found),
+        signs=known,
     )

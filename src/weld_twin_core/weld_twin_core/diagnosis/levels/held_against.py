@@ -39,13 +39,8 @@ def held_against(
         kept = {Site(effect.name, effect.site) for effect in rival.kept}
         stays = all(group[0] in kept for group in verdict.sets)
         return verdict if stays else replace(verdict, sets=())
-    before = named.squares(named.predict(range(len(named.parts))))
-    after = rival.unseen.squares(rival.unseen.predict(range(len(rival.unseen.parts))))
-    gain = 1.0 - float(after.mean() / max(float(before.mean()), 1e-300))
-    if (
-        gain < beliefs.beaten_share
-        or _steady(named, before, rival.unseen, after) < beliefs.beaten_steady
-    ):
+    gain, steady = gain_of(named, rival.unseen)
+    if gain < beliefs.beaten_share or steady < beliefs.beaten_steady:
         return verdict
     places = ' and '.join(str(part.group) for part in rival.form.parts)
     reason = (
@@ -55,9 +50,21 @@ def held_against(
     return Verdict('unknown', beliefs.beaten_belief, (), (reason,))
 
 
-def _steady(named: Unseen, before: np.ndarray, rival: Unseen, after: np.ndarray) -> float:
+def gain_of(named: Unseen, rival: Unseen) -> tuple[float, float]:
+    """
+    Return what a rival takes off the squared unseen error, as a share and in standard errors.
+
+    Parameters
+    ----------
+    named, rival : Unseen
+        The model held against the rival, and the rival, both whole.
+
+    """
+    before = named.squares(named.predict(range(len(named.parts))))
+    after = rival.squares(rival.predict(range(len(rival.parts))))
+    gain = 1.0 - float(after.mean() / max(float(before.mean()), 1e-300))
     labels, others = named.trusted_labels(), rival.trusted_labels()
     names = np.intersect1d(labels, others)
     one = np.array([before[labels == n].mean() for n in names])
     two = np.array([after[others == n].mean() for n in names])
-    return steadiness(one, two)
+    return gain, steadiness(one, two)

@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What cases with known truths taught about how often an answer is right.
+
+`belief.json` holds the weights: for each level of an answer and each status a logistic function of
+a few signs. `weld-twin lab belief` fits and writes it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+SCHEMA = 'weld_twin/belief/1'
+FILE = 'belief.json'
+LEAST_LOGIT = 1e-3
+"""A probability that is taken as a sign is kept so far from 0 and 1: odds of a thousand."""
+AS_LOGIT = frozenset({'belief', 'place', 'dependence', 'name', 'leader', 'mass', 'complete'})
+"""Signs that are probabilities; their log odds add up, they do not."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """
+    What one sign adds to the log odds.
+
+    Attributes
+    ----------
+    weight : float
+        Nats per ``spread``.
+    middle, spread : float
+        Mean and standard deviation of the sign over the cases it was learned from.
+    low, high : float
+        Least and greatest value among those cases; beyond, nothing was learned.
+
+    """
+
+    weight: float
+    middle: float
+    spread: float
+    low: float
+    high: float
+
+    def nats(self, value: float) -> float:
+        """Return what it adds to the log odds."""
+        held = min(max(value, self.low), self.high)
+        return self.weight * (held - self.middle) / self.spread
+
+
+@dataclass(frozen=True)
+class Learned:
+    """
+    How often one level of an answer is right, as a function of signs.
+
+    Attributes
+    ----------
+    bias : float
+        Log odds where every sign is at its middle.
+    least, most : float
+        Probabilities beyond which so few cases allow no statement.
+    terms : mapping from str to Term
+        By the name of the sign.
+
+    """
+
+    bias: float
+    least: float
+    most: float
+    terms: Mapping[str, Term]
+
+    def probability(self, signs: Mapping[str, float]) -> float:
+        """
+        Return the probability of being right.
+
+        Parameters
+        ----------
+        signs : mapping from str to float
+            A sign that is missing counts as at its middle.
+
+        """
+        total = self.bias
+        for name, term in self.terms.items():
+            if name in signs:
+                total += term.nats(taken(name, signs[name]))
+        return float(np.clip(1.0 / (1.0 + np.exp(-total)), self.least, self.most))
+
+
+def taken(name: str, value: float) -> float:
+    """
+    Return a sign as it enters the log odds.
+
+    Parameters
+    ----------
+    name : str
+        Of the sign; a probability, or the second of a list of them, enters as log odds.
+    value : float
+
+    """
+    if name not in AS_LOGIT:
+        return value
+    held = min(max(value, LEAST_LOGIT), 1.0 - LEAST_LOGIT)
+    return float(np.log(held / (1.0 - held)))
+
+
+@dataclass(frozen=True)
+class Trust:
+    """
+    All that was learned.
+
+    Attributes
+    ----------
+    sure_from : mapping from str to float
+        By level ('answer', 'place', 'dependence', 'name'): the probability from which on it is
+        told as sure.
+    told_unsure : float
+        What an answer below is told as at the most.
+    levels : mapping from str to Learned
+        By level and group of status, as in 'answer named'.
+    card : mapping
+        Cases, seeds, engines, mix and bounds, to read.
+
+    """
+
+    sure_from: Mapping[str, float]
+    told_unsure: float
+    levels: Mapping[str, Learned]
+    card: Mapping[str, Any]
+
+    def told(self, level: str, group: str, signs: Mapping[str, float]) -> float | None:
+        """
+        Return how far to believe a level: not above ``told_unsure`` where it is not sure.
+
+        Parameters
+        ----------
+        level : str
+        group : str
+            Of the status, as `trusted.group_of` gives it.
+        signs : mapping from str to float
+
+        Returns
+        -------
+        float or None
+            None where nothing was learned of such answers.
+
+        """
+        learned = self.levels.get(f'{level} {group}')
+        if learned is None:
+            return None
+        probability = learned.probability(signs)
+        sure = probability >= self.sure_from.get(level, 1.0)
+        return probability if sure else min(probability, self.told_unsure)
+
+
+def trust_from(content: Mapping[str, Any]) -> Trust:
+    """
+    Return what was learned, from the content of a belief file.
+
+    Parameters
+    ----------
+    content : mapping
+        As ``weld-twin lab belief`` writes it.
+
+    """
+    levels = {
+        name: Learned(
+            level['bias'],
+            level['least'],
+            level['most'],
+            {sign: Term(**term) for sign, term in level['terms'].items()},
+        )
+        for name, level in content['levels'].items()
+    }
+    return Trust(content['sure_from'], content['told_unsure'], levels, content['card'])
+
+
+@lru_cache(maxsize=1)
+def usual_trust() -> Trust:
+    """Return what this package has learned."""
+    text = files(__package__).joinpath(FILE).read_text(encoding='utf-8')
+    return trust_from(json.loads(text))

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""An answer with what was learned about answers like it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+from ..result import Cause
+from ..verdict.decision import Verdict
+from .model import Trust
+from .signs import Signs
+
+Key = TypeVar('Key')
+NAMING = ('identified', 'ambiguous')
+
+
+def group_of(status: str) -> str:
+    """Return which answers are learned from together: those that name something are one group."""
+    return 'named' if status in NAMING else status
+
+
+def trusted(
+    verdict: Verdict, causes: Sequence[Cause], signs: Signs, trust: Trust
+) -> tuple[Verdict, tuple[Cause, ...]]:
+    """
+    Return a verdict and its causes with the probabilities that they have earned.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    causes : sequence of Cause
+    signs : Signs
+        Of the verdict and of its causes, in their order.
+    trust : Trust
+
+    """
+    told = tuple(
+        trusted_cause(cause, verdict.status, {**signs.answer, **own}, trust)
+        for cause, own in zip(causes, signs.causes, strict=True)
+    )
+    return trusted_verdict(verdict, signs.answer, trust), told
+
+
+def trusted_verdict(verdict: Verdict, signs: Mapping[str, float], trust: Trust) -> Verdict:
+    """
+    Return the verdict with the confidence that such verdicts have earned.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    signs : mapping from str to float
+        Of the answer.
+    trust : Trust
+
+    """
+    told = trust.told('answer', group_of(verdict.status), signs)
+    return verdict if told is None else replace(verdict, confidence=told)
+
+
+def trusted_cause(cause: Cause, status: str, signs: Mapping[str, float], trust: Trust) -> Cause:
+    """
+    Return a cause with the probabilities that its levels have earned.
+
+    Parameters
+    ----------
+    cause : Cause
+    status : str
+        Of the verdict.
+    signs : mapping from str to float
+        Of the answer and of this cause.
+    trust : Trust
+
+    """
+
+    group = group_of(status)
+    place, dependence, name = (
+        trust.told(level, group, signs) for level in ('place', 'dependence', 'name')
+    )
+    if len(cause.name) == 1 and name is not None:
+        # A name that is right is right about place and dependence as well.
+        place, dependence = (None if p is None else max(p, name) for p in (place, dependence))
+    return replace(
+        cause,
+        place=_led(cause.place, place),
+        dependence=_led(cause.dependence, dependence),
+        name=_scaled(cause.name, name),
+    )
+
+
+def _led(
+    listed: Sequence[tuple[Key, float]], first: float | None
+) -> tuple[tuple[Key, float], ...]:
+    """Return a list whose first has a probability, and the others the rest as they shared it."""
+    if first is None or not listed:
+        return tuple(listed)
+    (leader, own), *others = listed
+    room = (1.0 - first) / max(1.0 - own, 1e-9)
+    rest = [(key, min(p * room, first)) for key, p in others]
+    return ((leader, first), *rest)
+
+
+def _scaled(
+    listed: Sequence[tuple[Key, float]], total: float | None
+) -> tuple[tuple[Key, float], ...]:
+    """Return a list whose probabilities add up to a total, shared as they were."""
+    whole = sum(p for _, p in listed)
+    if total is None or whole <= 0.0:
+        return tuple(listed)
+    return tuple((key, p * total / whole) for key, p in listed)

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Belief is learned from cases made up with a law that is known."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from weld_twin_lab.belief.bound import bounded, upper_limit
+from weld_twin_lab.belief.judged import Example
+from weld_twin_lab.belief.learning import learned, trust_of
+from weld_twin_lab.belief.logistic import fitted
+from weld_twin_lab.belief.mix import SHARES, mixed
+
+
+def logistic(x):
+    return 1.0 / (1.0 + np.exp(-x))
+
+
+def examples(count, seed, slope=2.0):
+    """Return answers that are right by a law in one sign alone."""
+    rng = np.random.default_rng(seed)
+    margin = rng.standard_normal(count)
+    right = rng.random(count) < logistic(1.0 + slope * margin)
+    return [
+        Example(
+            f'{seed}/{k}', 'answer named', {'belief': 0.9, 'margin': m, 'left': n}, bool(r), 0.9
+        )
+        for k, (m, r, n) in enumerate(zip(margin, right, rng.standard_normal(count), strict=True))
+    ]
+
+
+def test_weights_come_back_from_many_cases():
+    rng = np.random.default_rng(1)
+    columns = rng.standard_normal((4000, 2))
+    right = rng.random(4000) < logistic(0.5 + columns @ [1.5, -0.7])
+    weights = fitted(columns, right, np.zeros(2), np.zeros(2), 1.0, np.ones(4000))
+    assert weights.bias == pytest.approx(0.5, abs=0.1)
+    assert weights.slopes == pytest.approx([1.5, -0.7], abs=0.15)
+
+
+def test_no_weight_gets_the_wrong_sign_and_without_news_the_prior_stays():
+    rng = np.random.default_rng(2)
+    columns = rng.standard_normal((300, 2))
+    right = rng.random(300) < logistic(-2.0 * columns[:, 0])
+    weights = fitted(columns, right, np.array([1.0, 0.0]), np.array([0.0, 0.8]), 1e6, np.ones(300))
+    assert weights.slopes == pytest.approx([0.0, 0.8], abs=0.01)
+
+
+def test_learned_belief_is_as_often_right_as_it_says():
+    trust = trust_of(examples(1500, 3))
+    told = np.array([trust.levels['answer named'].probability(e.signs) for e in examples(4000, 4)])
+    right = np.array([e.right for e in examples(4000, 4)])
+    for low in (0.1, 0.3, 0.5, 0.7, 0.9):
+        here = (told >= low) & (told < low + 0.1)
+        assert told[here].mean() == pytest.approx(right[here].mean(), abs=0.08)
+
+
+def test_sure_and_wrong_is_bounded_on_cases_never_seen():
+    trust = trust_of(examples(1500, 5, slope=4.0))
+    fresh = examples(4000, 6, slope=4.0)
+    sure = [trust.told('answer', 'named', e.signs) > 0.8 for e in fresh]
+    wrong = [s and not e.right for s, e in zip(sure, fresh, strict=True)]
+    assert np.mean(wrong) <= 0.01
+    assert np.mean(sure) > 0.2
+
+
+def test_too_few_cases_are_told_as_sure_of_nothing():
+    content = learned(examples(60, 7), {})
+    assert content['sure_from']['answer'] > 1.0
+    assert content['card']['bounds']['answer']['sure'] == 0.0
+
+
+def test_the_limit_is_where_so_few_wrong_ones_are_rare():
+    limit = upper_limit(2, 300, 0.1)
+    assert binom.cdf(2, 300, limit) == pytest.approx(0.1)
+
+
+def test_the_threshold_is_the_lowest_that_keeps_the_risk():
+    probability = np.linspace(0.5, 0.999, 1000)
+    right = probability > 0.7
+    bound = bounded(probability, right, 0.02, 0.1)
+    wrong = np.sum((probability >= bound.sure_from) & ~right)
+    assert bound.wrong == wrong
+    assert upper_limit(int(wrong), 1000, 0.1) <= 0.02 < upper_limit(int(wrong) + 12, 1000, 0.1)
+
+
+def test_the_mix_has_its_shares():
+    kinds = [lot.kind for lot in mixed(11, 88)]
+    assert {kind: kinds.count(kind) for kind in SHARES} == {k: 2 * n for k, n in SHARES.items()}

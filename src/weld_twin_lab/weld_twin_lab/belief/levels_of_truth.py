@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where a cause of the plant really sits, what it depends on, and what else may rightly be said.
+
+Causes in the library have their place and dependence from there. Constant errors that the
+kinematics of the arm makes one and the same error may be told at any of their places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.diagnosis.hypotheses.structural_aliases import same_error
+from weld_twin_core.effects.effect import Effect
+from weld_twin_core.effects.registry import REGISTRY
+
+from ..blind.ambiguous import Site
+
+HERE = 'its joint'
+OUTSIDE_LEVELS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    'bearing_tilt': ((HERE,), ('angle',)),
+    'station_step': (('instrument', 'base'), ('time',)),
+    'tool_slip': (('tool',), ('time',)),
+    'quadratic_scale': (('instrument',), ('place',)),
+    'column_bend': (('base',), ('time', 'temperature')),
+    'stick_slip': ((HERE,), ('direction', 'speed')),
+    'friction_wander': ((HERE,), ('direction', 'time')),
+    'loaded_play': ((HERE,), ('load', 'direction')),
+    'dress_pack': ((HERE,), ('angle',)),
+}
+"""Places and dependences of the causes outside the library; the first is the one meant."""
+ALSO: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    'drift': (('base', 'instrument'), ('time',)),
+    'payload': (('load', 'tool'), ('load',)),
+}
+"""The same for causes in the library whose place has more than one right word."""
+LAGGING = 'equal lag'
+"""Construction in which every joint lags alike: the clock is late, to whoever measures."""
+
+
+class Levels(NamedTuple):
+    """Right words for the place and for the dependence of one cause."""
+
+    places: frozenset[str]
+    dependences: frozenset[str]
+
+
+def levels_of(truth: Mapping[str, Any]) -> list[Levels]:
+    """
+    Return the right words for every cause of a case.
+
+    Parameters
+    ----------
+    truth : mapping
+        As `making.truth_of` gives it.
+
+    """
+    out = [_levels(str(effect), joint, str(truth['robot'])) for effect, joint in truth['sites']]
+    if truth['construction'] == LAGGING:
+        out = [Levels(own.places | {'clock'}, own.dependences) for own in out]
+    return out
+
+
+def alike_by_structure(robot: str, site: Site) -> frozenset[Site]:
+    """
+    Return the constant errors that are always the same error as one, itself included.
+
+    Parameters
+    ----------
+    robot : str
+        Of the catalogue.
+    site : (str, str or None)
+
+    """
+    return frozenset(_alike(robot, site))
+
+
+@lru_cache(maxsize=1024)
+def _alike(name: str, site: Site) -> tuple[Site, ...]:
+    effect, joint = site
+    kind = REGISTRY.get(effect)
+    if kind is None or not _constant(kind):
+        return (site,)
+    robot = catalog.load(name)
+    own = _built(kind, joint)
+    others = [other for other in _constants(robot) if same_error(robot, own, other)]
+    return tuple({site, *((other.name, other.site) for other in others)})
+
+
+@lru_cache(maxsize=1024)
+def _levels(effect: str, joint: str | None, robot: str) -> Levels:
+    if effect in OUTSIDE_LEVELS or effect in ALSO:
+        words, dependences = {**OUTSIDE_LEVELS, **ALSO}[effect]
+        own = {str(joint) if word == HERE else word for word in words}
+        return Levels(frozenset(own), frozenset(dependences))
+    kind = REGISTRY[effect]
+    places = {_built(REGISTRY[e], j).at for e, j in _alike(robot, (effect, joint))}
+    return Levels(frozenset(places), frozenset({kind.depends_on}))
+
+
+def _constant(kind: type[Effect]) -> bool:
+    return kind.cause and kind.depends_on == 'constant'
+
+
+def _constants(robot: Robot) -> Iterator[Effect]:
+    for kind in REGISTRY.values():
+        if _constant(kind):
+            joints: Sequence[str | None] = (
+                robot.joint_names if kind.of in ('joint', 'link') else (None,)
+            )
+            yield from (_built(kind, joint) for joint in joints)
+
+
+def _built(kind: type[Effect], joint: str | None) -> Any:
+    return kind(**({'joint': joint} if kind.of in ('joint', 'link') else {}))

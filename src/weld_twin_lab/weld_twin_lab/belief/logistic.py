@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Logistic regression with a ridge and with signs that weights may not change.
+
+A sign that should raise belief may not lower it because of chance in a few hundred cases: weights
+are bounded on one side of zero, which makes belief monotone in what is known to be good or bad
+news. The ridge pulls towards the belief that was there before.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+
+from weld_twin_core.arrays import Array
+
+
+class Weights(NamedTuple):
+    """Bias and weights, on columns of mean zero and spread one."""
+
+    bias: float
+    slopes: Array
+
+
+def fitted(
+    columns: Array, right: Array, signs: Array, prior: Array, ridge: float, weight: Array
+) -> Weights:
+    """
+    Return the weights of least penalised log loss.
+
+    Parameters
+    ----------
+    columns : array, shape (N, P)
+        Standardised.
+    right : array of bool, shape (N,)
+    signs : array, shape (P,)
+        1 where a weight may not be negative, -1 where it may not be positive, 0 where it is free.
+    prior : array, shape (P,)
+        Weights that the ridge pulls to.
+    ridge : float
+        Of half the squared distance from the prior, against log loss in nats.
+    weight : array, shape (N,)
+        Of every example.
+
+    """
+    target = np.asarray(right, dtype=float)
+    share = float(np.clip((weight * target).sum() / weight.sum(), 0.02, 0.98))
+
+    def loss(x: Array) -> tuple[float, Array]:
+        odds = x[0] + columns @ x[1:]
+        off = x[1:] - prior
+        value = (weight * (np.logaddexp(0.0, odds) - target * odds)).sum()
+        error = weight * (1.0 / (1.0 + np.exp(-odds)) - target)
+        slope = np.concatenate([[error.sum()], columns.T @ error + ridge * off])
+        return float(value + 0.5 * ridge * off @ off), slope
+
+    bounds = [(None, None)] + [
+        (0.0 if sign > 0 else None, 0.0 if sign < 0 else None) for sign in signs
+    ]
+    start = np.concatenate([[np.log(share / (1.0 - share))], prior])
+    found = minimize(loss, start, jac=True, bounds=bounds, method='L-BFGS-B')
+    return Weights(float(found.x[0]), np.asarray(found.x[1:]))
+
+
+def log_loss(probability: Array, right: Array, weight: Array) -> float:
+    """
+    Return the mean log loss in nats.
+
+    Parameters
+    ----------
+    probability, right, weight : array, shape (N,)
+
+    """
+    held = np.clip(probability, 1e-4, 1.0 - 1e-4)
+    loss = -np.where(np.asarray(right, dtype=bool), np.log(held), np.log(1.0 - held))
+    return float((weight * loss).sum() / weight.sum())

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The table of cases: one line of JSON each, so that belief is fitted anew without a diagnosis."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.whole_files import write_text
+
+DIGITS = 5
+"""Significant digits that are kept."""
+TRUTH = (
+    'kind',
+    'robot',
+    'motion',
+    'construction',
+    'sites',
+    'alike',
+    'ratios',
+    'excluded',
+    'orientation',
+    'richness',
+    'align',
+    'test',
+)
+VERDICT = ('status', 'confidence', 'indistinguishable', 'causes')
+
+
+def slim(row: Mapping[str, Any]) -> dict[str, Any]:
+    """
+    Return a row with what belief is learned from and judged by, and nothing else.
+
+    Parameters
+    ----------
+    row : mapping
+        As `trial.tried` gives it.
+
+    """
+    if row['error']:
+        return {'name': row['name'], 'error': row['error']}
+    out = dict(row)
+    out['truth'] = {'name': row['name'], **{key: row['truth'][key] for key in TRUTH}}
+    out['verdict'] = {key: row['verdict'][key] for key in VERDICT}
+    return dict(_rounded(out))
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f'{value:.{DIGITS}g}')
+    if isinstance(value, Mapping):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(item) for item in value]
+    return value
+
+
+def write_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
+    """
+    Write a table of cases.
+
+    Parameters
+    ----------
+    path : Path
+    rows : iterable of mappings
+        As `slim` gives them.
+
+    """
+    lines = (json.dumps(row, separators=(',', ':')) for row in rows)
+    write_text(path, '\n'.join(lines) + '\n', overwrite=True)
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """
+    Return a table of cases.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    DataError
+        There is no such table.
+
+    """
+    try:
+        text = path.read_text(encoding='utf-8')
+        rows = [json.loads(line) for line in text.splitlines() if line]
+    except (OSError, ValueError) as error:
+        raise DataError(f"the table of cases '{path}' cannot be read: {error}") from None
+    if not all(isinstance(row, dict) and 'name' in row for row in rows):
+        raise DataError(f"'{path}' is no table of cases")
+    return rows
+
+
+def seeds_of(rows: Sequence[Mapping[str, Any]]) -> list[int]:
+    """
+    Return the seeds that cases were drawn from.
+
+    Parameters
+    ----------
+    rows : sequence of mappings
+
+    """
+    return sorted({int(row['name'].partition('/')[0]) for row in rows})

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What learned belief is worth, as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from weld_twin_msgs_py.files import markdown
+
+COUNTED = frozenset({'breadth', 'seconds', 'fia', 'curve_removes'})
+"""Measures that are no shares of cases."""
+HEAD = (
+    'statements on',
+    'number',
+    'right',
+    'calibration error, by hand',
+    'learned',
+    'sure and wrong, by hand',
+    'learned',
+    'sure, by hand',
+    'learned',
+    'wrong among the surest 70 %, by hand',
+    'learned',
+)
+
+
+def page(result: Mapping[str, Any]) -> str:
+    """
+    Return the whole in Markdown.
+
+    Parameters
+    ----------
+    result : mapping
+        As `study.judged` gives it.
+
+    """
+    taught, tried = result['learned_from'], result['judged_on']
+    bound = taught['bounds']['answer']
+    intro = (
+        f'Learned from {taught["cases"]} cases of seed {_listed(taught["seeds"])}, judged on '
+        f'{tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was learned '
+        f'from. {_bound(bound)}'
+    )
+    levels = [(name, row) for name, row in result['levels'].items() if row['after']]
+    groups = [(name, row) for name, row in result['groups'].items() if row['after']]
+    return '\n'.join(
+        [
+            intro,
+            '',
+            markdown.table(HEAD, *(_row(name, row) for name, row in levels)),
+            'Answers as a whole:',
+            '',
+            markdown.table(HEAD, *(_row(name, row) for name, row in groups)),
+            'Beside the goals:',
+            '',
+            markdown.table(
+                ('measure', 'value', '95 % interval', 'cases', 'goal', 'reached'),
+                *(_goal(item) for item in result['goals']),
+            ),
+            *_failures(result['wrong_and_sure']),
+        ]
+    )
+
+
+def _bound(bound: Mapping[str, Any]) -> str:
+    if bound['sure_from'] > 1.0:
+        return (
+            f'With {bound["cases"]} cases no threshold keeps the bound, so nothing is told as '
+            'sure.'
+        )
+    return (
+        f'An answer is told as sure from {bound["sure_from"]:.3f} on: of {bound["cases"]} cases, '
+        f'each judged by weights that had not seen it, {100.0 * bound["sure"]:.0f} % were then '
+        f'sure and {bound["wrong"]} of them wrong, and at most {100.0 * bound["most"]:.2f} % of '
+        f'such cases are sure and wrong ({100.0 * (1.0 - bound["error"]):.0f} % confidence).'
+    )
+
+
+def _row(name: str, row: Mapping[str, Any]) -> tuple[str, ...]:
+    before, after = row['before'], row['after']
+    return (
+        name,
+        str(row['statements']),
+        _percent(row['right'] / row['statements']),
+        *(f'{told["ece"]["value"]:.3f}' for told in (before, after)),
+        *(_percent(told['sure_and_wrong']['value']) for told in (before, after)),
+        *(_percent(told['sure']['value']) for told in (before, after)),
+        *(_percent(told['wrong_at_70']) for told in (before, after)),
+    )
+
+
+def _goal(item: Mapping[str, Any]) -> tuple[str, ...]:
+    estimate, goal = item['estimate'], item['goal']
+    if estimate['value'] is None:
+        return (item['title'], '-', '-', '0', '-', '-')
+    show = _number if item['key'] in COUNTED else _percent
+    reached = {True: 'yes', False: 'no', None: ''}[item['reached']]
+    return (
+        item['title'],
+        show(estimate['value']),
+        f'{show(estimate["low"])} to {show(estimate["high"])}',
+        str(estimate['cases']),
+        '' if goal is None else f'{"≥" if item["at_least"] else "≤"} {show(goal)}',
+        reached,
+    )
+
+
+def _failures(listed: Sequence[Mapping[str, Any]]) -> list[str]:
+    if not listed:
+        return ['No case was sure and wrong.', '']
+    rows = [
+        (
+            item['case'],
+            item['kind'],
+            item['robot'],
+            item['motion'],
+            item['truth'],
+            ', '.join(f'{size:.1f}' for size in item['sizes']),
+            item['said'],
+        )
+        for item in listed
+    ]
+    head = ('case', 'kind', 'robot', 'motion', 'truth', 'sizes [noise]', 'said')
+    return ['Sure and wrong:', '', markdown.table(head, *rows)]
+
+
+def _percent(value: float) -> str:
+    return f'{100.0 * value:.1f} %'
+
+
+def _number(value: float) -> str:
+    return f'{value:.2f}'
+
+
+def _listed(values: Sequence[object]) -> str:
+    return ', '.join(map(str, values))

@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which signs each level is learned from, and which way each may count.
+
+1: more of it is good news, so its weight may not be negative; -1: bad news; 0: either. A level
+starts from what was believed of it before, the first of its signs.
+"""
+
+from __future__ import annotations
+
+_MOTION = {'moving': 1, 'wide': 1, 'rows': 1, 'static': 0, 'orientation': 1, 'aligned': -1}
+_LEFT = {
+    'left': -1,
+    'rise': -1,
+    'share': -1,
+    'structure_gain': -1,
+    'structure_sure': -1,
+    'after': -1,
+    'elsewhere': -1,
+}
+_NAMED = {
+    'mass': 1,
+    'leader': 1,
+    'margin': 1,
+    'apart': 1,
+    'near': -1,
+    'nats': 1,
+    'weakest': 1,
+    'strongest': 0,
+    'separate': -1,
+    'breadth': 0,
+    'alike': -1,
+    'cancel': -1,
+    'coordinates': -1,
+    'constants': 0,
+    'angles': 0,
+    'joints_shared': -1,
+    'glimpsed': -1,
+    'families': -1,
+    'curve_gain': -1,
+    'curve_sure': -1,
+    **_LEFT,
+    **_MOTION,
+}
+_CAUSE = {
+    'cause_share': 1,
+    'cause_size': 1,
+    'cause_spread': -1,
+    'cause_rank': -1,
+    'cause_count': -1,
+    'one_joint': 0,
+    'curve_gain': 0,
+    'curve_left': -1,
+    'breadth': 0,
+    'families': -1,
+    'constants': 0,
+    **_LEFT,
+    **_MOTION,
+}
+TERMS: dict[str, dict[str, int]] = {
+    'answer named': {'belief': 1, **_NAMED},
+    'answer unknown': {
+        'belief': 1,
+        'gap': 0,
+        'left': 1,
+        'after': 1,
+        'elsewhere': 0,
+        'structure_gain': 1,
+        'structure_sure': 1,
+        'curves': 0,
+        'curve_gain': 1,
+        'curve_sure': 1,
+        'separate': 0,
+        'refused': 0,
+        'cancel': 1,
+        'families': 0,
+        'weakest': 1,
+        'margin': 0,
+        **_MOTION,
+    },
+    'answer none': {
+        'belief': 1,
+        'gap': -1,
+        'after': -1,
+        'structure_gain': -1,
+        'structure_sure': -1,
+        'independent': 1,
+        **_MOTION,
+    },
+    'place named': {
+        'place': 1,
+        'place_second': -1,
+        'curve_at_place': 1,
+        'margin': 1,
+        'apart': 1,
+        **_CAUSE,
+    },
+    'place unknown': {
+        'place': 1,
+        'place_second': -1,
+        'curve_place': 1,
+        'curve_sure': 1,
+        **_CAUSE,
+    },
+    'dependence named': {
+        'dependence': 1,
+        'dependence_second': -1,
+        'curve_on_dependence': 1,
+        'margin': 1,
+        'apart': 1,
+        **_CAUSE,
+    },
+    'dependence unknown': {
+        'dependence': 1,
+        'dependence_second': -1,
+        'curve_sure': 1,
+        **_CAUSE,
+    },
+    'name named': {'name': 1, 'belief': 1, **_CAUSE, **_NAMED},
+}
+"""Signs of each level and group of status, with the way they may count."""
+RANGES = {'curve_gain': (-1.0, 1.0), 'curve_sure': (-3.0, 10.0), 'structure_sure': (-3.0, 10.0)}
+"""Signs that are cut before anything is learned: far outside only a bad fit is told."""

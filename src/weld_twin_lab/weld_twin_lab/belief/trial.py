@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One case drawn, diagnosed and held against its truth, in plain values."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from weld_twin_core.diagnosis import Diagnosis, diagnose
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.trust.signs import Signs
+from weld_twin_core.diagnosis.verdict.evidence import Evidence
+from weld_twin_core.effects.registry import effects_from_list
+from weld_twin_core.recording import Recording
+
+from ..blind import layout
+from ..blind.achieved import aligned_on, counted, gap_on
+from ..blind.blind_cell import as_recording, record
+from ..blind.diagnosing import engine_digest
+from ..blind.displacement import rms
+from ..blind.making import Case, truth_of
+from .mix import drawn
+
+
+def tried(seed: int, number: int) -> dict[str, Any]:
+    """
+    Return the row of one case: its truth, what was said of it, and the signs it was said on.
+
+    Parameters
+    ----------
+    seed, number : int
+        Of the case, as `mix.drawn` takes them.
+
+    """
+    name = f'{seed}/{number}'
+    try:
+        case, poor = drawn(seed, number)
+    except Exception as error:
+        return {'name': name, 'error': f'not drawn: {error}'}
+    row: dict[str, Any] = {
+        'name': name,
+        'poor': poor,
+        'engine': engine_digest()[:16],
+        'truth': truth_of(name, case),
+    }
+    start = time.process_time()
+    try:
+        told = _diagnosed(case)
+    except Exception as error:
+        return {**row, 'error': f'{type(error).__name__}: {error}'}
+    row['seconds'] = time.process_time() - start
+    return {**row, 'error': None, **said(told), 'sealed': _sealed(case, row['truth'], told)}
+
+
+def said(told: Diagnosis) -> dict[str, Any]:
+    """
+    Return a verdict and its signs in plain values.
+
+    Parameters
+    ----------
+    told : Diagnosis
+
+    """
+    whole = told.as_dict()
+    signs = told.signs if isinstance(told.signs, Signs) else Signs({})
+    return {
+        'verdict': whole['verdict'],
+        'unsound': [item['kind'] for item in whole['unsound']],
+        'signs': dict(signs.answer),
+        'cause_signs': [dict(item) for item in signs.causes],
+    }
+
+
+def _diagnosed(case: Case) -> Diagnosis:
+    cell = case.cell
+    train, holdout = (_recorded(case, use) for use in (layout.TRAIN, layout.HOLDOUT))
+    return diagnose(
+        [train],
+        cell.robot,
+        align=frozenset(cell.align),
+        known=effects_from_list([dict(item) for item in cell.known], cell.robot),
+        exclude=case.excluded,
+        holdout=[holdout],
+    )
+
+
+def _recorded(case: Case, use: str) -> Recording:
+    taken = {layout.TRAIN: case.train, layout.HOLDOUT: case.holdout, layout.TEST: case.test}[use]
+    return as_recording(use, record(case.cell, case.causes, taken))
+
+
+def _sealed(case: Case, truth: dict[str, Any], told: Diagnosis) -> dict[str, Any]:
+    """Return what is left on the recording that the diagnosis never saw, RMS [m]."""
+    if told.status == 'unsound':
+        return {}
+    test = _recorded(case, layout.TEST)
+    good = counted(test, truth['outliers'])
+    robot = case.cell.robot
+    bare = Model(robot, (robot.T_world_base,), told.model.known)
+    if case.cell.align:
+        train = _recorded(case, layout.TRAIN)
+        bare = aligned_on(bare, train, list(case.cell.align))
+
+    def left(model: Model) -> float:
+        return rms(gap_on(model, test)[good])
+
+    return {
+        'before': left(bare),
+        'after': left(told.model),
+        'floor': truth['floor_m'],
+        'members': _members(told, left),
+    }
+
+
+def _members(told: Diagnosis, left: Any) -> list[list[dict[str, Any]]]:
+    """Return what each member of every set leaves in its place, the rest as it is."""
+    if not isinstance(told.evidence, Evidence) or told.families:
+        return []
+    by_site = {r.site: r for slot in told.evidence.slots for r in slot}
+    out = []
+    for group in told.indistinguishable:
+        rivals: Sequence[Rival] = [by_site[site] for site in group if site in by_site]
+        out.append(
+            [
+                {
+                    'effect': r.site.effect,
+                    'joint': r.site.joint,
+                    'left': left(_for_one(told.model, r.fit.model)),
+                }
+                for r in rivals
+            ]
+        )
+    return out
+
+
+def _for_one(model: Model, other: Model) -> Model:
+    """Return a rival's model with the base of the first recording."""
+    return replace(other, bases=other.bases[:1], known=model.known)

@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far a diagnosis can be trusted: learned on cases with known truths, judged on others.
+
+Draws cases, diagnoses them, and fits for every level of an answer how often it is right, with the
+threshold from which it is told as sure. Writes belief.json (the file the diagnosis reads), what it
+is worth, pictures, and the table of cases: with --learn-from and --judge-on it is fitted anew from
+such tables without a diagnosis. Stopped, it goes on where it was when run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..blind_jobs.job_options import add_pool, runner_of
+
+LEARNED, JUDGED, STORE = 'cases.jsonl', 'held_out.jsonl', 'done'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        '--cases', type=int, default=0, metavar='N', help='cases to learn from (default: 0)'
+    )
+    parser.add_argument('--seed', type=int, default=1, metavar='S', help='their seed')
+    parser.add_argument(
+        '--held-out', type=int, default=0, metavar='N', help='cases to judge on (default: 0)'
+    )
+    parser.add_argument('--held-out-seed', type=int, default=2, metavar='S', help='their seed')
+    parser.add_argument(
+        '--learn-from', nargs='*', default=[], metavar='TABLE', help='tables kept from other runs'
+    )
+    parser.add_argument(
+        '--judge-on', nargs='*', default=[], metavar='TABLE', help='tables kept from other runs'
+    )
+    add_pool(parser)
+    parser.add_argument('--out', required=True, metavar='DIR', help='where everything goes')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Make what is not made yet, fit, judge, write and print the page."""
+    from weld_twin_core.errors import DataError
+
+    from ...belief import study
+    from ...belief.rows import read_rows, write_rows
+    from ...blind.simulator import require_simulator
+
+    if args.cases or args.held_out:
+        require_simulator()
+    if args.seed == args.held_out_seed:
+        raise DataError(
+            '--seed and --held-out-seed must differ: a case is learned from or judged on'
+        )
+    out = Path(args.out)
+    taught = [row for table in args.learn_from for row in read_rows(Path(table))]
+    tried = [row for table in args.judge_on for row in read_rows(Path(table))]
+    with runner_of(args, out / STORE, 'diagnosing') as runner:
+        taught += study.rows_of(args.seed, args.cases, runner)
+        tried += study.rows_of(args.held_out_seed, args.held_out, runner)
+    _refuse_shared(taught, tried)
+    write_rows(out / LEARNED, taught)
+    write_rows(out / JUDGED, tried)
+    content = study.fit(taught)
+    print(study.write(out, content, tried), end='')
+    return 0
+
+
+def _refuse_shared(taught: list[dict[str, object]], tried: list[dict[str, object]]) -> None:
+    """Refuse cases that are learned from and judged on."""
+    from weld_twin_core.errors import DataError
+
+    shared = {row['name'] for row in taught} & {row['name'] for row in tried}
+    if shared:
+        raise DataError(
+            f'case {min(map(str, shared))} is in a table to learn from and in one to judge on'
+        )
+    if not taught or not tried:
+        raise DataError(
+            'there are no cases to learn from, or none to judge on; give --cases and --held-out, '
+            'or --learn-from and --judge-on'
+        )

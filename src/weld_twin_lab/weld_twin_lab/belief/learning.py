@@ -18,7 +18,10 @@ from .logistic import Weights, fitted, log_loss
 from .terms import RANGES, TERMS
 
 RIDGES = (3.0, 10.0, 30.0, 100.0, 300.0)
+"""Ridges tried, in nats for weights one away from the prior: from as free as a few hundred cases
+allow to hardly moved. The one that predicts unseen folds best is taken."""
 FOLDS = 8
+"""Parts of the cases that take turns in being unseen."""
 FEWEST = 20
 """Examples of a level from which on it is learned at all."""
 RISK, ERROR = 0.01, 0.1

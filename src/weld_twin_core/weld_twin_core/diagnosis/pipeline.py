@@ -15,6 +15,7 @@ from .algebra.problem import frames_named
 from .answer.answer import answer
 from .answer.refusal import refusal
 from .beliefs import Beliefs
+from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
 from .hypotheses.search import search
 from .hypotheses.structural_aliases import with_structural_aliases
@@ -45,6 +46,7 @@ def diagnose(
     holdout: Sequence[Recording] = (),
     beliefs: Beliefs | None = None,
     apply: bool = False,
+    may_change: str | Iterable[str] = (),
     progress: Progress = lambda text: None,
 ) -> Diagnosis:
     """
@@ -71,6 +73,10 @@ def diagnose(
     apply : bool
         Where data or set-up are wrong in a way that can be undone: undo it and go on. Otherwise
         the answer is then 'unsound' and says what is wrong.
+    may_change : str or iterable of str
+        Constant errors that may differ between the recordings, with commas between or in a list:
+        'joint_offset,tool_pose,base_pose'. They are fitted along, and ``changed`` says what the
+        later recordings have that the first has not.
     progress : callable
         Told in a few words what has been done.
 
@@ -85,7 +91,8 @@ def diagnose(
     DataError
         The data cannot be diagnosed; the message says what to mend.
     ModelError
-        ``align`` names something else than base and tool.
+        ``align`` names something else than base and tool, or ``may_change`` an error that is not
+        constant.
 
     Examples
     --------
@@ -108,8 +115,8 @@ def diagnose(
     beliefs = beliefs or Beliefs()
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     refuse_reused(recordings, holdout)
-    given = Given(recordings, robot, frames_named(align))
-    examined = examine(given, known, apply=apply)
+    given = Given(recordings, robot, frames_named(align), families_named(may_change))
+    examined = examine(given, known, apply=apply, beliefs=beliefs)
     progress('data checked')
     if examined.posed is None:
         return refusal(examined)
@@ -127,6 +134,7 @@ def _explained(
     assert examined.posed is not None
     found = search(*examined.posed, exclude, beliefs, progress)
     found = fitted_together(found, exclude, beliefs, progress)
+    found = settled_between(found, examined.given.may_change, beliefs)
     found = with_structural_aliases(found, exclude, beliefs)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     leftover = structure(unseen, found.final.model, beliefs)

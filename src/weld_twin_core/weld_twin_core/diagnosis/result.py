@@ -124,6 +124,40 @@ class Found:
         return {'effect': name, 'joint': joint, 'parameters': entry, 'std': self.std}
 
 
+@dataclass(frozen=True, eq=False)
+class Changed:
+    """
+    What one recording has that the first has not.
+
+    Attributes
+    ----------
+    recording : int
+        Counted from 0.
+    effect : Effect
+        By how much; a model of the first recording's arm with it is the arm of this one.
+    std : dict
+        Standard errors by parameter.
+
+    """
+
+    recording: int
+    effect: Effect
+    std: dict[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of ``changed``; a lone parameter is given as a plain number."""
+        value = self.effect.to_mapping()
+        name, joint = value.pop('effect'), value.pop('joint', None)
+        lone = len(value) == 1
+        return {
+            'recording': self.recording,
+            'effect': name,
+            'joint': joint,
+            'value': next(iter(value.values())) if lone else value,
+            'std': next(iter(self.std.values())) if lone else self.std,
+        }
+
+
 @dataclass(frozen=True)
 class Site:
     """A family on a joint (None: the robot as a whole)."""
@@ -345,6 +379,10 @@ class Diagnosis:
     shares: Shares = Shares(0.0, 0.0)
     unsound: tuple[Unsound, ...] = ()
     """Mistakes found in data and set-up; all of them undone unless the status is 'unsound'."""
+    changed: tuple[Changed, ...] = ()
+    """What differs between the recordings, of what was said to be able to."""
+    may_change: tuple[str, ...] = ()
+    """What was said to be able to differ."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
@@ -362,6 +400,7 @@ class Diagnosis:
             'checks': [dict(vars(check)) for check in self.checks],
             'not_considered': dict(self.absent),
             'model': self._model() if sound else None,
+            'changed': [item.as_dict() for item in self.changed],
             'posterior': None if self.posterior is None else as_dict(self.posterior),
         }
 

@@ -13,6 +13,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 
 from .cause_levels import levels_section
 from .cause_list import causes_section
+from .changed_section import changed_section
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
 from .headline import header, opening
@@ -55,6 +56,7 @@ def _causes(diagnosis: Diagnosis) -> tuple[Html | None, ...]:
         levels_section(diagnosis),
         where_section(diagnosis),
         causes_section(diagnosis),
+        changed_section(diagnosis),
         shrink_section(diagnosis),
         next_section(diagnosis),
     )

@@ -13,6 +13,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from ..offline.where_it_holds import where_it_holds
 from .cause_levels import LEVEL_HEADS, level_row
+from .changed_section import CHANGED_HEADS, changed_rows, nothing_changed
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows, worth_doing
 from .quantities import change, millimetres, odds, parameter_rows
 from .words import STATUS, found_name, listed, mended, site_name, verdict
@@ -47,6 +48,7 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     elif len(diagnosis.candidates) > 1:
         console.print(_candidates(diagnosis))
     _print_sets(diagnosis, console)
+    _print_changed(diagnosis, console)
     for check in diagnosis.checks:
         if check.level == 'warning':
             console.print(f'[yellow]data:[/] {escape(check.sentence)}')
@@ -56,6 +58,22 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     _print_holds(diagnosis, console)
     for action in worth_doing(diagnosis):
         console.print(f'[bold]do:[/] {escape(action)}')
+
+
+def _print_changed(diagnosis: Diagnosis, console: Console) -> None:
+    """Print what changed between the recordings, where that was asked."""
+    if not diagnosis.may_change or len(diagnosis.recordings) < 2:
+        return
+    if not diagnosis.changed:
+        console.print(escape(nothing_changed(diagnosis)))
+        return
+    title = f'changed since {diagnosis.recordings[0].name}'
+    table = Table(box=None, title=escape(title), title_justify='left', pad_edge=False)
+    for head in CHANGED_HEADS:
+        table.add_column(head, header_style='dim', overflow='fold')
+    for row in changed_rows(diagnosis):
+        table.add_row(*(escape(cell) for cell in row))
+    console.print(table)
 
 
 def _print_holds(diagnosis: Diagnosis, console: Console) -> None:

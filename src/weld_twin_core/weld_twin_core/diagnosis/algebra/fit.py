@@ -109,7 +109,7 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
     model : Model
         What is believed so far; everything is taken about it.
     step : array, shape (P,)
-        Of base and tool frames (xyz, rotvec) and fit coordinates.
+        Of base and tool frames (xyz, rotvec), changes between recordings, and fit coordinates.
 
     """
     at = 0
@@ -120,12 +120,15 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
     if 'tool' in problem.align:
         model = model.retooled(step[at : at + 6])
         at += 6
-    found = []
-    for effect in model.found:
+    effects = []
+    for effect in (*(change.effect for change in model.changes), *model.found):
         now = effect.coordinates()
-        found.append(effect.with_coordinates(now + step[at : at + now.size]))
+        effects.append(effect.with_coordinates(now + step[at : at + now.size]))
         at += now.size
-    return model.with_found(tuple(found))
+    own = len(model.changes)
+    pairs = zip(model.changes, effects[:own], strict=True)
+    changes = tuple(change._replace(effect=effect) for change, effect in pairs)
+    return replace(model, changes=changes, found=tuple(effects[own:]))
 
 
 def coordinates(model: Model) -> Array:

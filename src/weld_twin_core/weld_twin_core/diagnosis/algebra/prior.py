@@ -34,8 +34,18 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     """
     Return the prior precision of the frame columns, and how far the frames are off, (F,) each.
 
-    In the order of `Problem.frame_columns`; nothing is believed without an anchor.
+    In the order of `Problem.frame_columns`; nothing is believed of frames without an anchor.
+    What may differ between recordings is believed to be as large as in a machine.
     """
+    precision, off = _anchored(problem, model)
+    spread = [spreads(model.robot, change.effect) for change in model.changes]
+    now = [change.effect.coordinates() for change in model.changes]
+    own = np.concatenate([np.zeros(0), *spread]) ** -2.0 if spread else np.zeros(0)
+    return np.concatenate([precision, own]), np.concatenate([off, *now])
+
+
+def _anchored(problem: Problem, model: Model) -> tuple[Array, Array]:
+    """Return the prior precision of base and tool, and how far they are from the anchor."""
     pairs: list[tuple[Array, Array, bool]] = []
     anchor = problem.anchor
     count = 6 * (('base' in problem.align) * len(model.bases) + ('tool' in problem.align))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,6 +60,22 @@ class Scale:
     weights: tuple[Array, ...]
 
 
+class Change(NamedTuple):
+    """
+    What one recording has that the first has not, counted from the first.
+
+    Attributes
+    ----------
+    recording : int
+        Counted from 0; never 0.
+    effect : Effect
+
+    """
+
+    recording: int
+    effect: Effect
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """
@@ -72,6 +89,8 @@ class Model:
         Effects given by the user, and those this diagnosis put in.
     mended : tuple of str
         What was wrong with the data it stands on, and was undone.
+    changes : tuple of Change
+        What differs between the recordings.
 
     """
 
@@ -80,10 +99,16 @@ class Model:
     known: tuple[Effect, ...] = ()
     found: tuple[Effect, ...] = ()
     mended: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""
-        return Twin(self.robot.with_frames(base=self.bases[k]), self.known + self.found)
+        effects = self.known + self.found + self.changed(k)
+        return Twin(self.robot.with_frames(base=self.bases[k]), effects)
+
+    def changed(self, k: int) -> tuple[Effect, ...]:
+        """Return what recording k has that the first has not."""
+        return tuple(change.effect for change in self.changes if change.recording == k)
 
     def moved(self, k: int, step: Array) -> Model:
         """Return the model with the base of recording k moved by (xyz, rotvec)."""
@@ -144,6 +169,8 @@ class Problem:
         Where those frames are believed to be; see `prior`.
     dated : tuple of Effect
         What may have set in at an instant that was found: hypotheses beside the library's.
+    changes : tuple of Change
+        What may differ between the recordings: fitted along in every hypothesis, as frames are.
 
     """
 
@@ -151,6 +178,7 @@ class Problem:
     align: frozenset[str] = field(default_factory=frozenset)
     anchor: Anchor | None = None
     dated: tuple[Effect, ...] = ()
+    changes: tuple[Change, ...] = ()
 
     @property
     def rows(self) -> tuple[int, ...]:
@@ -218,8 +246,21 @@ class Problem:
                 kind, _, j = name.partition('.')
                 if kind == f'base {k}' or kind == 'tool':
                     block[p] = maker.column((kind.split()[0], int(j)))[: self.rows[k]]
-            parts.append(block)
+            parts.append(np.concatenate([block, *self._change_columns(k, maker)]))
+        sizes = [change.effect.coordinates().size for change in self.changes]
+        names += [f'change {i}.{j}' for i, size in enumerate(sizes) for j in range(size)]
         return parts, names
+
+    def _change_columns(self, k: int, maker: Features) -> list[Array]:
+        """Return the columns of every change in recording k, zero for those of the others."""
+        out = []
+        for change in self.changes:
+            if change.recording == k:
+                out.append(maker.columns(change.effect, atoms=False)[:, : self.rows[k]])
+            else:
+                size = change.effect.coordinates().size
+                out.append(np.zeros((size, self.rows[k], self.samples[k])))
+        return out
 
     def effect_columns(
         self, features: list[Features], effect: Effect, *, atoms: bool = True

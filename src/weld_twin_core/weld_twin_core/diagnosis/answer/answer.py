@@ -21,6 +21,7 @@ from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
+from .changed import changed, untold_check
 from .gap import gap, traces
 from .named_effects import named_effects
 from .weighed_candidates import unexplained, weighed_candidates
@@ -81,7 +82,7 @@ def answer(
         unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, rival),
         next_experiment=next_step(found, verdict),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
-        checks=examined.checks,
+        checks=(*examined.checks, *untold_check(found, examined.given.may_change)),
         model=found.final.model,
         traces=traces(found),
         absent=found.library.absent,
@@ -93,4 +94,6 @@ def answer(
         shares=shares,
         unsound=examined.told(found.final.model.found),
         signs=known,
+        changed=changed(found, examined.given.may_change),
+        may_change=examined.given.may_change,
     )

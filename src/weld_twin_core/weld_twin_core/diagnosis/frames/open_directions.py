@@ -10,6 +10,7 @@ frames explain the recordings as well, they stand.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ..algebra.fit import Fit, coordinates, design, fit, stepped
 from ..algebra.independent_rows import effective_share
-from ..algebra.prior import frame_offset
+from ..algebra.prior import frame_offset, frame_prior
 from ..algebra.problem import Model, Problem, Scale
 
 VISIBLE = (1e-3, 5e-3)
@@ -53,7 +54,7 @@ class Open(NamedTuple):
 
 def open_directions(problem: Problem, model: Model) -> Open:
     """Return the directions of the aligned frames in which a visible error would not show."""
-    problem = problem.thinned(ROWS)
+    problem = replace(problem.thinned(ROWS), changes=())
     parts, names = problem.frame_columns(problem.features(model))
     if not names:
         return Open(names, np.zeros((0, 0)))
@@ -83,7 +84,8 @@ def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Ro
         return found
     off, weight = _off(problem, found.model, given)
     back = np.linalg.lstsq(weight[:, None] * free.vectors, -weight * off, rcond=1e-9)[0]
-    step = np.concatenate([free.vectors @ back, np.zeros(found.coordinates.size)])
+    count = _between(found.model) + found.coordinates.size
+    step = np.concatenate([free.vectors @ back, np.zeros(count)])
     model = stepped(problem, found.model, step)
     for _ in range(ROUNDS):
         model = stepped(problem, model, _closed_step(problem, model, scale, precision, free))
@@ -93,6 +95,11 @@ def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Ro
     if residual @ residual > found.rss + most:
         return found
     return fit(problem, model, scale, precision if precision.size else None, iterations=0)
+
+
+def _between(model: Model) -> int:
+    """Return the number of coordinates of what differs between the recordings."""
+    return sum(change.effect.coordinates().size for change in model.changes)
 
 
 def _off(problem: Problem, model: Model, given: Robot) -> tuple[Array, Array]:
@@ -117,7 +124,9 @@ def _closed_step(
     """Return a least-squares step, shape (P,), that leaves the open directions where they are."""
     columns, _ = design(problem, model, scale)
     residual = problem.whitened(problem.residuals(model), scale)
-    frames, x = len(free.names), coordinates(model)
+    frames = len(free.names)
+    own, moved = frame_prior(problem, model)
+    x = np.concatenate([moved[frames:], coordinates(model)])
     size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in free.names])
     span, _, _ = np.linalg.svd(free.vectors / size[:, None])
     closed = size[:, None] * span[:, free.vectors.shape[1] :]
@@ -127,9 +136,9 @@ def _closed_step(
     mixed = allowed.T @ columns
     ridge = np.zeros(mixed.shape[0])
     pull = np.zeros(mixed.shape[0])
-    if precision.size:
-        ridge[closed.shape[1] :] = precision
-        pull[closed.shape[1] :] = precision * x
+    held = precision if precision.size else np.zeros(coordinates(model).size)
+    ridge[closed.shape[1] :] = np.concatenate([own[frames:], held])
+    pull[closed.shape[1] :] = ridge[closed.shape[1] :] * x
     norm = np.sqrt((mixed**2).sum(axis=1) + ridge)
     norm[norm == 0.0] = 1.0
     unit = mixed / norm[:, None]

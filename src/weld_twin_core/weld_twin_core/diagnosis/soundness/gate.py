@@ -15,8 +15,10 @@ from dataclasses import dataclass, replace
 from ...effects.effect import Effect
 from ...recording import Recording
 from ..algebra.problem import Model, Problem
+from ..beliefs import Beliefs
 from ..frames.aligned import aligned
 from ..frames.alignment import refined
+from ..frames.changes import with_changes
 from ..result import Check, Unsound
 from .checks import CHECKS
 from .evidence import Case, Mistake
@@ -72,7 +74,13 @@ class Examined:
         return tuple(velocities_checked(recording) for recording in out.recordings)
 
 
-def examine(given: Given, known: Sequence[Effect] = (), *, apply: bool = False) -> Examined:
+def examine(
+    given: Given,
+    known: Sequence[Effect] = (),
+    *,
+    apply: bool = False,
+    beliefs: Beliefs | None = None,
+) -> Examined:
     """
     Return what is wrong with data and set-up.
 
@@ -83,6 +91,8 @@ def examine(given: Given, known: Sequence[Effect] = (), *, apply: bool = False) 
         In the twin from the start.
     apply : bool
         Go on with mended data where every mistake can be undone.
+    beliefs : Beliefs, optional
+        What a difference between recordings must be worth; the usual ones when left out.
 
     Raises
     ------
@@ -98,6 +108,7 @@ def examine(given: Given, known: Sequence[Effect] = (), *, apply: bool = False) 
         posed = None
         if not found:
             posed = aligned(trial.recordings, trial.robot, trial.align, _kept(known, given, trial))
+            posed = with_changes(*posed, trial.may_change, beliefs or Beliefs())
             checks, found, dated = _checked(*posed)
         told = {mistake.sentence for mistake in mistakes}
         fresh = [mistake for mistake in found if mistake.sentence not in told]

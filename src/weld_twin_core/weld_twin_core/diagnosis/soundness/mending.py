@@ -26,12 +26,15 @@ class Given:
     robot : Robot
     align : frozenset of str
         Frames to be fitted: 'base', 'tool'.
+    may_change : tuple of str
+        Families that may differ between the recordings.
 
     """
 
     recordings: tuple[Recording, ...]
     robot: Robot
     align: frozenset[str] = frozenset()
+    may_change: tuple[str, ...] = ()
 
 
 Mend = Callable[[Given], Given]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def _one_way(case: Case) -> Iterator[Finding]:
 
 def _frames(case: Case) -> Iterator[Finding]:
     """Report directions of the frames in which an error would not show."""
-    problem = case.problem.thinned(3000)
+    problem = replace(case.problem.thinned(3000), changes=())
     parts, names = problem.frame_columns(problem.features(case.model))
     columns = problem.whitened(parts, problem.unit_scale())
     if not len(names):

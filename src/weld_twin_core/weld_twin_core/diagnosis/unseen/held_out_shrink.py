@@ -150,10 +150,10 @@ def _for_bag(
         Model(
             model.robot,
             (base,),
-            model.known,
+            model.known + model.changed(k),
             seen_from(model.found, own.epoch_ns, own.span_ns, recording),
         )
-        for base, own in zip(model.bases, recordings, strict=True)
+        for k, (base, own) in enumerate(zip(model.bases, recordings, strict=True))
     ]
     sizes = [_size(problem, choice) for choice in choices]
     best = choices[int(np.argmin(sizes))]

@@ -65,6 +65,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='families left out of the library',
     )
     parser.add_argument(
+        '--may-change',
+        default='',
+        metavar='NAMES',
+        help='errors that may differ between the recordings, such as '
+        'joint_offset,tool_pose,base_pose: says what changed since the first',
+    )
+    parser.add_argument(
         '--apply',
         action='store_true',
         help='where data or set-up are wrong and one correction explains it: make it and go on',
@@ -93,11 +100,16 @@ def run(args: argparse.Namespace) -> int:
 def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.diagnosis import diagnose
     from weld_twin_core.diagnosis.algebra.problem import frames_named
+    from weld_twin_core.diagnosis.frames.changes import families_named
+    from weld_twin_core.errors import ModelError
     from weld_twin_msgs_py.bags import read_recording
 
     from ...offline.told_twin import build_twin
 
     align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
+    changing = families_named(args.may_change, '--may-change')
+    if changing and len(args.bags) < 2:
+        raise ModelError('--may-change compares recordings; give two or more bags of one arm')
     twin = build_twin(robot_of(args), args.effects_known)
     topics = topics_of(args)
     with _progress() as tell:
@@ -115,6 +127,7 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             exclude=excluded,
             holdout=_bounded(recordings[count:]),
             apply=args.apply,
+            may_change=changing,
             progress=tell,
         )
 

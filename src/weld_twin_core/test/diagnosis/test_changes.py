@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Several recordings of one arm: what changed between them, and that nothing did."""
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.diagnosis.algebra.fit import robust_scale
+from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.frames.changes import told, untold, with_changes
+from weld_twin_core.effects import REGISTRY, JointOffset, LinkTwist, ToolPose
+from weld_twin_core.errors import ModelError
+
+NOISE = 3e-5
+COMMON = (JointOffset('elbow_joint', 8e-4), LinkTwist('shoulder_lift_joint', 6e-4))
+ALL = ('joint_offset', 'tool_pose', 'base_pose')
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return wt.load('ur5')
+
+
+def day(robot, seed, *changed, base=(0.0, 0.0, 0.0), turned=False):
+    """Return sixty stations of one arm on one day."""
+    rng = np.random.default_rng(seed)
+    middle = np.array([0.0, -1.2, 1.3, -1.2, -1.5, 0.0])
+    t = 5.0 * np.arange(60)
+    stations = wt.JointMotion(t, middle + rng.uniform(-0.8, 0.8, (60, 6)), static=True)
+    placed = np.array(robot.T_world_base)
+    placed[:3, 3] += base
+    commanded = wt.Recording(f'day {seed}', stations)
+    poses = wt.Twin(robot.with_frames(base=placed), (*COMMON, *changed)).poses(commanded, t)
+    noise = NOISE * rng.standard_normal(poses.position.shape)
+    rotation = poses.rotation if turned else None
+    return commanded.with_measured(wt.Measurements(t, poses.position + noise, rotation))
+
+
+def seen(robot, recordings, families, align=''):
+    """Return what is told to have changed, on top of the errors that all have in common."""
+    problem, model = aligned(recordings, robot, align, COMMON)
+    problem, model = with_changes(problem, model, families, Beliefs())
+    scale = robust_scale(problem, problem.residuals(model))
+    return told(problem, model, scale, np.zeros(0), families)
+
+
+def test_nothing_changed(robot):
+    """Noise alone is no change, with frames known and fitted."""
+    pair = [day(robot, 1), day(robot, 2)]
+    assert seen(robot, pair, ALL) == ()
+    assert seen(robot, pair, ('joint_offset',), 'base,tool') == ()
+
+
+@pytest.mark.parametrize('align', ['', 'base', 'base,tool'])
+def test_a_joint_that_was_mastered_anew(robot, align):
+    """Joint, recording and value are right, within what its standard error says."""
+    found = seen(
+        robot, [day(robot, 1), day(robot, 2, JointOffset('elbow_joint', 1e-3))], ALL[:2], align
+    )
+    (only,) = found
+    assert (only.change.recording, only.change.effect.site) == (1, 'elbow_joint')
+    std = float(np.sqrt(only.covariance[0, 0]))
+    assert 1e-6 < std < 1e-4
+    assert only.change.effect.offset == pytest.approx(1e-3, abs=4 * std)
+
+
+def test_another_tool(robot):
+    """A tool that was changed by centimetres is no crowd of outliers."""
+    (only,) = seen(robot, [day(robot, 1), day(robot, 2, ToolPose((5e-2, 0, 2e-3)))], ALL, 'base')[
+        :1
+    ]
+    assert only.change.effect.name == 'tool_pose'
+    assert only.change.effect.xyz == pytest.approx((5e-2, 0.0, 2e-3), abs=1e-4)
+
+
+def test_bases_that_are_fitted_are_compared(robot):
+    """The instrument stood elsewhere: told by how much, although bases are fitted anyway."""
+    (only,) = seen(robot, [day(robot, 1), day(robot, 2, base=(2e-3, 0, 1e-3))], ALL, 'base')
+    assert only.change.effect.name == 'base_pose'
+    assert only.change.effect.xyz == pytest.approx((2e-3, 0.0, 1e-3), abs=1e-4)
+
+
+def test_the_third_recording_alone(robot):
+    """What changed is put to the recording that has it."""
+    days = [day(robot, 1), day(robot, 2), day(robot, 3, JointOffset('wrist_1_joint', -8e-4))]
+    (only,) = seen(robot, days, ALL)
+    assert (only.change.recording, only.change.effect.site) == (2, 'wrist_1_joint')
+
+
+def test_what_cannot_be_told_is_listed(robot):
+    """A base that is fitted takes the place of the zero of the first joint."""
+    problem, model = aligned([day(robot, 1), day(robot, 2)], robot, 'base', COMMON)
+    names = untold(problem, model, ('joint_offset',))
+    assert 'joint_offset of shoulder_pan_joint' in names
+    assert 'joint_offset of elbow_joint' not in names
+
+
+def test_one_recording_changes_nothing(robot):
+    """There is nothing to compare a lone recording with."""
+    problem, model = aligned([day(robot, 1)], robot, '', COMMON)
+    assert with_changes(problem, model, ALL, Beliefs()) == (problem, model)
+    assert isinstance(problem, Problem)
+
+
+def test_only_constant_errors_may_change(robot):
+    """Play that grew is no constant error; the sentence lists those that are."""
+    with pytest.raises(ModelError, match="may_change: 'backlash' is no error that stays the same"):
+        wt.diagnose([day(robot, 1), day(robot, 2)], robot, may_change='backlash')
+
+
+def test_a_whole_diagnosis(robot):
+    """The common errors are the verdict, the change stands beside them."""
+    pair = [day(robot, 1), day(robot, 2, JointOffset('elbow_joint', 1e-3))]
+    rest = [name for name in REGISTRY if name not in ('joint_offset', 'link_twist')]
+    found = wt.diagnose(pair, robot, exclude=rest, may_change='joint_offset, tool_pose')
+    assert {(f.effect.name, f.effect.site) for f in found.effects} == {
+        (e.name, e.site) for e in COMMON
+    }
+    (entry,) = found.as_dict()['changed']
+    assert (entry['recording'], entry['joint']) == (1, 'elbow_joint')
+    assert entry['value'] == pytest.approx(1e-3, abs=5e-5)
+    assert 0.0 < entry['std'] < 5e-5

@@ -1,0 +1,363 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What differs between recordings of one arm: a short list of what may, held against noise.
+
+The first recording is what the others are compared with. Every error allowed to differ is a
+candidate in each later recording; those worth more than they cost are fitted along with the
+frames, in every hypothesis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...effects import REGISTRY
+from ...effects.effect import Effect
+from ...effects.plausible import spreads
+from ...errors import ModelError
+from ...twin.features import joints_of
+from ..algebra.fit import coordinates, design, fit, robust_fit, robust_scale
+from ..algebra.independent_rows import effective_share
+from ..algebra.prior import effect_precision, frame_offset, frame_prior
+from ..algebra.problem import Change, Model, Problem, Scale
+from ..beliefs import Beliefs
+from ..hypotheses.search import Search
+
+BLOCKS = 24
+"""Stretches whose scores are held apart: enough to tell a variance to a third."""
+ROWS = 9000
+"""Rows on which changes are chosen."""
+SURE = 3.0
+"""A change is told from this many standard errors on; of several numbers, the root of their mean
+chi-square. One in four hundred by chance."""
+UNTOLD = 0.9
+"""A coordinate whose spread after the data is this share of that before is not shown by them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A change with its standard errors, in the shape of its parameters."""
+
+    change: Change
+    covariance: Array
+
+    @property
+    def sure(self) -> bool:
+        """Return whether it stands out of the noise."""
+        value = self.change.effect.coordinates()
+        chi = float(value @ np.linalg.pinv(self.covariance, hermitian=True) @ value)
+        return chi > SURE**2 * value.size
+
+
+def families_named(given: str | Iterable[str], what: str = 'may_change') -> tuple[str, ...]:
+    """
+    Return the families that may differ between recordings.
+
+    Parameters
+    ----------
+    given : str or iterable of str
+        Names with commas between, or several names; nothing for none.
+    what : str
+        How the message names the argument.
+
+    Raises
+    ------
+    ModelError
+        A name is no effect, or one that is not constant.
+
+    """
+    parts = given.split(',') if isinstance(given, str) else given
+    names = tuple(dict.fromkeys(name for part in parts if (name := str(part).strip())))
+    constant = sorted(n for n, kind in REGISTRY.items() if kind.cause and _constant(kind))
+    for name in names:
+        if name not in constant:
+            raise ModelError(
+                f'{what}: {name!r} is no error that stays the same during a recording; those are '
+                + ', '.join(constant)
+            )
+    return names
+
+
+def _constant(kind: type[Effect]) -> bool:
+    return kind.depends_on == 'constant' and not kind.dated
+
+
+def with_changes(
+    problem: Problem,
+    model: Model,
+    families: Sequence[str],
+    beliefs: Beliefs,
+    precision: Array | None = None,
+) -> tuple[Problem, Model]:
+    """
+    Return problem and model with what differs between the recordings, fitted.
+
+    Parameters
+    ----------
+    problem : Problem
+        Several recordings; with fewer nothing changes.
+    model : Model
+        What is believed so far; its effects are fitted along.
+    families : sequence of str
+        What may differ; see `families_named`.
+    beliefs : Beliefs
+    precision : array, shape (K,), optional
+        Prior precision of the effects of ``model``; that of machines at large when left out.
+
+    """
+    candidates = _candidates(problem, model.robot, families)
+    if not candidates:
+        return problem, model
+    found = model.found
+    if not found:
+        # What all recordings have in common must not pass for what differs between them.
+        model, precision = model.with_found(_geometry(model.robot)), None
+    prior = effect_precision(model) if precision is None else precision
+    every = replace(problem.thinned(ROWS), changes=candidates)
+    free = _fitted(every, replace(model, changes=candidates), prior)
+    residual = every.residuals(free)
+    count = sum(c.effect.coordinates().size for c in candidates) + prior.size
+    # Without weights: a recording that differs much must not count as a handful of outliers.
+    scale = robust_scale(every, residual, freedom=float(min(count, every.size // 2)))
+    chosen = _chosen(every, free, scale, prior, beliefs)
+    picked = tuple(candidates[i] for i in sorted(chosen))
+    problem = replace(problem, changes=picked)
+    model = replace(free, changes=tuple(free.changes[i] for i in sorted(chosen)))
+    model = _fitted(problem, model, prior)
+    return problem, model if found else model.with_found(())
+
+
+def _geometry(robot: Robot) -> tuple[Effect, ...]:
+    """Return every constant error of every joint, at zero."""
+    kinds = [
+        k for k in REGISTRY.values() if k.cause and _constant(k) and k.of in ('joint', 'link')
+    ]
+    return tuple(kind(joint) for kind in kinds for joint in robot.joint_names)  # type: ignore[call-arg]
+
+
+def _candidates(problem: Problem, robot: Robot, families: Sequence[str]) -> tuple[Change, ...]:
+    """Return everything that may differ, at zero; frames fitted per recording differ anyway."""
+    out = []
+    for k in range(1, len(problem.recordings)):
+        for name in families:
+            kind = REGISTRY[name]
+            if 'base' in problem.align and kind.fitted_with == 'base':
+                continue
+            for joint in joints_of(kind, robot.joint_names):
+                out.append(Change(k, kind(**({} if joint is None else {'joint': joint}))))
+    return tuple(out)
+
+
+def _fitted(problem: Problem, model: Model, precision: Array) -> Model:
+    """Return the model after a fit in which every sample counts."""
+    scale = robust_scale(problem, problem.residuals(model))
+    even = replace(scale, weights=tuple(np.ones(m) for m in problem.samples))
+    return fit(problem, model, even, precision, iterations=8).model
+
+
+def _chosen(
+    problem: Problem, model: Model, scale: Scale, precision: Array, beliefs: Beliefs
+) -> list[int]:
+    """Return which candidates are worth more evidence than they cost, chosen one by one."""
+    columns, _ = design(problem, model, scale)
+    residual = problem.whitened(problem.residuals(model), scale)
+    ridge, off = frame_prior(problem, model)
+    ridge, x = np.concatenate([ridge, precision]), np.concatenate([off, coordinates(model)])
+    share = effective_share(residual, problem.rows, problem.samples)
+    normal = share * columns @ columns.T + np.diag(ridge)
+    parts = _places(problem, model)
+    own = np.zeros(x.size)
+    for part in parts:
+        own[part] = x[part]
+    # What the candidates explain now is put back; frames and effects stay about where they are.
+    right = share * columns @ (residual + own @ columns) - ridge * (x - own)
+    trials = np.log(max(len(parts), 1))
+    fixed = np.setdiff1d(np.arange(x.size), np.concatenate([np.arange(0), *parts]))
+    kept: list[int] = []
+    now = _evidence(normal, right, ridge, fixed, [])
+    while len(kept) < len(parts):
+        scores = {
+            i: _evidence(normal, right, ridge, fixed, [parts[j] for j in (*kept, i)]) - trials
+            for i in range(len(parts))
+            if i not in kept
+        }
+        best = max(scores, key=lambda i: scores[i])
+        if scores[best] < now + beliefs.enter_nats:
+            break
+        kept.append(best)
+        now = scores[best]
+    return kept
+
+
+def _places(problem: Problem, model: Model) -> list[Array]:
+    """Return the columns of every change."""
+    sizes = [change.effect.coordinates().size for change in model.changes]
+    frames = 6 * (('base' in problem.align) * len(problem.recordings) + ('tool' in problem.align))
+    ends = frames + np.cumsum(np.array([0, *sizes], dtype=int))
+    return [np.arange(a, b) for a, b in pairwise(ends)]
+
+
+def _evidence(
+    normal: Array, right: Array, ridge: Array, fixed: Array, parts: Sequence[Array]
+) -> float:
+    """Return the log evidence of some columns beside those that are always fitted, in nats."""
+    more = np.concatenate([np.zeros(0, dtype=int), *parts]).astype(int)
+    index = np.concatenate([fixed, more]).astype(int)
+    if not index.size:
+        return 0.0
+    system = normal[np.ix_(index, index)]
+    size = np.sqrt(np.maximum(np.diag(system), 1e-300))
+    scaled = system / np.outer(size, size) + 1e-11 * np.eye(size.size)
+    wanted = right[index] / size
+    gain = 0.5 * float(wanted @ np.linalg.solve(scaled, wanted))
+    volume = 0.5 * float(np.linalg.slogdet(scaled)[1] + 2.0 * np.log(size).sum())
+    return gain - volume + 0.5 * float(np.log(ridge[more]).sum())
+
+
+def settled_between(found: Search, families: Sequence[str], beliefs: Beliefs) -> Search:
+    """
+    Return what was found with the differences between recordings chosen anew beside it.
+
+    Before the effects were found, what they leave could pass for a difference, or hide one.
+
+    Parameters
+    ----------
+    found : Search
+    families : sequence of str
+        What may differ.
+    beliefs : Beliefs
+
+    """
+    if len(found.problem.recordings) < 2 or not families:
+        return found
+    before = [_site(change) for change in found.problem.changes]
+    problem, model = with_changes(
+        found.problem, found.final.model, families, beliefs, found.precision
+    )
+    scale = robust_scale(problem, problem.residuals(model))
+    final, scale = robust_fit(problem, model, scale, found.precision, rounds=1)
+    found = replace(found, problem=problem, scale=scale, final=final)
+    if [_site(change) for change in problem.changes] == before:
+        return found
+    work = replace(found.work, problem=replace(found.work.problem, changes=problem.changes))
+    small = replace(found.small.model, changes=final.model.changes)
+    start = replace(found.baseline.model, changes=final.model.changes)
+    bare, _ = robust_fit(problem, start, robust_scale(problem, problem.residuals(start)))
+    small_fit = replace(found.small, model=small)
+    return replace(found, work=work, small=small_fit, baseline=bare)
+
+
+def _site(change: Change) -> tuple[int, str, str | None]:
+    return change.recording, change.effect.name, change.effect.site
+
+
+def told(
+    problem: Problem, model: Model, scale: Scale, precision: Array, families: Sequence[str]
+) -> tuple[Told, ...]:
+    """
+    Return what differs between the recordings, with covariances; what noise may do is left out.
+
+    Parameters
+    ----------
+    problem, model, scale
+        A model fitted to all measurements.
+    precision : array, shape (K,)
+        Prior precision of the coordinates of the found effects.
+    families : sequence of str
+        What may differ. Frames that were fitted for each recording are compared here.
+
+    """
+    covariance = _covariance(problem, model, scale, precision)
+    parts = _places(problem, model)
+    out = [
+        Told(change, covariance[np.ix_(part, part)])
+        for change, part in zip(model.changes, parts, strict=True)
+    ]
+    for kind in (REGISTRY[name] for name in families):
+        if kind.fitted_with == 'base' and 'base' in problem.align:
+            out += _bases(kind, model, covariance)
+    found = sorted(out, key=lambda each: each.change.recording)
+    return tuple(each for each in found if each.sure)
+
+
+def _bases(kind: type[Effect], model: Model, covariance: Array) -> list[Told]:
+    """Return how every base differs from the first."""
+    out = []
+    for k in range(1, len(model.bases)):
+        step = frame_offset(model.bases[k], model.bases[0], left=True)
+        mix = np.zeros((6, covariance.shape[0]))
+        mix[:, :6], mix[:, 6 * k : 6 * k + 6] = -np.eye(6), np.eye(6)
+        effect = kind().with_coordinates(step)
+        out.append(Told(Change(k, effect), mix @ covariance @ mix.T))
+    return out
+
+
+def _covariance(problem: Problem, model: Model, scale: Scale, precision: Array) -> Array:
+    """
+    Return the covariance of all columns, shape (P, P).
+
+    The larger of that of the noise, and of what stretches of time say apart from each other.
+    """
+    unit, inverse, size = _inverse(problem, model, scale, precision)
+    residual = problem.whitened(problem.residuals(model), scale)
+    share = effective_share(residual, problem.rows, problem.samples)
+    labels = problem.block_labels(BLOCKS)
+    stretches = [np.flatnonzero(labels == b) for b in np.unique(labels)]
+    scores = inverse @ np.stack([unit[:, s] @ residual[s] for s in stretches], axis=1)
+    blocks = max(len(stretches), 2)
+    spread = (scores**2).sum(axis=1) * blocks / (blocks - 1)
+    noise = np.maximum(np.diag(inverse), 1e-300) / share
+    # Correlations are those of the noise, sizes the larger of both.
+    wider = np.sqrt(np.maximum(1.0, spread / noise) / share)
+    return np.asarray(inverse * np.outer(wider, wider) / np.outer(size, size))
+
+
+def _inverse(
+    problem: Problem, model: Model, scale: Scale, precision: Array
+) -> tuple[Array, Array, Array]:
+    """Return all columns at unit size, their inverse normal matrix, and their sizes."""
+    columns, _ = design(problem, model, scale)
+    prior = precision if precision.size else np.zeros(coordinates(model).size)
+    ridge = np.concatenate([frame_prior(problem, model)[0], prior])
+    size = np.sqrt((columns**2).sum(axis=1) + ridge)
+    size[size == 0.0] = 1.0
+    unit = columns / size[:, None]
+    normal = unit @ unit.T + np.diag(ridge / size**2)
+    return unit, np.linalg.pinv(normal, rcond=1e-12, hermitian=True), size
+
+
+def untold(problem: Problem, model: Model, families: Sequence[str]) -> list[str]:
+    """
+    Return what may differ but cannot be told by these recordings, in words.
+
+    Parameters
+    ----------
+    problem, model
+        A model fitted to all measurements.
+    families : sequence of str
+
+    """
+    candidates = _candidates(problem, model.robot, families)
+    if not candidates:
+        return []
+    thin = problem.thinned(ROWS)
+    scale = robust_scale(thin, thin.residuals(model))
+    every = replace(thin, changes=candidates)
+    free = replace(model, changes=candidates)
+    _, inverse, size = _inverse(every, free, scale, effect_precision(model))
+    left = np.sqrt(np.diag(inverse)) / size
+    out: dict[str, None] = {}
+    for change, part in zip(candidates, _places(every, free), strict=True):
+        effect = change.effect
+        open_ = left[part] > UNTOLD * spreads(model.robot, effect)
+        if open_.any():
+            words = effect.name + (f' of {effect.site}' if effect.site else '')
+            out[words if open_.all() else f'{words} (in part)'] = None
+    return list(out)

@@ -230,3 +230,48 @@ def test_every_subcommand_has_help(weld_twin):
     for name in ('demo', 'simulate', 'info', 'import'):
         assert f' {name} ' in listed
         assert weld_twin(name, '--help').code == 0
+
+
+@pytest.mark.parametrize(
+    ('effect', 'said'),
+    [
+        (
+            '{effect: joint_offset, joint: elbow_joint, offset: 5}',
+            'no machine is known beyond 0.13',
+        ),
+        ('{effect: time_delay, delay: 0.6}', 'no machine is known beyond 0.5'),
+    ],
+)
+def test_a_value_that_no_machine_has_is_doubted_in_a_sentence(weld_twin, tmp_path, effect, said):
+    (tmp_path / 'e.yaml').write_text(f'- {effect}\n')
+    result = weld_twin(
+        'simulate',
+        '--robot',
+        'ur5',
+        '--effects',
+        tmp_path / 'e.yaml',
+        '--rate',
+        20,
+        '--out',
+        tmp_path / 'bag',
+    )
+    assert result.code == 0
+    assert said in result.err
+
+
+def test_a_delay_beyond_the_motion_leaves_a_sentence_and_no_bag(weld_twin, tmp_path):
+    (tmp_path / 'e.yaml').write_text('- {effect: time_delay, delay: 200}\n')
+    result = weld_twin(
+        'simulate',
+        '--robot',
+        'ur5',
+        '--effects',
+        tmp_path / 'e.yaml',
+        '--rate',
+        20,
+        '--out',
+        tmp_path / 'bag',
+    )
+    assert result.code == 2
+    assert 'no measurement meets a pose of the twin' in result.err
+    assert not (tmp_path / 'bag').exists()

@@ -35,6 +35,13 @@ def test_a_mistyped_parameter_is_refused_with_the_one_that_was_meant():
     )
 
 
+def test_effects_without_quotes_are_refused_with_the_form_that_is_meant():
+    words = 'effects:=[{effect: backlash, joint: elbow_joint, width: 5e-4}]'
+    result = started('error_injector', '--ros-args', '-p', words)
+    assert result.returncode == 2
+    assert 'in two kinds of quotes' in result.stderr
+
+
 def test_a_parameter_of_another_node_may_be_in_a_file_for_all(cell, tmp_path):
     process = cell.start('recorder', out=str(tmp_path / 'bag'), robot='ur5', seed=3)
     cell.trigger('/recorder/counts')

@@ -20,6 +20,8 @@ INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
 PROOFS = 'weld_twin.commands'
 """Entry points under which other packages, such as weld_twin_lab, bring subcommands."""
+FIRST = ('diagnose', 'demo', 'import', 'info', 'predict', 'compensate', 'export')
+"""What people come for, in the order of a first day; the list of commands begins with it."""
 LAB = ('benchmark', 'blind', 'campaign', 'real-robots', 'lab')
 """What weld_twin_lab brings; named here to say so where it is not installed."""
 
@@ -38,8 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None:  # as a program: what it started ends with it
         signal.signal(signal.SIGTERM, _end)
     words = sys.argv[1:] if argv is None else list(argv)
-    args = _parser(words).parse_args(words)
     try:
+        args = _parser(words).parse_args(words)
         return int(args.run(args))
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -67,7 +69,11 @@ def _commands() -> dict[str, str]:
         for path in folder.glob('[!_]*.py')
     }
     proofs = {point.name: point.value for point in entry_points(group=PROOFS)}
-    return dict(sorted({**proofs, **own}.items()))
+    return {
+        **{name: own[name] for name in FIRST},
+        **dict(sorted((name, own[name]) for name in own.keys() - FIRST)),
+        **dict(sorted(proofs.items())),
+    }
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:

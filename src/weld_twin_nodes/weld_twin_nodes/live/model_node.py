@@ -15,7 +15,7 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TEMPERATURE, TOOL_WRENCH
 
-from ..offline.told_twin import build_twin
+from ..offline.told_twin import build_twin, doubts
 from ..streams.twin_stream import JointStream, Sample
 from .cell_frames import placed_twin
 from .cell_node import CellNode
@@ -77,6 +77,8 @@ class ModelNode(CellNode):
 
     def _twin(self, effects: str) -> Twin:
         twin = build_twin(self.robot, self.setting('model'), effects)
+        for doubt in doubts(twin):
+            self.warn(doubt, doubt)
         return placed_twin(self, twin)
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:

@@ -20,7 +20,7 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from weld_twin_core.errors import TwinError
+from weld_twin_core.errors import ModelError, TwinError
 
 from .all_nodes import usage
 from .cell_node import CellNode
@@ -94,9 +94,9 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
         print(usage(make, Path(file).stem))
         return 0
     stop = Stop()
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
+        _open(args)
         node = stop.node = make()
         gc.freeze()  # what has been loaded stays; looking through it again is a pause of the node
         spin(node, stop)
@@ -118,6 +118,26 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0 if node is None or node.failure is None else _told(node.failure)
+
+
+def _open(args: list[str] | None) -> None:
+    """
+    Open ROS; raise a sentence where it cannot read the arguments.
+
+    Raises
+    ------
+    ModelError
+        An argument after ``--ros-args`` is no parameter or no remap.
+
+    """
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # rclpy's own error of it has no public name
+        said = str(error).partition(', at /')[0]
+        raise ModelError(
+            f'{said}; a list or a mapping is given as text, in two kinds of quotes: '
+            '-p \'effects:="[{effect: backlash, joint: elbow_joint, width: 5e-4}]"\''
+        ) from None
 
 
 def _told(error: Exception) -> int:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import Effect
@@ -33,16 +35,18 @@ def write_model_urdf(path: Path, model: Model, notes: Sequence[str]) -> None:
 
 def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     """
-    Write how much further each joint really stands than its reading [rad, or m].
+    Write how much further each joint really stands than its reading: rad and deg, or m and mm.
 
     A table is read by spreadsheets; where the model holds stands in the other files.
     """
     del notes
     robot = model.robot
     offsets = joint_offsets(robot, _causes(model))
-    rows = [*(f'# {line}' for line in _mended(model)), 'joint,offset,unit']
+    rows = [*(f'# {line}' for line in _mended(model)), 'joint,offset,unit,shown,shown_unit']
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
-        rows.append(f'{name},{float(offset)!r},{"m" if slides else "rad"}')
+        shown = offset * 1e3 if slides else np.degrees(offset)
+        units = ('m', 'mm') if slides else ('rad', 'deg')
+        rows.append(f'{name},{float(offset)!r},{units[0]},{shown:.6f},{units[1]}')
     write_text(path, '\n'.join(rows) + '\n', overwrite=True)
 
 

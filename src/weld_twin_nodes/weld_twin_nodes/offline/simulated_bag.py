@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core import __version__
+from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BagWriter
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import bag_messages
@@ -30,7 +31,7 @@ def write_simulation(
     Raises
     ------
     DataError
-        The path exists or cannot be written.
+        The path exists or cannot be written, or no measurement meets the twin.
 
     """
     made = {
@@ -47,4 +48,9 @@ def write_simulation(
             bag.write(topic, message, stamp)
             if topic == DEVIATION_METRICS.name:
                 metrics = from_messages.metrics(message)
+        if 'RMS' not in metrics:
+            raise DataError(
+                'no measurement meets a pose of the twin: the effects delay measurements beyond '
+                'the end of the motion; take a shorter delay or a slower motion'
+            )
     return metrics

@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -162,14 +163,26 @@ class Cores:
         """Run as many at once as there are workers."""
         if self._pool is None:
             context = multiprocessing.get_context('spawn')
-            self._pool = ProcessPoolExecutor(self._workers, mp_context=context)
+            self._pool = ProcessPoolExecutor(
+                self._workers, mp_context=context, initializer=_leave_interrupts
+            )
         with environment(**dict.fromkeys(_THREADS, '1')):
             futures: dict[Future[str], int] = {
                 self._pool.submit(call, task.function, task.arguments): k
                 for k, task in enumerate(tasks)
             }
-        for future in as_completed(futures):
-            yield futures[future], future.result()
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except KeyboardInterrupt:
+            self._terminate()
+            raise
+
+    def _terminate(self) -> None:
+        """End the processes at once: nobody waits for what they have begun."""
+        if self._pool is not None:
+            for process in [*self._pool._processes.values()]:  # no public way before Python 3.14
+                process.terminate()
 
     def close(self) -> None:
         """Stop the processes; what has not begun is not run."""
@@ -211,6 +224,16 @@ def pool_of(scheduler: str = '', workers: int = 0) -> Pool:
     if workers < 0:
         raise DataError(f'the number of workers must not be negative, got {workers}')
     return Cluster(scheduler) if scheduler else Cores(workers)
+
+
+def _leave_interrupts() -> None:
+    """
+    Leave Ctrl-C to the process that asks, which ends this one.
+
+    A terminal interrupts all processes at once, and a worker interrupted while it takes a task
+    keeps the lock of the queue: nobody would end.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def available_cores() -> int:

@@ -10,6 +10,7 @@ from typing import Any
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.errors import ModelError
 from weld_twin_core.twin.twin import Twin
@@ -44,6 +45,16 @@ def build_twin(robot: Robot, model: Path | str = '', effects: str = '') -> Twin:
         return Twin(robot, read_effects(model, robot) + more)
     known = _diagnosed(robot, model)
     return Twin(known.robot, of_the_robot(known.effects) + more)
+
+
+def doubts(twin: Twin) -> list[str]:
+    """Return a sentence for every value of an effect that no machine has: a unit may be wrong."""
+    return [
+        f'{parameter} of {effect.name}{f" of {effect.site}" if effect.site else ""} is {value:g}; '
+        f'no machine is known beyond {limit:g}, so check its unit (rad, m, s, kg)'
+        for effect in twin.effects
+        for parameter, value, limit in beyond(twin.robot, effect)
+    ]
 
 
 def _diagnosed(robot: Robot, path: Path | str) -> Twin:

@@ -51,20 +51,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the bag and print the deviation."""
+    import sys
+
     from weld_twin_core.errors import DataError
 
     from ...offline.seam_motion import plan_motion, stamps
     from ...offline.simulated_bag import write_simulation
     from ...offline.simulation import Simulation
-    from ...offline.told_twin import build_twin
+    from ...offline.told_twin import build_twin, doubts
 
     if args.start_stamp <= 0 or args.seed < 0:
         raise DataError('--start-stamp must be positive and --seed not negative')
     robot = robot_of(args)
+    real, model = build_twin(robot, args.effects), build_twin(robot, args.model)
+    for doubt in doubts(real):
+        print(f'weld-twin: {args.effects}: {doubt}', file=sys.stderr)
     plan = plan_motion(robot, args.path, args.profile, args.rate, args.speed)
     simulation = Simulation(
-        build_twin(robot, args.effects),
-        build_twin(robot, args.model),
+        real,
+        model,
         plan.motion,
         stamps(plan.motion.t, args.start_stamp),
         args.seed,

@@ -337,6 +337,37 @@ class Recording:
                     f'got {signal.value.shape}'
                 )
 
+    def at(self, t: Array) -> tuple[Array, Array, Array | None, Array | None]:
+        """
+        Return joint position and velocity, wrench and temperature at other times.
+
+        What belongs to the stamps of the recording's own measurements is worked out once: a fit
+        asks for it again and again.
+
+        Parameters
+        ----------
+        t : array, any shape [s]
+
+        """
+        if self.measured is not None and t is self.measured.t:
+            return self._at_measured
+        return self._looked_up(t)
+
+    @cached_property
+    def _at_measured(self) -> tuple[Array, Array, Array | None, Array | None]:
+        assert self.measured is not None
+        found = self._looked_up(self.measured.t)
+        for value in found:
+            if value is not None:
+                value.setflags(write=False)
+        return found
+
+    def _looked_up(self, t: Array) -> tuple[Array, Array, Array | None, Array | None]:
+        wrench, temperature = (
+            None if signal is None else signal.at(t) for signal in (self.wrench, self.temperature)
+        )
+        return (*self.joints.at(t), wrench, temperature)
+
     @property
     def span_ns(self) -> tuple[int, int]:
         """Return first and last joint stamp [ns]."""

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -193,11 +194,14 @@ class Robot:
             ``T_flange_tool``; left out, it stays.
 
         """
-        return replace(
-            self,
-            T_world_base=self.T_world_base if base is None else base,
-            T_flange_tool=self.T_flange_tool if tool is None else tool,
-        )
+        frames = {'T_world_base': base, 'T_flange_tool': tool}
+        new = {key: frame for key, frame in frames.items() if frame is not None}
+        if all(frame is getattr(self, key) for key, frame in new.items()):
+            return self
+        out = copy(self)  # everything else has been checked already
+        for key, frame in new.items():
+            out._set(key, readonly(frame, (4, 4), f'{key} of robot {self.name!r}'))
+        return out
 
     def check_positions(self, q: Array) -> None:
         """

@@ -27,6 +27,9 @@ from ..errors import DataError
 
 SMALL_ANGLE = 1e-4
 """Below this angle [rad] the series of sin and cos are exact to rounding."""
+LARGE_TURN = 0.5
+"""Cosine of the angle (60 degrees) up to which the skew part of a matrix tells the turn to rounding;
+near half a turn it vanishes."""
 
 
 def skew(vector: Array) -> Array:
@@ -68,8 +71,19 @@ def left_jacobian(rotvec: ArrayLike) -> Array:
 
 def rotation_vector(matrix: Array) -> Array:
     """Return rotation vectors, shape (..., 3) [rad], of rotation matrices, shape (..., 3, 3)."""
-    vectors = _rotations(matrix).as_rotvec() if matrix.size else np.zeros(0)
-    return np.reshape(vectors, matrix.shape[:-2] + (3,))
+    if not matrix.size:
+        return np.zeros(matrix.shape[:-2] + (3,))
+    # sin(angle) times the axis, and cos(angle)
+    sine = 0.5 * np.stack(
+        [matrix[..., k - 1, k - 2] - matrix[..., k - 2, k - 1] for k in range(3)], axis=-1
+    )
+    cosine = 0.5 * (np.trace(matrix, axis1=-2, axis2=-1) - 1.0)
+    if cosine.min() < LARGE_TURN:
+        return np.reshape(_rotations(matrix).as_rotvec(), matrix.shape[:-2] + (3,))
+    length = np.sqrt((sine**2).sum(axis=-1))
+    angle = np.arctan2(length, cosine)
+    ratio = np.divide(angle, length, out=np.ones_like(angle), where=length > 0.0)
+    return np.asarray(ratio[..., None] * sine)
 
 
 def _rotations(matrix: Array) -> Rotation:

@@ -91,6 +91,9 @@ class Parametric:
 
     def vector(self) -> Array:
         """Return all components as one vector, shape (P,), or (D, P) with draws."""
+        values = [getattr(self, p.name) for p in self.parameters]
+        if all(isinstance(value, float) for value in values) and values:
+            return np.array(values)  # most effects, and a search asks very often
         parts = [
             np.asarray(getattr(self, p.name), dtype=np.float64)[... if k is None else (..., k)]
             for p, k in self.components()

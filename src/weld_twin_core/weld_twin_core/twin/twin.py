@@ -195,7 +195,9 @@ class Twin(EffectStages):
     def joint_view(self, recording: Recording) -> View:
         """Return what effects with memory see: the commanded motion on its own stamps."""
         motion = recording.joints
-        return _view(self.robot, recording, motion.t, motion.q, motion.causal_velocity)
+        return _view(
+            self.robot, recording, motion.t, motion.q, motion.causal_velocity, *_sides(recording)
+        )
 
     def _evaluate(self, recording: Recording, at: Array | None, want: bool) -> Evaluation:
         view, tangents = self._sampled(recording, at, want)
@@ -208,17 +210,18 @@ class Twin(EffectStages):
         moved, tangents = run_all(self.effects, self.joint_view(recording), want)
         if at is None:
             t, q, qd = motion.t, motion.q, motion.causal_velocity
+            sides = _sides(recording)
             picker = None
         else:
             t = np.asarray(at, dtype=np.float64)
             for effect in self.of_stage(Stage.CLOCK):
                 t = t - effect.displace(_clock_view(self.robot, motion))[('clock', 0)][..., :1]
-            q, qd = motion.at(t)
+            q, qd, *sides = recording.at(t)
             picker = Picker(motion, t)
         if moved is not None:
             q = q + (moved if picker is None else picker.take(moved))
             qd = qd + (rates(motion, moved) if picker is None else picker.rates(moved))
-        view = _view(self.robot, recording, t, q, qd)
+        view = _view(self.robot, recording, t, q, qd, *sides)
         if not want:
             return view, []
         picked: list[Tangent] = [
@@ -237,7 +240,15 @@ class Twin(EffectStages):
         return LiveTwin(self)
 
 
-def _view(robot: Robot, recording: Recording, t: Array, q: Array, qd: Array) -> View:
+def _view(
+    robot: Robot,
+    recording: Recording,
+    t: Array,
+    q: Array,
+    qd: Array,
+    wrench: Array | None,
+    temperature: Array | None,
+) -> View:
     return View(
         robot=robot,
         t=t,
@@ -245,10 +256,16 @@ def _view(robot: Robot, recording: Recording, t: Array, q: Array, qd: Array) -> 
         q=q,
         qd=qd,
         static=recording.joints.static,
-        wrench=None if recording.wrench is None else recording.wrench.at(t),
+        wrench=wrench,
         wrench_frame=recording.wrench_frame,
-        temperature=None if recording.temperature is None else recording.temperature.at(t),
+        temperature=temperature,
     )
+
+
+def _sides(recording: Recording) -> list[Array | None]:
+    """Return wrench and temperature at the joint stamps."""
+    t = recording.joints.t
+    return [s if s is None else s.at(t) for s in (recording.wrench, recording.temperature)]
 
 
 def _clock_view(robot: Robot, motion: JointMotion) -> View:

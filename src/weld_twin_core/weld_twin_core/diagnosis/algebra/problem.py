@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -198,9 +199,8 @@ class Problem:
     def residuals(self, model: Model) -> list[Array]:
         """Return measured minus twin, one array (3 or 6, M) per recording [m, rad]."""
         out = []
-        for k, recording in enumerate(self.recordings):
-            measured = _measured(recording)
-            poses = model.twin(k).poses(recording, measured.t)
+        for maker, recording in zip(self.features(model), self.recordings, strict=True):
+            measured, poses = _measured(recording), maker.run.poses
             parts = [(measured.position - poses.position).T]
             if measured.rotation is not None:
                 parts.append(angle_between(measured.rotation, poses.rotation).T)
@@ -208,8 +208,25 @@ class Problem:
         return out
 
     def features(self, model: Model) -> list[Features]:
-        """Return the feature makers of all recordings, taken at the model."""
-        return [Features(model.twin(k), r, _measured(r).t) for k, r in enumerate(self.recordings)]
+        """
+        Return the feature makers of all recordings, taken at the model.
+
+        Those of the last two models are kept: a fit asks for the residual of a model and then for
+        its columns, and falls back on the model before where a step was none.
+        """
+        for other, makers in self._lately:
+            if other is model:
+                return makers
+        makers = [
+            Features(model.twin(k), r, _measured(r).t) for k, r in enumerate(self.recordings)
+        ]
+        self._lately[1:] = self._lately[:1]
+        self._lately[:1] = [(model, makers)]
+        return makers
+
+    @cached_property
+    def _lately(self) -> list[tuple[Model, list[Features]]]:
+        return []
 
     def whitened(self, parts: list[Array], scale: Scale) -> Array:
         """

@@ -125,7 +125,7 @@ def compensate(
     (True, True)
 
     """
-    acting = tuple(e for e in effects if _commandable(e))
+    acting = tuple(e for e in effects if commandable(e))
     real = Twin(robot, acting)
     wanted, first = Twin(robot).poses(recording), real.poses(recording)
     before = _missing(wanted, first)
@@ -133,7 +133,7 @@ def compensate(
     q = _solved(real, recording, goal, rounds)
     motion = _commands(recording.joints, q)
     after = _missing(wanted, real.poses(replace(recording, joints=motion)))
-    left_out = tuple(e for e in effects if not _commandable(e))
+    left_out = tuple(e for e in effects if not commandable(e))
     return Compensation(motion, -before, -after, left_out)
 
 
@@ -165,7 +165,8 @@ def _part_way(start: Poses, missing: Array, share: Array) -> Poses:
     return Poses(start.position + step[:, :3], rotation_matrix(step[:, 3:]) @ start.rotation)
 
 
-def _commandable(effect: Effect) -> bool:
+def commandable(effect: Effect) -> bool:
+    """Tell whether joint commands can mend an effect."""
     return effect.name not in BEYOND_COMMANDS and effect.stage not in (Stage.CLOCK, Stage.NOISE)
 
 

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a robot program says of motion, whatever language it is written in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+
+Kind = Literal['joint', 'linear', 'circular', 'unknown']
+
+
+class Use(NamedTuple):
+    """
+    One use of a point by a move.
+
+    A point that is a pose is used as ``before @ point @ after``: the base frame stands before
+    it, a shift in the tool's own frame after it. Joint positions are used as they are.
+
+    Attributes
+    ----------
+    point : int
+        Which of the program's points.
+    before, after : array, shape (4, 4) [m]
+    leads : bool
+        False for a place derived from the point, such as an approach above it: it goes along when
+        the point is moved and has no say in where to.
+
+    """
+
+    point: int
+    before: Array
+    after: Array
+    leads: bool = True
+
+
+class Move(NamedTuple):
+    """
+    One move.
+
+    Attributes
+    ----------
+    kind : str
+        'joint', 'linear', 'circular'; or 'unknown', after which nobody knows where the arm is.
+    end : Use or None
+        None for an unknown move.
+    via : Use or None
+        A place on the arc of a circular move.
+    tool : array, shape (4, 4) [m]
+        ``T_flange_tool``, the flange that of the robot's model.
+    speed : float
+        Of the tool [m/s]; of a joint move the share of the joints' speeds.
+    stop : bool
+        The arm comes to rest at the end; else it goes on with the next move.
+    dwell : float [s]
+        How long it stays there.
+    suits : callable, optional
+        Takes joint positions (K, n), says which of them are the posture the program asks for.
+    where : str
+        File and line, for messages.
+    seam : int
+        Moves of one number are corrected together or not at all.
+
+    """
+
+    kind: Kind
+    end: Use | None
+    tool: Array
+    via: Use | None = None
+    speed: float = 0.1
+    stop: bool = True
+    dwell: float = 0.0
+    suits: Callable[[Array], Array] | None = None
+    where: str = ''
+    seam: int = 0
+
+    @property
+    def uses(self) -> list[Use]:
+        """Return the uses of points, the place on the way first."""
+        return [use for use in (self.via, self.end) if use is not None]
+
+
+@dataclass(frozen=True, eq=False)
+class MoveProgram:
+    """
+    Points, and moves between them.
+
+    Attributes
+    ----------
+    points : tuple of array
+        A pose, shape (4, 4) [m], or joint positions, shape (n,) [rad or m].
+    pieces : tuple of tuple of Move
+        Moves that follow each other; where a piece begins, nobody knows where the arm is.
+
+    """
+
+    points: tuple[Array, ...]
+    pieces: tuple[tuple[Move, ...], ...]
+
+    def with_points(self, points: Sequence[Array]) -> MoveProgram:
+        """Return the same moves between other points."""
+        return MoveProgram(tuple(points), self.pieces)
+
+    def place(self, use: Use) -> Array:
+        """Return where a use leads: ``T_base_tool``, shape (4, 4), or joints, shape (n,)."""
+        point = self.points[use.point]
+        if point.ndim == 1:
+            return point
+        return np.asarray(use.before @ point @ use.after)

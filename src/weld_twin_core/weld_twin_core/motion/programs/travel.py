@@ -1,0 +1,366 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The joint motion that a program makes, move by move, as a controller would make it.
+
+Joint moves are straight in joint positions, linear moves straight in position and turned about
+one axis, circular moves go through the place on the way. Corners are not rounded: where the arm
+goes on without a stop it passes through the point. A controller's own way near such a corner is
+not known, and does not matter for where the point itself has to be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arm.chain import forward
+from ...arm.robot import Robot
+from ...arm.rotation import rotation_matrix, rotation_vector, transform
+from ...arrays import Array
+from ...errors import DataError, PathError, ReachError
+from ...recording import JointMotion
+from ..inverse import polish, solve, solve_path
+from ..paths import Arc
+from .moves import Move, MoveProgram
+
+STEP = 0.01
+"""Way of the tool [m] between two samples of a linear or circular move."""
+SAMPLES = (32, 120)
+"""Fewest and most samples of a move: enough to follow a posture, and to keep long programs quick."""
+REST = 0.3
+"""Stay [s] after which the arm is where its controller wants it; servo lag is some 50 ms."""
+NEAR = 0.15
+"""A linear move that would begin farther than this [rad or m] from the posture reached so far has
+to change the posture."""
+CLOSED = 1e-7
+"""Gap [m, rad] up to which a pose counts as reached; programs write micrometres."""
+LEAST_TIME = 0.02
+"""Shortest time [s] of a move."""
+
+
+class Piece(NamedTuple):
+    """
+    The motion of one piece of a program.
+
+    Attributes
+    ----------
+    moves : tuple of Move
+    motion : JointMotion
+    move : array of int, shape (N,)
+        Which move each sample belongs to.
+    ends, vias : array of int, shape (M,)
+        Sample at which each move ends, and passes its place on the way; -1 where it has none.
+
+    """
+
+    moves: tuple[Move, ...]
+    motion: JointMotion
+    move: np.ndarray
+    ends: np.ndarray
+    vias: np.ndarray
+
+
+class Travel(NamedTuple):
+    """
+    The motion of a program.
+
+    Attributes
+    ----------
+    pieces : tuple of Piece
+    lost : dict of int to str
+        Seams that could not be followed, with the reason.
+
+    """
+
+    pieces: tuple[Piece, ...]
+    lost: dict[int, str]
+
+
+class _Reached(NamedTuple):
+    """One move followed: its samples, shares of the way and times."""
+
+    q: Array
+    t: Array
+    via: int
+
+
+def travel(robot: Robot, program: MoveProgram, start: Array | None = None) -> Travel:
+    """
+    Return the motion of a program; seams that cannot be followed are left out, with the reason.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its base frame does not matter; the tool is that of each move.
+    program : MoveProgram
+    start : array, shape (n,), optional
+        Joint positions before the first move of every piece.
+
+    """
+    lost: dict[int, str] = {}
+    pieces: list[Piece] = []
+    for moves in program.pieces:
+        pieces += _pieces(robot, program, moves, start, lost)
+    return Travel(tuple(pieces), lost)
+
+
+def _pieces(
+    robot: Robot,
+    program: MoveProgram,
+    moves: Sequence[Move],
+    start: Array | None,
+    lost: dict[int, str],
+) -> list[Piece]:
+    """Return the motion of moves that follow each other, in parts where one cannot be followed."""
+    out: list[Piece] = []
+    done: list[tuple[Move, _Reached]] = []
+    q = start
+    for move in moves:
+        try:
+            reached = _followed(robot, program, move, q)
+        except (PathError, DataError) as error:
+            lost.setdefault(move.seam, f'{move.where}: {error}')
+            if done:
+                out.append(_joined(done))
+            done, q = [], None
+            continue
+        done.append((move, reached))
+        q = reached.q[-1]
+    if done:
+        out.append(_joined(done))
+    return out
+
+
+def _followed(robot: Robot, program: MoveProgram, move: Move, q: Array | None) -> _Reached:
+    """Return the samples of a move that begins at joint positions, None for an unknown place."""
+    if move.end is None:
+        raise PathError('this move is not understood')
+    arm = robot.with_frames(base=np.eye(4), tool=move.tool)
+    if move.kind == 'joint':
+        return _joint_move(arm, program, move, q)
+    if q is None:
+        raise PathError(
+            'where the arm comes from is not known; let a joint move lead there, or say the '
+            'joints with --start'
+        )
+    poses, via = tool_way(program, move, forward(arm, q))
+    way = solve_path(arm, poses, q)
+    if np.abs(way.q[0] - q).max() > NEAR:
+        raise ReachError('the arm would have to change its posture on the way')
+    arm.check_positions(way.q)
+    length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
+    turn = float(np.linalg.norm(rotation_vector(poses[-1, :3, :3] @ poses[0, :3, :3].T)))
+    # A move that only turns the tool takes as long as one on which its end 0.2 m away travels.
+    duration = max(max(length, 0.2 * turn) / max(move.speed, 1e-3), LEAST_TIME)
+    return _Reached(way.q, np.linspace(0.0, duration, len(way.q)), via)
+
+
+def _joint_move(arm: Robot, program: MoveProgram, move: Move, q: Array | None) -> _Reached:
+    assert move.end is not None
+    place = program.place(move.end)
+    end = place if place.ndim == 1 else _posture(arm, place, move, q)
+    arm.check_positions(end[None])
+    if q is None:
+        return _Reached(end[None], np.zeros(1), -1)
+    share = np.linspace(0.0, 1.0, SAMPLES[0])[:, None]
+    duration = float((np.abs(end - q) / arm.max_velocity).max()) / max(move.speed, 1e-3)
+    times = share[:, 0] * max(duration, LEAST_TIME)
+    return _Reached(q + share * (end - q), times, -1)
+
+
+def _posture(arm: Robot, pose: Array, move: Move, q: Array | None) -> Array:
+    """Return the joint positions in which a joint move reaches a pose."""
+    found = _turned(arm, solve(arm, pose, q))
+    if move.suits is not None:
+        found = found[move.suits(found)]
+        if not len(found):
+            raise ReachError('no posture of this robot there is the one that the program names')
+    if q is None and len(found) > 1 and move.suits is None:
+        raise ReachError(
+            f'{len(found)} postures reach this point and the program names none; '
+            'let a move to joint positions come first, or say the joints with --start'
+        )
+    near = np.zeros(arm.n) if q is None else q
+    return np.asarray(found[np.abs(found - near).sum(axis=1).argmin()])
+
+
+def _turned(arm: Robot, found: Array) -> Array:
+    """Return every solution on every full turn that the limits allow for the last joint."""
+    last = [found]
+    for turn in (-2.0 * np.pi, 2.0 * np.pi):
+        for joint in np.flatnonzero(~arm.prismatic):
+            moved = found.copy()
+            moved[:, joint] += turn
+            inside = (moved >= arm.lower) & (moved <= arm.upper)
+            last.append(moved[inside.all(axis=1)])
+    return np.concatenate(last)
+
+
+def tool_way(
+    program: MoveProgram, move: Move, begin: Array, count: int = 0, at: int = 0
+) -> tuple[Array, int]:
+    """
+    Return the poses of a linear or circular move, shape (K, 4, 4), and the sample on its way.
+
+    Parameters
+    ----------
+    program : MoveProgram
+    move : Move
+    begin : array, shape (4, 4)
+        ``T_base_tool`` where it begins.
+    count, at : int
+        Samples, and which of them passes the place on the way; 0 to choose them.
+
+    Raises
+    ------
+    PathError
+        Three places of an arc lie on a line, or a linear move ends at joint positions.
+
+    """
+    assert move.end is not None
+    end = program.place(move.end)
+    if end.ndim == 1:
+        raise PathError('a linear move to joint positions is not understood')
+    if move.via is None:
+        count = count or _count(float(np.linalg.norm(end[:3, 3] - begin[:3, 3])))
+        share = np.linspace(0.0, 1.0, count)
+        position = begin[:3, 3] + share[:, None] * (end[:3, 3] - begin[:3, 3])
+        return transform(_turning(begin, end, share), position), -1
+    middle = program.place(move.via)[:3, 3]
+    arc = Arc(begin[:3, 3], middle, end[:3, 3])
+    count = count or _count(arc.length)
+    part = _share_of(arc, middle)
+    at = at or int(np.clip(round(part * (count - 1)), 1, count - 2))
+    share = np.interp(np.arange(count), [0, at, count - 1], [0.0, part, 1.0])
+    position = arc.sample(share * arc.length).position
+    return transform(_turning(begin, end, share), position), at
+
+
+def _share_of(arc: Arc, point: Array) -> float:
+    """Return at which share of an arc a point on it lies."""
+    out = (arc.start - arc.centre) / arc.radius
+    axis = np.cross(point - arc.start, arc.end - arc.start)
+    along = np.cross(axis / np.linalg.norm(axis), out)
+    angle = np.arctan2((point - arc.centre) @ along, (point - arc.centre) @ out)
+    return float(angle % (2.0 * np.pi) * arc.radius / arc.length)
+
+
+def _count(length: float) -> int:
+    return int(np.clip(np.ceil(length / STEP) + 1, *SAMPLES))
+
+
+def _turning(begin: Array, end: Array, share: Array) -> Array:
+    """Return rotations on the shortest way from one to the other, shape (K, 3, 3)."""
+    turn = rotation_vector(end[:3, :3] @ begin[:3, :3].T)
+    return rotation_matrix(share[:, None] * turn) @ begin[:3, :3]
+
+
+def _joined(done: Sequence[tuple[Move, _Reached]]) -> Piece:
+    """Put the samples of moves together; the arm eases in and out where it stops."""
+    t, q, which, ends, vias = [], [], [], [], []
+    clock, count, rest = 0.0, 0, True
+    for k, (move, reached) in enumerate(done):
+        first = 0 if k == 0 else 1
+        times = clock + _eased(reached.t, rest, move.stop)[first:]
+        vias.append(count + reached.via - first if reached.via >= 0 else -1)
+        t.append(times)
+        q.append(reached.q[first:])
+        clock = float(times[-1])
+        if move.stop or k == len(done) - 1:
+            stay = clock + max(move.dwell, REST) * np.array([0.25, 0.5, 1.0])
+            t.append(stay)
+            q.append(np.repeat(reached.q[-1:], stay.size, axis=0))
+            clock = float(stay[-1])
+        rest = move.stop
+        before = count
+        count = sum(part.size for part in t)
+        which.append(np.full(count - before, k))
+        ends.append(count - 1)
+    motion = JointMotion(np.concatenate(t), np.concatenate(q))
+    moves = tuple(move for move, _ in done)
+    return Piece(moves, motion, np.concatenate(which), np.array(ends), np.array(vias))
+
+
+def _eased(t: Array, from_rest: bool, to_rest: bool) -> Array:
+    """Return the times of samples at even shares of the way, slower near a stop."""
+    if t.size < 2:
+        return t
+    share = np.linspace(0.0, 1.0, t.size)
+    # Equal steps of way take longer near a stop: half a sine there is speed rising evenly enough.
+    slow = 0.15
+    speed = np.ones(t.size)
+    if from_rest:
+        speed = np.minimum(speed, 0.1 + share / slow)
+    if to_rest:
+        speed = np.minimum(speed, 0.1 + (1.0 - share) / slow)
+    pace = 1.0 / speed
+    steps = 0.5 * (pace[1:] + pace[:-1]) * np.diff(t)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
+    """
+    Return the motion of a piece with the same samples between points that moved a little.
+
+    Parameters
+    ----------
+    robot : Robot
+    program : MoveProgram
+        With the points moved.
+    piece : Piece
+        As they were.
+
+    Raises
+    ------
+    ReachError
+        A pose is out of reach now.
+
+    """
+    q = np.array(piece.motion.q)
+    for k, move in enumerate(piece.moves):
+        first = 0 if k == 0 else int(piece.ends[k - 1])
+        last = int(piece.ends[k])
+        way = _way_length(piece, k)
+        assert move.end is not None
+        arm = robot.with_frames(base=np.eye(4), tool=move.tool)
+        if move.kind == 'joint':
+            part = _joint_part(arm, program, move, q, first, way)
+        else:
+            at = max(int(piece.vias[k]) - first, 0)
+            poses, _ = tool_way(program, move, forward(arm, q[first]), way, at)
+            part = _closed(arm, piece.motion.q[first : first + way], poses, move)
+        q[first : first + way] = part
+        q[first + way : last + 1] = part[-1]
+    return JointMotion(piece.motion.t, q)
+
+
+def _way_length(piece: Piece, k: int) -> int:
+    """Return the number of samples of a move from where it begins to where it arrives."""
+    first = 0 if k == 0 else int(piece.ends[k - 1])
+    q = piece.motion.q[first : int(piece.ends[k]) + 1]
+    stays = piece.moves[k].stop or k == len(piece.moves) - 1
+    return len(q) - 3 if stays else len(q)
+
+
+def _joint_part(
+    arm: Robot, program: MoveProgram, move: Move, q: Array, first: int, way: int
+) -> Array:
+    assert move.end is not None
+    place = program.place(move.end)
+    end = place
+    if place.ndim == 2:
+        end = _closed(arm, q[first + way - 1][None], place[None], move)[0]
+    if way == 1:
+        return np.asarray(end[None])
+    share = np.linspace(0.0, 1.0, way)[:, None]
+    return np.asarray(q[first] + share * (end - q[first]))
+
+
+def _closed(arm: Robot, q: Array, poses: Array, move: Move) -> Array:
+    found, error = polish(arm, q, poses)
+    if np.abs(error).max() > CLOSED:
+        raise ReachError(f'{move.where}: out of reach, or at a singularity')
+    return found

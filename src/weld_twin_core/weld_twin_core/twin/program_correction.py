@@ -1,0 +1,304 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Points of a program moved so that the real tool goes where the program meant.
+
+Each round runs the program on the twin as a controller would, in its postures and directions,
+and moves every point by what is missing where it is used. A point that several moves use gets the
+mean of what they miss. Seams are corrected whole or not at all: a step in a weld is worse than an
+error that is the same along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arm.chain import frames
+from ..arm.rotation import rotation_matrix, rotation_vector
+from ..arrays import Array
+from ..errors import DataError, PathError
+from ..motion.inverse.newton import chain_jacobian, least_step
+from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
+from ..motion.programs.travel import repeated
+from ..recording import JointMotion
+from .program_model import ProgramModel, missing
+from .trust import trust
+
+ROUNDS = 5
+"""Rounds of moving points; effects are small, each takes away all but some thousandths."""
+SINGULAR = 1e-9
+"""Damping of a joint step [m^2]: invisible but within micrometres of a singularity."""
+APART = (2e-4, 2e-3)
+"""Two uses of one point may want corrections this far apart [m, rad]; the mean serves both."""
+WORTH = 0.5
+"""Share of a correction that must be trusted: below it the doubt is larger than the correction."""
+
+
+class Caps(NamedTuple):
+    """How far a point may be moved at most: ``length`` [m] and ``turn`` [rad]."""
+
+    length: float = 2e-3
+    turn: float = np.pi / 180.0
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramCorrection:
+    """
+    A corrected program and what is expected of it.
+
+    Attributes
+    ----------
+    program : MoveProgram
+        With the points moved.
+    travel : Travel
+        The motion of the program as it was.
+    left : dict of int to str
+        Seams that were left as they were, with the reason.
+    held : frozenset of int
+        Points that were not moved.
+    before, after : tuple of array, each of shape (N, 6) [m, rad]
+        What is missing to the real tool at every sample of every piece.
+    covariances : tuple of array or None, each of shape (N, 6, 6)
+    outside : tuple of tuple of (int, str)
+        For every piece the moves that leave what was recorded, with the reason.
+
+    """
+
+    program: MoveProgram
+    travel: Travel
+    left: dict[int, str]
+    held: frozenset[int]
+    before: tuple[Array, ...]
+    after: tuple[Array, ...]
+    covariances: tuple[Array | None, ...]
+    outside: tuple[tuple[tuple[int, str], ...], ...]
+
+
+def correct_program(
+    model: ProgramModel,
+    program: MoveProgram,
+    *,
+    held: dict[int, str] | None = None,
+    caps: Caps | None = None,
+    start: Array | None = None,
+) -> ProgramCorrection:
+    """
+    Return a program whose points are moved so that the real tool goes where it was to go.
+
+    Parameters
+    ----------
+    model : ProgramModel
+    program : MoveProgram
+    held : dict of int to str, optional
+        Points that must not be moved, with the reason; their seams are left as they were.
+    caps : Caps, optional
+    start : array, shape (n,), optional
+        Joint positions before the first move.
+
+    """
+    work = _Work(model, program, travel(model.robot, program, start), caps or Caps())
+    left = dict(work.travel.lost)
+    for seam, why in _held_seams(program, held or {}).items():
+        left.setdefault(seam, why)
+    moved = work.solved(_spread(program, left))
+    for _ in range(len(work.seams) + 1):
+        found = work.refused(moved, left)
+        if not found:
+            break
+        left |= found
+        moved = work.solved(_spread(program, left))
+    return work.result(moved, left)
+
+
+class _Work(NamedTuple):
+    """What a correction works on."""
+
+    model: ProgramModel
+    program: MoveProgram
+    travel: Travel
+    caps: Caps
+
+    @property
+    def seams(self) -> list[int]:
+        return sorted({move.seam for piece in self.program.pieces for move in piece})
+
+    def solved(self, still: set[int]) -> MoveProgram:
+        """Return the program with every point moved but those that stay."""
+        wanted = [self.model.wanted(piece) for piece in self.travel.pieces]
+        moved = self.program
+        for _ in range(ROUNDS):
+            steps: dict[int, list[Array]] = {}
+            for piece, aim in zip(self.travel.pieces, wanted, strict=True):
+                motion = repeated(self.model.robot, moved, piece)
+                gap = missing(aim, self.model.real(piece, motion))
+                _collect(self.model, moved, piece, motion, gap, steps)
+            points = list(moved.points)
+            for point, found in steps.items():
+                if point not in still:
+                    points[point] = _stepped(points[point], np.mean(found, axis=0))
+            moved = moved.with_points(points)
+        return moved
+
+    def refused(self, moved: MoveProgram, left: dict[int, str]) -> dict[int, str]:
+        """Return the seams that must not be corrected this way, with the reason."""
+        out: dict[int, str] = {}
+        for piece in self.travel.pieces:
+            try:
+                motion = repeated(self.model.robot, moved, piece)
+                self.model.robot.check_positions(motion.q)
+            except (PathError, DataError) as error:
+                for move in piece.moves:
+                    out.setdefault(move.seam, f'{move.where}: {error}')
+                continue
+            shares = self._trust(piece)
+            gap = missing(self.model.wanted(piece), self.model.real(piece, motion))
+            for k, move in enumerate(piece.moves):
+                why = self._why_not(moved, piece, k, shares, gap)
+                if why:
+                    out.setdefault(move.seam, f'{move.where}: {why}')
+        return {seam: why for seam, why in out.items() if seam not in left}
+
+    def _why_not(
+        self, moved: MoveProgram, piece: Piece, k: int, shares: Array | None, gap: Array
+    ) -> str:
+        move = piece.moves[k]
+        for use in move.uses:
+            length, turn = self.moved_by(moved, use, move.tool)
+            if length > self.caps.length or turn > self.caps.turn:
+                return (
+                    f'the point would move by {length * 1e3:.3f} mm and {np.degrees(turn):.3f} '
+                    f'degrees, at most {self.caps.length * 1e3:g} mm and '
+                    f'{np.degrees(self.caps.turn):g} degrees are allowed'
+                )
+        if shares is not None and shares[piece.ends[k]] < WORTH:
+            return 'the model is less sure of this place than the correction is large'
+        if move.end is not None and move.end.leads:
+            off = gap[piece.ends[k]]
+            if np.linalg.norm(off[:3]) > APART[0] or np.linalg.norm(off[3:]) > APART[1]:
+                return (
+                    f'{np.linalg.norm(off[:3]) * 1e3:.3f} mm would be left here, for the point is '
+                    'used by other moves that need another correction'
+                )
+        return ''
+
+    def moved_by(self, moved: MoveProgram, use: Use, tool: Array) -> tuple[float, float]:
+        """Return how far a place moved [m, rad]."""
+        old, new = self.program.place(use), moved.place(use)
+        if old.ndim == 1:
+            arm = self.model.arm(tool)
+            chain = frames(arm, np.stack([old, new]))
+            shift = chain.position[1] - chain.position[0]
+            turn = rotation_vector(chain.rotation[1] @ chain.rotation[0].T)
+        else:
+            shift = new[:3, 3] - old[:3, 3]
+            turn = rotation_vector(new[:3, :3] @ old[:3, :3].T)
+        return float(np.linalg.norm(shift)), float(np.linalg.norm(turn))
+
+    def _trust(self, piece: Piece) -> Array | None:
+        posterior = self.model.posterior
+        covariance = self.model.covariances(piece, piece.motion)
+        if posterior is None or covariance is None:
+            return None
+        gap = missing(self.model.wanted(piece), self.model.real(piece, piece.motion))
+        return trust(posterior.domain, piece.motion.q, gap[:, :3], covariance[:, :3, :3])
+
+    def result(self, moved: MoveProgram, left: dict[int, str]) -> ProgramCorrection:
+        """Return everything that is told of the correction."""
+        before, after, sure, outside = [], [], [], []
+        for piece in self.travel.pieces:
+            aim = self.model.wanted(piece)
+            motion = repeated(self.model.robot, moved, piece)
+            before.append(missing(aim, self.model.real(piece, piece.motion)))
+            after.append(missing(aim, self.model.real(piece, motion)))
+            sure.append(self.model.covariances(piece, piece.motion))
+            outside.append(_outside(self.model, piece))
+        return ProgramCorrection(
+            moved,
+            self.travel,
+            left,
+            frozenset(_spread(self.program, left)),
+            tuple(before),
+            tuple(after),
+            tuple(sure),
+            tuple(outside),
+        )
+
+
+def _collect(
+    model: ProgramModel,
+    moved: MoveProgram,
+    piece: Piece,
+    motion: JointMotion,
+    gap: Array,
+    steps: dict[int, list[Array]],
+) -> None:
+    """Add what each use of a point misses, in the point's own coordinates."""
+    for k, move in enumerate(piece.moves):
+        for use, at in ((move.via, piece.vias[k]), (move.end, piece.ends[k])):
+            if use is None or not use.leads:
+                continue
+            point = moved.points[use.point]
+            if point.ndim == 1:
+                arm = model.arm(move.tool)
+                jacobian = chain_jacobian(arm, frames(arm, motion.q[at]))
+                step = least_step(jacobian, gap[at], SINGULAR)
+            else:
+                step = _own(moved.place(use), use, point, gap[at])
+            steps.setdefault(use.point, []).append(step)
+
+
+def _own(place: Array, use: Use, point: Array, gap: Array) -> Array:
+    """Return the step of a point, shape (6,), that moves a place made of it by a gap."""
+    goal = np.array(place)
+    goal[:3, 3] += gap[:3]
+    goal[:3, :3] = rotation_matrix(gap[3:]) @ goal[:3, :3]
+    wanted = np.linalg.inv(use.before) @ goal @ np.linalg.inv(use.after)
+    turn = rotation_vector(wanted[:3, :3] @ point[:3, :3].T)
+    return np.concatenate([wanted[:3, 3] - point[:3, 3], turn])
+
+
+def _stepped(point: Array, step: Array) -> Array:
+    if point.ndim == 1:
+        return np.asarray(point + step)
+    out = np.array(point)
+    out[:3, 3] += step[:3]
+    out[:3, :3] = rotation_matrix(step[3:]) @ out[:3, :3]
+    return out
+
+
+def _held_seams(program: MoveProgram, held: dict[int, str]) -> dict[int, str]:
+    """Return the seams that use a point which must not be moved."""
+    out: dict[int, str] = {}
+    for move in (move for piece in program.pieces for move in piece):
+        for use in move.uses:
+            if use.point in held:
+                out.setdefault(move.seam, f'{move.where}: {held[use.point]}')
+    return out
+
+
+def _spread(program: MoveProgram, left: dict[int, str]) -> set[int]:
+    """Return the points of seams that are left, and leave the seams that share one with them."""
+    moves = [move for piece in program.pieces for move in piece]
+    still: set[int] = set()
+    while True:
+        more = {u.point for move in moves if move.seam in left for u in move.uses} - still
+        if not more:
+            return still
+        still |= more
+        for move in moves:
+            if move.seam not in left and any(u.point in still for u in move.uses):
+                left[move.seam] = (
+                    f'{move.where}: a point of this seam belongs to one that is left as it was'
+                )
+
+
+def _outside(model: ProgramModel, piece: Piece) -> tuple[tuple[int, str], ...]:
+    """Return the moves of a piece that leave what was recorded, and why."""
+    out: dict[int, str] = {}
+    for first, last, why in model.outside(piece.motion):
+        for k in np.unique(piece.move[first : last + 1]):
+            out.setdefault(int(k), why)
+    return tuple(sorted(out.items()))

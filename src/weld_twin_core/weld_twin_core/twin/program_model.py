@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the real tool goes on the motion of a program, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arm.chain import forward
+from ..arm.robot import Robot
+from ..arm.rotation import angle_between
+from ..arrays import Array
+from ..effects.effect import Effect
+from ..motion.programs import Move, Piece
+from ..recording import JointMotion, Recording, Signal
+from .compensation import commandable
+from .domain import Domain, Outside
+from .posterior import Posterior, pose_covariances
+from .twin import Twin
+
+SAME_TOOL = 1e-5
+"""Numbers of two tool frames [m, and parts of a unit vector] that mean the same tool: programs are
+written to a micrometre and some thousandths of a degree."""
+TOOL_EFFECT = 'tool_pose'
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramModel:
+    """
+    What acts on the arm that runs a program.
+
+    Attributes
+    ----------
+    robot : Robot
+        Nominal, with its own base and the tool that the effects were found with.
+    effects : tuple of Effect
+    posterior : Posterior, optional
+    temperature : float, optional [degC]
+        While the program runs.
+    setup : int
+        Which base frame of the posterior.
+
+    """
+
+    robot: Robot
+    effects: tuple[Effect, ...]
+    posterior: Posterior | None = None
+    temperature: float | None = None
+    setup: int = 0
+    _twins: dict[bytes, Twin] = field(default_factory=dict, repr=False)
+
+    @property
+    def acting(self) -> tuple[Effect, ...]:
+        """Return the effects that moves of the arm can mend."""
+        return tuple(effect for effect in self.effects if commandable(effect))
+
+    def arm(self, tool: Array) -> Robot:
+        """Return the nominal arm with a tool, in its own base."""
+        return self.robot.with_frames(base=np.eye(4), tool=tool)
+
+    def twin(self, tool: Array) -> Twin:
+        """Return the real arm with a tool; what was found of another tool is left out."""
+        key = np.ascontiguousarray(tool).tobytes()
+        if key not in self._twins:
+            same = self.same_tool(tool)
+            effects = [e for e in self.acting if same or e.name != TOOL_EFFECT]
+            self._twins[key] = Twin(self.robot.with_frames(tool=tool), effects)
+        return self._twins[key]
+
+    def same_tool(self, tool: Array) -> bool:
+        """Tell whether a tool is the one that the effects were found with."""
+        return bool(np.abs(tool - self.robot.T_flange_tool).max() < SAME_TOOL)
+
+    def wanted(self, piece: Piece) -> Array:
+        """Return ``T_base_tool`` as the program means it at every sample, shape (N, 4, 4)."""
+        return self._by_tool(piece, lambda tool: forward(self.arm(tool), piece.motion.q))
+
+    def real(self, piece: Piece, motion: JointMotion) -> Array:
+        """Return ``T_base_tool`` of the real arm at every sample of a motion, (N, 4, 4)."""
+        back = np.linalg.inv(self.robot.T_world_base)
+        recording = self.recording(motion)
+
+        def poses(tool: Array) -> Array:
+            position, rotation = self.twin(tool).poses(recording)
+            out = np.zeros((motion.t.size, 4, 4))
+            out[:, :3, :3], out[:, :3, 3], out[:, 3, 3] = rotation, position, 1.0
+            return np.asarray(back @ out)
+
+        return self._by_tool(piece, poses)
+
+    def covariances(self, piece: Piece, motion: JointMotion) -> Array | None:
+        """Return how sure the real poses are, shape (N, 6, 6), turned into the robot's base."""
+        if self.posterior is None:
+            return None
+        posterior, recording = self.posterior, self.recording(motion)
+        turn = np.kron(np.eye(2), self.robot.T_world_base[:3, :3].T)
+
+        def sureness(tool: Array) -> Array:
+            found = pose_covariances(posterior, self.twin(tool), recording, motion.t, self.setup)
+            return np.asarray(turn @ found @ turn.T)
+
+        return self._by_tool(piece, sureness)
+
+    def outside(self, motion: JointMotion) -> list[Outside]:
+        """Return the stretches of a motion outside what was recorded."""
+        if self.posterior is None:
+            return []
+        warm = None
+        if self.temperature is not None:
+            warm = np.full(motion.t.size, self.temperature)
+        domain: Domain = self.posterior.domain
+        return domain.outside(motion.q, motion.velocity, None, warm)
+
+    def recording(self, motion: JointMotion) -> Recording:
+        """Return a motion as the twin takes it."""
+        warm = None
+        if self.temperature is not None:
+            warm = Signal(motion.t[:1], np.array([self.temperature]))
+        return Recording('program', motion, temperature=warm)
+
+    @staticmethod
+    def _by_tool(piece: Piece, of: Callable[[Array], Array]) -> Array:
+        """Return values at every sample, each worked out with the tool of its move."""
+        keys = [np.ascontiguousarray(move.tool).tobytes() for move in piece.moves]
+        out: Array | None = None
+        for key in dict.fromkeys(keys):
+            chosen = np.array([k == key for k in keys])[piece.move]
+            values = of(_tool(piece.moves, keys, key))
+            out = values if out is None else out
+            out[chosen] = values[chosen]
+        assert out is not None
+        return out
+
+
+def _tool(moves: tuple[Move, ...], keys: list[bytes], key: bytes) -> Array:
+    return moves[keys.index(key)].tool
+
+
+def missing(wanted: Array, real: Array) -> Array:
+    """Return what is missing to poses, shape (N, 6) [m, rad], linear part first."""
+    turn = angle_between(wanted[..., :3, :3], real[..., :3, :3])
+    return np.concatenate([wanted[..., :3, 3] - real[..., :3, 3], turn], axis=-1)

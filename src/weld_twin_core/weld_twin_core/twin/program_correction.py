@@ -44,6 +44,29 @@ class Caps(NamedTuple):
     turn: float = np.pi / 180.0
 
 
+class MoveResult(NamedTuple):
+    """
+    What a correction does to one move.
+
+    Attributes
+    ----------
+    length, turn : float
+        How far the place it leads to was moved [m, rad].
+    before, after : float or None [m]
+        Expected distance of the real tool from that place; None where the move could not be
+        followed.
+    outside : str
+        Why the move leaves what was recorded; empty where it does not.
+
+    """
+
+    length: float
+    turn: float
+    before: float | None = None
+    after: float | None = None
+    outside: str = ''
+
+
 @dataclass(frozen=True, eq=False)
 class ProgramCorrection:
     """
@@ -62,8 +85,8 @@ class ProgramCorrection:
     before, after : tuple of array, each of shape (N, 6) [m, rad]
         What is missing to the real tool at every sample of every piece.
     covariances : tuple of array or None, each of shape (N, 6, 6)
-    outside : tuple of tuple of (int, str)
-        For every piece the moves that leave what was recorded, with the reason.
+    results : tuple of MoveResult
+        One for every move, in the order of the program.
 
     """
 
@@ -74,7 +97,7 @@ class ProgramCorrection:
     before: tuple[Array, ...]
     after: tuple[Array, ...]
     covariances: tuple[Array | None, ...]
-    outside: tuple[tuple[tuple[int, str], ...], ...]
+    results: tuple[MoveResult, ...]
 
 
 def correct_program(
@@ -207,14 +230,13 @@ class _Work(NamedTuple):
 
     def result(self, moved: MoveProgram, left: dict[int, str]) -> ProgramCorrection:
         """Return everything that is told of the correction."""
-        before, after, sure, outside = [], [], [], []
+        before, after, sure = [], [], []
         for piece in self.travel.pieces:
             aim = self.model.wanted(piece)
             motion = repeated(self.model.robot, moved, piece)
             before.append(missing(aim, self.model.real(piece, piece.motion)))
             after.append(missing(aim, self.model.real(piece, motion)))
             sure.append(self.model.covariances(piece, piece.motion))
-            outside.append(_outside(self.model, piece))
         return ProgramCorrection(
             moved,
             self.travel,
@@ -223,8 +245,24 @@ class _Work(NamedTuple):
             tuple(before),
             tuple(after),
             tuple(sure),
-            tuple(outside),
+            self._results(moved, before, after),
         )
+
+    def _results(
+        self, moved: MoveProgram, before: list[Array], after: list[Array]
+    ) -> tuple[MoveResult, ...]:
+        seen: dict[int, tuple[float, float, str]] = {}
+        for k, piece in enumerate(self.travel.pieces):
+            outside = _outside(self.model, piece)
+            for m, move in enumerate(piece.moves):
+                ends = (gaps[k][piece.ends[m], :3] for gaps in (before, after))
+                first, then = (float(np.linalg.norm(end)) for end in ends)
+                seen[id(move)] = first, then, outside.get(m, '')
+        out = []
+        for move in (move for piece in self.program.pieces for move in piece):
+            by = (0.0, 0.0) if move.end is None else self.moved_by(moved, move.end, move.tool)
+            out.append(MoveResult(*by, *seen.get(id(move), (None, None, ''))))
+        return tuple(out)
 
 
 def _collect(
@@ -295,10 +333,10 @@ def _spread(program: MoveProgram, left: dict[int, str]) -> set[int]:
                 )
 
 
-def _outside(model: ProgramModel, piece: Piece) -> tuple[tuple[int, str], ...]:
+def _outside(model: ProgramModel, piece: Piece) -> dict[int, str]:
     """Return the moves of a piece that leave what was recorded, and why."""
     out: dict[int, str] = {}
     for first, last, why in model.outside(piece.motion):
         for k in np.unique(piece.move[first : last + 1]):
             out.setdefault(int(k), why)
-    return tuple(sorted(out.items()))
+    return out

@@ -65,6 +65,8 @@ class Move(NamedTuple):
         File and line, for messages.
     seam : int
         Moves of one number are corrected together or not at all.
+    why : str
+        Of an unknown move, why it is not understood.
 
     """
 
@@ -78,6 +80,7 @@ class Move(NamedTuple):
     suits: Callable[[Array], Array] | None = None
     where: str = ''
     seam: int = 0
+    why: str = ''
 
     @property
     def uses(self) -> list[Use]:

@@ -137,7 +137,7 @@ def _pieces(
 def _followed(robot: Robot, program: MoveProgram, move: Move, q: Array | None) -> _Reached:
     """Return the samples of a move that begins at joint positions, None for an unknown place."""
     if move.end is None:
-        raise PathError('this move is not understood')
+        raise PathError(move.why or 'this move is not understood')
     arm = robot.with_frames(base=np.eye(4), tool=move.tool)
     if move.kind == 'joint':
         return _joint_move(arm, program, move, q)

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far the real tool will be from where a program means it, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Array
+from .program_correction import ProgramCorrection
+
+DRAWS = 400
+"""Enough for the 5th and 95th of a hundred to be steady within a few per cent."""
+SPAN = (5.0, 95.0)
+
+
+class Accuracy(NamedTuple):
+    """
+    Distance of the real tool from where it is wanted [m].
+
+    Attributes
+    ----------
+    rms, worst : float
+        Of the model's own prediction.
+    low, high : float or None
+        Nine of ten models that the recordings allow have their RMS between these; None where the
+        model says nothing of how sure it is.
+
+    """
+
+    rms: float
+    worst: float
+    low: float | None = None
+    high: float | None = None
+
+
+def accuracy(gaps: Sequence[Array], covariances: Sequence[Array | None]) -> Accuracy | None:
+    """
+    Return the accuracy over samples, or None without any.
+
+    A model that is off is off alike over a seam, so one draw is the same at every sample.
+
+    Parameters
+    ----------
+    gaps : sequence of array, each of shape (N, 6) [m, rad]
+        What is missing by the model.
+    covariances : sequence of array or None, each of shape (N, 6, 6)
+
+    """
+    gap = np.concatenate([np.zeros((0, 3)), *(g[:, :3] for g in gaps)])
+    if not len(gap):
+        return None
+    rms, worst = _rms(gap), float(np.linalg.norm(gap, axis=1).max())
+    if any(c is None for c in covariances):
+        return Accuracy(rms, worst)
+    factor = np.concatenate([_root(c[:, :3, :3]) for c in covariances if c is not None])
+    drawn = np.random.default_rng(0).standard_normal((DRAWS, 3))
+    sizes = [_rms(gap + factor @ z) for z in drawn]
+    low, high = np.percentile(sizes, SPAN)
+    return Accuracy(rms, worst, float(low), float(high))
+
+
+def along_seams(found: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | None]:
+    """Return the accuracy along corrected seams, before and after; of all moves without any."""
+    chosen = [
+        np.array(
+            [m.kind != 'joint' and m.seam not in found.left for m in piece.moves], dtype=bool
+        )[piece.move]
+        for piece in found.travel.pieces
+    ]
+    if not any(keep.any() for keep in chosen):
+        chosen = [_ends(piece.motion.t.size, piece.ends) for piece in found.travel.pieces]
+    sure = [
+        None if c is None else c[keep] for c, keep in zip(found.covariances, chosen, strict=True)
+    ]
+    before, after = (
+        accuracy([g[keep] for g, keep in zip(gaps, chosen, strict=True)], sure)
+        for gaps in (found.before, found.after)
+    )
+    return before, after
+
+
+def _ends(count: int, ends: np.ndarray) -> np.ndarray:
+    out = np.zeros(count, dtype=bool)
+    out[ends] = True
+    return out
+
+
+def _rms(gap: Array) -> float:
+    return float(np.sqrt((gap**2).sum(axis=1).mean()))
+
+
+def _root(covariance: Array) -> Array:
+    """Return symmetric square roots, shape (N, 3, 3)."""
+    values, vectors = np.linalg.eigh(covariance)
+    size = np.sqrt(np.maximum(values, 0.0))
+    return np.asarray((vectors * size[:, None, :]) @ np.swapaxes(vectors, -1, -2))

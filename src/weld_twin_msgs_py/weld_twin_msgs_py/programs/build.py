@@ -1,0 +1,247 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is understood of a program: points with the places of their numbers, and moves."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs import Move, MoveProgram, Use
+from weld_twin_core.motion.programs.moves import Kind
+
+from .controllers import Controller
+from .notation import Notation
+from .source import Number, Source
+
+Suits = Callable[[Robot, Controller], Callable[[Array], Array]]
+"""Makes, for a robot, what tells the postures that a program asks for."""
+
+
+class Point(NamedTuple):
+    """
+    A point of a program.
+
+    Attributes
+    ----------
+    name : str
+        As the program calls it; 'line 12' for one that stands in the move.
+    where : str
+        File and line.
+    numbers : tuple of Number
+    notation : Notation
+    value : array
+        A pose (4, 4) in its own base frame, or joint positions of the model (n,).
+
+    """
+
+    name: str
+    where: str
+    numbers: tuple[Number, ...]
+    notation: Notation
+    value: Array
+
+
+class Ref(NamedTuple):
+    """
+    A place that a move leads to, ``before @ point @ after`` in the base frame.
+
+    ``leads`` is False where the place is derived from the point, such as an approach above it.
+    """
+
+    point: int
+    before: Array | None = None
+    after: Array | None = None
+    leads: bool = True
+
+
+class Frame(NamedTuple):
+    """A tool or base frame as a program names it; ``value`` None where it has no numbers."""
+
+    name: str
+    value: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """
+    One move as a program says it; without an end it is not understood, and ``why`` says why.
+
+    ``relative``: a move that is counted from where the arm stands, which goes along with it.
+    """
+
+    kind: Kind
+    where: str
+    end: Ref | None = None
+    via: Ref | None = None
+    tool: Frame = field(default_factory=lambda: Frame(''))
+    base: Frame = field(default_factory=lambda: Frame(''))
+    speed: float = 0.1
+    stop: bool = True
+    dwell: float = 0.0
+    suits: Suits | None = None
+    why: str = ''
+
+
+@dataclass(eq=False)
+class Program:
+    """
+    A program that was read.
+
+    Attributes
+    ----------
+    language : str
+    sources : list of Source
+        The first is the program, the others belong to it.
+    points : list of Point
+    pieces : list of list of Step
+        Routines; where one begins, nobody knows where the arm is.
+    held : dict of int to str
+        Points that must not be moved, with the reason.
+    notes : list of str
+        What a reader should know, in sentences.
+
+    """
+
+    language: str
+    sources: list[Source]
+    points: list[Point] = field(default_factory=list)
+    pieces: list[list[Step]] = field(default_factory=lambda: [[]])
+    held: dict[int, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def add_point(
+        self, name: str, numbers: Sequence[Number], notation: Notation, file: int = 0
+    ) -> int:
+        """
+        Add a point and return its index.
+
+        Raises
+        ------
+        DataError
+            Its numbers make no pose.
+
+        """
+        where = self.sources[file].where(numbers[0].start)
+        try:
+            value = notation.value([number.value for number in numbers])
+        except DataError as error:
+            raise DataError(f'{where}: {error}') from None
+        self.points.append(Point(name, where, tuple(numbers), notation, value))
+        return len(self.points) - 1
+
+    def add(self, step: Step) -> None:
+        """Add a move to the routine at hand."""
+        self.pieces[-1].append(step)
+
+    def unknown(self, kind: Kind, where: str, why: str) -> None:
+        """Add a move that is not understood; ``kind`` says whether it is part of a seam."""
+        self.add(Step(kind, where, why=why))
+
+    def dwell(self, seconds: float) -> None:
+        """Let the move before last longer."""
+        if self.pieces[-1]:
+            last = self.pieces[-1][-1]
+            self.pieces[-1][-1] = replace(last, dwell=last.dwell + seconds, stop=True)
+
+    def new_piece(self) -> None:
+        """Begin another routine."""
+        if self.pieces[-1]:
+            self.pieces.append([])
+
+    def hold(self, point: int, why: str) -> None:
+        """Keep a point from being moved."""
+        self.held.setdefault(point, why)
+
+    @property
+    def steps(self) -> list[Step]:
+        """Return all moves."""
+        return [step for piece in self.pieces for step in piece]
+
+
+def hold_if_used_elsewhere(
+    program: Program, names: dict[str, int], texts: Sequence[str], used: Sequence[set[int]]
+) -> None:
+    """
+    Hold the points whose names stand where they are not understood.
+
+    A point that is assigned, computed with or handed on may come to mean something else.
+
+    Parameters
+    ----------
+    program : Program
+    names : dict of str to int
+        Points by name, in lower case where the language does not care.
+    texts : sequence of str
+        The files, comments and strings blanked out.
+    used : sequence of set of int
+        For every file, the places of names that are understood.
+
+    """
+    for file, text in enumerate(texts):
+        for found in re.finditer(r'[A-Za-z_$][\w$]*', text):
+            point = names.get(found[0], names.get(found[0].lower()))
+            if point is not None and found.start() not in used[file]:
+                where = program.sources[file].where(found.start())
+                program.hold(point, f'{found[0]} is used at {where} in a way not understood')
+
+
+def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProgram:
+    """
+    Return the points and moves of a program on a robot.
+
+    Moves from one joint move to the next make a seam, together with the point it begins at.
+
+    Parameters
+    ----------
+    program : Program
+    robot : Robot
+    controller : Controller
+        Where the controller's frames are on this robot, and the frames that were given.
+
+    """
+    seam, pieces = -1, []
+    for steps in program.pieces:
+        seam += 1
+        moves: list[Move] = []
+        for step in steps:
+            if step.kind == 'joint' and moves:
+                seam += 1
+            moves.append(_move(step, seam, robot, controller))
+        if moves:
+            pieces.append(tuple(moves))
+    return MoveProgram(tuple(point.value for point in program.points), tuple(pieces))
+
+
+def _move(step: Step, seam: int, robot: Robot, controller: Controller) -> Move:
+    try:
+        if step.end is None:
+            raise DataError(step.why)
+        tool, base = controller.tool(step.tool), controller.base(step.base)
+    except DataError as error:
+        return Move('unknown', None, np.eye(4), where=step.where, seam=seam, why=str(error))
+    end = _use(step.end, base)
+    return Move(
+        step.kind,
+        end,
+        tool,
+        None if step.via is None else _use(step.via, base),
+        step.speed,
+        step.stop,
+        step.dwell,
+        None if step.suits is None else step.suits(robot, controller),
+        step.where,
+        seam,
+    )
+
+
+def _use(ref: Ref, base: Array) -> Use:
+    before = base if ref.before is None else base @ ref.before
+    return Use(ref.point, before, np.eye(4) if ref.after is None else ref.after, ref.leads)

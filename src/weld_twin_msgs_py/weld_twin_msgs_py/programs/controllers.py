@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where a maker's controller has its frames and joints, on the model of a robot.
+
+The models of this project stand on the floor and count joint 3 from joint 2, as ROS drivers do.
+FANUC's and Yaskawa's controllers have their origin at the height of the second axis, and FANUC
+counts joint 3 from the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from weld_twin_core.arm.catalog import load, names
+from weld_twin_core.arm.fingerprint import fingerprint
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+
+if TYPE_CHECKING:
+    from .build import Frame
+
+AT_SECOND_AXIS = {'fanuc': 'FANUC', 'yaskawa': 'Yaskawa'}
+"""Bundled robots, by the begin of their names, whose controllers have the origin there."""
+COUPLED = 'fanuc'
+"""Bundled robots whose controller counts joint 3 from the ground."""
+
+
+@dataclass(frozen=True, eq=False)
+class Controller:
+    """
+    The frames of a controller on a robot.
+
+    Attributes
+    ----------
+    origin : array, shape (4, 4) [m]
+        ``T_base_origin``: the controller's robot frame in the base frame of the model.
+    flange : array, shape (4, 4) [m]
+        The controller's flange on the last frame of the model.
+    mix : array, shape (n, n)
+        Joints of the model from those of the controller.
+    own_tool : array, shape (4, 4) [m]
+        The tool of the robot's model.
+    tools, bases : mapping of str to array
+        Frames that were given, by the names of the program, in lower case.
+    notes : list of str
+        What was assumed, in sentences.
+
+    """
+
+    origin: Array
+    flange: Array
+    mix: Array
+    own_tool: Array
+    tools: Mapping[str, Array] = field(default_factory=dict)
+    bases: Mapping[str, Array] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def tool(self, frame: Frame) -> Array:
+        """
+        Return ``T_flange_tool`` on the model.
+
+        Raises
+        ------
+        DataError
+            The program gives no numbers for it, nor does anybody else.
+
+        """
+        given = self.tools.get(frame.name.lower())
+        if given is not None or frame.value is not None:
+            value = frame.value if given is None else given
+            assert value is not None
+            return np.asarray(self.flange @ value)
+        if not frame.name:
+            return self.own_tool
+        if np.abs(self.own_tool[:3, 3] - self.flange[:3, 3]).max() < 1e-9:
+            raise DataError(
+                f'the numbers of tool {frame.name} are not in the program, and the robot file has '
+                f"no tool; give them with --tool '{frame.name}=X,Y,Z,...'"
+            )
+        self._note(
+            f'the numbers of tool {frame.name} are not in the program; the tool of the robot file '
+            'was taken'
+        )
+        return self.own_tool
+
+    def base(self, frame: Frame) -> Array:
+        """
+        Return ``T_base_frame`` on the model.
+
+        Raises
+        ------
+        DataError
+            The program gives no numbers for it, nor does anybody else.
+
+        """
+        given = self.bases.get(frame.name.lower())
+        if given is not None:
+            return np.asarray(self.origin @ given)
+        if frame.value is not None:
+            return np.asarray(self.origin @ frame.value)
+        if not frame.name:
+            return self.origin
+        raise DataError(
+            f'the numbers of base {frame.name} are not in the program; give them with '
+            f"--base '{frame.name}=X,Y,Z,...'"
+        )
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
+
+
+def controller_of(
+    robot: Robot,
+    tools: Mapping[str, Array] | None = None,
+    bases: Mapping[str, Array] | None = None,
+) -> Controller:
+    """
+    Return the controller's frames on a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+    tools, bases : mapping of str to array, optional
+        Frames that were given, shape (4, 4) [m].
+
+    """
+    origin, mix, notes = np.eye(4), np.eye(robot.n), []
+    flange = np.array(robot.T_flange_tool)
+    if np.abs(flange[:3, 3]).max() > 1e-9:
+        flange = np.eye(4)
+    name = bundled_name(robot)
+    maker = next((maker for maker in AT_SECOND_AXIS if name.startswith(maker)), None)
+    if name:
+        flange = np.array(load(name).T_flange_tool)
+    if maker is not None:
+        origin[2, 3] = robot.d[0]
+        notes.append(
+            f'positions count from the origin of {AT_SECOND_AXIS[maker]}, {robot.d[0]:.4g} m '
+            'above the floor'
+        )
+    if name.startswith(COUPLED):
+        mix[2, 1] = 1.0
+        notes.append('J3 counts from the ground, as the teach pendant shows it')
+    own = np.array(robot.T_flange_tool)
+    return Controller(origin, flange, mix, own, _lower(tools), _lower(bases), notes)
+
+
+def _lower(frames: Mapping[str, Array] | None) -> dict[str, Array]:
+    return {name.lower(): value for name, value in (frames or {}).items()}
+
+
+def bundled_name(robot: Robot) -> str:
+    """Return the name of the bundled robot with the same kinematics; empty for none."""
+    own = fingerprint(robot)
+    if robot.name in names() and fingerprint(load(robot.name)) == own:
+        return robot.name
+    return next((name for name in names() if fingerprint(load(name)) == own), '')

@@ -1,0 +1,408 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+KRL of KUKA: a ``.src`` with the moves and, beside it, a ``.dat`` with the points.
+
+PTP, LIN and CIRC, and their spline forms, to points that stand in the move or are declared. Lengths
+are mm, angles degrees, ``$VEL.CP`` m/s. The bits of T are the signs of the axes.
+
+References
+----------
+.. [1] KUKA, "KUKA System Software 8.x, Operating and Programming Instructions for System
+   Integrators": motion programming, $BASE, $TOOL, E6POS, Status and Turn.
+
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs.moves import Kind
+
+from .build import Frame, Program, Ref, Step, Suits, hold_if_used_elsewhere
+from .context import Context
+from .controllers import Controller
+from .notation import KUKA_POSE
+from .source import Number, Source, closing, masked, number_at, split_outside, stripped
+
+NAME = 'krl'
+KINDS: dict[str, Kind] = {'PTP': 'joint', 'LIN': 'linear', 'CIRC': 'circular'}
+POSE_KEYS, EXTERNAL = ('X', 'Y', 'Z', 'A', 'B', 'C'), ('E1', 'E2', 'E3', 'E4', 'E5', 'E6')
+SIGN_DOUBT = np.radians(0.5)
+"""An axis this near zero may have either sign in T, which was worked out from other digits."""
+SPEED = 0.1
+"""m/s while the program has not said."""
+_COMMENTS = (r';[^\r\n]*', r'"[^"\r\n]*"')
+_MOVE = re.compile(r'^[ \t]*S?(PTP|LIN|CIRC)(_REL)?\b', re.I | re.M)
+_OTHER = re.compile(r'^[ \t]*(SPL|SPTP_REL|ASYPTP)\b', re.I | re.M)
+_DECLARED = re.compile(
+    r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DECL[ \t]+)?(?:GLOBAL[ \t]+)?(?:CONST[ \t]+)?'
+    r'(E6POS|POS|FRAME|E6AXIS|AXIS|FDAT|LDAT|PDAT)[ \t]+([A-Za-z_]\w*)[ \t]*=[ \t]*(\{)',
+    re.I | re.M,
+)
+_SET = re.compile(
+    r'^[ \t]*(\$BASE|\$TOOL|\$VEL\.CP|\$VEL_AXIS\[\w+\]|FDAT_ACT|LDAT_ACT|PDAT_ACT|'
+    r'(?:BASE|TOOL)_DATA\[\d+\])[ \t]*=[ \t]*([^\r\n]*)',
+    re.I | re.M,
+)
+_BAS = re.compile(r'^[ \t]*BAS[ \t]*\([ \t]*#(\w+)[ \t]*,[ \t]*([^)\r\n]*)\)', re.I | re.M)
+_WAIT = re.compile(r'^[ \t]*WAIT[ \t]+SEC[ \t]+([^\s;]+)', re.I | re.M)
+_ROUTINE = re.compile(r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DEF|DEFFCT)\b', re.I | re.M)
+_AGGREGATE = re.compile(r'\{\s*(?:\w+\s*:)?')
+
+
+class Aggregate(NamedTuple):
+    """``{X 1, Y 2, ...}``: values by component, those that are numbers, and the texts of others."""
+
+    numbers: dict[str, Number]
+    others: dict[str, str]
+
+
+@dataclass
+class _State:
+    """What the lines before have set."""
+
+    tool: Frame = field(default_factory=lambda: Frame(''))
+    base: Frame = field(default_factory=lambda: Frame(''))
+    speed: float = SPEED
+    joint_speed: float = 0.1
+
+
+def read(sources: Sequence[Source], context: Context) -> Program:
+    """
+    Return what is understood of a program.
+
+    Parameters
+    ----------
+    sources : sequence of Source
+        The .src, then the .dat where there is one.
+    context : Context
+
+    Raises
+    ------
+    DataError
+        A point is broken or declared twice; names file and line.
+
+    """
+    return _Reader(sources, context).read()
+
+
+class _Reader:
+    """Goes through the files once."""
+
+    def __init__(self, sources: Sequence[Source], context: Context) -> None:
+        self.sources, self.context = list(sources), context
+        self.program = Program(NAME, self.sources)
+        self.texts = [masked(source.text, _COMMENTS) for source in sources]
+        self.names: dict[str, int] = {}
+        self.data: dict[str, Aggregate] = {}
+        self.frames: dict[str, Array] = {}
+        self.used: list[set[int]] = [set() for _ in sources]
+        self.suits: dict[int, Suits] = {}
+        self.state = _State()
+
+    def read(self) -> Program:
+        for file in range(len(self.sources)):
+            for found in _DECLARED.finditer(self.texts[file]):
+                self._declaration(file, found)
+        self._frame_tables()
+        events = [
+            (found.start(), handle, found)
+            for pattern, handle in (
+                (_MOVE, self._move),
+                (_OTHER, self._other),
+                (_SET, self._set),
+                (_BAS, self._bas),
+                (_WAIT, self._wait),
+                (_ROUTINE, self._routine),
+            )
+            for found in pattern.finditer(self.texts[0])
+        ]
+        for _, handle, found in sorted(events, key=lambda event: event[0]):
+            handle(found)
+        hold_if_used_elsewhere(self.program, self.names, self.texts, self.used)
+        return self.program
+
+    # Declarations ----------------------------------------------------------------------------
+
+    def _declaration(self, file: int, found: re.Match[str]) -> None:
+        kind, name = found[1].upper(), found[2].lower()
+        where = self.sources[file].where(found.start(2))
+        self.used[file].add(found.start(2))
+        if name in self.names or name in self.data:
+            raise DataError(f'{where}: {found[2]} is declared twice')
+        end = closing(self.sources[file], self.texts[file], found.start(3)) + 1
+        content = self._aggregate(file, found.start(3), end)
+        if kind in ('FDAT', 'LDAT', 'PDAT'):
+            self.data[name] = content
+        else:
+            point = self._point_of(file, content, found.start(3), found[2])
+            if point is None:
+                self.data[name] = content
+            else:
+                self.names[name] = point
+
+    def _frame_tables(self) -> None:
+        """Take in TOOL_DATA and BASE_DATA where they stand in one of the files."""
+        for file, text in enumerate(self.texts):
+            for found in _SET.finditer(text):
+                if found[1].upper().endswith(']') and '_DATA' in found[1].upper():
+                    value = self._frame_at(file, *found.span(2))
+                    if value is not None:
+                        self.frames[found[1].upper()] = value
+
+    def _aggregate(self, file: int, start: int, end: int) -> Aggregate:
+        """Return the components of ``{...}``; nested ones are left as text."""
+        source, text = self.sources[file], self.texts[file]
+        opening = _AGGREGATE.match(text, start)
+        if opening is None or text[end - 1] != '}':
+            raise DataError(f'{source.where(start)}: a point in braces was expected')
+        numbers: dict[str, Number] = {}
+        others: dict[str, str] = {}
+        for first, last in split_outside(text, opening.end(), end - 1):
+            first, last = stripped(text, first, last)
+            named = re.match(r'([A-Za-z_]\w*)(?:\[[^\]]*\])?\s*', text[first:last])
+            if named is None:
+                raise DataError(
+                    f'{source.where(first)}: a component and its value were expected, got '
+                    f'{source.text[first:last]!r}'
+                )
+            key = named[1].upper()
+            if key in numbers or key in others:
+                raise DataError(f'{source.where(first)}: component {key} is given twice')
+            piece = text[first + named.end() : last]
+            if re.match(r'[-+.\d]', piece):
+                numbers[key] = number_at(source, first + named.end(), last, f'{key}', file)
+            else:
+                others[key] = piece.strip()
+        return Aggregate(numbers, others)
+
+    def _point_of(self, file: int, content: Aggregate, start: int, name: str) -> int | None:
+        """Add a point of all its components; None where some are missing or worked out."""
+        n = self.context.robot.n
+        axes = tuple(f'A{k + 1}' for k in range(n))
+        for keys, notation in ((POSE_KEYS, KUKA_POSE), (axes, self.context.degrees())):
+            if all(key in content.numbers for key in keys):
+                numbers = [content.numbers[key] for key in keys]
+                point = self.program.add_point(name, numbers, notation, file)
+                outer = [key for key in EXTERNAL if key in content.numbers]
+                if any(content.numbers[key].value != 0.0 for key in outer):
+                    self.program.hold(point, f'{name} moves external axes')
+                turn = content.numbers.get('T')
+                if turn is not None and notation is KUKA_POSE:
+                    self.suits[point] = turn_bits(int(turn.value))
+                return point
+        del start
+        return None
+
+    # Statements ------------------------------------------------------------------------------
+
+    def _routine(self, found: re.Match[str]) -> None:
+        del found
+        self.program.new_piece()
+
+    def _wait(self, found: re.Match[str]) -> None:
+        try:
+            self.program.dwell(
+                max(number_at(self.sources[0], *found.span(1), 'a time').value, 0.0)
+            )
+        except DataError:
+            return  # A computed time; how long it is does not matter here.
+
+    def _other(self, found: re.Match[str]) -> None:
+        where = self.sources[0].where(found.start())
+        self.program.unknown('linear', where, f'{found[1].upper()} is not understood')
+
+    def _set(self, found: re.Match[str]) -> None:
+        what = found[1].upper()
+        start, end = stripped(self.texts[0], *found.span(2))
+        value = self.texts[0][start:end]
+        if what in ('$BASE', '$TOOL'):
+            frame = self._frame_at(0, start, end)
+            named = Frame(_bare(value) or value, frame)
+            self.state.base = named if what == '$BASE' else self.state.base
+            self.state.tool = named if what == '$TOOL' else self.state.tool
+        elif what == '$VEL.CP':
+            self.state.speed = self._speed(start, end, self.state.speed)
+        elif what.startswith('$VEL_AXIS'):
+            self.state.joint_speed = self._speed(start, end, 10.0) / 100.0
+        elif what == 'FDAT_ACT':
+            self._frames_of(value)
+        elif what == 'LDAT_ACT' and value.lower() in self.data:
+            speed = self.data[value.lower()].numbers.get('VEL')
+            self.state.speed = self.state.speed if speed is None else max(speed.value, 1e-4)
+
+    def _bas(self, found: re.Match[str]) -> None:
+        what = found[1].upper()
+        start, end = stripped(self.texts[0], *found.span(2))
+        if what in ('TOOL', 'BASE'):
+            frame = self._numbered(what, self.texts[0][start:end])
+            self.state.tool = frame if what == 'TOOL' else self.state.tool
+            self.state.base = frame if what == 'BASE' else self.state.base
+        elif what == 'VEL_CP':
+            self.state.speed = self._speed(start, end, self.state.speed)
+        elif what == 'VEL_PTP':
+            self.state.joint_speed = self._speed(start, end, 10.0) / 100.0
+
+    def _frames_of(self, name: str) -> None:
+        """Take tool and base from the data of a taught point."""
+        content = self.data.get(name.lower())
+        if content is None:
+            self.state.tool, self.state.base = Frame(name), Frame(name)
+            return
+        for what, key in (('TOOL', 'TOOL_NO'), ('BASE', 'BASE_NO')):
+            number = content.numbers.get(key)
+            frame = Frame(name) if number is None else self._numbered(what, f'{number.value:g}')
+            if what == 'TOOL':
+                self.state.tool = frame
+            else:
+                self.state.base = frame
+
+    def _numbered(self, what: str, text: str) -> Frame:
+        """Return a frame by its number; number 0 is the robot's own."""
+        if text.strip() == '0':
+            return Frame('', np.eye(4))
+        key = f'{what}_DATA[{text.strip()}]'
+        return Frame(text.strip(), self.frames.get(key))
+
+    def _frame_at(self, file: int, start: int, end: int) -> Array | None:
+        """Return the frame that a piece of text stands for; None where it is worked out."""
+        start, end = stripped(self.texts[file], start, end)
+        text = self.texts[file][start:end]
+        if text.upper() == '$NULLFRAME':
+            return np.eye(4)
+        if text.startswith('{'):
+            last = closing(self.sources[file], self.texts[file], start) + 1
+            content = self._aggregate(file, start, last)
+            if last == end and all(key in content.numbers for key in POSE_KEYS):
+                return KUKA_POSE.value([content.numbers[key].value for key in POSE_KEYS])
+            return None
+        point = self.names.get(text.lower())
+        if point is not None and self.program.points[point].value.ndim == 2:
+            self.program.hold(point, f'{text} is used as a frame')
+            self.used[file].add(start)
+            return self.program.points[point].value
+        return self.frames.get(re.sub(r'\s', '', text.upper()))
+
+    def _speed(self, start: int, end: int, default: float) -> float:
+        try:
+            return max(number_at(self.sources[0], start, end, 'a speed').value, 1e-4)
+        except DataError:
+            return default
+
+    # Moves -----------------------------------------------------------------------------------
+
+    def _move(self, found: re.Match[str]) -> None:
+        word, kind = found[1].upper(), KINDS[found[1].upper()]
+        source, text = self.sources[0], self.texts[0]
+        where = source.where(found.start())
+        end = _line_end(text, found.end())
+        if found[2]:
+            self.program.unknown(kind, where, f'{word}_REL counts from where the arm stands')
+            return
+        parts = self._parts(found.end(), end)
+        tail = text[parts[-1][1] : end].upper() if parts else ''
+        if ' WITH ' in f'{tail} ' or len(parts) > (2 if kind == 'circular' else 1):
+            extra = 'an arc of its own angle' if kind == 'circular' else 'settings of its own'
+            if kind == 'circular' or re.search(r'\$(BASE|TOOL)', tail):
+                self.program.unknown(kind, where, f'{word} with {extra} is not understood')
+                return
+        refs = [self._ref(*part) for part in parts[: 2 if kind == 'circular' else 1]]
+        wanted = 2 if kind == 'circular' else 1
+        if len(refs) < wanted or any(ref is None for ref in refs):
+            what = source.text[found.end() : end].strip() or 'nothing'
+            self.program.unknown(kind, where, f'{word} goes to {what!r}, which is not given here')
+            return
+        ends = [ref for ref in refs if ref is not None]
+        joints = self.program.points[ends[-1]].value.ndim == 1
+        if joints and kind != 'joint':
+            self.program.unknown(kind, where, f'{word} to axis positions is not understood')
+            return
+        self.program.add(self._step(kind, where, ends, tail))
+
+    def _step(self, kind: Kind, where: str, ends: Sequence[int], tail: str) -> Step:
+        speed = self.state.joint_speed if kind == 'joint' else self.state.speed
+        own = re.search(r'\$VEL\.CP\s*=\s*([\d.]+)', tail)
+        return Step(
+            kind,
+            where,
+            Ref(ends[-1]),
+            Ref(ends[0]) if kind == 'circular' else None,
+            self.state.tool,
+            self.state.base,
+            speed if own is None else max(float(own[1].rstrip('.')), 1e-4),
+            re.search(r'\bC_(DIS|PTP|VEL|ORI|SPL)\b', tail) is None,
+            suits=self.suits.get(ends[-1]),
+        )
+
+    def _parts(self, start: int, end: int) -> list[tuple[int, int]]:
+        """Return the targets of a move, without what follows them."""
+        text = self.texts[0]
+        out = []
+        for first, last in split_outside(text, start, end):
+            first, last = stripped(text, first, last)
+            if text.startswith('{', first):
+                last = closing(self.sources[0], text, first) + 1
+            else:
+                word = re.match(r'[^\s]+', text[first:last])
+                last = first + (word.end() if word else 0)
+            if first < last:
+                out.append((first, last))
+        return out
+
+    def _ref(self, start: int, end: int) -> int | None:
+        text = self.texts[0]
+        if text.startswith('{', start):
+            content = self._aggregate(0, start, end)
+            line = self.sources[0].line(start)
+            return self._point_of(0, content, start, f'line {line}')
+        name = text[start:end].lower()
+        if re.fullmatch(r'[a-z_]\w*', name):
+            self.used[0].add(start)
+            return self.names.get(name)
+        return None
+
+
+def turn_bits(turn: int) -> Suits:
+    """
+    Return what takes the postures whose axes have the signs of T.
+
+    Parameters
+    ----------
+    turn : int
+        Bit k is set where axis k + 1 is below zero.
+
+    """
+
+    def suits(robot: object, controller: Controller) -> Any:
+        del robot
+        back = np.linalg.inv(controller.mix)
+
+        def of(q: Array) -> Array:
+            axes = q @ back.T
+            below = np.array([bool(turn >> k & 1) for k in range(axes.shape[1])])
+            fits = np.where(below, axes < SIGN_DOUBT, axes > -SIGN_DOUBT)
+            return np.asarray(fits.all(axis=1))
+
+        return of
+
+    return suits
+
+
+def _bare(text: str) -> str:
+    """Return the number of ``TOOL_DATA[1]``, as a user would name it."""
+    found = re.fullmatch(r'(?:TOOL|BASE)_DATA\s*\[\s*(\w+)\s*\]', text.strip(), re.I)
+    return found[1] if found else ''
+
+
+def _line_end(text: str, start: int) -> int:
+    """Return where the statement that goes on at a place ends."""
+    found = re.compile(r'[\r\n]').search(text, start)
+    return len(text) if found is None else found.start()

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The table of languages: which there are, how a file tells its own, who reads it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from weld_twin_core.errors import DataError
+
+from . import krl, rapid, urscript
+from .build import Program
+from .context import Context
+from .notation import ABB_POSE, KUKA_POSE, UR_POSE, Notation
+from .source import Source, read_source
+
+
+class Language(NamedTuple):
+    """
+    One language.
+
+    Attributes
+    ----------
+    maker : str
+    extensions : tuple of str
+        In lower case, with the point.
+    signs : str
+        A regular expression that only programs of this language hold.
+    read : callable
+    pose : Notation
+        How it writes a pose.
+    beside : tuple of str
+        Extensions of files that belong to a program and lie beside it.
+
+    """
+
+    maker: str
+    extensions: tuple[str, ...]
+    signs: str
+    read: Callable[[Sequence[Source], Context], Program]
+    pose: Notation
+    beside: tuple[str, ...] = ()
+
+
+LANGUAGES: dict[str, Language] = {
+    'urscript': Language(
+        'Universal Robots', ('.script', '.urscript'), r'\bmove[jlpc]\s*\(', urscript.read, UR_POSE
+    ),
+    'krl': Language(
+        'KUKA', ('.src',), r'(?im)^\s*(?:GLOBAL\s+)?DEF\s+\w+\s*\(', krl.read, KUKA_POSE, ('.dat',)
+    ),
+    'rapid': Language(
+        'ABB',
+        ('.mod', '.prg', '.modx'),
+        r'(?im)^\s*MODULE\s+\w+|^\s*PROC\s+\w+',
+        rapid.read,
+        ABB_POSE,
+    ),
+}
+"""By the names that ``--controller`` takes."""
+
+
+def language_of(source: Source, path: Path | str, controller: str = '') -> str:
+    """
+    Return the name of a program's language.
+
+    Parameters
+    ----------
+    source : Source
+    path : Path or str
+        Where it was read.
+    controller : str
+        As the user named it; empty to let the file tell.
+
+    Raises
+    ------
+    DataError
+        There is no such language, or the file is of none that is known.
+
+    """
+    known = ', '.join(LANGUAGES)
+    if controller:
+        if controller not in LANGUAGES:
+            raise DataError(
+                f'--controller: there is no language {controller!r}; known are {known}'
+            )
+        return controller
+    suffix = Path(path).suffix.lower()
+    by_name = [name for name, one in LANGUAGES.items() if suffix in one.extensions]
+    by_text = [name for name, one in LANGUAGES.items() if re.search(one.signs, source.text)]
+    both = [name for name in by_name if name in by_text] or by_name or by_text
+    if len(both) != 1:
+        raise DataError(
+            f"'{path}' does not tell its language; name it with --controller, one of {known}"
+        )
+    return both[0]
+
+
+def read_program(path: Path | str, context: Context, controller: str = '') -> Program:
+    """
+    Return a program with the files that belong to it.
+
+    Parameters
+    ----------
+    path : Path or str
+    context : Context
+    controller : str
+        Its language; empty to let the file tell.
+
+    Raises
+    ------
+    DataError
+        It cannot be read, tells no language, or a move in it is broken.
+
+    """
+    source = read_source(path)
+    name = language_of(source, path, controller)
+    place, beside = Path(path), []
+    for extension in LANGUAGES[name].beside:
+        found = [
+            other
+            for other in sorted(place.parent.glob('*'))
+            if other.stem.lower() == place.stem.lower() and other.suffix.lower() == extension
+        ]
+        beside += [read_source(other) for other in found[:1]]
+    return read_sources([source, *beside], context, name)
+
+
+def read_sources(sources: Sequence[Source], context: Context, name: str) -> Program:
+    """Return the program of texts in a language of the table."""
+    program = LANGUAGES[name].read(sources, context)
+    program.language = name
+    return program
+
+
+def pose_notation(name: str) -> Notation:
+    """Return how a language writes a pose."""
+    return LANGUAGES[name].pose

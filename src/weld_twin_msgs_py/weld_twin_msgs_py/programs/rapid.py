@@ -1,0 +1,391 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+RAPID of ABB: ``MoveJ``, ``MoveL``, ``MoveC``, ``MoveAbsJ``, and the arc and trigger forms of them.
+
+Lengths are mm, angles degrees, orientations quaternions with the scalar first, speeds mm/s.
+``Offs`` and ``RelTool`` with plain numbers are places that go along with their point.
+
+References
+----------
+.. [1] ABB, "Technical reference manual, RAPID Instructions, Functions and Data types",
+   3HAC050917: robtarget, confdata, speeddata, zonedata, tooldata, wobjdata.
+
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arm.rotation import rotation_matrix, transform
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs.moves import Kind
+
+from .build import Frame, Program, Ref, Step, Suits, hold_if_used_elsewhere
+from .context import Context
+from .controllers import Controller
+from .notation import ABB_POSE
+from .source import Number, Source, closing, masked, number_at, split_outside, stripped
+
+NAME = 'rapid'
+QUADRANT_DOUBT = np.radians(0.5)
+"""An axis this near the edge of its quadrant may count to either."""
+NO_AXIS = 8.9e9
+"""ABB writes 9E9 for an external axis that is not there."""
+SPEED = 0.1
+"""m/s where the speed is not known."""
+_COMMENTS = (r'"[^"\r\n]*"', r'![^\r\n]*')
+_DECLARED = re.compile(
+    r'\b(?:CONST|PERS|VAR)\s+(robtarget|jointtarget|tooldata|wobjdata|speeddata)\s+'
+    r'([A-Za-z]\w*)\s*(\{[^}]*\})?\s*:=\s*',
+    re.I,
+)
+_MOVE = re.compile(
+    r'\b(?:Move(AbsJ|J|L|C)(?:DO|AO|GO|Sync)?|Arc(L|C)(?:\d?(?:Start|End))?|Trigg(J|L|C)(?:IOs)?)'
+    r'(?=[\s\\])(?!\s*:=)',
+    re.I,
+)
+_OTHER = re.compile(
+    r'\b(Search[LC]|MoveExtJ|CapL|CapC|SpotL|SpotJ|DispL|DispC|PaintL|EGMMoveL|EGMRunPose|'
+    r'PDispOn|PDispSet|PDispOff|EOffsOn|EOffsSet|EOffsOff|IndAMove)\b',
+    re.I,
+)
+_DISPLACED = ('pdispon', 'pdispset', 'eoffson', 'eoffsset')
+_WAIT = re.compile(r'\bWaitTime\b((?:\s*\\\w+\s*,?)*)\s*([^;]*);', re.I)
+_ROUTINE = re.compile(r'^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC|TRAP)\b', re.I | re.M)
+_CONF = re.compile(r'\bConf([JL])\s*\\(On|Off)\b', re.I)
+_KINDS: dict[str, Kind] = {'absj': 'joint', 'j': 'joint', 'l': 'linear', 'c': 'circular'}
+
+
+class Leaf(NamedTuple):
+    """A part of a bracketed value that has no parts itself."""
+
+    start: int
+    end: int
+
+
+Tree = Leaf | list['Tree']
+
+
+def read(sources: Sequence[Source], context: Context) -> Program:
+    """
+    Return what is understood of a module.
+
+    Raises
+    ------
+    DataError
+        A point is broken or declared twice; names file and line.
+
+    """
+    return _Reader(sources[0], context).read()
+
+
+class _Reader:
+    """Goes through a module once."""
+
+    def __init__(self, source: Source, context: Context) -> None:
+        self.source, self.context = source, context
+        self.program = Program(NAME, [source])
+        self.text = masked(source.text, _COMMENTS)
+        self.names: dict[str, int] = {}
+        self.tools: dict[str, Frame] = {'tool0': Frame('', np.eye(4))}
+        self.bases: dict[str, Frame] = {'wobj0': Frame('', np.eye(4))}
+        self.speeds: dict[str, float] = {}
+        self.used: set[int] = set()
+        self.suits: dict[int, Suits] = {}
+        self.config = {'j': True, 'l': True}
+        self.displaced = ''
+
+    def read(self) -> Program:
+        for found in _DECLARED.finditer(self.text):
+            self._declaration(found)
+        events = [
+            (found.start(), handle, found)
+            for pattern, handle in (
+                (_MOVE, self._move),
+                (_OTHER, self._other),
+                (_WAIT, self._wait),
+                (_CONF, self._conf),
+                (_ROUTINE, self._routine),
+            )
+            for found in pattern.finditer(self.text)
+        ]
+        for _, handle, found in sorted(events, key=lambda event: event[0]):
+            handle(found)
+        hold_if_used_elsewhere(self.program, self.names, [self.text], [self.used])
+        return self.program
+
+    # Declarations ----------------------------------------------------------------------------
+
+    def _declaration(self, found: re.Match[str]) -> None:
+        kind, name = found[1].lower(), found[2].lower()
+        where = self.source.where(found.start(2))
+        self.used.add(found.start(2))
+        if found[3] or not self.text.startswith('[', found.end()):
+            return  # An array, or a value that is worked out: moves to it are not understood.
+        known: list[dict[str, Any]] = [self.names, self.tools, self.bases, self.speeds]
+        if any(name in table for table in known):
+            raise DataError(f'{where}: {found[2]} is declared twice')
+        tree = self._tree(found.end(), closing(self.source, self.text, found.end()) + 1)
+        if kind in ('robtarget', 'jointtarget'):
+            self.names[name] = self._target(tree, found.end(), found[2], kind == 'jointtarget')
+        elif kind == 'tooldata':
+            self.tools[name] = self._tool(tree, found[2], found.end())
+        elif kind == 'wobjdata':
+            self.bases[name] = self._wobj(tree, found[2], found.end())
+        elif isinstance(tree, list) and tree and isinstance(tree[0], Leaf):
+            speed = number_at(self.source, *tree[0], f'the speed of {found[2]}').value
+            self.speeds[name] = max(speed, 0.1) * 1e-3
+
+    def _tool(self, tree: Tree, name: str, at: int) -> Frame:
+        parts = tree if isinstance(tree, list) else []
+        if len(parts) < 2 or not self._is(parts[0], 'TRUE'):
+            return Frame(f'{name}, which does not sit on the robot,')
+        return Frame('', self._pose(parts[1], name, at))
+
+    def _wobj(self, tree: Tree, name: str, at: int) -> Frame:
+        parts = tree if isinstance(tree, list) else []
+        if len(parts) < 5 or not (self._is(parts[0], 'FALSE') and self._is(parts[1], 'TRUE')):
+            return Frame(f'{name}, which moves,')
+        return Frame('', self._pose(parts[3], name, at) @ self._pose(parts[4], name, at))
+
+    def _is(self, part: Tree, word: str) -> bool:
+        return isinstance(part, Leaf) and self.text[part.start : part.end].upper() == word
+
+    def _pose(self, tree: Tree, name: str, at: int) -> Array:
+        numbers = self._numbers(tree if isinstance(tree, list) else [], (3, 4), name, at)
+        try:
+            return ABB_POSE.value([number.value for number in numbers])
+        except DataError as error:
+            raise DataError(f'{self.source.where(at)}: {name}: {error}') from None
+
+    def _target(self, tree: Tree, start: int, name: str, joints: bool) -> int:
+        """Add a robtarget or a jointtarget that stands at a place."""
+        n = self.context.robot.n
+        parts = tree if isinstance(tree, list) else []
+        if joints:
+            numbers = self._numbers(parts[:1], (n,), name, start)
+            point = self.program.add_point(name, numbers, self.context.degrees())
+            outer = parts[1] if len(parts) > 1 else None
+        else:
+            numbers = self._numbers(parts[:2], (3, 4), name, start)
+            point = self.program.add_point(name, numbers, ABB_POSE)
+            outer = parts[3] if len(parts) > 3 else None
+            if len(parts) > 2:
+                conf = self._numbers(parts[2:3], (4,), name, start)
+                self.suits[point] = quadrants([round(number.value) for number in conf])
+        if outer is not None:
+            values = self._numbers([outer], (6,), name, start)
+            if any(0.0 != abs(number.value) < NO_AXIS for number in values):
+                self.program.hold(point, f'{name} moves external axes')
+        return point
+
+    def _numbers(
+        self, lists: Sequence[Tree], counts: Sequence[int], name: str, at: int
+    ) -> list[Number]:
+        """Return the numbers of lists of given lengths, one after the other."""
+        fits = [len(part) if isinstance(part, list) else 0 for part in lists] == list(counts)
+        leaves = [leaf for part in lists if isinstance(part, list) for leaf in part]
+        if not fits or not all(isinstance(leaf, Leaf) for leaf in leaves):
+            shape = ' and '.join(map(str, counts))
+            raise DataError(f'{self.source.where(at)}: {name} needs {shape} numbers in brackets')
+        return [
+            number_at(self.source, leaf.start, leaf.end, f'a coordinate of {name}')
+            for leaf in leaves
+            if isinstance(leaf, Leaf)
+        ]
+
+    def _tree(self, start: int, end: int) -> Tree:
+        """Return a bracketed value as lists in lists."""
+        start, end = stripped(self.text, start, end)
+        if not self.text.startswith('[', start):
+            return Leaf(start, end)
+        if closing(self.source, self.text, start) != end - 1:
+            raise DataError(f'{self.source.where(start)}: a bracket is closed too early')
+        return [self._tree(*part) for part in split_outside(self.text, start + 1, end - 1)]
+
+    # Statements ------------------------------------------------------------------------------
+
+    def _routine(self, found: re.Match[str]) -> None:
+        del found
+        self.program.new_piece()
+
+    def _conf(self, found: re.Match[str]) -> None:
+        self.config[found[1].lower()] = found[2].lower() == 'on'
+
+    def _wait(self, found: re.Match[str]) -> None:
+        try:
+            self.program.dwell(max(number_at(self.source, *found.span(2), 'a time').value, 0.0))
+        except DataError:
+            return  # A computed time; how long it is does not matter here.
+
+    def _other(self, found: re.Match[str]) -> None:
+        where = self.source.where(found.start())
+        if found[1].lower().endswith('offsoff') or found[1].lower() == 'pdispoff':
+            self.displaced = ''
+        elif found[1].lower() in _DISPLACED:
+            self.displaced = f'{found[1]} at {where} displaces it'
+        else:
+            self.program.unknown('linear', where, f'{found[1]} is not understood')
+
+    # Moves -----------------------------------------------------------------------------------
+
+    def _move(self, found: re.Match[str]) -> None:
+        word = (found[1] or found[2] or found[3]).lower()
+        kind, where = _KINDS[word], self.source.where(found.start())
+        end = self.text.find(';', found.end())
+        if end < 0:
+            raise DataError(f'{where}: the statement {found[0]} is not closed by ;')
+        parts = self._arguments(found.end(), end)
+        wanted = 2 if kind == 'circular' else 1
+        if len(parts) < wanted + 3:
+            raise DataError(f'{where}: {found[0]} needs a point, a speed, a zone and a tool')
+        refs = [self._ref(*part, word == 'absj') for part in parts[:wanted]]
+        if self.displaced or any(ref is None for ref in refs):
+            text = self.source.text[slice(*parts[wanted - 1])].strip()
+            why = self.displaced or f'{found[0]} goes to {text!r}, which is not given here'
+            self.program.unknown(kind, where, why)
+            return
+        places = [ref for ref in refs if ref is not None]
+        tool, base = self._frames(*parts[-1])
+        speed, stop = self._travel(kind, parts, wanted)
+        suits = self.suits.get(places[-1].point) if kind == 'joint' and self.config['j'] else None
+        via = places[0] if kind == 'circular' else None
+        self.program.add(Step(kind, where, places[-1], via, tool, base, speed, stop, suits=suits))
+
+    def _arguments(self, start: int, end: int) -> list[tuple[int, int]]:
+        """Return the arguments of a move, the switches before the first left out."""
+        parts: list[tuple[int, int]] = []
+        for first, last in split_outside(self.text, start, end):
+            first, last = stripped(self.text, first, last)
+            if not parts:
+                switch = re.match(r'(?:\\\w+\s*)+', self.text[first:last])
+                first += switch.end() if switch else 0
+            if first < last:
+                parts.append((first, last))
+        return parts
+
+    def _ref(self, start: int, end: int, joints: bool) -> Ref | None:
+        """Return where an argument leads; None where it is worked out."""
+        cut = self._before_switch(start, end)
+        text = self.text[start:cut]
+        if text.startswith('['):
+            tree = self._tree(start, cut)
+            return Ref(self._target(tree, start, f'line {self.source.line(start)}', joints))
+        call = re.match(r'(Offs|RelTool)\s*(\()', text, re.I)
+        if call is not None:
+            return self._shifted(call[1].lower(), start + call.start(2), cut)
+        point = self._named(start, cut)
+        return None if point is None else Ref(point)
+
+    def _named(self, start: int, end: int) -> int | None:
+        name = self.text[start:end].lower()
+        if re.fullmatch(r'[a-z]\w*', name):
+            self.used.add(start)
+            return self.names.get(name)
+        return None
+
+    def _shifted(self, word: str, opening: int, end: int) -> Ref | None:
+        if closing(self.source, self.text, opening) != end - 1:
+            return None
+        parts = [
+            stripped(self.text, *part) for part in split_outside(self.text, opening + 1, end - 1)
+        ]
+        point = self._named(*parts[0])
+        cut = self._before_switch(*parts[-1])
+        turns = self._switches(cut, parts[-1][1])
+        try:
+            spans = [*parts[1:-1], (parts[-1][0], cut)]
+            shift = [number_at(self.source, *part, 'a shift').value * 1e-3 for part in spans]
+        except DataError:
+            return None
+        if point is None or turns is None or len(shift) != 3:
+            return None
+        pose = transform(np.eye(3), np.array(shift))
+        if word == 'offs':
+            return Ref(point, pose, leads=False)
+        turn = np.radians([turns.get(axis, 0.0) for axis in ('rx', 'ry', 'rz')])
+        # RelTool turns about the tool's own x, then its new y, then its new z.
+        about = [rotation_matrix(row) for row in np.diag(turn)]
+        pose[:3, :3] = about[0] @ about[1] @ about[2]
+        return Ref(point, after=pose, leads=False)
+
+    def _switches(self, start: int, end: int) -> dict[str, float] | None:
+        """Return the numbers of ``\\Rx:=5`` and the like; None where one is worked out."""
+        out = {}
+        text = self.text[start:end]
+        for found in re.finditer(r'\\(\w+)\s*:=\s*([^\\]*)', text):
+            place = start + found.start(2), start + found.end(2)
+            try:
+                out[found[1].lower()] = number_at(self.source, *place, 'an angle').value
+            except DataError:
+                return None
+        return out
+
+    def _before_switch(self, start: int, end: int) -> int:
+        """Return where an argument ends and its optional arguments begin."""
+        depth = 0
+        for k in range(start, end):
+            depth += (self.text[k] in '([{') - (self.text[k] in ')]}')
+            if self.text[k] == '\\' and depth == 0:
+                return stripped(self.text, start, k)[1]
+        return end
+
+    def _frames(self, start: int, end: int) -> tuple[Frame, Frame]:
+        """Return tool and work object of a move's last argument."""
+        cut = self._before_switch(start, end)
+        tool = self.text[start:cut]
+        wobj = re.search(r'\\WObj\s*:=\s*([A-Za-z]\w*)', self.text[cut:end], re.I)
+        base = 'wobj0' if wobj is None else wobj[1]
+        return (
+            self.tools.get(tool.lower(), Frame(tool)),
+            self.bases.get(base.lower(), Frame(base)),
+        )
+
+    def _travel(self, kind: Kind, parts: Sequence[tuple[int, int]], at: int) -> tuple[float, bool]:
+        """Return the speed of a move and whether it stops."""
+        start, end = parts[at]
+        speed = self.text[start : self._before_switch(start, end)].lower()
+        value = self.speeds.get(speed)
+        usual = re.fullmatch(r'v(\d+)', speed)
+        if value is None:
+            value = float(usual[1]) * 1e-3 if usual else SPEED
+        start, end = parts[-2]
+        zone = self.text[start : self._before_switch(start, end)].lower()
+        if kind == 'joint':
+            # Of a joint move the speed is the tool's too; 1 m/s is near a tenth of full speed.
+            value = float(np.clip(value / 10.0, 0.01, 1.0))
+        return max(value, 1e-4), zone == 'fine'
+
+
+def quadrants(conf: Sequence[int]) -> Suits:
+    """
+    Return what takes the postures whose axes 1, 4 and 6 are in the quadrants of a confdata.
+
+    Parameters
+    ----------
+    conf : sequence of int
+        cf1, cf4, cf6 and cfx, which is left out: its meaning depends on the arm.
+
+    """
+
+    def suits(robot: object, controller: Controller) -> Any:
+        del robot, controller
+        places = np.array([0, 3, 5])
+
+        def of(q: Array) -> Array:
+            if q.shape[1] < 6:
+                return np.ones(len(q), dtype=bool)
+            low = np.array(conf[:3]) * 0.5 * np.pi
+            axes = q[:, places]
+            inside = (axes > low - QUADRANT_DOUBT) & (axes < low + 0.5 * np.pi + QUADRANT_DOUBT)
+            return np.asarray(inside.all(axis=1))
+
+        return of
+
+    return suits

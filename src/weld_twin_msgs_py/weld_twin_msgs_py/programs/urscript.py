@@ -1,0 +1,307 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+URScript of Universal Robots: ``movej``, ``movel``, ``movep`` and ``movec``.
+
+Poses are ``p[x, y, z, rx, ry, rz]`` in m and rad, joint positions lists in rad. Speeds are m/s and
+rad/s. A blend radius of 0 is a stop.
+
+References
+----------
+.. [1] Universal Robots, "The URScript Programming Language", module motion.
+
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs.moves import Kind
+
+from .build import Frame, Program, Ref, Step, Suits, hold_if_used_elsewhere
+from .context import Context
+from .controllers import Controller
+from .notation import UR_POSE, Notation
+from .source import Number, Source, closing, masked, number_at, split_outside, stripped
+
+NAME = 'urscript'
+MOVES: dict[str, tuple[Kind, tuple[str, ...]]] = {
+    'movej': ('joint', ('q', 'a', 'v', 't', 'r')),
+    'movel': ('linear', ('pose', 'a', 'v', 't', 'r')),
+    'movep': ('linear', ('pose', 'a', 'v', 'r')),
+    'movec': ('circular', ('pose_via', 'pose_to', 'a', 'v', 'r', 'mode')),
+}
+DEFAULT_SPEED = {'joint': 1.05, 'linear': 0.25, 'circular': 0.25}
+"""rad/s and m/s, as the manual gives them."""
+OTHER_MOTION = (
+    'servoj|servol|servoc|speedj|speedl|force_mode|conveyor_pulse_decode|freedrive_mode|'
+    'teach_mode|optimovej|optimovel|path_offset_enable|set_reference_frame|move_process'
+)
+"""Functions that move the arm, or its frames, in another way."""
+_COMMENTS = (r'#[^\r\n]*', r'"[^"\r\n]*"')
+_WORD = re.compile(
+    rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(?:def|thread)\s)'
+)
+_ASSIGNED = re.compile(r'^([ \t]*(?:global|local)?[ \t]*)([A-Za-z_]\w*)[ \t]*=(?!=)[ \t]*', re.M)
+
+
+class Assigned(NamedTuple):
+    """A variable that holds a pose or joint positions."""
+
+    point: int
+    place: int
+
+
+def read(sources: Sequence[Source], context: Context) -> Program:
+    """
+    Return what is understood of a script.
+
+    Raises
+    ------
+    DataError
+        A target of a move is broken; names file and line.
+
+    """
+    return _Reader(sources[0], context).read()
+
+
+class _Reader:
+    """Goes through a script once."""
+
+    def __init__(self, source: Source, context: Context) -> None:
+        self.source, self.context = source, context
+        self.program = Program(NAME, [source])
+        self.text = masked(source.text, _COMMENTS)
+        self.names: dict[str, int] = {}
+        self.used: set[int] = set()
+        self.tool = Frame('')
+
+    def read(self) -> Program:
+        self._declare()
+        for found in _WORD.finditer(self.text):
+            if found[5]:
+                self._statement(found)
+            else:
+                self.program.new_piece()
+        names = {name: point for name, point in self.names.items() if point >= 0}
+        hold_if_used_elsewhere(self.program, names, [self.text], [self.used])
+        self._hold_reassigned()
+        return self.program
+
+    def _declare(self) -> None:
+        """Take in the variables that are set to a pose or to joint positions."""
+        self.counts: dict[str, int] = {}
+        for found in _ASSIGNED.finditer(self.text):
+            name = found[2]
+            self.counts[name] = self.counts.get(name, 0) + 1
+            if re.match(r'(?:p\s*)?\[', self.text[found.end() :]) is None:
+                continue
+            opening = self.text.index('[', found.end())
+            try:
+                point = self._target(found.end(), closing(self.source, self.text, opening) + 1)
+            except DataError:
+                continue  # A list of something else; a move to it is refused where it stands.
+            if point is not None and name not in self.names:
+                self.names[name] = point
+                self.used.add(found.start(2))
+
+    def _hold_reassigned(self) -> None:
+        for name, point in self.names.items():
+            if self.counts.get(name, 0) > 1:
+                self.program.hold(point, f'{name} is set more than once')
+
+    def _statement(self, found: re.Match[str]) -> None:
+        opening = found.start(5)
+        end = closing(self.source, self.text, opening)
+        where = self.source.where(found.start())
+        if found[1]:
+            self._move(found[1], where, opening + 1, end)
+        elif found[2]:
+            self.program.unknown('linear', where, f'{found[2]} moves the arm in its own way')
+        elif found[3]:
+            self.tool = self._tool(opening + 1, end)
+        else:
+            self._sleep(opening + 1, end)
+
+    def _sleep(self, start: int, end: int) -> None:
+        try:
+            self.program.dwell(max(number_at(self.source, start, end, 'sleep').value, 0.0))
+        except DataError:
+            return  # A computed time; how long it is does not matter here.
+
+    def _tool(self, start: int, end: int) -> Frame:
+        first = split_outside(self.text, start, end)[0]
+        try:
+            numbers = self._numbers(*stripped(self.text, *first), 6)
+        except DataError:
+            numbers = None
+        if numbers is None:
+            text = self.source.text[first[0] : first[1]].strip()
+            return Frame(text or 'of set_tcp')
+        return Frame('', UR_POSE.value([n.value for n in numbers]))
+
+    def _move(self, word: str, where: str, start: int, end: int) -> None:
+        kind, order = MOVES[word]
+        given = self._arguments(order, start, end)
+        try:
+            refs = [self._ref(*given[name]) for name in order[: 1 + (kind == 'circular')]]
+        except KeyError:
+            raise DataError(f'{where}: {word} lacks its target') from None
+        if any(ref is None for ref in refs):
+            what = self.source.text[slice(*given[order[0]])]
+            self.program.unknown(
+                kind, where, f'{word} goes to {what!r}, which is worked out there'
+            )
+            return
+        end_ref, suits = refs[-1] or (Ref(0), None)
+        via = refs[0][0] if kind == 'circular' and refs[0] else None
+        joints = self.program.points[end_ref.point].value.ndim == 1
+        if joints and kind != 'joint':
+            # Joint positions as the target of a linear move stand for the pose that they make.
+            self.program.unknown(kind, where, f'{word} to joint positions is not understood')
+            return
+        speed = self._value(given.get('v'), DEFAULT_SPEED[kind])
+        if kind == 'joint':
+            speed = float(speed / np.max(self.context.robot.max_velocity))
+        step = Step(
+            kind,
+            where,
+            end_ref,
+            via,
+            self.tool,
+            Frame('', np.eye(4)),
+            max(speed, 1e-4),
+            self._value(given.get('r'), 0.0) <= 0.0,
+            suits=suits,
+        )
+        self.program.add(step)
+
+    def _arguments(self, order: Sequence[str], start: int, end: int) -> dict[str, tuple[int, int]]:
+        """Return the piece of text of every argument by its name."""
+        out: dict[str, tuple[int, int]] = {}
+        for k, (first, last) in enumerate(split_outside(self.text, start, end)):
+            first, last = stripped(self.text, first, last)
+            named = re.match(r'([a-z_]\w*)\s*=(?!=)\s*', self.text[first:last])
+            if named is not None:
+                out[named[1]] = (first + named.end(), last)
+            elif k < len(order) and first < last:
+                out[order[k]] = (first, last)
+        return out
+
+    def _value(self, piece: tuple[int, int] | None, default: float) -> float:
+        if piece is None:
+            return default
+        try:
+            return number_at(self.source, *piece, 'a number').value
+        except DataError:
+            return default
+
+    def _ref(self, start: int, end: int) -> tuple[Ref, Suits | None] | None:
+        """Return where a target leads, and the postures it allows; None where it is worked out."""
+        text = self.text[start:end]
+        call = re.match(r'(pose_trans|get_inverse_kin)\s*(\()', text)
+        if call is None:
+            point = self._point(start, end)
+            return None if point is None else (Ref(point), None)
+        inside = closing(self.source, self.text, start + call.start(2))
+        if stripped(self.text, inside + 1, end)[0] < end:
+            return None
+        parts = [
+            stripped(self.text, *part)
+            for part in split_outside(self.text, start + call.end(), inside)
+        ]
+        if call[1] == 'get_inverse_kin':
+            return self._near(parts)
+        if len(parts) != 2:
+            return None
+        frame, point = self._constant(*parts[0]), self._point(*parts[1])
+        if frame is None or point is None:
+            return None
+        # The frame counts as a base: the point itself leads, and is moved in that frame.
+        return Ref(point, frame), None
+
+    def _near(self, parts: Sequence[tuple[int, int]]) -> tuple[Ref, Suits | None] | None:
+        point = self._point(*parts[0])
+        if point is None or len(parts) < 2:
+            return None if point is None else (Ref(point), None)
+        first, last = parts[1]
+        named = re.match(r'qnear\s*=\s*', self.text[first:last])
+        near = self._constant_joints(first + (named.end() if named else 0), last)
+        return (Ref(point), None) if near is None else (Ref(point), _nearest(near))
+
+    def _constant(self, start: int, end: int) -> Array | None:
+        """Return a pose that stands there, or of a variable that is set once."""
+        point = self._point(start, end)
+        if point is None:
+            return None
+        self.program.hold(point, 'it is a frame of other points')
+        value = self.program.points[point].value
+        return value if value.ndim == 2 else None
+
+    def _constant_joints(self, start: int, end: int) -> Array | None:
+        point = self._point(start, end)
+        if point is None:
+            return None
+        value = self.program.points[point].value
+        return value if value.ndim == 1 else None
+
+    def _point(self, start: int, end: int) -> int | None:
+        """Return the point of a literal or a variable; None for anything worked out."""
+        name = self.text[start:end]
+        if re.fullmatch(r'[A-Za-z_]\w*', name):
+            self.used.add(start)
+            return self.names.get(name)
+        return self._target(start, end)
+
+    def _target(self, start: int, end: int) -> int | None:
+        pose = self.text[start:end].startswith('p')
+        numbers = self._numbers(start, end, 6 if pose else self.context.robot.n)
+        if numbers is None:
+            return None
+        notation: Notation = UR_POSE if pose else self.context.radians()
+        return self.program.add_point(f'line {self.source.line(start)}', numbers, notation)
+
+    def _numbers(self, start: int, end: int, count: int) -> list[Number] | None:
+        """Return the numbers of a list; None where it is no list, or one that is worked out."""
+        found = re.match(r'(?:p\s*)?(\[)', self.text[start:end])
+        if found is None:
+            return None
+        opening = start + found.start(1)
+        last = closing(self.source, self.text, opening)
+        if last != end - 1:
+            return None
+        parts = [
+            stripped(self.text, *part) for part in split_outside(self.text, opening + 1, last)
+        ]
+        if any(re.search(r'[A-Za-z_]|[-+*/]\s*[\w(]', self._bare(*part)) for part in parts):
+            return None
+        if len(parts) != count:
+            where = self.source.where(start)
+            raise DataError(f'{where}: {count} numbers are needed here, there are {len(parts)}')
+        return [number_at(self.source, *part, 'a coordinate') for part in parts]
+
+    def _bare(self, start: int, end: int) -> str:
+        """Return a coordinate without its sign and exponent, to see whether it is worked out."""
+        text = self.text[start:end].lstrip('+-')
+        return re.sub(r'(?<=[\d.])[eE][-+]?\d+', '', text)
+
+
+def _nearest(near: Array) -> Suits:
+    """Return what takes the posture nearest given joint positions, as qnear does."""
+
+    def suits(robot: object, controller: Controller) -> object:
+        del robot, controller
+
+        def of(q: Array) -> Array:
+            away = np.abs(q - near).sum(axis=1)
+            return np.asarray(away == away.min())
+
+        return of
+
+    return suits  # type: ignore[return-value]

@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Options of the commands that read or write robot programs."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.arrays import Array
+    from weld_twin_msgs_py.programs import Context
+
+_UNITS = {'mm': 1e-3, 'um': 1e-6, 'm': 1.0, 'deg': 0.017453292519943295, 'rad': 1.0}
+
+
+def add_program_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say how the numbers of a program are meant."""
+    parser.add_argument(
+        '--tool',
+        action='append',
+        default=[],
+        metavar='NAME=X,Y,Z,...',
+        help='numbers of a tool that the program only names, as the controller shows them '
+        '(mm and degrees, ABB with a quaternion, Universal Robots in m and rad)',
+    )
+    parser.add_argument(
+        '--base',
+        action='append',
+        default=[],
+        metavar='NAME=X,Y,Z,...',
+        help='the same of a base (user frame, work object)',
+    )
+    parser.add_argument(
+        '--pulses-per-degree',
+        metavar='N,N,...',
+        help='of every axis of a Yaskawa arm whose points are in pulses',
+    )
+
+
+def context_of(args: argparse.Namespace, robot: Robot, language: str) -> Context:
+    """
+    Return the robot and frames that a program is read with.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+    robot : Robot
+    language : str
+        Says how --tool and --base are written.
+
+    """
+    import numpy as np
+
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.programs import Context, controller_of
+
+    pulses = None
+    if args.pulses_per_degree:
+        pulses = np.array(_numbers(args.pulses_per_degree, '--pulses-per-degree'))
+        if pulses.size != robot.n or not (pulses != 0.0).all():
+            raise DataError(f'--pulses-per-degree needs {robot.n} numbers that are not zero')
+    tools = _frames(args.tool, '--tool', language)
+    bases = _frames(args.base, '--base', language)
+    return Context(robot, controller_of(robot, tools, bases), pulses)
+
+
+def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array]:
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.programs.languages import pose_notation
+
+    notation = pose_notation(language)
+    count = len(notation.name.split())
+    out = {}
+    for text in given:
+        name, sign, numbers = text.partition('=')
+        values = _numbers(numbers, option)
+        if not sign or not name or len(values) != count:
+            raise DataError(f'{option} needs NAME={",".join(notation.name.split())}, got {text!r}')
+        out[name] = notation.value(values)
+    return out
+
+
+def _numbers(text: str, option: str) -> list[float]:
+    from weld_twin_core.errors import DataError
+
+    try:
+        values = [float(part) for part in text.split(',')]
+    except ValueError:
+        raise DataError(f'{option} needs numbers with commas between, got {text!r}') from None
+    if not all(abs(value) < 1e9 for value in values):
+        raise DataError(f'{option} needs finite numbers, got {text!r}')
+    return values
+
+
+def quantity(text: str, units: Sequence[str], option: str) -> float:
+    """
+    Return a size with its unit, such as ``2mm`` or ``0.5deg``, in SI.
+
+    Parameters
+    ----------
+    text : str
+    units : sequence of str
+        Those that make sense here; the first is meant where none is written.
+    option : str
+        For the message.
+
+    Raises
+    ------
+    DataError
+        It is no size in one of the units.
+
+    """
+    from weld_twin_core.errors import DataError
+
+    found = re.fullmatch(r'\s*([\d.]+(?:[eE][-+]?\d+)?)\s*([a-z]*)\s*', text)
+    unit = found[2] or units[0] if found else ''
+    try:
+        value = float(found[1]) if found else -1.0
+    except ValueError:
+        value = -1.0
+    if unit not in units or not 0.0 <= value < 1e9:
+        raise DataError(f'{option} needs a size in {" or ".join(units)}, got {text!r}')
+    return value * _UNITS[unit]
+
+
+def start_of(args: argparse.Namespace, robot: Robot) -> Array | None:
+    """Return the joint positions of --start, degrees as written, in the model's units."""
+    import numpy as np
+
+    from weld_twin_core.errors import DataError
+
+    if not args.start:
+        return None
+    values = np.array(_numbers(args.start, '--start'))
+    if values.size != robot.n:
+        raise DataError(f'--start needs {robot.n} joint positions, got {values.size}')
+    q = np.where(robot.prismatic, values * 1e-3, np.radians(values))
+    robot.check_positions(q)
+    return np.asarray(q)

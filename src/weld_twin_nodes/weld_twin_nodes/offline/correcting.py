@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot program corrected by a model file: what is read, what is changed, what is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core import __version__
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.effects.setup_motion import of_the_robot
+from weld_twin_core.errors import DataError
+from weld_twin_core.twin.program_accuracy import Accuracy, along_seams
+from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
+from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
+from weld_twin_msgs_py.files.posterior_entry import read_posterior
+from weld_twin_msgs_py.programs import (
+    Context,
+    Program,
+    check_written,
+    read_sources,
+    rewritten,
+    to_moves,
+)
+from weld_twin_msgs_py.programs.source import Source
+
+from .told_twin import build_twin
+
+SCHEMA = 'weld_twin/correction/1'
+TOOL_LEFT = (
+    'what was found of the tool was left out, for the program works with another tool than the '
+    'one that was measured'
+)
+NOT_SURE = (
+    'how sure the correction is is not known: the model has no posterior, only a diagnosis.json '
+    'written by this version has'
+)
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedProgram:
+    """
+    A program, its correction, and the new texts.
+
+    Attributes
+    ----------
+    program : Program
+    texts : tuple of str
+        One for every file of the program.
+    found : ProgramCorrection
+    notes : tuple of str
+        What a reader should know, in sentences.
+
+    """
+
+    program: Program
+    texts: tuple[str, ...]
+    found: ProgramCorrection
+    notes: tuple[str, ...]
+
+    @property
+    def accuracy(self) -> tuple[Accuracy | None, Accuracy | None]:
+        """Return the expected accuracy before and after."""
+        return along_seams(self.found)
+
+
+def program_model(
+    robot: Robot, path: Path | str, temperature: float | None = None, setup: int = 0
+) -> ProgramModel:
+    """
+    Return what a model file says acts on the arm that runs a program.
+
+    Parameters
+    ----------
+    robot : Robot
+    path : Path or str
+        diagnosis.json, or an effects file.
+    temperature : float, optional [degC]
+    setup : int
+        Which base frame of the diagnosis, counted from 0.
+
+    Raises
+    ------
+    ModelError
+        The file is of no use, of another robot, or its data were unsound.
+
+    """
+    if Path(path).suffix.lower() == '.json' and (
+        'model' in read_diagnosis(path) or read_diagnosis(path).get('unsound')
+    ):
+        twin = load_model(robot, path, setup)
+        effects = of_the_robot(twin.effects)
+        posterior = read_posterior(robot, path)
+        return ProgramModel(twin.robot, tuple(effects), posterior, temperature, setup)
+    twin = build_twin(robot, path)
+    return ProgramModel(twin.robot, tuple(twin.effects), None, temperature)
+
+
+def corrected_program(
+    program: Program,
+    context: Context,
+    model: ProgramModel,
+    caps: Caps | None = None,
+    start: Array | None = None,
+) -> CorrectedProgram:
+    """
+    Return a program corrected so that the real tool goes where it means.
+
+    Parameters
+    ----------
+    program : Program
+    context : Context
+    model : ProgramModel
+    caps : Caps, optional
+    start : array, shape (n,), optional
+        Joint positions before the first move.
+
+    Raises
+    ------
+    DataError
+        There is no move to correct, or none that can be.
+
+    """
+    name = program.sources[0].name
+    if not program.steps:
+        raise DataError(f"no move was found in '{name}'; is its language {program.language}?")
+    moves = to_moves(program, context.robot, context.controller)
+    found = correct_program(model, moves, held=program.held, caps=caps, start=start)
+    seams = {move.seam for piece in moves.pieces for move in piece}
+    if seams <= set(found.left):
+        raise DataError(f"nothing in '{name}' can be corrected: {next(iter(found.left.values()))}")
+    moved = [k for k in _led(found) if k not in found.held]
+    texts = rewritten(program, found.program.points, moved)
+    again = [
+        Source(source.name, text) for source, text in zip(program.sources, texts, strict=True)
+    ]
+    check_written(program, read_sources(again, context, program.language), found.program.points)
+    return CorrectedProgram(program, tuple(texts), found, tuple(_notes(program, context, model)))
+
+
+def _led(found: ProgramCorrection) -> list[int]:
+    """Return the points that a move goes to."""
+    uses = [use for piece in found.program.pieces for move in piece for use in move.uses]
+    return sorted({use.point for use in uses if use.leads})
+
+
+def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]:
+    out = [*program.notes, *context.controller.notes]
+    tools = [
+        context.controller.tool(step.tool)
+        for step in program.steps
+        if step.end is not None and _has_tool(context, step.tool)
+    ]
+    named = any(effect.name == 'tool_pose' for effect in model.effects)
+    if named and not all(model.same_tool(tool) for tool in tools):
+        out.append(TOOL_LEFT)
+    left = [e.name for e in model.effects if e not in model.acting]
+    if left:
+        out.append(f'no program mends {", ".join(left)}')
+    if model.posterior is None:
+        out.append(NOT_SURE)
+    return out
+
+
+def _has_tool(context: Context, tool: Any) -> bool:
+    try:
+        context.controller.tool(tool)
+    except DataError:
+        return False
+    return True
+
+
+def move_rows(made: CorrectedProgram) -> list[dict[str, Any]]:
+    """Return for every move, in the order of the program, what happened to where it leads."""
+    rows = []
+    moves = [move for piece in made.found.program.pieces for move in piece]
+    for step, move, got in zip(made.program.steps, moves, made.found.results, strict=True):
+        point = None if move.end is None else made.program.points[move.end.point]
+        rows.append(
+            {
+                'where': step.where,
+                'kind': step.kind,
+                'point': None if point is None else point.name,
+                'declared': None if point is None else point.where,
+                'seam': move.seam,
+                'corrected': move.seam not in made.found.left,
+                'moved_m': got.length,
+                'turned_rad': got.turn,
+                'before_m': got.before,
+                'after_m': got.after,
+                'outside': got.outside,
+            }
+        )
+    return rows
+
+
+def correction_entry(made: CorrectedProgram, robot: Robot, caps: Caps) -> dict[str, Any]:
+    """Return the content of correction.json."""
+    before, after = made.accuracy
+    return {
+        'schema': SCHEMA,
+        'version': __version__,
+        'robot': robot.name,
+        'program': made.program.sources[0].name,
+        'language': made.program.language,
+        'max_correction': {'length_m': caps.length, 'turn_rad': caps.turn},
+        'expected': {'before': _accuracy(before), 'after': _accuracy(after)},
+        'moves': move_rows(made),
+        'left': [{'seam': seam, 'why': why} for seam, why in sorted(made.found.left.items())],
+        'notes': list(made.notes),
+    }
+
+
+def _accuracy(value: Accuracy | None) -> dict[str, Any] | None:
+    if value is None:
+        return None
+    interval = None if value.low is None else [value.low, value.high]
+    return {'rms_m': value.rms, 'rms_ci90_m': interval, 'worst_m': value.worst}

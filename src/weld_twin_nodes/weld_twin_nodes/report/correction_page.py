@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a corrected program: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from weld_twin_msgs_py.files.input_files import InputFile
+
+from .footing import inputs_section
+from .html import Html, document, section, table, tag
+
+ROWS = 500
+"""Moves in the table of the page at most; correction.json has them all."""
+
+
+def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) -> str:
+    """
+    Return the page.
+
+    Parameters
+    ----------
+    entry : mapping
+        The content of correction.json.
+    inputs : sequence of InputFile
+
+    """
+    title = f'{entry["program"]} · {entry["robot"]}'
+    body = tag(
+        'main',
+        tag(
+            'header',
+            tag('p', 'Corrected program ', tag('b', entry['language']), class_='kind'),
+            tag('p', title, class_='subject'),
+        ),
+        tag('section', tag('h1', headline(entry)), _figures(entry), id_='verdict'),
+        _first_run(entry),
+        _left(entry),
+        _outside(entry),
+        _moves(entry),
+        _notes(entry),
+        inputs_section(inputs),
+    )
+    return document(f'Corrected program · {title}', body)
+
+
+def headline(entry: Mapping[str, Any]) -> str:
+    """Return in one sentence how many moves were corrected and what is expected of it."""
+    moves = entry['moves']
+    done = sum(move['corrected'] for move in moves)
+    before, after = (entry['expected'][key] for key in ('before', 'after'))
+    if before is None or after is None:
+        return f'{done} of {len(moves)} moves were corrected.'
+    return (
+        f'{done} of {len(moves)} moves were corrected: the real tool is expected '
+        f'{_rms(before)} from where the program means it, and {_rms(after)} after.'
+    )
+
+
+def _rms(accuracy: Mapping[str, Any]) -> str:
+    text = f'{accuracy["rms_m"] * 1e3:.3f} mm RMS'
+    if accuracy['rms_ci90_m'] is None:
+        return text
+    low, high = (value * 1e3 for value in accuracy['rms_ci90_m'])
+    return f'{text} ({low:.3f} to {high:.3f})'
+
+
+def _figures(entry: Mapping[str, Any]) -> Html:
+    moved = [move for move in entry['moves'] if move['corrected']]
+    cells = []
+    for key, name in (('before', 'Before'), ('after', 'After')):
+        value = entry['expected'][key]
+        if value is not None:
+            worst = f'at worst {value["worst_m"] * 1e3:.3f} mm'
+            cells.append((name, f'{value["rms_m"] * 1e3:.3f} mm', _span(value) or worst))
+    most = max((move['moved_m'] for move in moved), default=0.0)
+    turn = max((move['turned_rad'] for move in moved), default=0.0)
+    cells.append(
+        ('Moved', f'{most * 1e3:.3f} mm', f'at most, and turned by {_degrees(turn)} at most')
+    )
+    return tag(
+        'dl',
+        *(
+            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
+            for name, value, note in cells
+        ),
+        class_='figures',
+    )
+
+
+def _span(accuracy: Mapping[str, Any]) -> str:
+    if accuracy['rms_ci90_m'] is None:
+        return ''
+    low, high = (value * 1e3 for value in accuracy['rms_ci90_m'])
+    return f'in nine of ten cases {low:.3f} to {high:.3f} mm'
+
+
+def _first_run(entry: Mapping[str, Any]) -> Html:
+    limit = entry['max_correction']
+    steps = [
+        'Keep the program as it was: the corrected one has the same name in another folder.',
+        'Compare both on the controller. Only the coordinates of points differ.',
+        'Run it first without welding, in manual mode at reduced speed, and watch the torch.',
+        'Measure some points again. Where it is not better, the arm has changed: diagnose anew.',
+    ]
+    lead = (
+        f'No point was moved by more than {limit["length_m"] * 1e3:g} mm and '
+        f'{_degrees(limit["turn_rad"])}. A seam is corrected whole or not at all.'
+    )
+    return section(
+        'Before it runs', tag('ol', *(tag('li', step) for step in steps)), id_='run', lead=lead
+    )
+
+
+def _left(entry: Mapping[str, Any]) -> Html | None:
+    if not entry['left']:
+        return None
+    rows = []
+    for left in entry['left']:
+        places = [m['where'] for m in entry['moves'] if m['seam'] == left['seam']]
+        span = places[0] if len(places) == 1 else f'{places[0]} to {places[-1]}'
+        rows.append((span, left['why']))
+    return section(
+        'Left as it was',
+        table(('moves', 'why'), rows),
+        id_='left',
+        lead='These moves are not corrected. Their points are as in the program given.',
+    )
+
+
+def _outside(entry: Mapping[str, Any]) -> Html | None:
+    moves = [move for move in entry['moves'] if move['outside']]
+    if not moves:
+        return None
+    rows = [(move['where'], move['outside']) for move in moves[:ROWS]]
+    return section(
+        'Outside what the model knows',
+        table(('move', 'why'), rows),
+        id_='outside',
+        lead='Nothing was recorded there, so the correction is less sure. Record such postures.',
+    )
+
+
+def _moves(entry: Mapping[str, Any]) -> Html:
+    rows = [
+        (
+            move['where'],
+            move['kind'],
+            move['point'] or '',
+            f'{move["moved_m"] * 1e3:.3f}' if move['corrected'] else 'left',
+            f'{move["turned_rad"] * 57.29578:.4f}' if move['corrected'] else 'left',
+            _millimetres(move['before_m']),
+            _millimetres(move['after_m']),
+        )
+        for move in entry['moves'][:ROWS]
+    ]
+    more = len(entry['moves']) - len(rows)
+    lead = 'How far the place of each move was moved, and how far off the real tool is expected.'
+    if more > 0:
+        lead += f' {more} more are in correction.json.'
+    heads = ('line', 'move', 'point', 'moved, mm', 'turned, deg', 'before, mm', 'after, mm')
+    return section('Moves', table(heads, rows), id_='moves', lead=lead)
+
+
+def _millimetres(value: float | None) -> str:
+    return '' if value is None else f'{value * 1e3:.3f}'
+
+
+def _degrees(turn: float) -> str:
+    return f'{turn * 57.29578:.3g}°'
+
+
+def _notes(entry: Mapping[str, Any]) -> Html | None:
+    if not entry['notes']:
+        return None
+    items = [tag('li', f'{text[:1].upper()}{text[1:]}.') for text in entry['notes']]
+    return section('What was assumed', tag('ul', *items, class_='sentences'), id_='notes')

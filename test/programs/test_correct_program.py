@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A program as a controller has it, corrected: read by another reader, run by another arm."""
+
+import json
+from pathlib import Path
+
+import independent_readers as readers
+import numpy as np
+import pytest
+import yaml
+from plain_arm import along, joints_for, tool_pose
+
+import weld_twin_core as wt
+from weld_twin_nodes.cli.in_process import weld_twin
+
+MADE = Path(__file__).parent / 'made'
+CELLS = {
+    'krl': ('kuka_kr16_2', ['bracket.src', 'bracket.dat'], readers.krl, [8, -85, 100, 5, 70, -3]),
+    'rapid': ('abb_irb1600', ['bracket.mod'], readers.rapid, [8, 20, 15, 4, 55, -6]),
+    'urscript': ('ur5', ['bracket.script'], readers.urscript, [10, -80, 95, -105, -90, 5]),
+}
+OFFSETS = np.array([2e-4, 8e-4, -5e-4, 3e-4, 2e-4, 0.0])
+
+
+def texts(folder, files):
+    return [(folder / name).read_bytes().decode('latin-1') for name in files]
+
+
+def effects(robot):
+    names = [(name, float(value)) for name, value in zip(robot.joint_names, OFFSETS, strict=True)]
+    return yaml.safe_dump(
+        [
+            {'effect': 'joint_offset', 'joint': name, 'offset': value}
+            for name, value in names
+            if value
+        ]
+    )
+
+
+def tool_of(robot):
+    return robot.T_flange_tool @ along(2, 0.25)
+
+
+def driven(robot, moves, near):
+    """Return where an arm with joints that are off takes its tool, and where it was told to."""
+    tool, out = tool_of(robot), []
+    q = np.radians(near)
+    for _, places in moves:
+        for place in places:
+            q = place if place.ndim == 1 else joints_for(robot, place, tool, q)
+            out.append(tool_pose(robot, q, tool, OFFSETS))
+    return out
+
+
+def told(robot, moves):
+    tool = tool_of(robot)
+    return [
+        tool_pose(robot, place, tool) if place.ndim == 1 else place
+        for _, places in moves
+        for place in places
+    ]
+
+
+@pytest.mark.parametrize('language', CELLS)
+def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
+    robot, files, _, _ = CELLS[language]
+    said = weld_twin(
+        'correct-program', MADE / files[0], '--robot', robot, '--out', tmp_path / 'out'
+    )
+    assert said.code == 0, said.err
+    for name in files:
+        assert (tmp_path / 'out' / name).read_bytes() == (MADE / name).read_bytes()
+
+
+@pytest.mark.parametrize('language', CELLS)
+def test_the_real_tool_goes_where_the_program_meant(language, tmp_path):
+    name, files, reader, near = CELLS[language]
+    robot = wt.load(name)
+    (tmp_path / 'found.yaml').write_text(effects(robot))
+    said = weld_twin(
+        *('correct-program', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
+        *('--model', tmp_path / 'found.yaml'),
+    )
+    assert said.code == 0, said.err
+    before, after = (reader(texts(folder, files)) for folder in (MADE, tmp_path / 'out'))
+    assert [word for word, _ in before] == [word for word, _ in after]
+    goals = told(robot, before)
+    errors = [
+        np.array([np.linalg.norm(g[:3, 3] - r[:3, 3]) for g, r in zip(goals, real, strict=True)])
+        for real in (driven(robot, before, near), driven(robot, after, near))
+    ]
+    # A place derived from another (Offs) goes along with it, and is not corrected for itself.
+    led = np.array([word != 'MoveL' for word, places in before for _ in places])
+    assert errors[0].min() > 1.5e-4
+    assert errors[1][led].max() < 4e-6
+    expected = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']
+    assert expected['after']['rms_m'] < 0.05 * expected['before']['rms_m']
+
+
+@pytest.mark.parametrize('language', CELLS)
+def test_only_digits_of_points_change(language, tmp_path):
+    name, files, _, _ = CELLS[language]
+    (tmp_path / 'found.yaml').write_text(effects(wt.load(name)))
+    weld_twin(
+        *('correct-program', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
+        *('--model', tmp_path / 'found.yaml'),
+    )
+    for old, new in zip(texts(MADE, files), texts(tmp_path / 'out', files), strict=True):
+        bare = [''.join(readers.re.split(readers.NUMBER, text)) for text in (old, new)]
+        assert bare[0] == bare[1]
+        comments = [readers.re.findall(r'(?:;|!|#)[^\n]*', text) for text in (old, new)]
+        assert comments[0] == comments[1]
+
+
+def corrected(tmp_path, text, *more, name='seam.script', robot='ur5', offset=8e-4):
+    (tmp_path / name).write_text(text)
+    (tmp_path / 'found.yaml').write_text(
+        f'- {{effect: joint_offset, joint: {wt.load(robot).joint_names[1]}, offset: {offset}}}\n'
+    )
+    return weld_twin(
+        *('correct-program', tmp_path / name, '--robot', robot, '--out', tmp_path / 'out'),
+        *('--model', tmp_path / 'found.yaml', *more),
+    )
+
+
+SEAM = """def seam():
+  movej([0.17, -1.39, 1.65, -1.83, -1.57, 0.08])
+  movel(p[-0.52, -0.20, 0.25, 2.12, 2.31, 0.0], v=0.1)
+  movel(p[-0.45, -0.20, 0.25, 2.12, 2.31, 0.0], v=0.1)
+  movej([0.1, -1.3, 2.5, -1.8, -1.5, 0.0])
+end
+"""
+
+
+def test_a_seam_beyond_the_cap_is_left_whole(tmp_path):
+    said = corrected(tmp_path, SEAM, '--max-correction', '0.2mm', '1deg', offset=5e-4)
+    assert said.code == 0, said.err
+    assert 'would move by' in said.out and 'line 2' in said.out
+    lines = (tmp_path / 'out' / 'seam.script').read_text().splitlines()
+    assert lines[:4] == SEAM.splitlines()[:4]
+
+
+def test_nothing_within_the_cap_is_an_error_that_says_so(tmp_path):
+    said = corrected(tmp_path, SEAM, '--max-correction', '0.01mm', '1deg')
+    assert said.code == 2 and 'nothing in' in said.err and 'line 2' in said.err
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.parametrize(
+    ('text', 'line'),
+    [
+        (SEAM.replace('-0.45, -0.20', '-0.45, -0.2.0'), 4),
+        (SEAM.replace('2.31, 0.0], v=0.1)\n  movel', '2.31], v=0.1)\n  movel'), 3),
+        (SEAM.replace('movej([0.1, -1.3', 'movej([0.1, 1e99'), 5),
+        (SEAM.replace('2.5, -1.8, -1.5, 0.0])', '1.5, -1.8, -1.5, 0.0]'), 5),
+    ],
+)
+def test_a_broken_program_is_one_sentence_with_file_and_line(text, line, tmp_path):
+    said = corrected(tmp_path, text)
+    assert said.code == 2
+    assert f'seam.script line {line}:' in said.err and said.err.count('\n') == 1
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        '  movel(pose_add(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0]))',
+        '  movel(next_point)',
+        '  speedl([0.1, 0, 0, 0, 0, 0], 0.5, 1)',
+    ],
+)
+def test_a_seam_with_a_move_that_is_worked_out_is_left_whole(line, tmp_path):
+    rows = SEAM.splitlines()
+    text = '\n'.join([*rows[:3], line, *rows[3:], ''])
+    said = corrected(tmp_path, text)
+    assert said.code == 0, said.err
+    assert 'left as it was' in said.out and 'line 4' in said.out
+    assert (tmp_path / 'out' / 'seam.script').read_text().splitlines()[:5] == text.splitlines()[:5]
+
+
+def test_a_point_that_the_program_changes_itself_is_left(tmp_path):
+    text = SEAM.replace('def seam():', 'def seam():\n  P = p[-0.52, -0.20, 0.25, 2.12, 2.31, 0.0]')
+    text = text.replace('movel(p[-0.52, -0.20, 0.25, 2.12, 2.31, 0.0]', 'P[2] = 0.3\n  movel(P')
+    said = corrected(tmp_path, text)
+    assert 'P is used at seam.script line 4' in said.out
+
+
+def test_the_model_of_another_robot_and_of_unsound_data_is_refused(tmp_path):
+    (tmp_path / 'seam.script').write_text(SEAM)
+    content = {'schema': 'weld_twin/diagnosis/1', 'model': {'robot': 'ur10', 'kinematics': 'x'}}
+    unsound = {'schema': 'weld_twin/diagnosis/1', 'unsound': [{'sentence': 'joints are swapped'}]}
+    for data, words in ((content, "of the robot 'ur10'"), (unsound, 'were unsound: joints are')):
+        (tmp_path / 'diagnosis.json').write_text(json.dumps(data))
+        said = weld_twin(
+            *('correct-program', tmp_path / 'seam.script', '--robot', 'ur5'),
+            *('--model', tmp_path / 'diagnosis.json', '--out', tmp_path / 'out'),
+        )
+        assert said.code == 2 and words in said.err

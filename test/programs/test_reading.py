@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the readers of programs make of numbers, of rarer forms, and of broken texts."""
+
+import random
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
+
+import weld_twin_core as wt
+from weld_twin_core.errors import TwinError
+from weld_twin_msgs_py.programs import (
+    Context,
+    check_written,
+    controller_of,
+    read_sources,
+    rewritten,
+)
+from weld_twin_msgs_py.programs.notation import (
+    ABB_POSE,
+    FANUC_POSE,
+    KUKA_POSE,
+    UR_POSE,
+    YASKAWA_POSE,
+)
+from weld_twin_msgs_py.programs.source import NUMBER, Source
+
+MADE = Path(__file__).parent / 'made'
+PROGRAMS = {
+    'krl': ('kuka_kr16_2', ('bracket.src', 'bracket.dat')),
+    'rapid': ('abb_irb1600', ('bracket.mod',)),
+    'urscript': ('ur5', ('bracket.script',)),
+}
+FUZZED = 120
+"""Broken texts a language; `weld-twin lab programs` tries thousands."""
+
+
+def context(robot):
+    return Context(wt.load(robot), controller_of(wt.load(robot)))
+
+
+def read(language, texts, robot):
+    sources = [Source(f'file{k}', text) for k, text in enumerate(texts)]
+    return read_sources(sources, context(robot), language)
+
+
+# Expected with scipy: capital letters turn about axes that turn along, small ones about fixed axes.
+@pytest.mark.parametrize(
+    ('notation', 'numbers', 'turn'),
+    [
+        (KUKA_POSE, (30.0, 20.0, 10.0), Rotation.from_euler('ZYX', [30, 20, 10], degrees=True)),
+        (FANUC_POSE, (10.0, 20.0, 30.0), Rotation.from_euler('xyz', [10, 20, 30], degrees=True)),
+        (YASKAWA_POSE, (10.0, 20.0, 30.0), Rotation.from_euler('xyz', [10, 20, 30], degrees=True)),
+        (ABB_POSE, (0.5, 0.5, 0.5, 0.5), Rotation.from_rotvec(np.full(3, 2 * np.pi / 27**0.5))),
+        (UR_POSE, (0.0, 0.0, 0.5), Rotation.from_euler('z', 0.5)),
+    ],
+)
+def test_orientations_are_written_as_each_maker_does(notation, numbers, turn):
+    pose = notation.value((1000.0, 0.0, 0.0, *numbers))
+    np.testing.assert_allclose(pose[:3, :3], turn.as_matrix(), atol=1e-12)
+    assert pose[0, 3] == (1000.0 if notation is UR_POSE else 1.0)
+
+
+@pytest.mark.parametrize('notation', [KUKA_POSE, FANUC_POSE, UR_POSE, ABB_POSE])
+@given(
+    vector=arrays(float, 3, elements=st.floats(-3.1, 3.1)),
+    far=st.sampled_from([0.0, 1e-9, 1e-4]),
+)
+@settings(max_examples=40, deadline=None)
+def test_a_pose_is_written_next_to_the_numbers_it_replaces(notation, vector, far):
+    turn = Rotation.from_rotvec(vector)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn.as_matrix(), [0.5, -0.25, 1.0]
+    first = notation.numbers(pose, [0.0] * 7)
+    moved = pose.copy()
+    moved[:3, :3] = Rotation.from_rotvec([far, 0.0, 0.0]).as_matrix() @ pose[:3, :3]
+    again = notation.numbers(moved, first)
+    np.testing.assert_allclose(notation.value(again), moved, atol=1e-9)
+    same = notation.numbers(pose, first)
+    np.testing.assert_allclose(same, first, atol=1e-5)
+
+
+def test_both_euler_triples_of_one_turn_are_left_as_the_program_wrote_them():
+    one, other = [0.0] * 3 + [170.0, 100.0, -20.0], [0.0] * 3 + [-10.0, 80.0, 160.0]
+    np.testing.assert_allclose(KUKA_POSE.value(one), KUKA_POSE.value(other), atol=1e-12)
+    for written in (one, other):
+        np.testing.assert_allclose(
+            KUKA_POSE.numbers(KUKA_POSE.value(written), written), written, atol=1e-9
+        )
+
+
+def test_frames_of_a_taught_kuka_point_come_from_its_data():
+    src = 'DEF a()\nFDAT_ACT=FP1\nPTP XP1\nFDAT_ACT=FP2\nLIN XP2\nEND\n'
+    dat = (
+        'DEFDAT A\nDECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 0,S 2,T 2}\n'
+        'DECL E6POS XP2={X 1,Y 2,Z 3,A 0,B 0,C 0,S 2,T 2}\n'
+        'DECL FDAT FP1={TOOL_NO 2,BASE_NO 0,IPO_FRAME #BASE}\n'
+        'DECL FDAT FP2={TOOL_NO 2,BASE_NO 3,IPO_FRAME #BASE}\n'
+        'BASE_DATA[3]={X 100.0,Y 0.0,Z 0.0,A 90.0,B 0.0,C 0.0}\nENDDAT\n'
+    )
+    program = read('krl', (src, dat), 'kuka_kr16_2')
+    first, second = program.steps
+    assert (first.tool.name, first.tool.value) == ('2', None)
+    np.testing.assert_allclose(first.base.value, np.eye(4))
+    np.testing.assert_allclose(second.base.value[:3, 3], [0.1, 0.0, 0.0])
+    np.testing.assert_allclose(second.base.value[:3, 0], [0.0, 1.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    'line',
+    ['LIN_REL {X 5}', 'LIN {X 5,Y 1}', 'LIN XP1:XP2', 'SPL XP1', 'PTP HOME', 'CIRC XP1,XP2,CA 90'],
+)
+def test_kuka_moves_that_are_not_understood_say_so(line):
+    point = 'DECL E6POS {}={{X 1,Y 2,Z 3,A 0,B 0,C 0}}\n'
+    text = 'DEF a()\n' + point.format('XP1') + point.format('XP2') + f'{line}\nEND\n'
+    (step,) = read('krl', (text,), 'kuka_kr16_2').steps
+    assert step.end is None and step.why
+
+
+@pytest.mark.parametrize(
+    ('call', 'moved'),
+    [
+        ('Offs(p1,0,0,50)', [0.1, 0.2, 0.35]),
+        ('RelTool(p1,0,0,50)', [0.1, 0.2, 0.25]),  # the tool looks down
+    ],
+)
+def test_abb_places_derived_from_a_point_go_along_with_it(call, moved):
+    text = (
+        'MODULE M\nCONST robtarget p1:=[[100,200,300],[0,1,0,0],[0,0,0,0],'
+        '[9E9,9E9,9E9,9E9,9E9,9E9]];\nPROC main()\n'
+        f'MoveL {call},v100,fine,tool0;\nENDPROC\nENDMODULE\n'
+    )
+    program = read('rapid', (text,), 'abb_irb1600')
+    (step,) = program.steps
+    assert not step.end.leads
+    before = np.eye(4) if step.end.before is None else step.end.before
+    after = np.eye(4) if step.end.after is None else step.end.after
+    place = before @ program.points[step.end.point].value @ after
+    np.testing.assert_allclose(place[:3, 3], moved, atol=1e-12)
+
+
+def test_abb_targets_under_a_displacement_are_not_touched():
+    text = (
+        'MODULE M\nPROC main()\nPDispOn p5, tool0;\n'
+        'MoveJ [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n'
+        'PDispOff;\n'
+        'MoveJ [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n'
+        'ENDPROC\nENDMODULE\n'
+    )
+    displaced, plain = read('rapid', (text,), 'abb_irb1600').steps
+    assert 'displaces' in displaced.why and plain.end is not None
+
+
+def test_a_point_that_is_declared_twice_is_refused_with_its_line():
+    text = 'MODULE M\n' + 2 * (
+        'CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'
+    )
+    with pytest.raises(TwinError, match='file0 line 3: p1 is declared twice'):
+        read('rapid', (text,), 'abb_irb1600')
+
+
+def broken(text, draw):
+    """Return a text with a few of its characters lost, doubled or swapped."""
+    for _ in range(draw.randint(1, 4)):
+        at = draw.randrange(len(text))
+        cut = at + draw.randint(1, 12)
+        text = (
+            draw.choice(
+                [
+                    text[:at] + text[cut:],
+                    text[:at] + text[at:cut] * 2 + text[cut:],
+                    text[:at] + draw.choice('[]{}(),;:.-+eE 0x"!#') + text[at + 1 :],
+                    text[:cut],
+                ]
+            )
+            or ' '
+        )
+    return text
+
+
+@pytest.mark.parametrize('language', PROGRAMS)
+def test_broken_programs_are_refused_in_words_or_change_in_moved_points_alone(language):
+    robot, names = PROGRAMS[language]
+    whole = [(MADE / name).read_bytes().decode('latin-1') for name in names]
+    draw, refused = random.Random(language), 0
+    for _ in range(FUZZED):
+        texts = [broken(text, draw) for text in whole]
+        try:
+            program = read(language, texts, robot)
+        except TwinError as error:
+            assert re.search(r'file\d line \d+: ', str(error)), error
+            refused += 1
+            continue
+        points = [point.value.copy() for point in program.points]
+        assert rewritten(program, points, range(len(points))) == texts
+        for point in points:
+            point[..., -1] += [1e-4, -2e-4, 3e-4, 0.0] if point.ndim == 2 else 1e-4
+        again = rewritten(program, points, range(len(points)))
+        check_written(program, read(language, again, robot), points)
+        assert [re.sub(NUMBER, '', t) for t in again] == [re.sub(NUMBER, '', t) for t in texts]
+    assert 0.05 * FUZZED < refused < 0.95 * FUZZED

@@ -17,7 +17,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs import Move, MoveProgram, Use
 from weld_twin_core.motion.programs.moves import Kind
 
-from .controllers import Controller
+from .controllers import Controller, Frame
 from .notation import Notation
 from .source import Number, Source
 
@@ -60,13 +60,6 @@ class Ref(NamedTuple):
     before: Array | None = None
     after: Array | None = None
     leads: bool = True
-
-
-class Frame(NamedTuple):
-    """A tool or base frame as a program names it; ``value`` None where it has no numbers."""
-
-    name: str
-    value: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,13 +22,17 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-if TYPE_CHECKING:
-    from .build import Frame
-
 AT_SECOND_AXIS = {'fanuc': 'FANUC', 'yaskawa': 'Yaskawa'}
 """Bundled robots, by the begin of their names, whose controllers have the origin there."""
 COUPLED = 'fanuc'
 """Bundled robots whose controller counts joint 3 from the ground."""
+
+
+class Frame(NamedTuple):
+    """A tool or base frame as a program names it; ``value`` None where it has no numbers."""
+
+    name: str
+    value: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,9 +26,9 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Frame, Program, Ref, Step, Suits, hold_if_used_elsewhere
+from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere
 from .context import Context
-from .controllers import Controller
+from .controllers import Controller, Frame
 from .notation import KUKA_POSE
 from .source import Number, Source, closing, masked, number_at, split_outside, stripped
 

@@ -11,11 +11,13 @@ from typing import NamedTuple
 
 from weld_twin_core.errors import DataError
 
-from . import krl, rapid, urscript
 from .build import Program
 from .context import Context
+from .krl import read as read_krl
 from .notation import ABB_POSE, KUKA_POSE, UR_POSE, Notation
+from .rapid import read as read_rapid
 from .source import Source, read_source
+from .urscript import read as read_urscript
 
 
 class Language(NamedTuple):
@@ -47,16 +49,16 @@ class Language(NamedTuple):
 
 LANGUAGES: dict[str, Language] = {
     'urscript': Language(
-        'Universal Robots', ('.script', '.urscript'), r'\bmove[jlpc]\s*\(', urscript.read, UR_POSE
+        'Universal Robots', ('.script', '.urscript'), r'\bmove[jlpc]\s*\(', read_urscript, UR_POSE
     ),
     'krl': Language(
-        'KUKA', ('.src',), r'(?im)^\s*(?:GLOBAL\s+)?DEF\s+\w+\s*\(', krl.read, KUKA_POSE, ('.dat',)
+        'KUKA', ('.src',), r'(?im)^\s*(?:GLOBAL\s+)?DEF\s+\w+\s*\(', read_krl, KUKA_POSE, ('.dat',)
     ),
     'rapid': Language(
         'ABB',
         ('.mod', '.prg', '.modx'),
         r'(?im)^\s*MODULE\s+\w+|^\s*PROC\s+\w+',
-        rapid.read,
+        read_rapid,
         ABB_POSE,
     ),
 }

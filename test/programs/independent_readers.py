@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Readers of robot programs that share nothing with the package: what a controller would be told."""
 
+import csv
 import re
 
 import numpy as np
+import yaml
 from scipy.spatial.transform import Rotation
 
 NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
@@ -114,3 +116,64 @@ def ur_value(text):
     if not text.startswith('p'):
         return np.array(values)
     return pose(values[:3], Rotation.from_rotvec(values[3:]))
+
+
+def fanuc(files):
+    """W about the fixed x, then P about y, then R about z; the origin 0.45 m above the floor."""
+    moves, _, positions = files[0].partition('/POS')
+    known = {}
+    for index, body in re.findall(r'P\[(\d+)[^\]]*\]\{(.*?)\};', positions, re.S):
+        fields = {k: float(v) for k, v in re.findall(rf'\b([JXYZWPR]\d?)\s*=\s*({NUMBER})', body)}
+        if 'J1' in fields:
+            q = np.radians([fields[f'J{k}'] for k in range(1, 7)])
+            q[2] += q[1]
+            known[index] = q
+        else:
+            turn = Rotation.from_euler('xyz', [fields[k] for k in 'WPR'], degrees=True)
+            at = np.array([fields[k] for k in 'XYZ']) / 1e3
+            known[index] = pose(at + [0.0, 0.0, 0.45], turn)
+    out = []
+    for word, rest in re.findall(r'^\s*\d+:([JLC]) (P\[[^;]*);', moves, re.M):
+        out.append((word, [known[i] for i in re.findall(r'P\[(\d+)', rest)]))
+    return out
+
+
+def inform(files):
+    pulses, known = np.array([1000.0, -1200.0, 1100.0, 900.0, -800.0, 700.0]), {}
+    for name, body in re.findall(r'^(C\d+)=(.*?)\r?$', files[0], re.M):
+        values = np.array(numbers(body))
+        if abs(values).max() > 2000.0:
+            known[name] = np.radians(values / pulses)
+        else:
+            turn = Rotation.from_euler('xyz', values[3:], degrees=True)
+            known[name] = pose(values[:3] / 1e3 + [0.0, 0.0, 0.45], turn)
+    return [(word, [known[name]]) for word, name in re.findall(r'^(MOV\w) (C\d+)', files[0], re.M)]
+
+
+def trajectory(files):
+    content = yaml.safe_load(files[0])
+    order = [UR_JOINTS.index(name) for name in content['joint_names']]
+    out = []
+    for point in content['points']:
+        q = np.zeros(6)
+        q[order] = point['positions']
+        out.append(('point', [q]))
+    return out
+
+
+UR_JOINTS = [
+    'shoulder_pan_joint',
+    'shoulder_lift_joint',
+    'elbow_joint',
+    'wrist_1_joint',
+    'wrist_2_joint',
+    'wrist_3_joint',
+]
+
+
+def table(files):
+    lines = [line for line in files[0].splitlines() if not line.startswith('#')]
+    return [
+        (row['move'], [np.array([float(row[name]) for name in UR_JOINTS])])
+        for row in csv.DictReader(lines)
+    ]

@@ -64,11 +64,7 @@ class Ref(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """
-    One move as a program says it; without an end it is not understood, and ``why`` says why.
-
-    ``relative``: a move that is counted from where the arm stands, which goes along with it.
-    """
+    """One move as a program says it; without an end it is not understood, ``why`` says why."""
 
     kind: Kind
     where: str
@@ -79,6 +75,7 @@ class Step:
     speed: float = 0.1
     stop: bool = True
     dwell: float = 0.0
+    duration: float = 0.0
     suits: Suits | None = None
     why: str = ''
 
@@ -100,6 +97,8 @@ class Program:
         Points that must not be moved, with the reason.
     notes : list of str
         What a reader should know, in sentences.
+    one_seam : bool
+        The whole program is corrected together or not at all.
 
     """
 
@@ -109,6 +108,7 @@ class Program:
     pieces: list[list[Step]] = field(default_factory=lambda: [[]])
     held: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    one_seam: bool = False
 
     def add_point(
         self, name: str, numbers: Sequence[Number], notation: Notation, file: int = 0
@@ -205,7 +205,7 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
         seam += 1
         moves: list[Move] = []
         for step in steps:
-            if step.kind == 'joint' and moves:
+            if step.kind == 'joint' and moves and not program.one_seam:
                 seam += 1
             moves.append(_move(step, seam, robot, controller))
         if moves:
@@ -229,6 +229,7 @@ def _move(step: Step, seam: int, robot: Robot, controller: Controller) -> Move:
         step.speed,
         step.stop,
         step.dwell,
+        step.duration,
         None if step.suits is None else step.suits(robot, controller),
         step.where,
         seam,

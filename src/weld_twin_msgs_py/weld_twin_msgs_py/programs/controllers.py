@@ -22,10 +22,10 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-AT_SECOND_AXIS = {'fanuc': 'FANUC', 'yaskawa': 'Yaskawa'}
-"""Bundled robots, by the begin of their names, whose controllers have the origin there."""
-COUPLED = 'fanuc'
-"""Bundled robots whose controller counts joint 3 from the ground."""
+AT_SECOND_AXIS = {'fanuc-ls': ('fanuc', 'FANUC'), 'inform': ('yaskawa', 'Yaskawa')}
+"""Languages whose controllers have the origin there, with the names of bundled robots and maker."""
+COUPLED = 'fanuc-ls'
+"""The language whose controller counts joint 3 from the ground."""
 
 
 class Frame(NamedTuple):
@@ -122,15 +122,18 @@ class Controller:
 
 def controller_of(
     robot: Robot,
+    language: str,
     tools: Mapping[str, Array] | None = None,
     bases: Mapping[str, Array] | None = None,
 ) -> Controller:
     """
-    Return the controller's frames on a robot.
+    Return the frames of the controller that runs a language on a robot.
 
     Parameters
     ----------
     robot : Robot
+    language : str
+        Each maker's controller runs its own, on its own robots; on others nothing is assumed.
     tools, bases : mapping of str to array, optional
         Frames that were given, shape (4, 4) [m].
 
@@ -140,18 +143,17 @@ def controller_of(
     if np.abs(flange[:3, 3]).max() > 1e-9:
         flange = np.eye(4)
     name = bundled_name(robot)
-    maker = next((maker for maker in AT_SECOND_AXIS if name.startswith(maker)), None)
     if name:
         flange = np.array(load(name).T_flange_tool)
-    if maker is not None:
+    begin, maker = AT_SECOND_AXIS.get(language, ('none', ''))
+    if name.startswith(begin):
         origin[2, 3] = robot.d[0]
         notes.append(
-            f'positions count from the origin of {AT_SECOND_AXIS[maker]}, {robot.d[0]:.4g} m '
-            'above the floor'
+            f'positions count from the origin of {maker}, {robot.d[0]:.4g} m above the floor'
         )
-    if name.startswith(COUPLED):
-        mix[2, 1] = 1.0
-        notes.append('J3 counts from the ground, as the teach pendant shows it')
+        if language == COUPLED:
+            mix[2, 1] = 1.0
+            notes.append('J3 counts from the ground, as the teach pendant shows it')
     own = np.array(robot.T_flange_tool)
     return Controller(origin, flange, mix, own, _lower(tools), _lower(bases), notes)
 

@@ -13,8 +13,13 @@ from weld_twin_core.errors import DataError
 
 from .build import Program
 from .context import Context
+from .csv_points import CSV_POSE
+from .csv_points import read as read_csv
+from .fanuc_ls import read as read_fanuc
+from .inform import read as read_inform
+from .joint_trajectory import read as read_trajectory
 from .krl import read as read_krl
-from .notation import ABB_POSE, KUKA_POSE, UR_POSE, Notation
+from .notation import ABB_POSE, FANUC_POSE, KUKA_POSE, UR_POSE, YASKAWA_POSE, Notation
 from .rapid import read as read_rapid
 from .source import Source, read_source
 from .urscript import read as read_urscript
@@ -54,6 +59,12 @@ LANGUAGES: dict[str, Language] = {
     'krl': Language(
         'KUKA', ('.src',), r'(?im)^\s*(?:GLOBAL\s+)?DEF\s+\w+\s*\(', read_krl, KUKA_POSE, ('.dat',)
     ),
+    'inform': Language('Yaskawa', ('.jbi',), r'(?m)^/JOB\b', read_inform, YASKAWA_POSE),
+    'fanuc-ls': Language('FANUC', ('.ls',), r'(?m)^/PROG\b', read_fanuc, FANUC_POSE),
+    'joint-trajectory': Language(
+        'ROS', ('.yaml', '.yml', '.json'), r'\bjoint_names\b', read_trajectory, CSV_POSE
+    ),
+    'csv': Language('any', ('.csv',), r'\A(?:\s*#[^\n]*\n)*[\w" ]+,', read_csv, CSV_POSE),
     'rapid': Language(
         'ABB',
         ('.mod', '.prg', '.modx'),

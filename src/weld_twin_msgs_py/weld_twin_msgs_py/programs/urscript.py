@@ -161,11 +161,6 @@ class _Reader:
             return
         end_ref, suits = refs[-1] or (Ref(0), None)
         via = refs[0][0] if kind == 'circular' and refs[0] else None
-        joints = self.program.points[end_ref.point].value.ndim == 1
-        if joints and kind != 'joint':
-            # Joint positions as the target of a linear move stand for the pose that they make.
-            self.program.unknown(kind, where, f'{word} to joint positions is not understood')
-            return
         speed = self._value(given.get('v'), DEFAULT_SPEED[kind])
         if kind == 'joint':
             speed = float(speed / np.max(self.context.robot.max_velocity))

@@ -65,7 +65,7 @@ def context_of(args: argparse.Namespace, robot: Robot, language: str) -> Context
             raise DataError(f'--pulses-per-degree needs {robot.n} numbers that are not zero')
     tools = _frames(args.tool, '--tool', language)
     bases = _frames(args.base, '--base', language)
-    return Context(robot, controller_of(robot, tools, bases), pulses)
+    return Context(robot, controller_of(robot, language, tools, bases), pulses)
 
 
 def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array]:

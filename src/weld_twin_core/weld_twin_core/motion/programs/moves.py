@@ -48,7 +48,7 @@ class Move(NamedTuple):
     kind : str
         'joint', 'linear', 'circular'; or 'unknown', after which nobody knows where the arm is.
     end : Use or None
-        None for an unknown move.
+        None for an unknown move. Joint positions of a linear move stand for the pose they make.
     via : Use or None
         A place on the arc of a circular move.
     tool : array, shape (4, 4) [m]
@@ -59,6 +59,8 @@ class Move(NamedTuple):
         The arm comes to rest at the end; else it goes on with the next move.
     dwell : float [s]
         How long it stays there.
+    duration : float [s]
+        How long it takes, where the program says so; else 0.
     suits : callable, optional
         Takes joint positions (K, n), says which of them are the posture the program asks for.
     where : str
@@ -77,6 +79,7 @@ class Move(NamedTuple):
     speed: float = 0.1
     stop: bool = True
     dwell: float = 0.0
+    duration: float = 0.0
     suits: Callable[[Array], Array] | None = None
     where: str = ''
     seam: int = 0

@@ -28,8 +28,12 @@ from .moves import Move, MoveProgram
 
 STEP = 0.01
 """Way of the tool [m] between two samples of a linear or circular move."""
-SAMPLES = (32, 120)
+SAMPLES = (5, 120)
 """Fewest and most samples of a move: enough to follow a posture, and to keep long programs quick."""
+TURN = 0.02
+"""Way of a joint [rad or m] between two samples of a joint move."""
+SHORT = 32
+"""Samples below which a move is followed from its begin alone."""
 REST = 0.3
 """Stay [s] after which the arm is where its controller wants it; servo lag is some 50 ms."""
 NEAR = 0.15
@@ -146,16 +150,27 @@ def _followed(robot: Robot, program: MoveProgram, move: Move, q: Array | None) -
             'where the arm comes from is not known; let a joint move lead there, or say the '
             'joints with --start'
         )
-    poses, via = tool_way(program, move, forward(arm, q))
-    way = solve_path(arm, poses, q)
-    if np.abs(way.q[0] - q).max() > NEAR:
-        raise ReachError('the arm would have to change its posture on the way')
-    arm.check_positions(way.q)
+    poses, via = tool_way(arm, program, move, forward(arm, q))
+    way = _on_the_way(arm, poses, q)
+    arm.check_positions(way)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
     turn = float(np.linalg.norm(rotation_vector(poses[-1, :3, :3] @ poses[0, :3, :3].T)))
     # A move that only turns the tool takes as long as one on which its end 0.2 m away travels.
     duration = max(max(length, 0.2 * turn) / max(move.speed, 1e-3), LEAST_TIME)
-    return _Reached(way.q, np.linspace(0.0, duration, len(way.q)), via)
+    return _Reached(way, np.linspace(0.0, move.duration or duration, len(way)), via)
+
+
+def _on_the_way(arm: Robot, poses: Array, q: Array) -> Array:
+    """Return joint positions along poses that begin where the arm stands, shape (K, n)."""
+    if len(poses) < SHORT:
+        near, error = polish(arm, np.tile(q, (len(poses), 1)), poses)
+        steps = np.abs(np.diff(near, axis=0, prepend=q[None])).max()
+        if np.abs(error).max() < CLOSED and steps < NEAR:
+            return near
+    found = solve_path(arm, poses, q).q
+    if np.abs(found[0] - q).max() > NEAR:
+        raise ReachError('the arm would have to change its posture on the way')
+    return found
 
 
 def _joint_move(arm: Robot, program: MoveProgram, move: Move, q: Array | None) -> _Reached:
@@ -165,9 +180,10 @@ def _joint_move(arm: Robot, program: MoveProgram, move: Move, q: Array | None) -
     arm.check_positions(end[None])
     if q is None:
         return _Reached(end[None], np.zeros(1), -1)
-    share = np.linspace(0.0, 1.0, SAMPLES[0])[:, None]
+    count = int(np.clip(np.ceil(np.abs(end - q).max() / TURN) + 1, 3, SHORT))
+    share = np.linspace(0.0, 1.0, count)[:, None]
     duration = float((np.abs(end - q) / arm.max_velocity).max()) / max(move.speed, 1e-3)
-    times = share[:, 0] * max(duration, LEAST_TIME)
+    times = share[:, 0] * max(move.duration or duration, LEAST_TIME)
     return _Reached(q + share * (end - q), times, -1)
 
 
@@ -200,13 +216,15 @@ def _turned(arm: Robot, found: Array) -> Array:
 
 
 def tool_way(
-    program: MoveProgram, move: Move, begin: Array, count: int = 0, at: int = 0
+    arm: Robot, program: MoveProgram, move: Move, begin: Array, count: int = 0, at: int = 0
 ) -> tuple[Array, int]:
     """
     Return the poses of a linear or circular move, shape (K, 4, 4), and the sample on its way.
 
     Parameters
     ----------
+    arm : Robot
+        With the tool of the move.
     program : MoveProgram
     move : Move
     begin : array, shape (4, 4)
@@ -217,19 +235,17 @@ def tool_way(
     Raises
     ------
     PathError
-        Three places of an arc lie on a line, or a linear move ends at joint positions.
+        Three places of an arc lie on a line.
 
     """
     assert move.end is not None
-    end = program.place(move.end)
-    if end.ndim == 1:
-        raise PathError('a linear move to joint positions is not understood')
+    end = _pose(arm, program.place(move.end))
     if move.via is None:
         count = count or _count(float(np.linalg.norm(end[:3, 3] - begin[:3, 3])))
         share = np.linspace(0.0, 1.0, count)
         position = begin[:3, 3] + share[:, None] * (end[:3, 3] - begin[:3, 3])
         return transform(_turning(begin, end, share), position), -1
-    middle = program.place(move.via)[:3, 3]
+    middle = _pose(arm, program.place(move.via))[:3, 3]
     arc = Arc(begin[:3, 3], middle, end[:3, 3])
     count = count or _count(arc.length)
     part = _share_of(arc, middle)
@@ -237,6 +253,10 @@ def tool_way(
     share = np.interp(np.arange(count), [0, at, count - 1], [0.0, part, 1.0])
     position = arc.sample(share * arc.length).position
     return transform(_turning(begin, end, share), position), at
+
+
+def _pose(arm: Robot, place: Array) -> Array:
+    return place if place.ndim == 2 else np.asarray(forward(arm, place))
 
 
 def _share_of(arc: Arc, point: Array) -> float:
@@ -330,7 +350,7 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
             part = _joint_part(arm, program, move, q, first, way)
         else:
             at = max(int(piece.vias[k]) - first, 0)
-            poses, _ = tool_way(program, move, forward(arm, q[first]), way, at)
+            poses, _ = tool_way(arm, program, move, forward(arm, q[first]), way, at)
             part = _closed(arm, piece.motion.q[first : first + way], poses, move)
         q[first : first + way] = part
         q[first + way : last + 1] = part[-1]

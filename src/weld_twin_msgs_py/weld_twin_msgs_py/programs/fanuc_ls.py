@@ -1,0 +1,214 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+TP programs of FANUC as text, ``.ls``: instructions under ``/MN``, points under ``/POS``.
+
+Points are in mm with W P R, or in joints, J3 counted from the ground. Every point names its user
+frame UF (0 is the robot's own) and its tool frame UT. FANUC writes thousandths.
+
+References
+----------
+.. [1] FANUC Robotics, "SYSTEM R-30iA, R-30iB Handling Tool Operator's Manual", B-83284EN: motion
+   instruction, position data.
+
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs.moves import Kind
+
+from .build import Program, Ref, Step
+from .context import Context
+from .controllers import Frame
+from .notation import FANUC_POSE, Notation
+from .source import NUMBER, Number, Source, closing, masked, number_at
+
+NAME = 'fanuc-ls'
+POSE_KEYS = ('X', 'Y', 'Z', 'W', 'P', 'R')
+_PART = re.compile(r'^/(MN|POS|END)\b', re.M)
+_POINT = re.compile(r'^[ \t]*P\[\s*(\d+)\s*(?::[^\]\r\n]*)?\]\s*(\{)', re.M)
+_STATEMENT = re.compile(r'^[ \t]*(\d*)[ \t]*:[ \t]*([^;]*);', re.M)
+_MOVE = re.compile(r'^([JLCAS])[ \t]+(P|PR)\[\s*([^\]]*)\](.*)', re.S)
+_NEXT = re.compile(r'^\s*:?\s*(P|PR)\[\s*([^\]]*)\](.*)', re.S)
+_INDEX = re.compile(r'(\d+)\s*(?::.*)?\Z', re.S)
+_FIELD = re.compile(rf'\b(J\d|E\d|[XYZWPR])\s*=\s*({NUMBER}|\*+)', re.S)
+_KINDS: dict[str, Kind] = {'J': 'joint', 'L': 'linear', 'C': 'circular'}
+_SHIFTING = re.compile(r'\b(?:Tool_)?Offset\b|\bINC\b|\bVOFFSET\b|\bTOUCH|\bPTH_', re.I)
+_SPEED = re.compile(r'([\d.]+)[ \t]*(%|mm/sec|cm/min|inch/min|deg/sec|sec|msec)')
+_UNITS = {'mm/sec': 1e-3, 'cm/min': 0.01 / 60.0, 'inch/min': 0.0254 / 60.0}
+SPEED = 0.1
+"""m/s, and share of full speed, where a speed stands in a register."""
+
+
+def read(sources: Sequence[Source], context: Context) -> Program:
+    """
+    Return what is understood of a program.
+
+    Raises
+    ------
+    DataError
+        A point is broken, not taught, or defined twice; names file and line.
+
+    """
+    return _Reader(sources[0], context).read()
+
+
+class _Reader:
+    """Goes through a program once."""
+
+    def __init__(self, source: Source, context: Context) -> None:
+        self.source, self.context = source, context
+        self.program = Program(NAME, [source])
+        self.text = masked(source.text, (r'"[^"\r\n]*"',))
+        self.points: dict[int, int] = {}
+        self.frames: dict[int, tuple[Frame, Frame]] = {}
+        self.untaught: dict[int, str] = {}
+
+    def read(self) -> Program:
+        parts = {found[1]: found.start() for found in _PART.finditer(self.text)}
+        moves, points = parts.get('MN', 0), parts.get('POS', len(self.text))
+        for found in _POINT.finditer(self.text, points):
+            self._point(found)
+        for found in _STATEMENT.finditer(self.text, moves, points):
+            self._statement(found)
+        self._refuse_open(moves, points)
+        return self.program
+
+    def _refuse_open(self, start: int, end: int) -> None:
+        """Refuse a move that no semicolon ends: what it says would be lost."""
+        rest = _STATEMENT.sub(lambda found: ' ' * len(found[0]), self.text[start:end])
+        lost = re.search(r'^[ \t]*\d+[ \t]*:[ \t]*[JLCAS][ \t]+PR?\[', rest, re.M)
+        if lost is not None:
+            where = self.source.where(start + lost.start())
+            raise DataError(f'{where}: the move is not closed by ;')
+
+    # Points ----------------------------------------------------------------------------------
+
+    def _point(self, found: re.Match[str]) -> None:
+        index, where = int(found[1]), self.source.where(found.start())
+        if index in self.points or index in self.untaught:
+            raise DataError(f'{where}: P[{index}] is defined twice')
+        end = closing(self.source, self.text, found.start(2))
+        groups = [m.start() for m in re.finditer(r'\bGP\d+\s*:', self.text[found.end() : end])]
+        first = found.end() + groups[0] if groups else found.end()
+        last = found.end() + groups[1] if len(groups) > 1 else end
+        fields = self._fields(first, last, index)
+        if fields is None:
+            self.untaught[index] = f'P[{index}] is not taught'
+            return
+        keys, notation = self._form(fields, where, index)
+        point = self.program.add_point(f'P[{index}]', [fields[k] for k in keys], notation)
+        self.points[index] = point
+        self.frames[point] = self._frames(first, last, where)
+        outer = [key for key in fields if key.startswith('E')]
+        if any(fields[key].value != 0.0 for key in outer) or self._others(last, end):
+            self.program.hold(point, f'P[{index}] moves other axes')
+
+    def _others(self, start: int, end: int) -> bool:
+        """Tell whether another group stands somewhere but at zero."""
+        return any(
+            found[2].startswith('*') or float(found[2]) != 0.0
+            for found in _FIELD.finditer(self.text, start, end)
+        )
+
+    def _fields(self, start: int, end: int, index: int) -> dict[str, Number] | None:
+        fields: dict[str, Number] = {}
+        for found in re.finditer(r'\b(J\d|E\d|[XYZWPR])\s*=\s*([^\s,]+)', self.text[start:end]):
+            key, place = found[1], (start + found.start(2), start + found.end(2))
+            if found[2].startswith('*'):
+                return None
+            if key in fields:
+                where = self.source.where(place[0])
+                raise DataError(f'{where}: {key} of P[{index}] is given twice')
+            fields[key] = number_at(self.source, *place, f'{key} of P[{index}]')
+        return fields
+
+    def _form(
+        self, fields: dict[str, Number], where: str, index: int
+    ) -> tuple[tuple[str, ...], Notation]:
+        axes = tuple(f'J{k + 1}' for k in range(self.context.robot.n))
+        for keys, notation in ((POSE_KEYS, FANUC_POSE), (axes, self.context.degrees(3))):
+            if all(key in fields for key in keys):
+                return keys, notation
+        raise DataError(f'{where}: P[{index}] needs X Y Z W P R, or J1 to J{len(axes)}')
+
+    def _frames(self, start: int, end: int, where: str) -> tuple[Frame, Frame]:
+        found = re.search(r'\bUF\s*:\s*(\w+)\s*,\s*UT\s*:\s*(\w+)', self.text[start:end])
+        if found is None:
+            raise DataError(f'{where}: a point needs UF and UT')
+        user, tool = found[1], found[2]
+        base = Frame('', np.eye(4)) if user == '0' else Frame(user)
+        return Frame(tool), base
+
+    # Moves -----------------------------------------------------------------------------------
+
+    def _statement(self, found: re.Match[str]) -> None:
+        text, where = found[2].strip(), self.source.where(found.start(2))
+        wait = re.match(r'WAIT\s+([\d.]+)\s*\(sec\)', text)
+        if wait is not None and wait[1].strip('.'):
+            self.program.dwell(float(wait[1].rstrip('.') or 0.0))
+        move = _MOVE.match(text)
+        if move is None:
+            return
+        kind, via = _KINDS.get(move[1], 'linear'), None
+        name, index, tail = move[2], move[3], move[4]
+        if kind == 'circular':
+            via = self._index(name, index)
+            end = _NEXT.match(tail)
+            if end is None:
+                raise DataError(f'{where}: a circular move needs two points')
+            name, index, tail = end[1], end[2], end[3]
+        point = self._index(name, index)
+        shift = _SHIFTING.search(tail)
+        lost = point is None or (kind == 'circular' and via is None) or move[1] not in _KINDS
+        if lost or shift is not None:
+            why = self._why(name, index, shift)
+            self.program.unknown(kind, where, why)
+            return
+        self._add(kind, where, via, point, tail)
+
+    def _add(self, kind: Kind, where: str, via: int | None, point: int | None, tail: str) -> None:
+        assert point is not None
+        tool, base = self.frames[point]
+        step = Step(
+            kind,
+            where,
+            Ref(point),
+            None if via is None else Ref(via),
+            tool,
+            base,
+            _speed(kind, tail),
+            re.search(r'\bFINE\b', tail) is not None,
+        )
+        self.program.add(step)
+
+    def _index(self, name: str, text: str) -> int | None:
+        found = _INDEX.match(text)
+        return self.points.get(int(found[1])) if name == 'P' and found is not None else None
+
+    def _why(self, name: str, index: str, shift: re.Match[str] | None) -> str:
+        found = _INDEX.match(index)
+        if shift is not None:
+            return f'{shift[0]} shifts it'
+        if name == 'P' and found is not None and int(found[1]) in self.untaught:
+            return self.untaught[int(found[1])]
+        return f'{name}[{index}] is not given here'
+
+
+def _speed(kind: Kind, tail: str) -> float:
+    found = _SPEED.search(tail)
+    if found is None:
+        return SPEED
+    try:
+        value = float(found[1])
+    except ValueError:
+        return SPEED
+    if kind == 'joint':
+        return max(value / 100.0, 1e-4) if found[2] == '%' else SPEED
+    return max(value * _UNITS[found[2]], 1e-4) if found[2] in _UNITS else SPEED

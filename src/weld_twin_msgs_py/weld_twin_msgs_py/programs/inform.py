@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+INFORM of Yaskawa: a job, ``.jbi``, with its points before its instructions.
+
+Points are ``C00000=...`` in pulses (``///POSTYPE PULSE``) or in mm and degrees. Three ``MOVC`` after
+each other are an arc: the first is where it begins. Speeds ``V=`` are mm/s, ``VJ=`` per cent. Pulses
+are turned into degrees by numbers that only the controller has: ``--pulses-per-degree``.
+
+References
+----------
+.. [1] Yaskawa Motoman, "DX100 Options, Instructions for Data Transmission Function", HW0482494,
+   4.1 Job data format; "INFORM Header Fields", knowledge.motoman.com.
+
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs.moves import Kind
+
+from .build import Program, Ref, Step
+from .context import Context
+from .controllers import Frame
+from .notation import YASKAWA_POSE, Notation, joint_notation
+from .source import Number, Source, masked, number_at, split_outside
+
+NAME = 'inform'
+_HEAD = re.compile(r'^///(\w+)(?:[ \t]+([^\r\n]*))?', re.M)
+_POINT = re.compile(r'^(B?P|B?C|EC|EX)(\d+)[ \t]*=[ \t]*([^\r\n]*)', re.M)
+_MOVE = re.compile(r'^[ \t]*(MOV[JLCS]|IMOV|EIMOV[LC])\b[ \t]*([^\r\n]*)', re.M)
+_SHIFT = re.compile(r'^[ \t]*(SFTON|SFTOF|MULMAT|GETPOS|SETUALM)\b', re.M)
+_TIMER = re.compile(r'^[ \t]*TIMER[ \t]+T=([^\s]+)', re.M)
+_KINDS: dict[str, Kind] = {'MOVJ': 'joint', 'MOVL': 'linear', 'MOVC': 'circular'}
+SPEED, JOINT_SPEED = 0.1, 0.1
+"""m/s, and share of full speed, where a move does not say."""
+CM_PER_MIN = 0.01 / 60.0
+"""m/s of a speed in cm/min, as ``V=50cm/min`` has it on arc welding controllers."""
+
+
+def read(sources: Sequence[Source], context: Context) -> Program:
+    """
+    Return what is understood of a job.
+
+    Raises
+    ------
+    DataError
+        A point is broken, or in pulses that nobody can turn into degrees; names file and line.
+
+    """
+    return _Reader(sources[0], context).read()
+
+
+class _Reader:
+    """Goes through a job once."""
+
+    def __init__(self, source: Source, context: Context) -> None:
+        self.source, self.context = source, context
+        self.program = Program(NAME, [source])
+        self.text = masked(source.text, (r"'[^\r\n]*",))
+        self.points: dict[str, int] = {}
+        self.frames: dict[int, tuple[Frame, Frame]] = {}
+        self.tool, self.base, self.form = Frame(''), Frame('', np.eye(4)), 'PULSE'
+        self.user = ''
+        self.shifted = ''
+        self.arc: list[Step] = []
+
+    def read(self) -> Program:
+        found = re.search(r'^//INST\b', self.text, re.M)
+        cut = len(self.text) if found is None else found.start()
+        head = [(m.start(), self._head, m) for m in _HEAD.finditer(self.text, 0, cut)]
+        head += [(m.start(), self._point, m) for m in _POINT.finditer(self.text, 0, cut)]
+        body = [
+            (m.start(), handle, m)
+            for pattern, handle in (
+                (_MOVE, self._move),
+                (_SHIFT, self._shift),
+                (_TIMER, self._timer),
+            )
+            for m in pattern.finditer(self.text, cut)
+        ]
+        for _, handle, match in sorted(head, key=lambda e: e[0]):
+            handle(match)
+        for _, handle, match in sorted(body, key=lambda e: e[0]):
+            handle(match)
+        self._close_arc()
+        return self.program
+
+    def _head(self, found: re.Match[str]) -> None:
+        word, value = found[1].upper(), (found[2] or '').strip()
+        if word == 'TOOL':
+            self.tool = Frame(value)
+        elif word == 'USER':
+            self.user = value
+        elif word == 'POSTYPE':
+            self.form = value.upper()
+        self.base = Frame(self.user or 'USER') if self.form == 'USER' else Frame('', np.eye(4))
+
+    def _point(self, found: re.Match[str]) -> None:
+        if found[1] != 'C':
+            return  # Variables and other axes: a move that uses them is not understood.
+        name = f'C{int(found[2]):05d}'
+        where = self.source.where(found.start())
+        if name in self.points:
+            raise DataError(f'{where}: {name} is defined twice')
+        parts = split_outside(self.text, *found.span(3))
+        notation = self._notation(where)
+        numbers = [number_at(self.source, *part, f'a coordinate of {name}') for part in parts]
+        count = self.context.robot.n if notation.joints else 6
+        if len(numbers) < count:
+            raise DataError(f'{where}: {name} needs {count} numbers, it has {len(numbers)}')
+        self.points[name] = self._added(name, numbers, count, notation)
+        self.frames[self.points[name]] = self.tool, self.base
+
+    def _added(self, name: str, numbers: list[Number], count: int, notation: Notation) -> int:
+        point = self.program.add_point(name, numbers[:count], notation)
+        if any(number.value != 0.0 for number in numbers[count:]):
+            self.program.hold(point, f'{name} has a seventh axis')
+        return point
+
+    def _notation(self, where: str) -> Notation:
+        if self.form in ('USER', 'BASE', 'ROBOT'):
+            return YASKAWA_POSE
+        if self.form != 'PULSE':
+            raise DataError(f'{where}: positions of type {self.form} are not understood')
+        pulses = self.context.pulses_per_degree
+        if pulses is None:
+            raise DataError(
+                f'{where}: positions are in pulses; give --pulses-per-degree, as the parameters '
+                'of the controller have it, or export the job as a relative job'
+            )
+        unit = np.radians(1.0 / pulses)
+        return joint_notation(unit, self.context.controller.mix, 0, 'pulses')
+
+    def _timer(self, found: re.Match[str]) -> None:
+        self._close_arc()
+        try:
+            self.program.dwell(max(number_at(self.source, *found.span(1), 'a time').value, 0.0))
+        except DataError:
+            return  # A time in a variable; how long it is does not matter here.
+
+    def _shift(self, found: re.Match[str]) -> None:
+        self._close_arc()
+        where = self.source.where(found.start())
+        if found[1] == 'SFTON':
+            self.shifted = f'SFTON at {where} shifts it'
+        elif found[1] == 'SFTOF':
+            self.shifted = ''
+
+    def _move(self, found: re.Match[str]) -> None:
+        word, rest = found[1], found[2]
+        where, kind = self.source.where(found.start()), _KINDS.get(found[1], 'linear')
+        if kind != 'circular':
+            self._close_arc()
+        named = re.match(r'C(\d+)\b', rest)
+        point = None if named is None else self.points.get(f'C{int(named[1]):05d}')
+        other = re.search(r'(?<![A-Z])(?:BC|EC|BP|EX)\d+|\+MOV', rest)
+        if word not in _KINDS or point is None or other or self.shifted:
+            self._close_arc()
+            what = rest.split()[0] if rest.split() else 'nothing'
+            why = self.shifted or f'{word} to {what!r} is not understood'
+            self.program.unknown(kind, where, why)
+            return
+        step = self._step(kind, where, point, rest)
+        if kind == 'circular':
+            self.arc.append(step)
+        else:
+            self.program.add(step)
+
+    def _close_arc(self) -> None:
+        """Add the arc of the MOVC so far: where it begins, what it passes, where it ends."""
+        arc, self.arc = self.arc, []
+        if not arc:
+            return
+        if len(arc) != 3:
+            why = f'{len(arc)} MOVC after each other are not understood, an arc has 3'
+            for step in arc:
+                self.program.unknown('linear', step.where, why)
+            return
+        first, middle, last = arc
+        self.program.add(replace(first, kind='linear'))
+        self.program.add(replace(last, via=middle.end, where=middle.where))
+
+    def _step(self, kind: Kind, where: str, point: int, rest: str) -> Step:
+        level = re.search(r'\bPL=(\d+)', rest)
+        tool, base = self.frames[point]
+        return Step(
+            kind,
+            where,
+            Ref(point),
+            None,
+            tool,
+            base,
+            _speed(kind, rest),
+            level is not None and level[1] == '0',
+        )
+
+
+def _speed(kind: Kind, rest: str) -> float:
+    joint = re.search(r'\bVJ=([\d.]+)', rest)
+    straight = re.search(r'\bV=([\d.]+)(cm/min|mm/sec|cm/m)?', rest)
+    try:
+        if kind == 'joint':
+            return JOINT_SPEED if joint is None else max(float(joint[1]) / 100.0, 1e-4)
+        if straight is None:
+            return SPEED
+        unit = CM_PER_MIN if (straight[2] or '').startswith('cm') else 1e-3
+        return max(float(straight[1]) * unit, 1e-4)
+    except ValueError:
+        return SPEED

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from weld_twin_core.diagnosis.trust.trusted import NAMING, group_of
 
 from ..blind.judging import Judged, answers_of, judge
-from .levels_of_truth import alike_by_structure, levels_of
+from .levels_of_truth import alike_by_structure, levels_of, numbers
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""
@@ -83,11 +83,28 @@ def cases_of(rows: Sequence[Mapping[str, Any]]) -> list[Case]:
 
 
 def _case(row: Mapping[str, Any]) -> Case:
-    told = judge({**row['truth'], 'causes': ()}, {'verdict': {'effects': (), **row['verdict']}})
+    truth = {**row['truth'], 'causes': (), 'alike': [*row['truth']['alike'], *_absorbed(row)]}
+    told = judge(truth, {'verdict': {'effects': (), **row['verdict']}})
     right = told.right and _sets_hold(row)
     sealed = row['sealed']
     as_good = sealed['after'] < AS_GOOD * sealed['floor'] and told.status in NAMING
     return Case(row, told, right, right or (as_good and bool(row['truth']['sites'])))
+
+
+def _absorbed(row: Mapping[str, Any]) -> list[list[tuple[str, str | None]]]:
+    """Return the causes at work without those that another of them contains on any motion."""
+    sites = answers_of(row['truth'])[0]
+    kept = [
+        site
+        for site in sites
+        if not any(
+            other != site
+            and site in alike_by_structure(row['truth']['robot'], other)
+            and numbers(other) > numbers(site)
+            for other in sites
+        )
+    ]
+    return [kept] if len(kept) < len(sites) else []
 
 
 def _sets_hold(row: Mapping[str, Any]) -> bool:
@@ -121,7 +138,8 @@ def examples_of(cases: Sequence[Case]) -> list[Example]:
 def _examples(case: Case) -> Iterator[Example]:
     row, status = case.row, case.judged.status
     name, group = str(row['name']), group_of(status)
-    signs = row['signs']
+    causes = row['verdict']['causes']
+    signs = {**row['signs'], 'top_share': causes[0]['share'] if causes else 0.0}
     yield Example(name, f'answer {group}', signs, case.right, signs['belief'])
     if status == 'none':
         return

@@ -80,6 +80,19 @@ def alike_by_structure(robot: str, site: Site) -> frozenset[Site]:
     return frozenset(_alike(robot, site))
 
 
+def numbers(site: Site) -> int:
+    """
+    Return how many numbers a family of the library has.
+
+    Parameters
+    ----------
+    site : (str, str or None)
+
+    """
+    kind = REGISTRY.get(site[0])
+    return sum(max(p.size, 1) for p in kind.parameters) if kind is not None else 0
+
+
 @lru_cache(maxsize=1024)
 def _alike(name: str, site: Site) -> tuple[Site, ...]:
     effect, joint = site

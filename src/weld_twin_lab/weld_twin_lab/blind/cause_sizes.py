@@ -69,6 +69,7 @@ MOST = {
     'time_delay': 10.0,
     'quantization': 5.0,
     'payload': 10.0,
+    'thermal_growth': 2.4,
 }
 """The same for causes that become absurd sooner."""
 LEAST = {'servo_lag': 0.15, 'joint_compliance': 0.1}

@@ -61,7 +61,7 @@ def answer(
     """
     told, shares = causes(found, unseen, verdict, rival, evidence.floor, found.work.beliefs)
     known = Signs(
-        signs,
+        {**signs, 'top_share': told[0].share if told else 0.0},
         tuple(
             signs_of_cause(cause, k, len(told), evidence.gap, evidence.floor, rival)
             for k, cause in enumerate(told)

@@ -46,6 +46,8 @@ class _Claim:
     place: dict[str, float]
     dependence: dict[str, float]
     name: dict[Site, float]
+    uncarried: float = 0.0
+    """Share of what no curve of the model stands for, as unseen folds tell it."""
 
 
 def causes(
@@ -83,6 +85,7 @@ def causes(
     labels = unseen.trusted_labels()
     whole = _shares(squares, parts, claims, np.ones(labels.size, dtype=bool))
     spread = _spread(squares, parts, claims, labels)
+    whole, spread = _with_uncarried(whole, spread, claims, rival)
     out = [
         Cause(
             place=_listed(claim.place),
@@ -100,6 +103,18 @@ def causes(
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
     rest = max(1.0 - float(whole.sum()) - noise, 0.0)
     return tuple(out), Shares(unexplained=rest, noise=max(noise, 0.0))
+
+
+def _with_uncarried(
+    whole: Array, spread: Array, claims: Sequence[_Claim], rival: Curved | None
+) -> tuple[Array, Array]:
+    """Return shares and their errors with what no curve carries, one at most in all."""
+    if rival is None or not claims:
+        return whole, spread
+    more = np.array([claim.uncarried for claim in claims])
+    room = max(1.0 - float(whole.sum()), 0.0) / max(float(more.sum()), 1e-300)
+    more *= min(room, 1.0)
+    return whole + more, np.hypot(spread, more / max(rival.form.steady, 1.0))
 
 
 def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
@@ -192,7 +207,8 @@ def _curve_claims(model: tuple[Effect, ...], rival: Curved, beliefs: Beliefs) ->
             for name, weight in part.weight_of('on').items():
                 on[name] = max(on.get(name, 0.0), weight * beliefs.level_free)
         curves = {Site(model[k].name, model[k].site): beliefs.level_free for k in held}
-        out.append(_Claim(held, believed, on, curves))
+        uncarried = sum(part.share for part, members in parts if not members)
+        out.append(_Claim(held, believed, on, curves, uncarried))
     return out
 
 

@@ -22,7 +22,9 @@ def held_against(
     """
     Return the verdict, or 'unknown' where a free form predicts clearly better than the names.
 
-    What an 'unknown' names beside is withdrawn where curves alone predict better.
+    What an 'unknown' names beside is withdrawn where curves alone predict better. There is no
+    'none' where a free form predicts what looks like noise, whether or not a curve can carry it to
+    another motion.
 
     Parameters
     ----------
@@ -35,6 +37,8 @@ def held_against(
     """
     if rival is None:
         return verdict
+    if verdict.status == 'none':
+        return _something(verdict, rival, beliefs)
     if verdict.status == 'unknown':
         kept = {Site(effect.name, effect.site) for effect in rival.kept}
         stays = all(group[0] in kept for group in verdict.sets)
@@ -42,12 +46,27 @@ def held_against(
     gain, steady = gain_of(named, rival.unseen)
     if gain < beliefs.beaten_share or steady < beliefs.beaten_steady:
         return verdict
-    places = ' and '.join(str(part.group) for part in rival.form.parts)
     reason = (
-        f'a curve at {places} predicts unseen stretches better than any effect in the library '
+        f'a curve at {_places(rival)} predicts unseen stretches better than any effect in the library '
         f'({100.0 * gain:.0f} % less squared error)'
     )
     return Verdict('unknown', beliefs.beaten_belief, (), (reason,))
+
+
+def _something(verdict: Verdict, rival: Curved, beliefs: Beliefs) -> Verdict:
+    """Return 'unknown' where what looks like noise follows something on unseen stretches."""
+    form = rival.form
+    if form.gain < beliefs.beaten_share or form.steady < beliefs.beaten_steady:
+        return verdict
+    reason = (
+        f'no effect in the library explains the gap, but it is no noise: {_places(rival)} predicts '
+        f'{100.0 * form.gain:.0f} % of it on unseen stretches'
+    )
+    return Verdict('unknown', beliefs.beaten_belief, (), (reason,))
+
+
+def _places(rival: Curved) -> str:
+    return ' and '.join(str(part.group) for part in rival.form.parts)
 
 
 def gain_of(named: Unseen, rival: Unseen) -> tuple[float, float]:

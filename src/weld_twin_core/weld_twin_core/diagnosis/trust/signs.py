@@ -32,7 +32,16 @@ MOVES, WIDE = 0.02, 0.5
 angle well."""
 FAR = 1e3
 """Signs are cut here: nothing beyond says more."""
-CURVES = ('curves', 'curve_gain', 'curve_sure', 'curve_left', 'curve_kept', 'curve_place')
+CURVES = (
+    'curves',
+    'curve_gain',
+    'curve_sure',
+    'curve_left',
+    'curve_kept',
+    'curve_place',
+    'form_gain',
+    'form_sure',
+)
 
 Numbers = dict[str, float]
 
@@ -223,6 +232,8 @@ def _of_curves(unseen: Unseen, rival: Curved | None, floor: float) -> Numbers:
         'curve_left': _log(rival.rms_m / max(floor, 1e-12)),
         'curve_kept': len(rival.kept),
         'curve_place': min(weights, default=0.0),
+        'form_gain': rival.form.gain,
+        'form_sure': rival.form.steady,
     }
 
 

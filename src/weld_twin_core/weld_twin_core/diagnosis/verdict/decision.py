@@ -211,10 +211,16 @@ def _unknown_confidence(case: Weighed) -> float:
 
 
 def _leaders(slot: tuple[Rival, ...], beliefs: Beliefs) -> tuple[Site, ...]:
-    """Return the leader alone when it is sure, else all that are worth naming."""
+    """Return the leader alone when it is sure, else all worth naming, the simplest first."""
     if slot[0].probability >= beliefs.sure:
         return (slot[0].site,)
-    return tuple(dict.fromkeys(r.site for r in slot if r.probability >= beliefs.listed))
+    listed = dict.fromkeys(r.site for r in slot if r.probability >= beliefs.listed)
+    return tuple(sorted(listed, key=_numbers))
+
+
+def _numbers(site: Site) -> int:
+    """Return how many numbers an effect has: the fewer, the simpler."""
+    return sum(max(parameter.size, 1) for parameter in REGISTRY[site.effect].parameters)
 
 
 def _alike(chosen: tuple[Site, ...]) -> str:

@@ -104,6 +104,19 @@ def test_a_rival_is_named_beside_an_unsure_leader_from_3_percent_on(probability,
     assert (DRIFT in verdict.sets[0]) is listed
 
 
+def test_a_set_begins_with_the_effect_of_fewest_numbers():
+    base = Site('base_pose', None)
+    assert decide(evidence(slot((base, 0.7), (OFFSET, 0.3)))).sets == ((OFFSET, base),)
+
+
+def test_a_set_of_which_another_member_carries_over_is_no_sign_of_a_foreign_cause():
+    case = evidence(slot((PLAY, 0.6), (OFFSET, 0.4)), after=9.0 * FLOOR)
+    assert decide(replace(case, least=9.0 * FLOOR)).status == 'unknown'
+    verdict = decide(replace(case, least=1.01 * FLOOR))
+    assert verdict.status == 'ambiguous'
+    assert '9.0 times' in verdict.reasons[-1]
+
+
 def test_what_cannot_be_told_apart_is_said_in_words():
     verdict = decide(evidence(SURE, slot((OFFSET, 0.5), (GEAR, 0.5))))
     assert len(verdict.reasons) == 1

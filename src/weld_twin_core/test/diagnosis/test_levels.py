@@ -4,12 +4,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.levels.sparse_groups import Folds, steadiness
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.levels.held_against import held_against
+from weld_twin_core.diagnosis.levels.sparse_groups import (
+    Choosing,
+    Folds,
+    Member,
+    steadiness,
+    worth,
+)
 from weld_twin_core.diagnosis.unseen.regions import posture_regions
+from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.effects.curve import basis
 from weld_twin_core.effects.joint_curve import JointCurve
 
@@ -136,3 +147,33 @@ def test_a_curve_that_is_none_is_refused_in_a_sentence(change, words):
     values = {'values': [0.0, 1e-4, 0.0], 'knots': [0.0, 1.0, 2.0]} | change
     with pytest.raises(wt.ModelError, match=words):
         wt.Twin(wt.load('ur5'), [JointCurve('elbow_joint', **values)])
+
+
+@pytest.mark.parametrize(
+    ('gain', 'steady', 'status'),
+    [(0.16, 2.1, 'unknown'), (0.14, 9.0, 'none'), (0.9, 1.9, 'none')],
+)
+def test_a_gap_that_something_predicts_is_no_noise(gain, steady, status):
+    part = SimpleNamespace(group='tool, depending on load')
+    rival = SimpleNamespace(form=SimpleNamespace(parts=(part,), gain=gain, steady=steady))
+    nothing = Verdict('none', 0.95, (), ())
+    verdict = held_against(nothing, None, rival, Beliefs())
+    assert verdict.status == status
+    assert (verdict == nothing) or 'tool, depending on load' in verdict.reasons[0]
+
+
+def test_what_groups_are_worth_adds_up():
+    rng = np.random.default_rng(4)
+    columns = rng.standard_normal((2, 600))
+    target = 2.0 * columns[0] + columns[1] + 0.5 * rng.standard_normal(600)
+    work = Choosing(
+        [],
+        np.zeros(0, dtype=int),
+        np.zeros(0),
+        [np.array([0]), np.array([1])],
+        (Folds.of(columns, target, np.arange(600) % 10),),
+    )
+    told = worth(work, [Member(0, 1e-3), Member(1, 1e-3)])
+    assert sum(told.shares) == pytest.approx(told.gain)
+    assert told.gain == pytest.approx(5.0 / 5.25, abs=0.02)
+    assert told.shares[0] / told.shares[1] == pytest.approx(4.0, rel=0.3)

@@ -142,7 +142,7 @@ def _explained(
     floor = noise_floor(found.problem, found.problem.residuals(found.final.model))
     holdout = examined.mended(holdout)
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
-    evidence = gathered(found, unseen, leftover, shrink, floor, beliefs)
+    evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, holdout)
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict, beliefs)
     verdict = held_against(verdict, unseen, rival, beliefs)

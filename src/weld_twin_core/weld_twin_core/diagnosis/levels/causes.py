@@ -111,7 +111,7 @@ def _with_uncarried(
     """Return shares and their errors with what no curve carries, one at most in all."""
     if rival is None or not claims:
         return whole, spread
-    more = np.array([claim.uncarried for claim in claims])
+    more = np.array([claim.uncarried for claim in claims], dtype=np.float64)
     room = max(1.0 - float(whole.sum()), 0.0) / max(float(more.sum()), 1e-300)
     more *= min(room, 1.0)
     return whole + more, np.hypot(spread, more / max(rival.form.steady, 1.0))
@@ -207,7 +207,7 @@ def _curve_claims(model: tuple[Effect, ...], rival: Curved, beliefs: Beliefs) ->
             for name, weight in part.weight_of('on').items():
                 on[name] = max(on.get(name, 0.0), weight * beliefs.level_free)
         curves = {Site(model[k].name, model[k].site): beliefs.level_free for k in held}
-        uncarried = sum(part.share for part, members in parts if not members)
+        uncarried = float(sum(part.share for part, members in parts if not members))
         out.append(_Claim(held, believed, on, curves, uncarried))
     return out
 

@@ -39,6 +39,9 @@ class Evidence:
         What would explain the rest best but no machine has, in words.
     families : tuple of WeighedFamily, optional
         Where many small errors were fitted together: what each kind accounts for.
+    least : float, optional
+        Least RMS [m] on held-out data over what could be in the model, one rival at a time; left
+        out, it is ``after``.
 
     """
 
@@ -54,3 +57,4 @@ class Evidence:
     glimpsed: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
     families: tuple[WeighedFamily, ...] | None = None
+    least: float | None = None

@@ -4,15 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
+from ...recording import Recording
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..many.weighed_families import weighed_families
 from ..result import Shrink, Site
+from ..unseen.held_out_shrink import least_elsewhere
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 from .evidence import Evidence
@@ -26,6 +30,7 @@ def gathered(
     shrink: Shrink,
     floor: NoiseFloor,
     beliefs: Beliefs,
+    holdout: Sequence[Recording] = (),
 ) -> Evidence:
     """
     Return the evidence for a verdict.
@@ -41,6 +46,8 @@ def gathered(
         On held-out recordings or on stretches taking their turn.
     floor : NoiseFloor
     beliefs : Beliefs
+    holdout : sequence of Recording
+        That the shrink was judged on.
 
     """
     everything = range(len(found.final.model.found))
@@ -57,6 +64,7 @@ def gathered(
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),
         refused=tuple(_refused(found.final.model.robot, effect) for effect in found.refused),
         families=weighed_families(found, unseen) if found.dense else None,
+        least=least_elsewhere(found, holdout, shrink.rms_after_m, beliefs),
     )
 
 

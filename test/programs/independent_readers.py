@@ -66,7 +66,8 @@ def rapid(files):
     known = {}
     for kind, name, body in re.findall(r'CONST (robtarget|jointtarget) (\w+)\s*:=([^;]*);', text):
         known[name] = rapid_target(kind, body)
-    table = pose([0.5, 0.0, 0.1], Rotation.identity())
+    at = [0.5, 0.0, 0.1] if 'wobjTable' in text else [0.0, 0.0, 0.0]
+    table = pose(at, Rotation.identity())
     out = []
     body = text.partition('PROC')[2]
     for word, rest in re.findall(r'(MoveAbsJ|MoveL|Arc[LC]\w*)\s+([^;]*);', body):
@@ -78,7 +79,9 @@ def rapid(files):
                 moved[:3, 3] += np.array([float(v) for v in shift]) / 1e3
                 places.append(table @ moved)
             elif item.startswith('['):
-                places.append(table @ rapid_target('robtarget', item))
+                kind = 'jointtarget' if word == 'MoveAbsJ' else 'robtarget'
+                value = rapid_target(kind, item)
+                places.append(value if value.ndim == 1 else table @ value)
             else:
                 value = known[item]
                 places.append(value if value.ndim == 1 else table @ value)

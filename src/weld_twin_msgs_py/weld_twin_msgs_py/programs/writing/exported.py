@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a new program is to do, whatever language it is written in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+
+from ..context import Context
+
+
+class ExportMove(NamedTuple):
+    """
+    One move.
+
+    Attributes
+    ----------
+    kind : str
+        'joint' or 'linear'.
+    q : array, shape (n,)
+        Joint positions of the model at its end.
+    pose : array, shape (4, 4) [m]
+        The tool there, in the controller's robot frame.
+    speed : float [m/s]
+        Of the tool; of a joint move what its share of joint speed makes of it.
+    share : float
+        Of the joints' speeds.
+    stop : bool
+    dwell : float [s]
+    duration : float [s]
+        How long it takes.
+    comment : str
+
+    """
+
+    kind: Literal['joint', 'linear']
+    q: Array
+    pose: Array
+    speed: float
+    share: float
+    stop: bool = True
+    dwell: float = 0.0
+    duration: float = 1.0
+    comment: str = ''
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """
+    A program to write.
+
+    Attributes
+    ----------
+    name : str
+        Letters, digits and underscores, as all controllers take it.
+    moves : tuple of ExportMove
+    context : Context
+    tool : array, shape (4, 4) [m]
+        On the controller's flange.
+    trigger : int
+        Number of the digital output that tells the instrument when to measure.
+    stations : bool
+        The output is on while the arm stands; else from the first to the last move.
+    comments : tuple of str
+
+    """
+
+    name: str
+    moves: tuple[ExportMove, ...]
+    context: Context
+    tool: Array
+    trigger: int
+    stations: bool
+    comments: tuple[str, ...] = ()
+
+    def joints(self, move: ExportMove) -> list[float]:
+        """Return the joints of a move as the controller shows them, degrees or mm."""
+        return self.context.degrees().numbers(move.q, [0.0] * self.context.robot.n)
+
+    @property
+    def joint_sizes(self) -> Array:
+        """Return the speed limits of the joints, shape (n,) [rad/s or m/s]."""
+        return np.asarray(self.context.robot.max_velocity)
+
+
+def move_count(program: Exported) -> int:
+    """Return how many moves a program has."""
+    return len(program.moves)
+
+
+def comma(values: list[float], digits: int) -> str:
+    """Return numbers with commas between, no minus before a zero."""
+    return ', '.join(f'{0.0 if abs(v) < 0.5 * 10.0**-digits else v:.{digits}f}' for v in values)

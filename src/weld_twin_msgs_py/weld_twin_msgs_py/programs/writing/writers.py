@@ -1,0 +1,269 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The writers, one for every language, as short as a program is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from weld_twin_core.errors import DataError
+
+from ..notation import ABB_POSE, KUKA_POSE, UR_POSE
+from .exported import Exported, ExportMove, comma
+
+BLEND = 1e-3
+"""Corners are rounded within this much [m] where the arm goes on."""
+SETTLE = 0.3
+"""Time [s] between the stop and the trigger."""
+UR_ACCELERATION = (0.5, 0.3)
+"""Of joint moves [rad/s^2] and of the tool [m/s^2], a fraction of what the manual has."""
+
+
+def written(program: Exported, language: str) -> str:
+    """
+    Return the text of a program.
+
+    Raises
+    ------
+    DataError
+        The language cannot say it, as INFORM without the pulses of every axis.
+
+    """
+    return WRITERS[language](program)
+
+
+def _urscript(program: Exported) -> str:
+    rows = [f'def {program.name}():', *(f'  # {text}' for text in program.comments)]
+    rows.append(f'  set_tcp(p[{comma(UR_POSE.numbers(program.tool, [0.0] * 7), 7)}])')
+    on, off = (f'  set_digital_out({program.trigger}, {word})' for word in ('True', 'False'))
+    fastest = float(program.joint_sizes.max())
+    old = [0.0] * 7
+
+    def move(step: ExportMove) -> list[str]:
+        nonlocal old
+        radius = 0.0 if step.stop else BLEND
+        if step.kind == 'joint':
+            target = f'[{comma(step.q.tolist(), 7)}]'
+            speed = f'a={UR_ACCELERATION[0]}, v={step.share * fastest:.4f}'
+            return [f'  movej({target}, {speed}, r={radius:g})']
+        old = UR_POSE.numbers(step.pose, old)
+        speed = f'a={UR_ACCELERATION[1]}, v={step.speed:.4f}'
+        return [f'  movel(p[{comma(old, 7)}], {speed}, r={radius:g})']
+
+    rows += _body(program, move, on, off, lambda s: f'  sleep({s:.2f})', '  # {}')
+    return '\n'.join([*rows, 'end', ''])
+
+
+def _krl(program: Exported) -> str:
+    rows = ['&ACCESS RVP', '&REL 1', f'DEF {program.name}( )']
+    rows += [f'; {text}' for text in program.comments]
+    rows += [
+        ';FOLD INI',
+        'GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )',
+        'INTERRUPT ON 3',
+        'BAS (#INITMOV,0 )',
+        ';ENDFOLD (INI)',
+        '$BASE = $NULLFRAME',
+        f'$TOOL = {{FRAME: {_krl_pose(KUKA_POSE.numbers(program.tool, [0.0] * 6))}}}',
+        f'$APO.CDIS = {BLEND * 1e3:.1f}',
+    ]
+    share = speed = -1.0
+    old = [0.0] * 6
+    joints = [f'A{k + 1}' for k in range(program.context.robot.n)]
+
+    def move(step: ExportMove) -> list[str]:
+        nonlocal share, speed, old
+        out = []
+        if step.kind == 'joint':
+            if abs(step.share - share) > 5e-4:
+                share = step.share
+                out.append(f'BAS(#VEL_PTP,{100.0 * share:.3f})')
+            values = (f'{n} {v:.5f}' for n, v in zip(joints, program.joints(step), strict=True))
+            return [*out, f'PTP {{{",".join(values)}}}' + ('' if step.stop else ' C_PTP')]
+        if abs(step.speed - speed) > 1e-6:
+            speed = step.speed
+            out.append(f'$VEL.CP = {speed:.5f}')
+        old = KUKA_POSE.numbers(step.pose, old)
+        target = f'LIN {{{_krl_pose(old)}}}'
+        return [*out, target + ('' if step.stop else ' C_DIS')]
+
+    on, off = (f'$OUT[{program.trigger}] = {word}' for word in ('TRUE', 'FALSE'))
+    rows += _body(program, move, on, off, lambda s: f'WAIT SEC {s:.2f}', '; {}')
+    return '\r\n'.join([*rows, 'END', ''])
+
+
+def _krl_pose(values: list[float]) -> str:
+    parts = [*comma(values[:3], 4).split(', '), *comma(values[3:], 5).split(', ')]
+    return ','.join(f'{name} {part}' for name, part in zip('XYZABC', parts, strict=True))
+
+
+def _rapid(program: Exported) -> str:
+    away = '[9E9,9E9,9E9,9E9,9E9,9E9]'
+    rows = [f'MODULE {program.name}', *(f'  ! {text}' for text in program.comments)]
+    old = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    position, turn = _rapid_pose(ABB_POSE.numbers(program.tool, old))
+    load = '[0.001,[0,0,0.001],[1,0,0,0],0,0,0]'
+    rows += [
+        f'  PERS tooldata tMeasured := [TRUE,[{position},{turn}],{load}];',
+        '  PROC main()',
+        '    ConfJ \\On;',
+        '    ConfL \\Off;',
+    ]
+
+    def move(step: ExportMove) -> list[str]:
+        nonlocal old
+        zone = 'fine' if step.stop else 'z1'
+        speed = f'[{max(step.speed * 1e3, 1.0):.2f},50,50,50]'
+        if step.kind == 'joint':
+            target = f'[[{comma(program.joints(step), 5)}],{away}]'
+            return [f'    MoveAbsJ {target}, {speed}, {zone}, tMeasured;']
+        old = ABB_POSE.numbers(step.pose, old)
+        position, turn = _rapid_pose(old)
+        q = np.degrees(step.q)
+        conf = ','.join(f'{np.floor(q[k] / 90.0) + 0.0:.0f}' for k in (0, 3, 5)) + ',0'
+        target = f'[{position},{turn},[{conf}],{away}]'
+        return [f'    MoveL {target}, {speed}, {zone}, tMeasured;']
+
+    on, off = (f'    SetDO doTracker{program.trigger}, {word};' for word in '10')
+    wait = '    WaitTime \\InPos, {:.2f};'
+    rows += _body(program, move, on, off, lambda s: wait.format(s), '    ! {}')
+    return '\n'.join([*rows, '  ENDPROC', 'ENDMODULE', ''])
+
+
+def _rapid_pose(values: list[float]) -> tuple[str, str]:
+    return (f'[{comma(values[:3], 4)}]', f'[{comma(values[3:], 8)}]')
+
+
+def _inform(program: Exported) -> str:
+    pulses = program.context.pulses_per_degree
+    if pulses is None:
+        raise DataError(
+            'a job of Yaskawa has its points in pulses; give --pulses-per-degree, as the '
+            'parameters of the controller have it'
+        )
+    rows = ['/JOB', f'//NAME {program.name[:32].upper()}', '//POS']
+    rows += [
+        f'///NPOS {len(program.moves)},0,0,0,0,0',
+        '///TOOL 0',
+        '///POSTYPE PULSE',
+        '///PULSE',
+    ]
+    for k, step in enumerate(program.moves):
+        values = np.round(np.array(program.joints(step)) * pulses)
+        rows.append(f'C{k:05d}=' + ','.join(f'{v:.0f}' for v in values + 0.0))
+    rows += ['//INST', '///DATE 2000/01/01 00:00', '///ATTR SC,RW', '///GROUP1 RB1', 'NOP']
+    rows += [f"'{text[:32]}" for text in program.comments]
+    count = -1
+
+    def move(step: ExportMove) -> list[str]:
+        nonlocal count
+        count += 1
+        level = ' PL=0' if step.stop else ' PL=1'
+        if step.kind == 'joint':
+            return [f'MOVJ C{count:05d} VJ={max(100.0 * step.share, 0.01):.2f}{level}']
+        return [f'MOVL C{count:05d} V={max(step.speed * 1e3, 0.1):.1f}{level}']
+
+    on, off = (f'DOUT OT#({program.trigger}) {word}' for word in ('ON', 'OFF'))
+    rows += _body(program, move, on, off, lambda s: f'TIMER T={s:.2f}', "'{}")
+    return '\r\n'.join([*rows, 'END', ''])
+
+
+def _fanuc(program: Exported) -> str:
+    body: list[str] = [f'!{text[:32]}' for text in program.comments]
+    body += ['UFRAME_NUM=0', 'UTOOL_NUM=1']
+    count = 0
+
+    def move(step: ExportMove) -> list[str]:
+        nonlocal count
+        count += 1
+        end = 'FINE' if step.stop else 'CNT5'
+        if step.kind == 'joint':
+            return [f'J P[{count}] {max(round(100.0 * step.share), 1)}% {end}']
+        return [f'L P[{count}] {max(step.speed * 1e3, 1.0):.0f}mm/sec {end}']
+
+    on, off = (f'DO[{program.trigger}]={word}' for word in ('ON', 'OFF'))
+    body += _body(program, move, on, off, lambda s: f'WAIT {s:6.2f}(sec)', '!{}')
+    rows = [f'/PROG  {program.name[:32].upper()}', '/ATTR', 'OWNER\t\t= MNEDITOR;']
+    rows += [f'LINE_COUNT\t= {len(body)};', 'PROTECT\t\t= READ_WRITE;']
+    rows += ['DEFAULT_GROUP\t= 1,*,*,*,*;', 'CONTROL_CODE\t= 00000000 00000000;', '/MN']
+    rows += [_fanuc_line(k, text) for k, text in enumerate(body, start=1)]
+    rows.append('/POS')
+    for k, step in enumerate(program.moves, start=1):
+        values = [f'J{i}= {v:9.3f} deg' for i, v in enumerate(program.joints(step), start=1)]
+        first, second = ',\t'.join(values[:3]), ',\t'.join(values[3:])
+        rows += [f'P[{k}]{{', '   GP1:', '\tUF : 0, UT : 1,\t', f'\t{first},', f'\t{second}', '};']
+    return '\r\n'.join([*rows, '/END', ''])
+
+
+def _fanuc_line(number: int, text: str) -> str:
+    motion = text.startswith(('J P[', 'L P['))
+    return f'{number:4d}:{text}    ;' if motion else f'{number:4d}:  {text} ;'
+
+
+def _trajectory(program: Exported) -> str:
+    rows = [f'# {text}' for text in program.comments]
+    rows += ['joint_names:', *(f'- {name}' for name in program.context.robot.joint_names)]
+    rows.append('points:')
+    clock = 0.0
+    for k, step in enumerate(program.moves):
+        clock += step.duration if k else 0.0
+        rows += _trajectory_point(step, clock)
+        if step.dwell > 0.0:
+            clock += step.dwell
+            rows += _trajectory_point(step, clock)
+    return '\n'.join([*rows, ''])
+
+
+def _trajectory_point(step: ExportMove, clock: float) -> list[str]:
+    whole, part = divmod(round(clock * 1e9), 10**9)
+    return [
+        f'- positions: [{comma(step.q.tolist(), 9)}]',
+        f'  time_from_start: {{sec: {whole}, nanosec: {part}}}',
+    ]
+
+
+def _csv(program: Exported) -> str:
+    rows = [f'# {text}' for text in program.comments]
+    rows.append(','.join(['move', *program.context.robot.joint_names, 'speed', 'dwell']))
+    for step in program.moves:
+        speed = step.share if step.kind == 'joint' else step.speed
+        dwell = max(step.dwell, 0.001) if step.stop else 0.0
+        values = comma(step.q.tolist(), 9).replace(' ', '')
+        rows.append(f'{step.kind},{values},{speed:.5f},{dwell:.3f}')
+    return '\n'.join([*rows, ''])
+
+
+def _body(
+    program: Exported,
+    move: Callable[[ExportMove], list[str]],
+    on: str,
+    off: str,
+    wait: Callable[[float], str],
+    remark: str,
+) -> list[str]:
+    """Return the moves with stays and trigger between them."""
+    rows: list[str] = []
+    for k, step in enumerate(program.moves):
+        rows += [remark.format(step.comment)] if step.comment else []
+        rows += move(step)
+        if program.stations and step.dwell > 0.0:
+            rows += [wait(SETTLE), on, wait(step.dwell), off]
+        elif not program.stations and k == 0:
+            rows += [wait(SETTLE), on, wait(max(step.dwell, SETTLE))]
+        elif step.dwell > 0.0:
+            rows.append(wait(step.dwell))
+    return rows if program.stations else [*rows, wait(SETTLE), off]
+
+
+WRITERS: dict[str, Callable[[Exported], str]] = {
+    'urscript': _urscript,
+    'krl': _krl,
+    'rapid': _rapid,
+    'inform': _inform,
+    'fanuc-ls': _fanuc,
+    'joint-trajectory': _trajectory,
+    'csv': _csv,
+}
+"""By the names that ``--controller`` takes."""

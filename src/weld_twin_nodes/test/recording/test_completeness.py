@@ -258,10 +258,15 @@ LISTENERS = {
 """Of the main outputs without the recorder, as demo.launch.py has them."""
 MOTION = ('/joint_states', '/actual/joint_states', '/measured/tool_pose', '/twin/tool_pose')
 """Topics with one message for every sample of the motion."""
+SUBSCRIBERS = dict(zip(MOTION, (3, 1, 2, 2), strict=True))
+"""The recorder, and the nodes that take each of them in."""
 
 
 @pytest.mark.parametrize('way', ['launched', 'by hand'])
 def test_a_cell_is_recorded_from_the_first_to_the_last_message(cell, tmp_path, way):
+    def heard(topic):
+        return cell.node.count_subscribers(topic) == SUBSCRIBERS[topic]
+
     process = cell.start('recorder', out=str(tmp_path / 'bag'), reliable_inputs=way == 'launched')
     motion = {'profile': 'aggressive', 'playback': 4.0, 'exit_when_done': True}
     for name, count in LISTENERS.items():
@@ -269,8 +274,7 @@ def test_a_cell_is_recorded_from_the_first_to_the_last_message(cell, tmp_path, w
         if way == 'launched':
             own = {**own, 'wait_for_subscribers': count + 1, 'reliable_inputs': True}
         elif own:  # by hand the motion is started last, when the other nodes are there
-            there = {'recorder', *LISTENERS} - {name}
-            cell.wait(lambda wanted=there: wanted <= set(cell.node.get_node_names()), 'the nodes')
+            cell.wait(lambda: all(map(heard, SUBSCRIBERS)), 'the nodes that listen')
         cell.start(name, **own)
     generator = cell.processes[-1]
     cell.wait(lambda: generator.code is not None, 'the motion to end', limit=120.0)

@@ -55,6 +55,7 @@ def evidences(rss: float, gain: Array, freedom: Array | float, effective: float)
         Number of independent rows.
 
     """
-    left = np.maximum(rss - gain, PERFECT * rss)
+    # Where nothing was left before, nothing can fall.
+    left = np.maximum(rss - gain, PERFECT * rss) / rss if rss > 0.0 else np.ones_like(gain)
     count = max(effective, FEWEST)
-    return np.asarray(0.5 * count * np.log(rss / left) - 0.5 * freedom * np.log(count))
+    return np.asarray(-0.5 * count * np.log(left) - 0.5 * freedom * np.log(count))

@@ -93,6 +93,12 @@ class Intake:
         widths = {Role.POSE: 8, Role.POINT: 3, Role.SIGMA: 3, Role.WRENCH: 6, Role.TEMPERATURE: 1}
         return widths.get(role, 2 * robot.n)
 
+    @property
+    def remarks(self) -> list[str]:
+        """Return what is to be told of names and frames that were taken for granted."""
+        told = (self.joints, self.measuring_frame, self.wrench_frame)
+        return [each.remark for each in told if each.remark]
+
     def last(self, role: Role) -> int | None:
         """Return the stamp of the last sample of a stream [ns]."""
         return self._orders[role].last

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 from typing import Any, NamedTuple
 
@@ -57,6 +57,8 @@ class JointStates:
         Messages that hold no joint of the robot.
     parts : int
         Messages that hold some joints and wait for the rest.
+    remark : str
+        What is to be told of the names; empty where they are those of the robot.
 
     """
 
@@ -74,6 +76,7 @@ class JointStates:
         self._stamp = 0
         self._parts: dict[str, tuple[float, float]] = {}
         self.others = self.parts = 0
+        self.remark = ''
 
     def take(self, message: Any) -> JointSample | None:
         """
@@ -97,8 +100,10 @@ class JointStates:
         if not present:
             if not message.name:
                 raise Missing('the joint state names no joint')
-            self.others += 1
-            return None
+            if not self._take_prefix(message.name):
+                self.others += 1
+                return None
+            present = self._names
         if 0 < len(present) < len(self._names):
             return self._part(stamp, message, present)
         q = from_messages.joint_positions(message, self._names)
@@ -106,6 +111,36 @@ class JointStates:
         self._usual = message.name
         self._index = [list(message.name).index(name) for name in self._names]
         return JointSample(stamp, q, from_messages.joint_velocities(message, self._names))
+
+    def _take_prefix(self, names: Sequence[str]) -> bool:
+        """
+        Take the names of a message for the robot's own with one prefix, if they are.
+
+        Raises
+        ------
+        DataError
+            There are several prefixes: those of several robots.
+
+        """
+        prefixes = set.intersection(
+            *(
+                {each.removesuffix(own) for each in names if each.endswith(own)}
+                for own in self._names
+            )
+        )
+        if len(prefixes) > 1:
+            listed = ', '.join(repr(each) for each in sorted(prefixes))
+            raise DataError(
+                f'the joint state holds the joints of several robots, with the prefixes {listed}; '
+                "publish each robot's on a topic of its own, or name the joints in the robot file "
+                'as the joint state does'
+            )
+        if not prefixes:
+            return False
+        prefix = prefixes.pop()
+        self._names = tuple(prefix + own for own in self._names)
+        self.remark = f'the joints are named with the prefix {prefix!r}; they are taken without it'
+        return True
 
     def _quick(self, stamp: int, message: Any) -> JointSample | None:
         """Return the sample of a message with the names of the last one, None if in doubt."""

@@ -16,6 +16,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 
 from ..assembly import Intake, Role, Samples, assembled
+from ..assembly.foreign_types import JOINTS, POSES, plain_messages, split_topic
 from ..messages.topics import (
     JOINT_STATES,
     MEASURED_POINT,
@@ -29,9 +30,9 @@ from .columns import LEFT_OUT, Stream
 from .ends import Ends, never_recorded, uneven_ends
 from .reader import BagReader
 
-POSE_TYPES = (MEASURED_POSE.type, 'geometry_msgs/msg/PoseWithCovarianceStamped')
+POSE_TYPES = (MEASURED_POSE.type, 'geometry_msgs/msg/PoseWithCovarianceStamped', *POSES)
 TYPES = {
-    Role.JOINTS: (JOINT_STATES.type,),
+    Role.JOINTS: (JOINT_STATES.type, *JOINTS),
     Role.POSE: POSE_TYPES,
     Role.POINT: (MEASURED_POINT.type,),
     Role.SIGMA: (MEASURED_SIGMA.type,),
@@ -80,8 +81,9 @@ def read_recording(
     with BagReader(path) as bag:
         roles = _roles(names, bag.topics)
         streams = {role: Stream(topic, Intake.width(role, robot)) for topic, role in roles.items()}
-        _fill(bag, roles, streams, intake)
-        made, points = bag.provenance, bag.topics.get(names.point, ('', 0))[1]
+        _fill(bag, names, roles, streams, intake)
+        points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
+        made = bag.provenance
     if streams[Role.JOINTS].messages == intake.joints.others:
         raise DataError(
             f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
@@ -125,8 +127,8 @@ def _name(path: Path) -> str:
 
 def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[str, Role]:
     """Return the topics to read; the joint states are a must, the others as they are there."""
-    roles = {getattr(names, role.value): role for role in Role}
-    space = names.joints.removesuffix(TopicNames().joints)
+    roles = {_topic(names, role): role for role in Role}
+    space = _topic(names, Role.JOINTS).removesuffix(TopicNames().joints)
     defaults = {*vars(TopicNames()).values(), *vars(TopicNames.within(space)).values()}
     for topic, role in list(roles.items()):
         kind, count = present.get(topic, ('', 0))
@@ -142,36 +144,52 @@ def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[st
                 f"topic '{topic}' has the type {kind}, but this use needs "
                 + ' or '.join(TYPES[role])
             )
-    if names.pose in roles:
-        roles.pop(names.point, None)
+    if _topic(names, Role.POSE) in roles:
+        roles.pop(_topic(names, Role.POINT), None)
     return roles
+
+
+def _topic(names: TopicNames, role: Role) -> str:
+    """Return the topic of a role, without the part of its messages that is meant."""
+    name: str = getattr(names, role.value)
+    return split_topic(name)[0]
 
 
 def _fill(
     bag: BagReader,
+    names: TopicNames,
     roles: Mapping[str, Role],
     streams: Mapping[Role, Stream],
     intake: Intake,
 ) -> None:
     """Stream the bag into the columns."""
-    for topic, _, _, message in bag.messages(roles):
-        role = roles[topic]
-        stream = streams[role]
-        stream.messages += 1
-        last = intake.last(role)
+    parts = {topic: split_topic(getattr(names, role.value))[1] for topic, role in roles.items()}
+    for topic, kind, _, message in bag.messages(roles):
+        stream = streams[roles[topic]]
         try:
-            taken = intake.take(role, message)
-        except LEFT_OUT as error:
-            stream.leave_out(error)
-            continue
+            plain = tuple(plain_messages(kind, message, parts[topic]))
         except DataError as error:
-            raise DataError(f"message {stream.messages - 1} of '{topic}': {error}") from None
-        if taken is None:
-            continue
-        if taken.restarted and last is not None:
-            raise stream.jumped(last - taken.stamp)
-        stream.frames.add(message.header.frame_id)
-        stream.append(taken.stamp, taken.row)
+            raise DataError(f"message {stream.messages} of '{topic}': {error}") from None
+        for each in plain:
+            stream.messages += 1
+            _take(each, roles[topic], stream, intake)
+
+
+def _take(message: Any, role: Role, stream: Stream, intake: Intake) -> None:
+    last = intake.last(role)
+    try:
+        taken = intake.take(role, message)
+    except LEFT_OUT as error:
+        stream.leave_out(error)
+        return
+    except DataError as error:
+        raise DataError(f"message {stream.messages - 1} of '{stream.topic}': {error}") from None
+    if taken is None:
+        return
+    if taken.restarted and last is not None:
+        raise stream.jumped(last - taken.stamp)
+    stream.frames.add(message.header.frame_id)
+    stream.append(taken.stamp, taken.row)
 
 
 def _notes(
@@ -184,6 +202,5 @@ def _notes(
         notes.append(
             f"{intake.joints.others} messages of '{names.joints}' hold no joint of the robot"
         )
-    if intake.wrench_frame.remark:
-        notes.append(intake.wrench_frame.remark)
+    notes += [said for said in (intake.joints.remark, intake.wrench_frame.remark) if said]
     return tuple(notes)

@@ -3,8 +3,9 @@
 """
 Streaming access to one bag: a message is decoded, handed over and forgotten.
 
-Only the standard message types this project knows are decoded, with the definitions of Jazzy, so
-a bag that also holds somebody's own types reads as well.
+Only messages of the topics that are asked for are decoded: with the definitions of Jazzy, or, for a
+type that Jazzy does not bring, with the one that the bag holds. A bag that also holds somebody's
+own types reads as well.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from traceback import clear_frames
 from types import TracebackType
 from typing import Any, NamedTuple
 
+from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
 
 from weld_twin_core.errors import DataError, TwinError
 
 from ..messages.from_messages import NANOSECONDS
-from ..messages.typestore import PROVENANCE_PREFIX, TYPES, decode
+from ..messages.typestore import PROVENANCE_PREFIX, TYPES, decode, types_with
 from .storage import PACKED, look
 from .unpack import unpack_file, unzstd
 
@@ -60,6 +62,7 @@ class BagReader:
         self.topics: dict[str, tuple[str, int]] = {}
         self.provenance: dict[str, Any] = {}
         self._packed = False
+        self._definitions: dict[str, tuple[str, bool]] = {}
         self._readers: list[Reader] = []
         self._stack = ExitStack()
 
@@ -107,7 +110,14 @@ class BagReader:
         """
         with clear_errors(self.path):
             for topic, kind, log_ns, data in self.raw(topics):
-                yield BagMessage(topic, kind, log_ns, decode(data, kind))
+                yield BagMessage(topic, kind, log_ns, self._decode(data, kind))
+
+    def _decode(self, data: bytes, kind: str) -> Any:
+        """Decode by the definition of Jazzy, or by that of the bag where Jazzy has none."""
+        if kind in TYPES.fielddefs:
+            return decode(data, kind)
+        definition, idl = self._definitions.get(kind, ('', False))
+        return decode(data, kind, types_with(kind, definition, idl))
 
     def raw(self, topics: Collection[str]) -> Iterator[tuple[str, str, int, bytes]]:
         """
@@ -159,6 +169,11 @@ class BagReader:
                     raise ValueError('name or type of a topic is no text')
                 count = self.topics.get(connection.topic, ('', 0))[1]
                 self.topics[connection.topic] = (connection.msgtype, count + connection.msgcount)
+                defined = connection.msgdef
+                self._definitions[connection.msgtype] = (
+                    defined.data,
+                    defined.format == MessageDefinitionFormat.IDL,
+                )
 
     def _open(self, file: Path) -> None:
         if file.suffix == PACKED:

@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_msgs_py.messages.topics import TopicNames
 
+PARTS = {
+    'joint': 'JointState, DynamicJointState or JointTrajectoryControllerState (TOPIC:feedback)',
+    'pose': 'PoseStamped, PoseWithCovarianceStamped, TransformStamped or /tf:FRAME',
+}
+"""What the topics may hold besides the usual; after a colon, the part that is meant."""
 TOPIC_OPTIONS = ('joint', 'pose', 'point', 'wrench', 'temperature')
 
 
@@ -43,7 +48,7 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
         '--namespace', default='', metavar='NS', help='of the robot, such as left for /left/...'
     )
     for name in TOPIC_OPTIONS:
-        group.add_argument(f'--{name}-topic', metavar='TOPIC')
+        group.add_argument(f'--{name}-topic', metavar='TOPIC', help=PARTS.get(name))
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:

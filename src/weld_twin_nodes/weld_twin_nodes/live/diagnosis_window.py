@@ -55,9 +55,8 @@ class Window:
 
     @property
     def remarks(self) -> list[str]:
-        """Return what is to be told of the frames that were taken for granted."""
-        frames = self._intake.measuring_frame, self._intake.wrench_frame
-        return [frame.remark for frame in frames if frame.remark]
+        """Return what is to be told of names and frames that were taken for granted."""
+        return self._intake.remarks
 
     @property
     def last(self) -> int | None:

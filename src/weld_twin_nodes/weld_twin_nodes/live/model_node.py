@@ -58,14 +58,18 @@ class ModelNode(CellNode):
 
     def _on_wrench(self, message: Any) -> None:
         self.stream.take_wrench(message)
-        if self.stream.remark:
-            self.remark(self.stream.remark)
+        self._remark()
 
     def _on_joints(self, message: Any) -> None:
         sample = self.stream.step(message)
         self._input.others = self.stream.passed_over
+        self._remark()
         if sample is not None:
             self.publish(sample)
+
+    def _remark(self) -> None:
+        for sentence in self.stream.remarks:
+            self.remark(sentence)
 
     @abstractmethod
     def publish(self, sample: Sample) -> None:

@@ -72,9 +72,9 @@ class JointStream:
         return self._intake.joints.others + self._intake.joints.parts
 
     @property
-    def remark(self) -> str:
-        """Return what is to be told of the frame of the wrench; empty where it is clear."""
-        return self._intake.wrench_frame.remark
+    def remarks(self) -> list[str]:
+        """Return what is to be told of names and frames that were taken for granted."""
+        return self._intake.remarks
 
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""

@@ -1,0 +1,214 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags of trackers that publish transforms and of controllers that publish states of their own."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.rotation import quaternion_from_matrix
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.messages.topics import TopicNames
+
+ROBOT = load('ur5')
+N = 12
+RNG = np.random.default_rng(3)
+Q = np.linspace(0.1, 0.6, N)[:, None] + RNG.uniform(-1.0, 1.0, 6)
+STATE = """\
+std_msgs/Header header
+string[] joint_names
+trajectory_msgs/JointTrajectoryPoint reference
+trajectory_msgs/JointTrajectoryPoint feedback
+================================================================================
+MSG: trajectory_msgs/JointTrajectoryPoint
+float64[] positions
+float64[] velocities
+float64[] accelerations
+float64[] effort
+builtin_interfaces/Duration time_from_start
+"""
+DYNAMIC = """\
+std_msgs/Header header
+string[] joint_names
+InterfaceValue[] interface_values
+================================================================================
+MSG: control_msgs/InterfaceValue
+string[] interface_names
+float64[] values
+"""
+
+
+class Cell:
+    """Messages of a controller and a tracker, written by rosbags' own writer."""
+
+    def __init__(self):
+        self.store = get_typestore(Stores.ROS2_JAZZY)
+        for name, text in (
+            ('control_msgs/msg/JointTrajectoryControllerState', STATE),
+            ('control_msgs/msg/DynamicJointState', DYNAMIC),
+        ):
+            types = get_types_from_msg(text, name)
+            self.store.register({k: v for k, v in types.items() if k not in self.store.types})
+        self.rows = []
+
+    def make(self, kind, **fields):
+        return self.store.types[kind](**fields)
+
+    def header(self, k, frame=''):
+        stamp = self.make('builtin_interfaces/msg/Time', sec=k // 10 + 1, nanosec=k % 10 * 10**8)
+        return self.make('std_msgs/msg/Header', stamp=stamp, frame_id=frame)
+
+    def add(self, topic, kind, k, **fields):
+        self.rows.append((topic, kind, k, self.make(kind, **fields)))
+
+    def joints(self, k, prefixes=('',), topic='/joint_states'):
+        self.add(
+            topic,
+            'sensor_msgs/msg/JointState',
+            k,
+            header=self.header(k),
+            name=[prefix + name for prefix in prefixes for name in ROBOT.joint_names],
+            position=np.tile(Q[k], len(prefixes)),
+            velocity=np.array([]),
+            effort=np.array([]),
+        )
+
+    def transform(self, k, child='probe'):
+        pose = forward(ROBOT, Q[k])
+        x, y, z, w = quaternion_from_matrix(pose[:3, :3])
+        return self.make(
+            'geometry_msgs/msg/TransformStamped',
+            header=self.header(k, 'tracker'),
+            child_frame_id=child,
+            transform=self.make(
+                'geometry_msgs/msg/Transform',
+                translation=self.make(
+                    'geometry_msgs/msg/Vector3', **dict(zip('xyz', pose[:3, 3], strict=True))
+                ),
+                rotation=self.make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w),
+            ),
+        )
+
+    def write(self, folder):
+        with Writer(folder / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+            known = {}
+            for topic, kind, k, message in self.rows:
+                if topic not in known:
+                    known[topic] = bag.add_connection(topic, kind, typestore=self.store)
+                bag.write(known[topic], (k + 10) * 10**8, self.store.serialize_cdr(message, kind))
+        return folder / 'bag'
+
+
+@pytest.fixture
+def cell():
+    return Cell()
+
+
+def tool(k):
+    return forward(ROBOT, Q[k])[:3, 3]
+
+
+def assert_read(recording):
+    np.testing.assert_allclose(recording.joints.q, Q, atol=1e-15)
+    np.testing.assert_allclose(
+        recording.measured.position, [tool(k) for k in range(N)], atol=1e-12
+    )
+
+
+def test_transforms_of_one_topic_are_measured_poses(cell, tmp_path):
+    for k in range(N):
+        cell.joints(k)
+        message = cell.transform(k)
+        cell.rows.append(('/probe', 'geometry_msgs/msg/TransformStamped', k, message))
+    assert_read(read_recording(cell.write(tmp_path), ROBOT, TopicNames(pose='/probe')))
+
+
+def test_one_frame_of_tf_is_the_measured_pose(cell, tmp_path):
+    for k in range(N):
+        cell.joints(k)
+        both = [cell.transform(k, 'camera'), cell.transform(k)]
+        cell.add('/tf', 'tf2_msgs/msg/TFMessage', k, transforms=both)
+    bag = cell.write(tmp_path)
+    assert_read(read_recording(bag, ROBOT, TopicNames(pose='/tf:probe')))
+    with pytest.raises(DataError, match='holds the frames camera, probe; say which'):
+        read_recording(bag, ROBOT, TopicNames(pose='/tf'))
+
+
+def point(cell, q):
+    return cell.make(
+        'trajectory_msgs/msg/JointTrajectoryPoint',
+        positions=q,
+        velocities=np.zeros(6),
+        accelerations=np.array([]),
+        effort=np.array([]),
+        time_from_start=cell.make('builtin_interfaces/msg/Duration', sec=0, nanosec=0),
+    )
+
+
+def test_the_reference_of_a_controller_is_the_commanded_motion(cell, tmp_path):
+    for k in range(N):
+        cell.add(
+            '/controller/state',
+            'control_msgs/msg/JointTrajectoryControllerState',
+            k,
+            header=cell.header(k),
+            joint_names=list(ROBOT.joint_names),
+            reference=point(cell, Q[k]),
+            feedback=point(cell, Q[k] + 1e-3),
+        )
+    bag = cell.write(tmp_path)
+    for part, off in (('', 0.0), (':reference', 0.0), (':feedback', 1e-3)):
+        names = TopicNames(joints=f'/controller/state{part}')
+        np.testing.assert_allclose(read_recording(bag, ROBOT, names).joints.q, Q + off, atol=1e-15)
+    with pytest.raises(DataError, match="no part 'eror'; reference and feedback"):
+        read_recording(bag, ROBOT, TopicNames(joints='/controller/state:eror'))
+
+
+def test_a_dynamic_joint_state_is_a_joint_state(cell, tmp_path):
+    value = 'control_msgs/msg/InterfaceValue'
+    for k in range(N):
+        each = [
+            cell.make(value, interface_names=['effort', 'position'], values=np.array([7.0, q]))
+            for q in Q[k]
+        ]
+        other = cell.make(value, interface_names=['force'], values=np.array([1.0]))
+        cell.add(
+            '/dynamic_joint_states',
+            'control_msgs/msg/DynamicJointState',
+            k,
+            header=cell.header(k),
+            joint_names=['wrench_sensor', *ROBOT.joint_names],
+            interface_values=[other, *each],
+        )
+    names = TopicNames(joints='/dynamic_joint_states')
+    np.testing.assert_allclose(read_recording(cell.write(tmp_path), ROBOT, names).joints.q, Q)
+
+
+def test_a_prefix_of_all_joints_is_taken_off_and_told(cell, tmp_path):
+    for k in range(N):
+        cell.joints(k, ('left_',))
+    recording = read_recording(cell.write(tmp_path), ROBOT)
+    np.testing.assert_allclose(recording.joints.q, Q)
+    assert "named with the prefix 'left_'" in ' '.join(recording.notes)
+
+
+def test_two_robots_on_one_topic_are_not_mixed(cell, tmp_path):
+    for k in range(N):
+        cell.joints(k, ('left_', 'right_'))
+    with pytest.raises(DataError, match="prefixes 'left_', 'right_'"):
+        read_recording(cell.write(tmp_path), ROBOT)
+
+
+def test_stamps_stay_those_of_the_headers(cell, tmp_path):
+    for k in range(N):
+        cell.joints(k)
+    t = read_recording(cell.write(tmp_path), ROBOT).joints.t
+    assert all(b - a == pytest.approx(0.1, abs=1e-9) for a, b in pairwise(t))

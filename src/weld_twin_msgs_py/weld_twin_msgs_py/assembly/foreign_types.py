@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Messages of other types than the table of topics has, as the messages that they stand for.
+
+Trackers publish transforms, controllers their own states. Each type is turned into a joint state
+or a pose before it is taken in, so that there is one way for all from then on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from weld_twin_core.errors import DataError
+
+Plain = Callable[[Any, str], Iterator[Any]]
+"""A message, and the frame that is looked for where it holds several; to plain messages."""
+
+
+def _pose_of_transform(message: Any, frame: str) -> Iterator[Any]:
+    """Yield the pose of the child frame in the frame of the header."""
+    if frame and message.child_frame_id.strip('/') != frame:
+        return
+    where = message.transform
+    yield SimpleNamespace(
+        header=message.header,
+        pose=SimpleNamespace(position=where.translation, orientation=where.rotation),
+    )
+
+
+def _poses_of_tf(message: Any, frame: str) -> Iterator[Any]:
+    """
+    Yield the pose of one child frame out of many.
+
+    Raises
+    ------
+    DataError
+        No frame is named: which of them was measured, nobody knows.
+
+    """
+    if not frame:
+        children = ', '.join(sorted({each.child_frame_id for each in message.transforms}))
+        raise DataError(
+            f'it holds the frames {children}; say which of them was measured as TOPIC:FRAME'
+        )
+    for each in message.transforms:
+        yield from _pose_of_transform(each, frame)
+
+
+def _joints_of_controller_state(message: Any, part: str) -> Iterator[Any]:
+    """
+    Yield the joint state of a `JointTrajectoryControllerState`: what was commanded.
+
+    Raises
+    ------
+    DataError
+        The part that is named is none of the message.
+
+    """
+    name = part or ('reference' if hasattr(message, 'reference') else 'desired')
+    point = getattr(message, name, None)
+    if point is None or not hasattr(point, 'positions'):
+        raise DataError(f'it has no part {name!r}; reference and feedback are two that it has')
+    yield SimpleNamespace(
+        header=message.header,
+        name=message.joint_names,
+        position=point.positions,
+        velocity=point.velocities,
+    )
+
+
+def _joints_of_dynamic_state(message: Any, _: str) -> Iterator[Any]:
+    """Yield the joint state of a `DynamicJointState`; a joint without a position is left out."""
+    told = [
+        (name, dict(zip(values.interface_names, values.values, strict=True)))
+        for name, values in zip(message.joint_names, message.interface_values, strict=True)
+    ]
+    told = [(name, values) for name, values in told if 'position' in values]
+    unknown = float('nan')
+    yield SimpleNamespace(
+        header=message.header,
+        name=[name for name, _ in told],
+        position=[values['position'] for _, values in told],
+        velocity=[values.get('velocity', unknown) for _, values in told],
+    )
+
+
+POSES: Mapping[str, Plain] = {
+    'geometry_msgs/msg/TransformStamped': _pose_of_transform,
+    'tf2_msgs/msg/TFMessage': _poses_of_tf,
+}
+"""Types that hold poses."""
+JOINTS: Mapping[str, Plain] = {
+    'control_msgs/msg/JointTrajectoryControllerState': _joints_of_controller_state,
+    'control_msgs/msg/DynamicJointState': _joints_of_dynamic_state,
+}
+"""Types that hold joint states."""
+FOREIGN: Mapping[str, Plain] = {**POSES, **JOINTS}
+
+
+def split_topic(name: str) -> tuple[str, str]:
+    """Return topic and part of ``TOPIC:PART``, the part empty where there is none."""
+    topic, _, part = name.partition(':')
+    return topic, part.strip('/')
+
+
+def plain_messages(kind: str, message: Any, part: str = '') -> Iterator[Any]:
+    """
+    Yield the plain messages that a message stands for, itself where it is one.
+
+    Parameters
+    ----------
+    kind : str
+        Its type.
+    message : message
+    part : str
+        The child frame of a transform, or the part of a controller's state, that is meant.
+
+    Raises
+    ------
+    DataError
+        It does not hold what is looked for.
+
+    """
+    turn = FOREIGN.get(kind)
+    if turn is None:
+        yield message
+        return
+    yield from turn(message, part)

@@ -203,7 +203,8 @@ def test_stations_copied_in_a_table_are_named(ur5, placed):
     assert sentence(ur5, 'repeats', bad).startswith('2 station(s)')
 
 
-def test_a_frozen_instrument_is_named(ur5, run):
+def test_a_frozen_instrument_is_named(ur5, rng):
+    run = recorded(ur5, moving(ur5, rng, size=0.04), rng, points=True)
     held = (np.arange(run.measured.t.size) // 3) * 3
     bad = remeasured(run, position=run.measured.position[held])
     found = [c.sentence for c in findings(ur5, bad) if c.name == 'repeats']

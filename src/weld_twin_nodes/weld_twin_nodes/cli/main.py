@@ -89,7 +89,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     chosen = next((word for word in words if not word.startswith('-')), None)
     if chosen in LAB and chosen not in commands:
         parser.error(
-            f"'{chosen}' is a proof, and the package weld_twin_lab that holds it is not installed"
+            f"'{chosen}' is a proof; it needs the package weld_twin_lab, which is not installed"
         )
     for name in [chosen] if chosen in commands else commands:
         module = import_module(commands[name])

@@ -28,7 +28,7 @@ def add_robot(parser: argparse.ArgumentParser, *, required: bool = True) -> None
         '--robot',
         required=required,
         metavar='R',
-        help='bundled robot (weld-twin info --robots lists them), robot file or URDF',
+        help='a bundled robot (weld-twin info --robots lists them), a robot file or a URDF',
     )
     parser.add_argument('--base-link', metavar='LINK', help='first link of a chain in a URDF')
     parser.add_argument('--tip-link', metavar='LINK', help='last link of a chain in a URDF')
@@ -45,7 +45,10 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
     """Add the options that say what the topics of a bag are called."""
     group = parser.add_argument_group('topics, for bags recorded elsewhere')
     group.add_argument(
-        '--namespace', default='', metavar='NS', help='of the robot, such as left for /left/...'
+        '--namespace',
+        default='',
+        metavar='NS',
+        help='namespace of the robot; left stands for /left/...',
     )
     for name in TOPIC_OPTIONS:
         group.add_argument(f'--{name}-topic', metavar='TOPIC', help=PARTS.get(name))
@@ -63,7 +66,9 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
 
 def add_bag_output(parser: argparse.ArgumentParser) -> None:
     """Add the options of a command that writes a bag."""
-    parser.add_argument('--out', required=True, metavar='BAG', help='bag to write; must not exist')
+    parser.add_argument(
+        '--out', required=True, metavar='BAG', help='bag to write; it must not exist yet'
+    )
     parser.add_argument('--storage', choices=('mcap', 'sqlite3'), default='mcap')
 
 

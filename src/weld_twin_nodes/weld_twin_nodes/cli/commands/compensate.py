@@ -40,5 +40,5 @@ def run(args: argparse.Namespace) -> int:
         print(sentence)
     if made.result.left_out:
         names = ', '.join(effect.name for effect in made.result.left_out)
-        print(f'no joint command mends {names}')
+        print(f'joint commands cannot mend {names}')
     return 0

@@ -10,7 +10,7 @@ import argparse
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument(
-        '--out', default='out', metavar='DIR', help='where results go (default: out)'
+        '--out', default='out', metavar='DIR', help='directory for the results (default: out)'
     )
 
 

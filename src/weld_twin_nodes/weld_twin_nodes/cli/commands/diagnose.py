@@ -42,19 +42,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='BAG',
-        help='a recording that is not fitted, to judge the shrink on; may be given again',
+        help='a recording that is not fitted; the shrink is judged on it; may be given again',
     )
     parser.add_argument(
         '--align',
         default='',
         metavar='FRAMES',
-        help='frames that are not known and fitted along: base, tool, or base,tool',
+        help='frames that are not known, and are fitted: base, tool, or base,tool',
     )
     parser.add_argument(
         '--effects-known',
         default='',
         metavar='FILE',
-        help='effects file or diagnosis.json put into the twin first',
+        help='effects file or diagnosis.json; the twin has these effects from the start',
     )
     parser.add_argument(
         '--exclude-effect',
@@ -62,21 +62,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs='+',
         default=[],
         metavar='NAME',
-        help='families left out of the library',
+        help='effects that cannot be the cause',
     )
     parser.add_argument(
         '--may-change',
         default='',
         metavar='NAMES',
         help='errors that may differ between the recordings, such as '
-        'joint_offset,tool_pose,base_pose: says what changed since the first',
+        'joint_offset,tool_pose,base_pose; the result says what changed since the first',
     )
     parser.add_argument(
         '--apply',
         action='store_true',
-        help='where data or set-up are wrong and one correction explains it: make it and go on',
+        help='if data or set-up are wrong and one correction explains it, make it and go on',
     )
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
     add_topics(parser)
 
 

@@ -21,10 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--format',
         choices=_FORMATS,
         default='yaml',
-        help='yaml, urdf: the corrected robot; offsets: per joint, as CSV; effects: all, for the '
-        'nominal robot; left-over: what the corrected robot cannot hold (default: yaml)',
+        help='yaml, urdf: the corrected robot; offsets: a CSV with a row for each joint; effects: '
+        'all effects, for the nominal robot; left-over: the effects that a corrected robot '
+        'cannot hold (default: yaml)',
     )
-    parser.add_argument('--out', metavar='FILE', help='file to write; left out, the terminal')
+    parser.add_argument('--out', metavar='FILE', help='file to write (default: print it)')
 
 
 def run(args: argparse.Namespace) -> int:

@@ -27,29 +27,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_robot(parser)
     add_bag_output(parser)
     parser.add_argument('--table', metavar='CSV', help='also write every deviation from the twin')
-    parser.add_argument('--picture', metavar='PNG', help='also draw them')
+    parser.add_argument('--picture', metavar='PNG', help='also draw the deviations')
     group = parser.add_argument_group('how to read the table')
     for name in LISTS:
         group.add_argument(f'--{name}-columns', metavar='A,B,C', type=_names)
     group.add_argument('--temperature-column', metavar='A')
     group.add_argument('--time-column', metavar='A')
     group.add_argument('--length-unit', choices=('m', 'mm'))
-    group.add_argument('--angle-unit', choices=('rad', 'deg'), help='of the joints')
-    group.add_argument('--rotation-unit', choices=('rad', 'deg'), help='of measured angles')
-    group.add_argument('--rotation', metavar='ORDER', help='XYZ, ZYX, ... (intrinsic) or rotvec')
+    group.add_argument('--angle-unit', choices=('rad', 'deg'), help='unit of the joint angles')
+    group.add_argument('--rotation-unit', choices=('rad', 'deg'), help='unit of measured angles')
+    group.add_argument(
+        '--rotation',
+        metavar='ORDER',
+        help='order of the angles: XYZ, ZYX, ... (intrinsic), or rotvec',
+    )
     group.add_argument(
         '--difference',
         choices=('add', 'subtract'),
         default='add',
-        help='measured is target plus or minus difference',
+        help='whether measured is target plus or minus difference',
     )
-    group.add_argument('--positions-only', action='store_true', help='leave orientation out')
+    group.add_argument('--positions-only', action='store_true', help='do not read orientations')
     group.add_argument(
         '--skip-rows',
         metavar='N,N',
         type=_numbers,
         default=(),
-        help='rows to leave out, the first under the header being 1',
+        help='rows to leave out; the first row under the header is 1',
     )
     group.add_argument('--delimiter', help='comma, semicolon or tab')
     group.add_argument('--decimal', choices=('.', ','))

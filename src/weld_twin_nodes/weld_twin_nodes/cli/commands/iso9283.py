@@ -39,9 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--align',
         default='',
         metavar='FRAMES',
-        help='frames that are not known and fitted along: base, tool, or base,tool',
+        help='frames that are not known, and are fitted: base, tool, or base,tool',
     )
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
     add_topics(parser)
 
 

@@ -15,7 +15,9 @@ import sys
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('bag', metavar='BAG', help='rosbag2 directory, .mcap or .db3')
-    parser.add_argument('--rate', type=float, default=1.0, help='speed against the recording')
+    parser.add_argument(
+        '--rate', type=float, default=1.0, help='2 plays twice as fast as recorded (default: 1)'
+    )
     parser.add_argument(
         '--clock',
         type=float,
@@ -23,9 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         const=100.0,
         default=0.0,
         metavar='HZ',
-        help='tell the time of the recording on /clock, 100 times a second unless said',
+        help='publish the time of the recording on /clock, HZ times a second (100 if left out)',
     )
-    parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='only these')
+    parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='play only these')
     parser.add_argument(
         '--loop',
         type=int,
@@ -33,17 +35,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         const=0,
         default=1,
         metavar='N',
-        help='play N times, without a number until stopped',
+        help='play N times; without N, until stopped',
     )
     parser.add_argument(
         '--subscribers',
         type=int,
         default=1,
         metavar='N',
-        help='how many each topic is to have before the start',
+        help='start when every topic has so many subscribers (default: 1)',
     )
     parser.add_argument(
-        '--wait', type=float, default=5.0, metavar='S', help='longest time to wait for them [s]'
+        '--wait',
+        type=float,
+        default=5.0,
+        metavar='S',
+        help='start after S seconds in any case (default: 5)',
     )
 
 

@@ -23,10 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--setup',
         type=int,
         metavar='N',
-        help='where the set-up moved between the recordings of the diagnosis: which of them',
+        help='recording of the diagnosis whose set-up is meant, if the set-up moved between them',
     )
     parser.add_argument(
-        '--table', metavar='FILE.csv', help='the poses as a table too, with standard deviations'
+        '--table',
+        metavar='FILE.csv',
+        help='also write the poses as a table, with standard deviations',
     )
     add_bag_output(parser)
     add_topics(parser)

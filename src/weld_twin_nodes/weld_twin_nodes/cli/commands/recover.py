@@ -17,8 +17,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--out',
         metavar='BAG2',
-        help='bag to write; must not exist (default: the name the recording was to have, or '
-        'BAG_recovered)',
+        help='bag to write; it must not exist yet (default: the name that the recording should '
+        'have, or BAG_recovered)',
     )
 
 

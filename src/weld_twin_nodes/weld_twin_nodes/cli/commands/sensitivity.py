@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('bag', nargs='?', metavar='BAG', help='study the motion recorded in a bag')
     add_robot(parser, required=False)
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
     _add_question(parser.add_argument_group('what is studied'))
     _add_effort(parser.add_argument_group('how much is run, and where'))
     add_topics(parser)
@@ -47,14 +47,14 @@ def _add_question(group: argparse._ArgumentGroup) -> None:
     add(
         '--tolerances',
         metavar='FILE',
-        help='tolerance file; left out, typical magnitudes of '
-        'joint_offset, link_length, link_twist, backlash and base_pose',
+        help='tolerance file (default: typical magnitudes of '
+        'joint_offset, link_length, link_twist, backlash and base_pose)',
     )
     add(
         '--effects-known',
         metavar='FILE',
         default='',
-        help='effects file or diagnosis.json put into the twin first',
+        help='effects file or diagnosis.json; the twin has these effects from the start',
     )
     add(
         '--tool',
@@ -107,7 +107,7 @@ def _add_seam(group: argparse._ArgumentGroup) -> None:
         type=float,
         nargs=3,
         metavar=('X', 'Y', 'Z'),
-        help='direction out of the work of a recorded motion; left out, against the wire',
+        help='direction out of the work, for a recorded motion (default: against the wire)',
     )
 
 
@@ -120,10 +120,28 @@ def _add_effort(group: argparse._ArgumentGroup) -> None:
         metavar='N',
         help='Sobol base samples, a power of two (default: 1024)',
     )
-    add('--runs', type=int, default=20_000, metavar='N', help='of the tolerance stack')
-    add('--trajectories', type=int, default=50, metavar='N', help='of the Morris screening')
-    add('--placements', type=int, default=32, metavar='N', help='tried for the advice')
-    add('--seed', type=int, default=0)
+    add(
+        '--runs',
+        type=int,
+        default=20_000,
+        metavar='N',
+        help='runs of the tolerance stack (default: 20,000)',
+    )
+    add(
+        '--trajectories',
+        type=int,
+        default=50,
+        metavar='N',
+        help='trajectories of the Morris screening (default: 50)',
+    )
+    add(
+        '--placements',
+        type=int,
+        default=32,
+        metavar='N',
+        help='placements tried for the advice (default: 32)',
+    )
+    add('--seed', type=int, default=0, help='seed of all draws (default: 0)')
     add('--workers', type=int, default=0, metavar='N', help='processes (default: one a core)')
     add('--scheduler', default='', metavar='ADDRESS', help='Dask scheduler to run on instead')
 

@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--model',
         metavar='FILE',
         default='',
-        help='what the twin knows: an effects file or diagnosis.json',
+        help='effects that the twin knows: an effects file or diagnosis.json',
     )
     parser.add_argument(
         '--path',
@@ -35,16 +35,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar='M/S',
-        help='travel speed; left out, as fast as the profile and the joints go',
+        help='travel speed (default: as fast as profile and joints allow)',
     )
-    parser.add_argument('--rate', type=float, default=125.0, metavar='HZ', help='samples a second')
-    parser.add_argument('--seed', type=int, default=0, help='of the measurement noise')
+    parser.add_argument(
+        '--rate', type=float, default=125.0, metavar='HZ', help='samples a second (default: 125)'
+    )
+    parser.add_argument(
+        '--seed', type=int, default=0, help='seed of the measurement noise (default: 0)'
+    )
     parser.add_argument(
         '--start-stamp',
         type=int,
         default=1_000_000_000,
         metavar='NS',
-        help='stamp of the first sample; stamp 0 means unset (default: 1 s)',
+        help='stamp of the first sample [ns]; 0 would mean unset (default: 1 s)',
     )
     add_bag_output(parser)
 
@@ -78,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     made = {'path': args.path, 'profile': args.profile, 'rate_hz': args.rate}
     metrics = write_simulation(args.out, simulation, storage=args.storage, provenance=made)
     if plan.report.slowed > 1.0:
-        print(f'slowed down {plan.report.slowed:.2f} times, as the joint limits demand')
+        print(f'slowed down {plan.report.slowed:.2f} times, to stay within the joint limits')
     print(
         f'{args.out}: {plan.motion.t.size} joint states in {plan.report.duration:.1f} s along '
         f'{plan.length:.3f} m; deviation RMS {metrics["RMS"] * 1e3:.4f} mm, '

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -83,15 +84,18 @@ class Folds:
         """Return the squared error on every fold of the columns fitted on the others, (B,)."""
         if not index.size:
             return self.squares
-        at = np.ix_(index, index)
-        total = self.normals.sum(axis=0)[at] + np.diag(precision)
-        right = self.rights.sum(axis=0)[index]
-        out = np.empty(self.squares.size)
-        for b, square in enumerate(self.squares):
-            here, pull = self.normals[b][at], self.rights[b][index]
-            x = cho_solve(cho_factor(total - here), right - pull)
-            out[b] = square - 2.0 * x @ pull + x @ here @ x
-        return out
+        mine = self.normals[:, index[:, None], index]
+        pulls = self.rights[:, index]
+        normal, right = self.total
+        others = normal[np.ix_(index, index)] + np.diag(precision) - mine
+        x = np.linalg.solve(others, (right[index] - pulls)[..., None])[..., 0]
+        explained = np.einsum('bp,bp->b', x, 2.0 * pulls - np.einsum('bpq,bq->bp', mine, x))
+        return np.asarray(self.squares - explained)
+
+    @cached_property
+    def total(self) -> tuple[Array, Array]:
+        """Return the normal equations of all folds together, shapes (P, P) and (P,)."""
+        return self.normals.sum(axis=0), self.rights.sum(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +124,7 @@ class Choosing:
     def shortlist(self, members: Sequence[Member]) -> list[int]:
         """Return the groups that would fit best in sample beside the members, best first."""
         index, precision = self._columns_of(members)
-        folds = self.ways[0]
-        normal, right = folds.normals.sum(axis=0), folds.rights.sum(axis=0)
+        normal, right = self.ways[0].total
         own = cho_factor(normal[np.ix_(index, index)] + np.diag(precision))
         rest = right - normal[:, index] @ cho_solve(own, right[index])
         taken = {m.group for m in members}

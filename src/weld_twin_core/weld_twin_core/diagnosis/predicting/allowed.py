@@ -91,10 +91,6 @@ class Rows:
     residual: Array
     share: float
 
-    def kept(self, keep: Array) -> Rows:
-        """Return some of the rows."""
-        return replace(self, columns=self.columns[:, keep], residual=self.residual[keep])
-
 
 def allowed(
     problem: Problem, model: Model, scale: Scale, precision: Array, floor: NoiseFloor
@@ -117,13 +113,11 @@ def allowed(
     what = _directions(problem, model)
     rows, prior = _rows(problem, model, scale, what), _prior(what, model)
     width, noise = learned(rows, prior, _expected(problem, scale))
-    mean, covariance = conditioned(rows, prior, width, noise)
+    system = Conditioning(rows, prior, width, noise)
+    mean, covariance = system.given()
     unseen = _unseen(problem, model, scale, precision, rows)
 
-    def given(keep: Array) -> tuple[Array, Array]:
-        return conditioned(rows.kept(keep), prior, width, noise)
-
-    left = leftover(problem, scale, unseen, given, floor)
+    left = leftover(problem, scale, unseen, system.given, floor)
     ends = what.count - np.cumsum([k.size for k in reversed(what.knots)])[::-1]
     posterior = Posterior(
         what,
@@ -313,9 +307,9 @@ def _factor(information: Array) -> tuple[Array, bool]:
     return factor, bool(lower)
 
 
-def conditioned(rows: Rows, prior: Prior, width: Array, noise: float) -> tuple[Array, Array]:
+class Conditioning:
     """
-    Return mean, shape (P,), and covariance, shape (P, P), of the coordinates given rows.
+    The coordinates given rows, all of them or all but some.
 
     Parameters
     ----------
@@ -329,12 +323,29 @@ def conditioned(rows: Rows, prior: Prior, width: Array, noise: float) -> tuple[A
         Variance of a row.
 
     """
-    weight = rows.share / noise
-    unit = rows.columns * width[:, None]
-    middle = prior.middle / width
-    system = weight * unit @ unit.T
-    right = weight * unit @ rows.residual - system @ middle
-    factor = _factor(system)
-    inverse = cho_solve(factor, np.eye(width.size))
-    mean = prior.middle + width * (inverse @ right)
-    return mean, 0.5 * (inverse + inverse.T) * np.outer(width, width)
+
+    def __init__(self, rows: Rows, prior: Prior, width: Array, noise: float) -> None:
+        self._prior, self._width = prior, width
+        self._unit = np.sqrt(rows.share / noise) * rows.columns * width[:, None]
+        self._wanted = np.sqrt(rows.share / noise) * rows.residual
+        self._system = self._unit @ self._unit.T
+        self._right = self._unit @ self._wanted
+
+    def given(self, but: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+        """
+        Return mean, shape (P,), and covariance, shape (P, P), of the coordinates.
+
+        Parameters
+        ----------
+        but : array of bool, shape (rows,), optional
+            Rows left out.
+
+        """
+        system, right, width = self._system, self._right, self._width
+        if but is not None:
+            less = self._unit[:, but]
+            system, right = system - less @ less.T, right - less @ self._wanted[but]
+        inverse = cho_solve(_factor(system), np.eye(width.size))
+        right = right - system @ (self._prior.middle / width)
+        mean = self._prior.middle + width * (inverse @ right)
+        return mean, 0.5 * (inverse + inverse.T) * np.outer(width, width)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ...arrays import Array
@@ -32,8 +33,8 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
 STEPS = 60
 """Halvings of the bracket in which the size is sought; far below rounding."""
 
-Given = Callable[[Array], tuple[Array, Array]]
-"""Mean and covariance of the coordinates given a mask of rows."""
+Given = Callable[[NDArray[np.bool_]], tuple[Array, Array]]
+"""Mean and covariance of the coordinates given all rows but those of a mask."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +110,7 @@ def leftover(
     problem, scale : Problem, Scale
     unseen : Unseen
     given : callable
-        Mean and covariance of the uncertain coordinates given a mask of rows.
+        Mean and covariance of the uncertain coordinates given all rows but those of a mask.
     floor : NoiseFloor
         What the recordings themselves say of the instrument's noise.
 
@@ -168,20 +169,23 @@ def _predicted(
     errors, shifts = np.array(unseen.residual), np.zeros(unseen.residual.size)
     normal = unseen.own @ unseen.own.T + np.diag(unseen.precision)
     right = unseen.own @ unseen.residual - unseen.pull
-    covariances: dict[int, Array] = {}
+    place = np.repeat(np.arange(len(samples)), [index.size for index in samples])
+    moments: list[Array] = [np.zeros((0, 0))] * len(samples)
     for b in np.unique(unseen.labels):
         out = unseen.labels == b
-        mine = unseen.own[:, out]
+        mine, columns = unseen.own[:, out], unseen.columns[:, out]
         step = solve_scaled(normal - mine @ mine.T, right - mine @ unseen.residual[out], 1e-9)
-        mean, covariances[int(b)] = given(~out)
+        mean, covariance = given(out)
         errors[out] -= step @ mine
         # The mean is counted from the fit to all rows, the error from the fit to the others.
-        shifts[out] = mean @ unseen.columns[:, out] - step @ mine
-    moments = []
-    for index in samples:
-        columns = unseen.columns[:, index]
-        spread = columns.T @ covariances[int(unseen.labels[index[0]])] @ columns
-        moments.append(spread + np.outer(shifts[index], shifts[index]))
+        shifts[out] = mean @ columns - step @ mine
+        spread, at = covariance @ columns, 0
+        for k in np.unique(place[out]):
+            size = samples[k].size
+            own = slice(at, at + size)
+            shift = shifts[samples[k]]
+            moments[k] = columns[:, own].T @ spread[:, own] + np.outer(shift, shift)
+            at += size
     return [errors[index] for index in samples], moments
 
 
@@ -191,10 +195,13 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
     # Of few errors the largest say more of those to come than their count: conformal level.
     wanted = min(HOLD * (1.0 + 1.0 / len(errors)), 1.0)
 
+    # On the axes in which both are diagonal, every size asked for costs a division.
+    root = np.linalg.inv(np.linalg.cholesky(np.broadcast_to(shape, moments.shape)))
+    spread, turn = np.linalg.eigh(root @ (moments + 1e-18 * np.eye(3)) @ np.swapaxes(root, -1, -2))
+    along = (np.swapaxes(turn, -1, -2) @ (root @ errors[..., None]))[..., 0] ** 2
+
     def held(variance: float) -> float:
-        whole = moments + variance * shape + 1e-18 * np.eye(3)
-        solved = np.linalg.solve(whole, errors[..., None])[..., 0]
-        return float(np.mean((errors * solved).sum(axis=1) <= limit))
+        return float(np.mean((along / (spread + variance)).sum(axis=1) <= limit))
 
     low, high = 0.0, 100.0 * float((errors**2).sum(axis=1).max()) + 1e-18
     if held(low) >= wanted:

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -50,6 +52,22 @@ def test_no_traceback_and_nothing_absurd(draw):
     assert came['wrong'] == []
     if came['status'] == 'refused':
         assert len(came['sentence'].split()) > 3
+
+
+SLIDE = Draw('slide', False, 3, False, '', 0, 0.02, 0.0, 1, 0.0, 0, 'none', False, 0)
+"""One axis that hardly moves, measured without noise."""
+
+
+@pytest.mark.filterwarnings('ignore')
+@pytest.mark.parametrize(
+    'draw',
+    [
+        SLIDE,
+        replace(SLIDE, count=21, align='tool', travel=0.5, repeats=2, flat=1, error='jumbled'),
+    ],
+)
+def test_one_axis_is_no_traceback(draw):
+    assert tried(draw)['traceback'] is None
 
 
 @pytest.mark.filterwarnings('ignore')

@@ -104,6 +104,8 @@ def _best(
     round by half a turn of its outer joints is one whose middle joint counts the other way.
     """
     tried = [(suspicion, shot.mended(suspicion.mend)) for suspicion in tries]
+    if not tried:  # one joint, and nothing that could be swapped with it
+        return None, shot, before
     fitted: list[tuple[Suspicion, Snapshot, Arm]] = []
     # Without orientations a quick fit may end beside the tool vector: then from many starts.
     for thorough in (False,) if shot.turned else (False, True):

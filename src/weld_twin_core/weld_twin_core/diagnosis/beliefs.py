@@ -163,6 +163,10 @@ class Beliefs:
     """Times by which a held-out recording must fit better with a frame of its own to stem from
     another set-up. A judgement."""
 
+    parted: float = _unseen(0.05)
+    """Share by which a rival may leave more on held-out recordings than the effect in the model and
+    still count as its like. Two errors told apart by less are the same to who uses the model."""
+
     farthest: float = _unseen(1.0)
     """Logarithm of a ratio between two motions from which on it says no more about the interval:
     a model that leaves e times as much elsewhere fits neither."""

@@ -29,6 +29,7 @@ from .soundness import Examined, Given, examine, refuse_reused
 from .trust.signs import signs_of_answer
 from .unseen.held_out_shrink import held_out_shrink
 from .unseen.leftover_structure import structure
+from .unseen.parted_elsewhere import parted_elsewhere
 from .unseen.unseen_stretches import Unseen
 from .verdict.decision import decide
 from .verdict.gathered_evidence import gathered
@@ -142,7 +143,8 @@ def _explained(
     floor = noise_floor(found.problem, found.problem.residuals(found.final.model))
     holdout = examined.mended(holdout)
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
-    evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, holdout)
+    found, least = parted_elsewhere(found, holdout, beliefs)
+    evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least)
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict, beliefs)
     verdict = held_against(verdict, unseen, rival, beliefs)

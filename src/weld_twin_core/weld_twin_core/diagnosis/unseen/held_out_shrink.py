@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -74,34 +73,19 @@ def held_out_shrink(
     )
 
 
-def least_elsewhere(
-    found: Search, holdout: Sequence[Recording], after: float, beliefs: Beliefs
-) -> float:
+def left_on(found: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> float:
     """
-    Return the least RMS that is left on held-out recordings by what could be in the model, [m].
+    Return what the model leaves on held-out recordings, RMS over trusted samples [m].
 
     Parameters
     ----------
     found : Search
-        Its slots hold the rivals, each fitted in its place with the rest as it is.
+        Its final model is judged.
     holdout : sequence of Recording
-        Never fitted here either.
-    after : float
-        What the model itself leaves there, RMS [m].
     beliefs : Beliefs
-        Rivals are tried where they are probable enough to be named.
 
     """
-    left = [after]
-    for slot in found.slots if holdout else ():
-        if slot[0].probability >= beliefs.sure:
-            continue
-        for rival in slot[1:]:
-            if rival.probability >= beliefs.listed:
-                trial = replace(found, final=rival.fit)
-                squares = _on_bags(trial, holdout, beliefs.other_setup)[1]
-                left.append(float(np.sqrt(squares.mean())))
-    return min(left)
+    return float(np.sqrt(_on_bags(found, holdout, beliefs.other_setup)[1].mean()))
 
 
 class Judged(NamedTuple):

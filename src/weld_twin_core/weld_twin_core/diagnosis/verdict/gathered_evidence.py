@@ -4,19 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
-from ...recording import Recording
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..many.weighed_families import weighed_families
 from ..result import Shrink, Site
-from ..unseen.held_out_shrink import least_elsewhere
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 from .evidence import Evidence
@@ -30,7 +26,7 @@ def gathered(
     shrink: Shrink,
     floor: NoiseFloor,
     beliefs: Beliefs,
-    holdout: Sequence[Recording] = (),
+    least: float | None = None,
 ) -> Evidence:
     """
     Return the evidence for a verdict.
@@ -46,8 +42,8 @@ def gathered(
         On held-out recordings or on stretches taking their turn.
     floor : NoiseFloor
     beliefs : Beliefs
-    holdout : sequence of Recording
-        That the shrink was judged on.
+    least : float or None
+        As `parted_elsewhere` gives it.
 
     """
     everything = range(len(found.final.model.found))
@@ -64,7 +60,7 @@ def gathered(
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),
         refused=tuple(_refused(found.final.model.robot, effect) for effect in found.refused),
         families=weighed_families(found, unseen) if found.dense else None,
-        least=least_elsewhere(found, holdout, shrink.rms_after_m, beliefs),
+        least=least,
     )
 
 

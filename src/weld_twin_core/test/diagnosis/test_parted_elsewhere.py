@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Rivals that are alike on the recordings fitted, and part on one held out."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.result import Site
+from weld_twin_core.diagnosis.unseen import parted_elsewhere as room
+from weld_twin_core.diagnosis.unseen.parted_elsewhere import parted_elsewhere
+
+TWIST, BASE, PLAY = Site('link_twist', 'a'), Site('base_pose', None), Site('backlash', 'b')
+
+
+@dataclass(frozen=True)
+class Found:
+    """A search of which only slots and final fit are asked; a fit is what it leaves [m]."""
+
+    slots: tuple
+    final: float = 0.0
+
+
+def parted(monkeypatch, *slot):
+    """Return what is left of a slot, given sites, probabilities and what each leaves [m]."""
+    monkeypatch.setattr(room, 'left_on', lambda found, holdout, beliefs: found.final)
+    rivals = tuple(Rival(site, 0.0, left, p) for site, p, left in slot)
+    found, least = parted_elsewhere(Found((rivals,)), ['held out'], Beliefs())
+    return {r.site: r.probability for r in found.slots[0]}, least
+
+
+def test_a_rival_that_fails_where_the_leader_holds_is_not_its_like(monkeypatch):
+    told, least = parted(monkeypatch, (TWIST, 0.6, 1e-4), (BASE, 0.2, 1.06e-4), (PLAY, 0.2, 1e-4))
+    assert told == pytest.approx({TWIST: 0.75, PLAY: 0.25})
+    assert least == 1e-4
+
+
+def test_a_rival_that_leaves_five_percent_more_is_still_alike(monkeypatch):
+    told, _ = parted(monkeypatch, (TWIST, 0.6, 1e-4), (BASE, 0.4, 1.04e-4))
+    assert told == {TWIST: 0.6, BASE: 0.4}
+
+
+def test_a_leader_that_fails_itself_rules_nothing_out(monkeypatch):
+    told, least = parted(monkeypatch, (TWIST, 0.6, 3e-4), (BASE, 0.4, 1e-4))
+    assert told == {TWIST: 0.6, BASE: 0.4}
+    assert least == 1e-4
+
+
+def test_a_sure_leader_and_a_diagnosis_without_held_out_data_are_not_asked():
+    slots = ((Rival(TWIST, 0.0, 1e-4, 0.9), Rival(BASE, 0.0, 9e-4, 0.1)),)
+    assert parted_elsewhere(Found(slots), ['held out'], Beliefs()) == (Found(slots), None)
+    unsure = ((Rival(TWIST, 0.0, 1e-4, 0.6), Rival(BASE, 0.0, 9e-4, 0.4)),)
+    assert parted_elsewhere(Found(unsure), [], Beliefs()) == (Found(unsure), None)

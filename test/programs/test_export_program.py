@@ -4,13 +4,13 @@
 
 import re
 
-import independent_readers as readers
 import numpy as np
 import pytest
 import yaml
-from plain_arm import joints_for, tool_pose
 
 import weld_twin_core as wt
+from weld_twin_lab.programs import plain_readers as readers
+from weld_twin_lab.programs.plain_arm import joints_for, tool_pose
 from weld_twin_nodes.cli.in_process import weld_twin
 
 CELLS = {

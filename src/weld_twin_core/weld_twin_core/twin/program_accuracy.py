@@ -24,8 +24,10 @@ class Accuracy(NamedTuple):
 
     Attributes
     ----------
-    rms, worst : float
-        Of the model's own prediction.
+    rms : float
+        Expected; what the model is not sure of adds to it.
+    worst : float
+        By the model's own prediction.
     low, high : float or None
         Nine of ten models that the recordings allow have their RMS between these; None where the
         model says nothing of how sure it is.
@@ -61,7 +63,9 @@ def accuracy(gaps: Sequence[Array], covariances: Sequence[Array | None]) -> Accu
     drawn = np.random.default_rng(0).standard_normal((DRAWS, 3))
     sizes = [_rms(gap + factor @ z) for z in drawn]
     low, high = np.percentile(sizes, SPAN)
-    return Accuracy(rms, worst, float(low), float(high))
+    return Accuracy(
+        float(np.hypot(rms, _rms(factor.reshape(-1, 9)))), worst, float(low), float(high)
+    )
 
 
 def along_seams(found: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | None]:

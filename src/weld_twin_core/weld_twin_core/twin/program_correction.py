@@ -24,6 +24,7 @@ from ..motion.inverse.newton import chain_jacobian, least_step
 from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
 from ..motion.programs.travel import repeated
 from ..recording import JointMotion
+from .posterior import largest_sigma
 from .program_model import ProgramModel, missing
 from .trust import trust
 
@@ -57,6 +58,9 @@ class MoveResult(NamedTuple):
         followed.
     outside : str
         Why the move leaves what was recorded; empty where it does not.
+    sigma : float or None [m]
+        Standard deviation of where the real tool will be, in its worst direction; None where the
+        model says nothing of how sure it is.
 
     """
 
@@ -65,6 +69,7 @@ class MoveResult(NamedTuple):
     before: float | None = None
     after: float | None = None
     outside: str = ''
+    sigma: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,23 +250,29 @@ class _Work(NamedTuple):
             tuple(before),
             tuple(after),
             tuple(sure),
-            self._results(moved, before, after),
+            self._results(moved, before, after, sure),
         )
 
     def _results(
-        self, moved: MoveProgram, before: list[Array], after: list[Array]
+        self,
+        moved: MoveProgram,
+        before: list[Array],
+        after: list[Array],
+        sure: list[Array | None],
     ) -> tuple[MoveResult, ...]:
-        seen: dict[int, tuple[float, float, str]] = {}
+        seen: dict[int, tuple[float, float, str, float | None]] = {}
         for k, piece in enumerate(self.travel.pieces):
-            outside = _outside(self.model, piece)
+            outside, spread = _outside(self.model, piece), sure[k]
+            sigma = None if spread is None else largest_sigma(spread[piece.ends])
             for m, move in enumerate(piece.moves):
                 ends = (gaps[k][piece.ends[m], :3] for gaps in (before, after))
                 first, then = (float(np.linalg.norm(end)) for end in ends)
-                seen[id(move)] = first, then, outside.get(m, '')
+                doubt = None if sigma is None else float(sigma[m])
+                seen[id(move)] = first, then, outside.get(m, ''), doubt
         out = []
         for move in (move for piece in self.program.pieces for move in piece):
             by = (0.0, 0.0) if move.end is None else self.moved_by(moved, move.end, move.tool)
-            out.append(MoveResult(*by, *seen.get(id(move), (None, None, ''))))
+            out.append(MoveResult(*by, *seen.get(id(move), (None, None, '', None))))
         return tuple(out)
 
 

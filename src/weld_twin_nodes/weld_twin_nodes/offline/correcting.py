@@ -193,6 +193,7 @@ def move_rows(made: CorrectedProgram) -> list[dict[str, Any]]:
                 'before_m': got.before,
                 'after_m': got.after,
                 'outside': got.outside,
+                'sigma_m': got.sigma,
             }
         )
     return rows

@@ -153,14 +153,27 @@ def _moves(entry: Mapping[str, Any]) -> Html:
             f'{move["turned_rad"] * 57.29578:.4f}' if move['corrected'] else 'left',
             _millimetres(move['before_m']),
             _millimetres(move['after_m']),
+            _millimetres(move['sigma_m']),
         )
         for move in entry['moves'][:ROWS]
     ]
     more = len(entry['moves']) - len(rows)
-    lead = 'How far the place of each move was moved, and how far off the real tool is expected.'
+    lead = (
+        'How far the place of each move was moved, and how far off the real tool is there by the '
+        'model. ±: how sure the model is of that (one standard deviation).'
+    )
     if more > 0:
         lead += f' {more} more are in correction.json.'
-    heads = ('line', 'move', 'point', 'moved, mm', 'turned, deg', 'before, mm', 'after, mm')
+    heads = (
+        'line',
+        'move',
+        'point',
+        'moved, mm',
+        'turned, deg',
+        'before, mm',
+        'after, mm',
+        '±, mm',
+    )
     return section('Moves', table(heads, rows), id_='moves', lead=lead)
 
 

@@ -1,28 +1,45 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Readers of robot programs that share nothing with the package: what a controller would be told."""
+"""
+Readers of robot programs that share nothing with the package: what a controller would be told.
+
+Short, as they know only the forms that the programs of tests and studies have. Every reader takes the
+texts of a program's files and returns its moves: the word, and the places, each a pose (4, 4) [m]
+or joint positions (n,) [rad] of the robot's model.
+"""
+
+from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
 
+Place = np.ndarray
+Moves = list[tuple[str, list[Place]]]
+Texts = Sequence[str]
+
 NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
+"""A number in any of the languages."""
 
 
-def numbers(text):
+def numbers(text: str) -> list[float]:
+    """Return all numbers of a text."""
     return [float(v) for v in re.findall(NUMBER, text)]
 
 
-def pose(position, rotation):
+def pose(position: Any, rotation: Rotation) -> Place:
+    """Return a pose, shape (4, 4)."""
     out = np.eye(4)
     out[:3, :3], out[:3, 3] = rotation.as_matrix(), position
     return out
 
 
-def krl_pose(fields):
+def krl_pose(fields: dict[str, float]) -> Place:
     """A about z, then B about the new y, then C about the new x: scipy's capital letters."""
     angles = [fields[k] for k in 'ABC']
     return pose(
@@ -31,19 +48,20 @@ def krl_pose(fields):
     )
 
 
-def krl_fields(text):
+def krl_fields(text: str) -> dict[str, float]:
+    """Return the components of an aggregate."""
     return {
         k: float(v) for k, v in re.findall(rf'\b([A-Z]\d?)\s+({NUMBER})', text.partition('{')[2])
     }
 
 
-def krl(files):
+def krl(files: Texts) -> Moves:
     """Return the targets of the moves: (word, list of poses or joint positions)."""
-    src, dat = files
-    known = {}
+    src, dat = files[0], files[1] if len(files) > 1 else ''
+    known: dict[str, dict[str, float]] = {}
     for name, body in re.findall(r'DECL \w+ (X?\w+)=(\{[^}]*\})', dat):
         known[name] = krl_fields(body)
-    out = []
+    out: Moves = []
     for line in src.splitlines():
         line = line.split(';')[0].strip()
         found = re.match(r'(PTP|LIN|CIRC) (.*)', line)
@@ -60,15 +78,16 @@ def krl(files):
     return out
 
 
-def rapid(files):
+def rapid(files: Texts) -> Moves:
+    """Return the moves of a module; work object wobjTable stands at 0.5 0 0.1 m."""
     text = re.sub(r'"[^"\n]*"', '', re.sub(r'!.*', '', files[0]))
     text = text.replace('\\NoEOffs', '')
-    known = {}
+    known: dict[str, Place] = {}
     for kind, name, body in re.findall(r'CONST (robtarget|jointtarget) (\w+)\s*:=([^;]*);', text):
         known[name] = rapid_target(kind, body)
     at = [0.5, 0.0, 0.1] if 'wobjTable' in text else [0.0, 0.0, 0.0]
     table = pose(at, Rotation.identity())
-    out = []
+    out: Moves = []
     body = text.partition('PROC')[2]
     for word, rest in re.findall(r'(MoveAbsJ|MoveL|Arc[LC]\w*)\s+([^;]*);', body):
         places = []
@@ -89,7 +108,8 @@ def rapid(files):
     return out
 
 
-def rapid_target(kind, body):
+def rapid_target(kind: str, body: str) -> Place:
+    """Return a robtarget or jointtarget."""
     values = numbers(body)
     if kind == 'jointtarget':
         return np.radians(values[:6])
@@ -97,12 +117,13 @@ def rapid_target(kind, body):
     return pose(np.array(values[:3]) / 1e3, Rotation.from_quat([x, y, z, w]))
 
 
-def urscript(files):
+def urscript(files: Texts) -> Moves:
+    """Return the moves of a script."""
     text = re.sub(r'"[^"\n]*"', '', re.sub(r'#.*', '', files[0]))
-    known = {}
+    known: dict[str, Place] = {}
     for name, body in re.findall(r'(\w+)\s*=\s*(p?\[[^\]]*\])', text):
         known[name] = ur_value(body)
-    out = []
+    out: Moves = []
     for word, rest in re.findall(r'\b(move[jlpc])\((.*)\)', text):
         items = [
             known[i] if i in known else ur_value(i)
@@ -114,17 +135,18 @@ def urscript(files):
     return out
 
 
-def ur_value(text):
+def ur_value(text: str) -> Place:
+    """Return a pose or joint positions."""
     values = numbers(text)
     if not text.startswith('p'):
         return np.array(values)
     return pose(values[:3], Rotation.from_rotvec(values[3:]))
 
 
-def fanuc(files):
+def fanuc(files: Texts) -> Moves:
     """W about the fixed x, then P about y, then R about z; the origin 0.45 m above the floor."""
     moves, _, positions = files[0].partition('/POS')
-    known = {}
+    known: dict[str, Place] = {}
     for index, body in re.findall(r'P\[(\d+)[^\]]*\]\{(.*?)\};', positions, re.S):
         fields = {k: float(v) for k, v in re.findall(rf'\b([JXYZWPR]\d?)\s*=\s*({NUMBER})', body)}
         if 'J1' in fields:
@@ -135,14 +157,16 @@ def fanuc(files):
             turn = Rotation.from_euler('xyz', [fields[k] for k in 'WPR'], degrees=True)
             at = np.array([fields[k] for k in 'XYZ']) / 1e3
             known[index] = pose(at + [0.0, 0.0, 0.45], turn)
-    out = []
+    out: Moves = []
     for word, rest in re.findall(r'^\s*\d+:([JLC]) (P\[[^;]*);', moves, re.M):
         out.append((word, [known[i] for i in re.findall(r'P\[(\d+)', rest)]))
     return out
 
 
-def inform(files):
-    pulses, known = np.array([1000.0, -1200.0, 1100.0, 900.0, -800.0, 700.0]), {}
+def inform(files: Texts) -> Moves:
+    """Return the moves of a job with pulses of 1000, -1200, 1100, 900, -800, 700 a degree."""
+    pulses = np.array([1000.0, -1200.0, 1100.0, 900.0, -800.0, 700.0])
+    known: dict[str, Place] = {}
     for name, body in re.findall(r'^(C\d+)=(.*?)\r?$', files[0], re.M):
         values = np.array(numbers(body))
         if abs(values).max() > 2000.0:
@@ -153,10 +177,11 @@ def inform(files):
     return [(word, [known[name]]) for word, name in re.findall(r'^(MOV\w) (C\d+)', files[0], re.M)]
 
 
-def trajectory(files):
+def trajectory(files: Texts) -> Moves:
+    """Return the points of a trajectory of a UR arm."""
     content = yaml.safe_load(files[0])
     order = [UR_JOINTS.index(name) for name in content['joint_names']]
-    out = []
+    out: Moves = []
     for point in content['points']:
         q = np.zeros(6)
         q[order] = point['positions']
@@ -172,9 +197,11 @@ UR_JOINTS = [
     'wrist_2_joint',
     'wrist_3_joint',
 ]
+"""In the order of the model."""
 
 
-def table(files):
+def table(files: Texts) -> Moves:
+    """Return the lines of a table of a UR arm."""
     lines = [line for line in files[0].splitlines() if not line.startswith('#')]
     return [
         (row['move'], [np.array([float(row[name]) for name in UR_JOINTS])])

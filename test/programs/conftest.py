@@ -1,8 +1,0 @@
-# SPDX-FileCopyrightText: weld_twin contributors
-# SPDX-License-Identifier: Apache-2.0
-"""The readers of programs that share nothing with the package."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))

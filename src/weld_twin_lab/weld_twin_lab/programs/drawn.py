@@ -60,7 +60,7 @@ def drawn(language: str, rng: np.random.Generator) -> Drawn:
         kind = 'linear' if linear else 'joint'
         moves.append(ExportMove(kind, q, pose, speed, share, stop, dwell))  # type: ignore[arg-type]
     stations = bool(rng.random() < 0.5)
-    name = f'drawn{int(rng.integers(1e6))}'
+    name = f'drawn{int(rng.integers(10**6))}'
     made = Exported(name, tuple(moves), context, tool, 5, stations, ('a drawn program',))
     return Drawn(made, _filled(written(made, language), language, rng))
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from .arrays import Array, increasing, readonly
+from .contacts import Contacts
 from .errors import DataError
 
 WRENCH_FRAMES = ('tool', 'base')
@@ -295,6 +296,8 @@ class Recording:
     incomplete : tuple of str
         What of it is missing, in sentences: messages its recorder knows were sent, and streams
         that begin late or end early against the others.
+    contacts : Contacts, optional
+        What the tool point touched in every posture, in place of measured positions.
 
     Raises
     ------
@@ -322,8 +325,14 @@ class Recording:
     epoch_ns: int = 0
     notes: tuple[str, ...] = ()
     incomplete: tuple[str, ...] = ()
+    contacts: Contacts | None = None
 
     def __post_init__(self) -> None:
+        if self.contacts is not None and self.contacts.size != self.joints.t.size:
+            raise DataError(
+                f'{self.name} has {self.contacts.size} contacts and {self.joints.t.size} '
+                'postures; every posture touches one thing'
+            )
         if self.wrench_frame not in WRENCH_FRAMES:
             raise DataError(
                 f'wrench_frame must be one of {", ".join(WRENCH_FRAMES)}, '

@@ -299,6 +299,82 @@ class Traces:
     """Which samples are no outliers, bool, shape (M,); empty for all of them."""
 
 
+@dataclass(frozen=True)
+class Touched:
+    """
+    How far tool points are from one contact, on average [m].
+
+    Attributes
+    ----------
+    label : str
+    postures : int
+    before_m, after_m, held_out_m : float [m]
+        With the nominal robot, with the effects found, and where its place was not fitted.
+
+    """
+
+    label: str
+    postures: int
+    before_m: float
+    after_m: float
+    held_out_m: float
+
+
+@dataclass(frozen=True)
+class KnownLength:
+    """A known distance [m] or angle [rad] between contacts, and what a model makes of it."""
+
+    between: tuple[str, str]
+    kind: str
+    value: float
+    sigma: float
+    before: float
+    after: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers."""
+        unit = 'm' if self.kind == 'distance' else 'rad'
+        return {'between': list(self.between), 'kind': self.kind} | {
+            f'{name}_{unit}': getattr(self, name) for name in ('value', 'sigma', 'before', 'after')
+        }
+
+
+@dataclass(frozen=True)
+class ContactResult:
+    """
+    How well contacts agree: mean distances of the tool points from where they touched [m].
+
+    Attributes
+    ----------
+    spread_before_m, spread_after_m, held_out_spread_m : float [m]
+        With the nominal robot (its tool fitted where asked), with the effects found, and with
+        each place predicted from the others.
+    touched : tuple of Touched
+    lengths : tuple of KnownLength
+    not_seen : tuple of str
+        What no contact shows, in words.
+
+    """
+
+    spread_before_m: float
+    spread_after_m: float
+    held_out_spread_m: float
+    touched: tuple[Touched, ...] = ()
+    lengths: tuple[KnownLength, ...] = ()
+    not_seen: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers."""
+        return {
+            'spread_before_m': self.spread_before_m,
+            'spread_after_m': self.spread_after_m,
+            'held_out_spread_m': self.held_out_spread_m,
+            'touched': [dict(vars(item)) for item in self.touched],
+            'distances': [item.as_dict() for item in self.lengths],
+            'not_seen': list(self.not_seen),
+        }
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """
@@ -383,6 +459,8 @@ class Diagnosis:
     """What differs between the recordings, of what was said to be able to."""
     may_change: tuple[str, ...] = ()
     """What was said to be able to differ."""
+    contacts: ContactResult | None = None
+    """How well contacts agree, where contacts took the place of an instrument."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
@@ -401,6 +479,7 @@ class Diagnosis:
             'not_considered': dict(self.absent),
             'model': self._model() if sound else None,
             'changed': [item.as_dict() for item in self.changed],
+            **({} if self.contacts is None else {'contacts': self.contacts.as_dict()}),
             'posterior': None if self.posterior is None else as_dict(self.posterior),
         }
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..messages.topics import (
     BY_NAME,
+    CONTACT,
     JOINT_STATES,
     MEASURED_POINT,
     MEASURED_SIGMA,
@@ -173,6 +174,7 @@ def _uses(names: TopicNames) -> dict[str, tuple[str, tuple[str, ...]]]:
         names.joints: ('joints', (JOINT_STATES.type,)),
         names.pose: ('pose', POSE_TYPES),
         names.point: ('point', (MEASURED_POINT.type,)),
+        names.contact: ('contact', (CONTACT.type,)),
         names.sigma: ('sigma', (MEASURED_SIGMA.type,)),
         names.wrench: ('wrench', (TOOL_WRENCH.type,)),
         names.temperature: ('temperature', (TEMPERATURE.type,)),
@@ -218,7 +220,7 @@ def _judge(
         missing.append(
             f"no joint states on '{names.joints}'" + _hint(others, JOINT_STATES.type, 'joint')
         )
-    measured = used.get('pose') or used.get('point')
+    measured = used.get('contact') or used.get('pose') or used.get('point')
     if measured is None:
         hints = _hint(others, POSE_TYPES[0], 'pose') or _hint(others, MEASURED_POINT.type, 'point')
         missing.append(f"no measurements on '{names.pose}' or '{names.point}'" + hints)

@@ -27,6 +27,7 @@ from ..messages.topics import (
     TopicNames,
 )
 from .columns import LEFT_OUT, Stream
+from .contacts import marks, touching
 from .ends import Ends, never_recorded, uneven_ends
 from .reader import BagReader
 
@@ -84,6 +85,7 @@ def read_recording(
         _fill(bag, names, roles, streams, intake)
         points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
         made = bag.provenance
+        touched = marks(bag, names)
     if streams[Role.JOINTS].messages == intake.joints.others:
         raise DataError(
             f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
@@ -99,6 +101,8 @@ def read_recording(
         one_clock=one_clock,
         notes=_notes(names, streams, intake, bool(points)),
     )
+    if touched:
+        return touching(whole, touched, made)
     return _with_what_is_missing(whole, made, _ends(names, samples))
 
 

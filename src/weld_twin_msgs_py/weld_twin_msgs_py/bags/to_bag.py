@@ -14,6 +14,7 @@ import numpy as np
 from weld_twin_core import __version__
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
+from weld_twin_core.contacts import Contacts
 from weld_twin_core.recording import Measurements, Recording
 
 from ..assembly.frame_names import WORLD
@@ -21,6 +22,7 @@ from ..messages.from_messages import NANOSECONDS
 from ..messages.to_messages import Messages, bag_messages
 from ..messages.topics import (
     ACTUAL_JOINT_STATES,
+    CONTACT,
     DEVIATION,
     JOINT_STATES,
     MEASURED_POINT,
@@ -84,6 +86,8 @@ def write_recording(
         'static': recording.joints.static,
         **(provenance or {}),
     }
+    if recording.contacts is not None:
+        made['artefact'] = recording.contacts.artefact.as_mapping()
     entries = _Entries(recording)
     parts = [*entries.inputs(robot)]
     if actual is not None:
@@ -118,6 +122,8 @@ class _Entries:
         yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd)
         if measured is not None:
             yield from self.measured(measured)
+        if self.recording.contacts is not None:
+            yield self.contacts(self.recording.contacts)
         if wrench is not None:
             frame = self.recording.wrench_frame
             yield self._each(
@@ -155,6 +161,17 @@ class _Entries:
             yield self.vectors(
                 MEASURED_SIGMA.name, measured.t, np.repeat(sigma[:, None], 3, axis=1)
             )
+
+    def contacts(self, contacts: Contacts) -> Iterator[_Entry]:
+        """Return what each posture touched."""
+        none = np.zeros(contacts.size)
+        value = none if contacts.value is None else contacts.value
+        sigma = none if contacts.sigma is None else contacts.sigma
+        return self._each(
+            CONTACT.name,
+            self.recording.joints.t,
+            lambda ns, k: self.make.contact(ns, contacts.labels[k], value[k], sigma[k]),
+        )
 
     def poses(self, topic: str, t: Array, position: Array, rotation: Array) -> Iterator[_Entry]:
         """Return poses, shapes (K, 3) and (K, 3, 3)."""

@@ -151,6 +151,19 @@ class Messages:
             variance=0.0,
         )
 
+    def contact(self, ns: int, label: str, value: float = 0.0, sigma: float = 0.0) -> Any:
+        """Return the Range of a contact: what is touched, a length and its deviation [m]."""
+        return self._make(
+            'sensor_msgs/msg/Range',
+            header=self.header(ns, label),
+            radiation_type=0,
+            field_of_view=0.0,
+            min_range=0.0,
+            max_range=0.0,
+            range=float(value),
+            variance=float(sigma) ** 2,
+        )
+
     def diagnostics(
         self,
         ns: int,

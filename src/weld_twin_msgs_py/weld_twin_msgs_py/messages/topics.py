@@ -135,6 +135,13 @@ MEASURED_SIGMA = _stream(
     DEEP,
     'standard deviation of the measured position of the same stamp, per axis [m]',
 )
+CONTACT = _stream(
+    '/contact',
+    'sensor_msgs/msg/Range',
+    DEEP,
+    'the tool point touches what header.frame_id names; range is the measured length where that is '
+    'what a contact gives, else 0 [m], variance its variance where known [m^2]',
+)
 TWIN_POSE = _result(
     '/twin/tool_pose',
     'geometry_msgs/msg/PoseStamped',
@@ -186,6 +193,7 @@ TOPICS = (
     MEASURED_POSE,
     MEASURED_POINT,
     MEASURED_SIGMA,
+    CONTACT,
     TWIN_POSE,
     TWIN_COVARIANCE,
     DEVIATION,
@@ -267,6 +275,7 @@ class TopicNames:
     sigma: str = MEASURED_SIGMA.name
     wrench: str = TOOL_WRENCH.name
     temperature: str = TEMPERATURE.name
+    contact: str = CONTACT.name
 
     def __post_init__(self) -> None:
         for item in fields(self):

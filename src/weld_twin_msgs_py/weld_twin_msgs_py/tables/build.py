@@ -78,7 +78,8 @@ def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) ->
     columns = find_columns(cells.header, robot, options)
     cells = _usable(cells, columns, options, said)
     said.append('joint columns are ' + ', '.join(columns.joints))
-    q = _joints(cells, robot, columns, options, said)
+    unit = columns.unit(columns.joints)
+    q = joint_angles(cells, robot, columns.joints, options, said, unit)
     position, scale = _position(cells, robot, q, columns, options, said)
     rotation = _rotation(cells, robot, q, columns, options, said) if columns.rotation else None
     sigma = _sigma(cells, columns, scale, said) if columns.sigma else None
@@ -86,7 +87,7 @@ def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) ->
     t, sentence = stamps(cells, columns.time, columns.unit((columns.time or '',)))
     said.append(sentence)
     if t is None:
-        epoch, t = _own_epoch(cells.path), np.arange(float(len(q)))
+        epoch, t = own_epoch(cells.path), np.arange(float(len(q)))
     else:
         epoch, t = round(float(t[0])) * 1_000_000_000, t - round(float(t[0]))
     temperature = None
@@ -105,7 +106,7 @@ def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) ->
     return Table(recording, tuple(said))
 
 
-def _own_epoch(path: Path) -> int:
+def own_epoch(path: Path) -> int:
     """
     Return a date for a table without one, made from its content [ns].
 
@@ -151,12 +152,33 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
     )
 
 
-def _joints(
-    cells: Cells, robot: Robot, columns: Columns, options: TableOptions, said: list[str]
+def joint_angles(
+    cells: Cells,
+    robot: Robot,
+    names: tuple[str, ...],
+    options: TableOptions,
+    said: list[str],
+    unit: str | None = None,
 ) -> Array:
-    q = cells.stack(columns.joints)
+    """
+    Return the joint columns of a table, shape (M, n) [rad or m], and say how they were read.
+
+    Parameters
+    ----------
+    cells : Cells
+    robot : Robot
+    names : tuple of str
+        The columns, in the robot's order.
+    options : TableOptions
+    said : list of str
+        Sentences are added to it.
+    unit : str, optional
+        That the header gives.
+
+    """
+    q = cells.stack(names)
     turning = ~robot.prismatic
-    given = options.angle_unit or columns.unit(columns.joints)
+    given = options.angle_unit or unit
     unit, sentence = angle_unit(q[:, turning], given, 'joint angles')
     if sentence:
         said.append(sentence)

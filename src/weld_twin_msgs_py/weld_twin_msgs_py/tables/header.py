@@ -81,6 +81,19 @@ def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> 
     return out
 
 
+def joint_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> tuple[str, ...]:
+    """
+    Return the joint columns alone, in the robot's order.
+
+    Raises
+    ------
+    DataError
+        There are none, or more than one set; the message names the option that decides.
+
+    """
+    return options.joint_columns or _joints([_taken_apart(name) for name in header], robot)
+
+
 def _taken_apart(name: str) -> Named:
     tokens = [t for t in re.split(r'[^0-9a-z\u00b0]+', name.lower()) if t]
     unit = None

@@ -8,12 +8,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ...arm.robot import Robot
 from ...arm.rotation import angle_between, rotation_matrix
 from ...arrays import Array
+from ...contacts import Unknowns, places, unknowns
 from ...effects.effect import Effect
 from ...errors import DataError, ModelError
 from ...recording import Measurements, Recording
@@ -22,6 +24,9 @@ from ...twin.twin import Twin
 from .row_layout import by_sample
 
 FRAMES = ('base', 'tool')
+PLACES = 3
+"""Places of contacts from which on each is left out as a whole: with two, one would have to tell of
+the other what only both together show."""
 
 
 def frames_named(align: str | Iterable[str], what: str = 'align') -> frozenset[str]:
@@ -172,6 +177,9 @@ class Problem:
         What may have set in at an instant that was found: hypotheses beside the library's.
     changes : tuple of Change
         What may differ between the recordings: fitted along in every hypothesis, as frames are.
+    touched : tuple of Unknowns
+        Where recordings are contacts, one each: what they see of the tool point, and their
+        unknown places; see `touching`. Empty where an instrument measured.
 
     """
 
@@ -180,11 +188,60 @@ class Problem:
     anchor: Anchor | None = None
     dated: tuple[Effect, ...] = ()
     changes: tuple[Change, ...] = ()
+    touched: tuple[Unknowns, ...] = ()
+    _taken: WeakKeyDictionary[Scale, list[tuple[Array, Array]]] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
 
     @property
     def rows(self) -> tuple[int, ...]:
         """Return the scalar rows per sample of each recording: 6 for poses, 3 for points."""
+        if self.touched:
+            return tuple(unknown.seen.shape[1] for unknown in self.touched)
         return tuple(3 if _measured(r).rotation is None else 6 for r in self.recordings)
+
+    def touching(self, model: Model) -> Problem:
+        """Return the problem with its contacts as a model sees them; no contacts, no change."""
+        each = []
+        for k, recording in enumerate(self.recordings):
+            if recording.contacts is not None:
+                poses = model.twin(k).poses(recording, _measured(recording).t)
+                each.append(unknowns(recording.contacts, poses.position))
+        return replace(self, touched=tuple(each))
+
+    def seen(self, k: int, block: Array) -> Array:
+        """
+        Return what recording k shows of changes of its poses, shape (..., c, M).
+
+        Parameters
+        ----------
+        k : int
+            Which recording, counted from 0.
+        block : array, shape (..., 6, M) [m, rad]
+
+        """
+        if self.touched:
+            ways = self.touched[k].seen
+            return np.asarray(np.einsum('mci,...im->...cm', ways, block[..., :3, :]))
+        return block[..., : self.rows[k], :]
+
+    def pulled(self, k: int, rows: Array) -> Array:
+        """Return the pull on the tool of recording k's rows, (c, M), as (3 or 6, M): along each."""
+        if self.touched:
+            return np.asarray(np.einsum('mci,cm->im', self.touched[k].seen, rows))
+        return rows
+
+    def places_taken(self, scale: Scale) -> list[tuple[Array, Array]]:
+        """
+        Return what the unknown places of contacts take up of whitened rows, one per recording.
+
+        Orthonormal directions (k, rows of the recording), and the share (k,) left of each; see
+        `Unknowns.eliminated`. Empty without contacts.
+        """
+        if self.touched and scale not in self._taken:
+            pairs = zip(self.touched, scale.weights, strict=True)
+            self._taken[scale] = [u.eliminated(np.sqrt(w) / scale.position) for u, w in pairs]
+        return self._taken[scale] if self.touched else []
 
     @property
     def samples(self) -> tuple[int, ...]:
@@ -197,10 +254,19 @@ class Problem:
         return sum(c * m for c, m in zip(self.rows, self.samples, strict=True))
 
     def residuals(self, model: Model) -> list[Array]:
-        """Return measured minus twin, one array (3 or 6, M) per recording [m, rad]."""
+        """
+        Return measured minus twin, one array (c, M) per recording [m, rad].
+
+        Of contacts it is the way from the tool point to where the contact is, as this model and
+        the lengths known put it.
+        """
         out = []
         for maker, recording in zip(self.features(model), self.recordings, strict=True):
             measured, poses = _measured(recording), maker.run.poses
+            if recording.contacts is not None:
+                where = places(recording.contacts, poses.position)
+                out.append(where.rows(poses.position)[0].T)
+                continue
             parts = [(measured.position - poses.position).T]
             if measured.rotation is not None:
                 parts.append(angle_between(measured.rotation, poses.rotation).T)
@@ -236,13 +302,18 @@ class Problem:
         stretch of rows.
         """
         out = []
-        for part, weight in zip(parts, scale.weights, strict=True):
+        taken = self.places_taken(scale)
+        for k, (part, weight) in enumerate(zip(parts, scale.weights, strict=True)):
             unit = np.full(part.shape[-2], 1.0 / scale.position)
             unit[3:] = 1.0 / scale.orientation
             turned = np.swapaxes(part, -1, -2)
             scaled = np.empty(turned.shape)
             np.multiply(turned, np.sqrt(weight)[:, None] * unit, out=scaled)
-            out.append(scaled.reshape(*part.shape[:-2], weight.size * unit.size))
+            rows = scaled.reshape(*part.shape[:-2], weight.size * unit.size)
+            if taken:
+                ways, left = taken[k]
+                rows = rows - ((rows @ ways.T) * (1.0 - left)) @ ways
+            out.append(rows)
         return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
 
     def by_sample(self, values: Array) -> list[Array]:
@@ -262,7 +333,7 @@ class Problem:
             for p, name in enumerate(names):
                 kind, _, j = name.partition('.')
                 if kind == f'base {k}' or kind == 'tool':
-                    block[p] = maker.column((kind.split()[0], int(j)))[: self.rows[k]]
+                    block[p] = self.seen(k, maker.column((kind.split()[0], int(j))))
             parts.append(np.concatenate([block, *self._change_columns(k, maker)]))
         sizes = [change.effect.coordinates().size for change in self.changes]
         names += [f'change {i}.{j}' for i, size in enumerate(sizes) for j in range(size)]
@@ -273,7 +344,7 @@ class Problem:
         out = []
         for change in self.changes:
             if change.recording == k:
-                out.append(maker.columns(change.effect, atoms=False)[:, : self.rows[k]])
+                out.append(self.seen(k, maker.columns(change.effect, atoms=False)))
             else:
                 size = change.effect.coordinates().size
                 out.append(np.zeros((size, self.rows[k], self.samples[k])))
@@ -294,16 +365,17 @@ class Problem:
             Its linear features; else the derivatives by its fit coordinates.
 
         """
-        return [
-            maker.columns(effect, atoms)[:, : self.rows[k]] for k, maker in enumerate(features)
-        ]
+        return [self.seen(k, maker.columns(effect, atoms)) for k, maker in enumerate(features)]
 
     def block_labels(self, blocks: int) -> Array:
         """
         Return a block number for every row: contiguous stretches, at least one per recording.
 
-        Recordings count by their length; a stretch never spans two recordings.
+        Recordings count by their length; a stretch never spans two recordings. Of contacts each
+        place is a stretch, where there are at least `PLACES`.
         """
+        if len(self.touched) >= PLACES:
+            blocks = 1
         total = max(sum(self.samples), 1)
         out, start = [], 0
         for c, m in zip(self.rows, self.samples, strict=True):
@@ -316,7 +388,7 @@ class Problem:
     def thinned(self, most_rows: int) -> Problem:
         """Return the problem with evenly fewer measurements when it has too many rows."""
         factor = self.size / most_rows
-        if factor <= 1.0:
+        if factor <= 1.0 or self.touched:
             return self
         out = []
         for recording in self.recordings:

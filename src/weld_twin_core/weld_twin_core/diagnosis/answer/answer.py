@@ -22,6 +22,7 @@ from ..unseen.where import locate
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
 from .changed import changed, untold_check
+from .contact_spreads import contact_spreads
 from .gap import gap, traces
 from .named_effects import named_effects
 from .weighed_candidates import unexplained, weighed_candidates
@@ -96,4 +97,5 @@ def answer(
         signs=known,
         changed=changed(found, examined.given.may_change),
         may_change=examined.given.may_change,
+        contacts=contact_spreads(found, unseen),
     )

@@ -12,6 +12,7 @@ from ...effects.effect import Effect
 from ...recording import Recording
 from ..algebra.problem import Anchor, Model, Problem, frames_named, usable
 from .alignment import initial_frames
+from .places import posed
 
 
 def aligned(
@@ -42,6 +43,8 @@ def aligned(
 
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    if any(recording.contacts is not None for recording in recordings):
+        return posed(recordings, robot, frames_named(align), known)
     problem = Problem(tuple(usable(r) for r in recordings), frames_named(align))
     model = Model(robot, tuple(robot.T_world_base for _ in recordings), tuple(known))
     model = initial_frames(problem, model)

@@ -130,6 +130,7 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
     residual = problem.residuals(model)[0]
     residual[:3] *= scale.weights[0] / scale.position**2
     residual[3:] *= scale.weights[0] / scale.orientation**2
+    residual = problem.pulled(0, residual)
     shelf = _Shelf(problem, scale, features, residual, dict.fromkeys(exclude, EXCLUDED))
     for kind in candidate_kinds(exclude, problem.align):
         for joint in joints_of(kind, model.robot.joint_names):
@@ -200,11 +201,9 @@ class _Shelf:
         shifts = [maker.shifts(seed) for maker in self.features]
         joint = moved_joint(shifts)
         piece: Columns
-        if joint is None:
-            parts = [
-                maker.changes(own)[:, :c]
-                for maker, own, c in zip(self.features, shifts, self.problem.rows, strict=True)
-            ]
+        if joint is None or self.problem.touched:
+            changes = [m.changes(own) for m, own in zip(self.features, shifts, strict=True)]
+            parts = [self.problem.seen(k, change) for k, change in enumerate(changes)]
             piece = Whole(self.problem.whitened(parts, self.scale))
         else:
             piece = Amounts(self._moved(joint), amounts(shifts, joint, self.problem.samples))

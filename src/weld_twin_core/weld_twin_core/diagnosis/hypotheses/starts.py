@@ -182,7 +182,7 @@ class _Looker:
         """Return what one joint does in recording k, whitened, shape (M, c)."""
         unit = np.full(self.problem.rows[k], 1.0 / self.scale.position)
         unit[3:] = 1.0 / self.scale.orientation
-        column = maker.column(('q', joint))[: self.problem.rows[k]].T
+        column = self.problem.seen(k, maker.column(('q', joint))).T
         return np.asarray(column * unit * np.sqrt(self.scale.weights[k])[:, None])
 
 

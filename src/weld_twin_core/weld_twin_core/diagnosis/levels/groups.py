@@ -180,7 +180,7 @@ def _plain(
             parts = []
             for k, maker in enumerate(features):
                 push = np.gradient(maker.view.qd[:, index], maker.view.t)
-                parts.append(maker.column(('q', index))[None, : problem.rows[k]] * push)
+                parts.append(problem.seen(k, maker.column(('q', index)))[None] * push)
             yield joint, 'acceleration', parts
     if moving:
         yield 'clock', 'speed', [_velocity(problem, k, m) for k, m in enumerate(features)]
@@ -203,7 +203,7 @@ def _velocity(problem: Problem, k: int, maker: Features) -> Array:
     """Return the tool's twist, shape (1, c, M): what a late clock shows."""
     joints = range(maker.twin.robot.n)
     total = sum(maker.column(('q', i)) * maker.view.qd[:, i] for i in joints)
-    return np.asarray(total)[None, : problem.rows[k]]
+    return problem.seen(k, np.asarray(total))[None]
 
 
 def _place(problem: Problem, k: int, maker: Features) -> Array:
@@ -211,20 +211,20 @@ def _place(problem: Problem, k: int, maker: Features) -> Array:
     p = maker.run.poses.position
     x = ((p - p.mean(axis=0)) / np.maximum(p.std(axis=0), 1e-9)).T
     shapes = [*x, *(x[a] * x[b] for a in range(3) for b in range(a, 3))]
-    out = np.zeros((3, len(shapes), problem.rows[k], x.shape[1]))
+    out = np.zeros((3, len(shapes), 6, x.shape[1]))
     for axis in range(3):
         out[axis, :, axis] = shapes
-    return out.reshape(-1, problem.rows[k], x.shape[1])
+    return problem.seen(k, out.reshape(-1, 6, x.shape[1]))
 
 
 def _yielding(problem: Problem, k: int, maker: Features) -> Array:
     """Return the tool pushed along its axes by the force on it, shape (3, c, M)."""
     rotation, wrench = maker.run.poses.rotation, maker.view.wrench
     assert wrench is not None
-    out = np.zeros((3, problem.rows[k], wrench.shape[0]))
+    out = np.zeros((3, 6, wrench.shape[0]))
     force = wrench[:, :3]
     if maker.view.wrench_frame != 'tool':
         force = np.einsum('mji,mj->mi', rotation, force)
     for axis in range(3):
         out[axis, :3] = (rotation[:, :, axis] * force[:, axis, None]).T
-    return out
+    return problem.seen(k, out)

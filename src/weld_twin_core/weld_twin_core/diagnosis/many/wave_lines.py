@@ -88,7 +88,7 @@ class Waves:
         for r, maker in enumerate(features):
             unit = np.full((problem.rows[r], 1), scale.position**-2)
             unit[3:] = scale.orientation**-2
-            column = maker.column(('q', joint))[: problem.rows[r]]
+            column = problem.seen(r, maker.column(('q', joint)))
             mass = column * unit * scale.weights[r]
             angle = orders[:, None] * maker.view.q[:, joint]
             sine, cosine = np.sin(angle), np.cos(angle)

@@ -180,10 +180,8 @@ def _joints(recording: Recording) -> Array:
 
 
 def _rows(problem: Problem, model: Model, scale: Scale, what: Directions) -> Rows:
-    parts = [
-        what.columns(maker, k)[:, : problem.rows[k]]
-        for k, maker in enumerate(problem.features(model))
-    ]
+    features = problem.features(model)
+    parts = [problem.seen(k, what.columns(maker, k)) for k, maker in enumerate(features)]
     residual = problem.whitened(problem.residuals(model), scale)
     share = effective_share(residual, problem.rows, problem.samples)
     return Rows(problem.whitened(parts, scale), residual, share)
@@ -210,7 +208,7 @@ def _turns(problem: Problem, model: Model, scale: Scale) -> Array:
     joints = np.flatnonzero(~np.asarray(model.robot.prismatic))
     parts = []
     for k, maker in enumerate(problem.features(model)):
-        columns = [maker.column(('q', int(i)))[: problem.rows[k]] for i in joints]
+        columns = [problem.seen(k, maker.column(('q', int(i)))) for i in joints]
         shape = (joints.size, problem.rows[k], problem.samples[k])
         parts.append(np.reshape(columns, shape))
     return problem.whitened(parts, scale)

@@ -129,7 +129,7 @@ def _column_group(
         values = regressors(maker, i, lows, highs)  # type: ignore[operator]
         if values.size == 0:
             return None
-        parts.append(maker.column(('q', i))[None, : problem.rows[k]] * values[:, None, :])
+        parts.append(problem.seen(k, maker.column(('q', i)))[None] * values[:, None, :])
     return _unit(problem.whitened(parts, scale))
 
 
@@ -144,11 +144,11 @@ def _pose_group(
     parts = []
     for k, maker in enumerate(features):
         values = regressors(maker)  # type: ignore[operator]
-        block = np.zeros((3, values.shape[0], problem.rows[k], values.shape[1]))
+        block = np.zeros((3, values.shape[0], 6, values.shape[1]))
         axes = maker.run.poses.rotation if of_tool else np.eye(3)[None]
         for j in range(3):
             block[j, :, :3] = (axes[:, :, j].T)[None] * values[:, None, :]
-        parts.append(block.reshape(-1, problem.rows[k], values.shape[1]))
+        parts.append(problem.seen(k, block.reshape(-1, 6, values.shape[1])))
     return _unit(problem.whitened(parts, scale))
 
 

@@ -116,7 +116,7 @@ def _map(problem: Problem, baseline: Unseen, model: Model) -> Array:
             parts = []
             for k, maker in enumerate(features):
                 values = _regressor(maker, i, name)
-                column = maker.column(('q', i))[None, : problem.rows[k]]
+                column = problem.seen(k, maker.column(('q', i)))[None]
                 parts.append(column * values[:, None, :])
             block = problem.whitened(parts, baseline.scale)
             size = np.sqrt((block**2).mean(axis=1))

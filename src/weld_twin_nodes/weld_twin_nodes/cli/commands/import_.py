@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of joint angles and measured positions or poses into a bag.
+"""Tables of joint angles and measured positions, poses or contacts into a bag.
 
 Delimiter, units and columns are read from the table where they are plain, and every guess is
 printed; an option settles what is not. Lists of columns are separated by commas.
@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING
 from ..options import add_bag_output, add_robot, robot_of
 
 if TYPE_CHECKING:
+    from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arrays import Array
     from weld_twin_core.recording import Recording
+    from weld_twin_msgs_py.tables import TableOptions
 
 LISTS = ('joint', 'position', 'target', 'difference', 'rotation', 'sigma')
 """Options that take several columns."""
@@ -26,6 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('file', metavar='FILE.csv')
     add_robot(parser)
     add_bag_output(parser)
+    parser.add_argument(
+        '--contacts',
+        metavar='ARTEFACT.yaml',
+        help='the table holds joint angles and what was touched; this file describes it',
+    )
     parser.add_argument('--table', metavar='CSV', help='also write every deviation from the twin')
     parser.add_argument('--picture', metavar='PNG', help='also draw the deviations')
     group = parser.add_argument_group('how to read the table')
@@ -70,6 +77,8 @@ def run(args: argparse.Namespace) -> int:
 
     robot = robot_of(args)
     options = TableOptions(**{f.name: getattr(args, f.name) for f in fields(TableOptions)})
+    if args.contacts is not None:
+        return _touched(args, robot, options)
     recording, said = read_table(args.file, robot, options)
     measured = recording.measured
     assert measured is not None
@@ -93,6 +102,31 @@ def run(args: argparse.Namespace) -> int:
         f'{args.out}: {found.samples} stations; from the nominal twin, base and tool frame not '
         f'fitted: RMS {found.rms_m * 1e3:.3f} mm, max {found.max_m * 1e3:.3f} mm'
     )
+    return 0
+
+
+def _touched(args: argparse.Namespace, robot: Robot, options: TableOptions) -> int:
+    """Write the bag of a table of contacts, and say how far the nominal twin spreads."""
+    from weld_twin_core.contacts import spreads
+    from weld_twin_core.errors import ModelError
+    from weld_twin_core.twin.twin import Twin
+    from weld_twin_msgs_py.bags import write_recording
+    from weld_twin_msgs_py.files.artefact_file import read_artefact
+    from weld_twin_msgs_py.tables import read_contacts
+
+    if args.table or args.picture:
+        raise ModelError('--table and --picture need measured positions; contacts have none')
+    artefact = read_artefact(args.contacts)
+    recording, said = read_contacts(args.file, robot, artefact, options)
+    provenance = {'source': args.file, 'assumptions': list(said)}
+    write_recording(args.out, recording, robot, storage=args.storage, provenance=provenance)
+    for sentence in said:
+        print(sentence)
+    assert recording.contacts is not None
+    points = Twin(robot).poses(recording, recording.joints.t).position
+    for label, each in spreads(recording.contacts, points).items():
+        print(f'{label}: nominal twin {each.mean() * 1e3:.3f} mm off on average')
+    print(f'{args.out}: {recording.contacts.size} postures; weld-twin diagnose takes the bag')
     return 0
 
 

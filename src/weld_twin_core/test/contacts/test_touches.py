@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Touches of a pin, a ball, a face, held against what can be worked out by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, places, spreads
+from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.problem import Scale
+from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.errors import DataError
+
+SIGMA = 1e-4
+
+
+def two_links():
+    """Return a planar arm of two links, 0.5 m and 0.4 m."""
+    rows = [{'name': 'shoulder', 'a': 0.5}, {'name': 'elbow', 'a': 0.4}]
+    zero = {'alpha': 0.0, 'd': 0.0, 'theta_offset': 0.0, 'lower': -3.0, 'upper': 3.0}
+    entry = {'name': 'planar', 'joints': [row | zero | {'max_velocity': 1.0} for row in rows]}
+    return wt.Robot.from_mapping(entry)
+
+
+def touching(robot, postures, labels, *, kinds='point', ties=()):
+    """Return a recording of postures and what they touched."""
+    names = dict.fromkeys(labels)
+    artefact = Artefact(tuple(Contact(name, kinds) for name in names), tuple(ties))
+    motion = wt.JointMotion(np.arange(float(len(postures))), postures, static=True)
+    return wt.Recording('touches', motion, contacts=Contacts(artefact, tuple(labels)))
+
+
+def fitted(recording, robot, effects=(), align='', sigma=SIGMA):
+    """Return the fit of effects that start at zero."""
+    problem, model = aligned(recording, robot, align, ())
+    scale = Scale(sigma, 1.0, tuple(np.ones(m) for m in problem.samples))
+    free = np.full(sum(e.coordinates().size for e in effects), 1e-12)
+    return problem, fit(problem, model.with_found(tuple(effects)), scale, free)
+
+
+def test_three_touches_of_a_pin_tell_the_elbow_offset():
+    # With the elbow up and down on the same pin, the two true elbow angles are b and -b. Each
+    # reading is short of the true angle by the offset, so the offset is minus their mean.
+    up, down = 1.2 - 0.004, -1.2 - 0.004
+    reach = np.sqrt(0.5**2 + 0.4**2 + 2 * 0.5 * 0.4 * np.cos(1.2))
+    inner = np.arccos((0.5**2 + reach**2 - 0.4**2) / (2 * 0.5 * reach))
+    postures = np.array([[0.3 - inner, up], [0.3 + inner, down], [0.3 - inner, up]])
+    recording = touching(two_links(), postures, ['pin'] * 3)
+
+    _, found = fitted(recording, two_links(), [wt.effects.JointOffset('elbow', offset=0.0)])
+
+    assert found.coordinates[0] == pytest.approx(-(up + down) / 2, abs=1e-9)
+    assert found.rss < 1e-9
+
+
+def test_the_shoulder_offset_is_not_seen_by_a_pin():
+    postures = np.array([[0.1, 1.2], [1.2, -1.2], [0.1, 1.2]])
+    recording = touching(two_links(), postures, ['pin'] * 3)
+
+    problem, model = aligned(recording, two_links(), '', ())
+    before = problem.residuals(model)[0]
+    turned = model.with_found((wt.effects.JointOffset('shoulder', offset=0.01),))
+
+    off = [np.linalg.norm(part, axis=0) for part in (before, problem.residuals(turned)[0])]
+    np.testing.assert_allclose(off[0], off[1], atol=1e-12)
+
+
+def postures_at(robot, tool, target, count, rng):
+    """Return postures in which the tool point rests at a target."""
+    from scipy.optimize import least_squares
+
+    placed = robot.with_frames(tool=tool)
+    out = []
+    while len(out) < count:
+        start = rng.uniform(-1.5, 1.5, robot.n)
+
+        def off(q):
+            motion = wt.JointMotion([0.0], [q], static=True)
+            return (
+                wt.Twin(placed).poses(wt.Recording('', motion), np.zeros(1)).position[0] - target
+            )
+
+        found = least_squares(off, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        if np.abs(found.fun).max() < 1e-8:
+            out.append(found.x)
+    return np.array(out)
+
+
+def test_four_point_tool_calibration_is_a_special_case_with_its_uncertainty():
+    robot, rng = wt.load('ur5'), np.random.default_rng(3)
+    tool = np.array(robot.T_flange_tool)
+    tool[:3, 3] = [0.02, -0.05, 0.19]
+    postures = postures_at(robot, tool, [0.45, 0.1, 0.3], 4, rng)
+    recording = touching(robot, postures, ['spike'] * 4)
+    flange = wt.Twin(robot.with_frames(tool=np.eye(4))).poses(recording, recording.joints.t)
+
+    # What a controller does with four postures: rotations times tip, minus one point, is minus
+    # the flange; unknown are the tip and the point.
+    columns = np.concatenate([np.hstack([turn, -np.eye(3)]) for turn in flange.rotation])
+    tip = np.linalg.lstsq(columns, -flange.position.ravel(), rcond=None)[0][:3]
+    deviation = SIGMA * np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))[:3]
+
+    _, aligned_fit = fitted(recording, robot, align='tool')
+    np.testing.assert_allclose(tip, tool[:3, 3], atol=1e-6)
+    np.testing.assert_allclose(aligned_fit.model.robot.T_flange_tool[:3, 3], tip, atol=1e-6)
+
+    near = robot.with_frames(tool=tool)
+    _, told = fitted(recording, near, [wt.effects.ToolPose(xyz=np.zeros(3), rotvec=np.zeros(3))])
+    np.testing.assert_allclose(np.sqrt(np.diag(told.covariance()))[:3], deviation, rtol=1e-3)
+
+
+def test_a_known_distance_between_two_sockets_gives_the_scale():
+    # Two pins on a line through the shoulder, both links 2 % longer than the model has them. Each
+    # pin alone fits an arm of any size; their known distance tells it.
+    true, arm = 1.02, two_links()
+    postures, labels = [], []
+    for name, reach in (('near', 0.6), ('far', 0.8)):
+        for elbow in (1.0, -1.0):
+            bend = np.arccos((reach**2 - true**2 * (0.25 + 0.16)) / (2 * true**2 * 0.2))
+            inner = np.arccos((0.25 * true**2 + reach**2 - 0.16 * true**2) / (true * reach))
+            postures += [[-elbow * inner, elbow * bend]]
+            labels += [name]
+    tie = Tie(('near', 'far'), 0.2, 1e-5)
+    lengths = [wt.effects.LinkLength(joint, da=0.0) for joint in arm.joint_names]
+    recording = touching(arm, np.array(postures), labels, ties=[tie])
+
+    _, found = fitted(recording, arm, lengths, sigma=1e-5)
+
+    np.testing.assert_allclose(found.coordinates, [0.01, 0.008], atol=2e-5)
+
+
+@pytest.mark.parametrize('kind', ['plane', 'line', 'sphere', 'length'])
+def test_columns_are_the_derivatives_of_residuals_once_places_are_fitted(kind):
+    rng = np.random.default_rng(5)
+    points = surface_points(kind, rng) + rng.normal(0.0, 1e-4, (12, 3))
+    value = np.linalg.norm(points - [0.1, 0.2, 0.0], axis=1) if kind == 'length' else None
+    contacts = Contacts(Artefact((Contact('it', kind),)), ('it',) * 12, value)
+    here = places(contacts, points)
+    residual, seen, free = here.rows(points)
+    push = rng.normal(0.0, 1.0, points.shape)
+    step = 1e-6
+
+    moved, _, _ = here.rows(points + step * push)
+    np.testing.assert_allclose(
+        (moved - residual) / step, -np.einsum('mci,mi->mc', seen, push), atol=1e-4
+    )
+    for j, unit in enumerate(np.eye(free.shape[2])):
+        changed, _, _ = here.moved(step * unit).rows(points)
+        np.testing.assert_allclose((changed - residual) / step, free[:, :, j], atol=1e-4)
+    assert np.abs(np.einsum('mcz,mc->z', free, residual)).max() < 1e-6
+
+
+def surface_points(kind, rng):
+    """Return twelve points on a surface of a kind."""
+    along = rng.uniform(-0.1, 0.1, (12, 2))
+    if kind == 'plane':
+        return np.column_stack([along, 0.3 + 0.2 * along[:, 0]])
+    if kind == 'line':
+        return np.outer(along[:, 0], [0.6, 0.8, 0.0]) + [0.1, 0.2, 0.3]
+    ways = rng.normal(size=(12, 3))
+    return 0.05 * ways / np.linalg.norm(ways, axis=1)[:, None] + [0.1, 0.2, 0.0]
+
+
+def test_spread_is_the_mean_distance_to_the_middle():
+    points = np.array([[0.0, 0.0, 0.0], [0.002, 0.0, 0.0], [5.0, 1.0, 0.0], [5.0, 1.0, 0.004]])
+    artefact = Artefact((Contact('a'), Contact('b')))
+    found = spreads(Contacts(artefact, ('a', 'a', 'b', 'b')), points)
+    np.testing.assert_allclose(found['a'], [0.001, 0.001])
+    np.testing.assert_allclose(found['b'], [0.002, 0.002])
+
+
+@pytest.mark.parametrize(
+    ('entry', 'message'),
+    [
+        ({'contacts': {'a': {'kind': 'cube'}}}, 'a kind is one of point, length'),
+        ({'sockets': {}}, 'an artefact has contacts, distances and angles; got sockets'),
+        (
+            {'contacts': {'a': 'point'}, 'distances': [{'between': ['a', 'b'], 'value': 1.0}]},
+            "there is no contact 'b' in the artefact; it has a",
+        ),
+        (
+            {'contacts': {'a': 'point', 'b': 'plane'}, 'distances': [{'between': ['a', 'b']}]},
+            'a value in distances must be a number, got None',
+        ),
+    ],
+)
+def test_an_artefact_that_makes_no_sense_is_refused(entry, message):
+    with pytest.raises(DataError, match=message):
+        Artefact.from_mapping(entry)
+
+
+def test_a_single_touch_is_refused():
+    recording = touching(two_links(), np.zeros((2, 2)), ['a', 'b'])
+    with pytest.raises(DataError, match="contact 'a' of touches has 1 postures; touch it in at"):
+        aligned(replace(recording), two_links(), '', ())

@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Contacts as a measurement: a ball in a socket, a pin, a bar, a plane, each somewhere unknown."""
+
+from .artefact import KINDS, Artefact, Contact, Tie
+from .contacts import Contacts
+from .places import Places, places
+from .spreads import Length, lengths, spreads
+from .unknowns import Unknowns, unknowns
+
+__all__ = [
+    'KINDS',
+    'Artefact',
+    'Contact',
+    'Contacts',
+    'Length',
+    'Places',
+    'Tie',
+    'Unknowns',
+    'lengths',
+    'places',
+    'spreads',
+    'unknowns',
+]

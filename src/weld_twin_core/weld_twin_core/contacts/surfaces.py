@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How each kind of contact sees the tool point, and what of it is not known.
+
+Every kind is a residual r(p, z) of the tool point p and of unknowns z: zero where p touches. With
+``seen`` and ``free`` its change is r - seen dp + free dz, so a column of tool displacements
+becomes a column of residuals by one product.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Array
+from .artefact import Contact
+
+LEAST = 1e-9
+"""Length [m] that counts as none; keeps a direction from a division by zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """
+    A contact at the place where it is believed to be.
+
+    Attributes
+    ----------
+    contact : Contact
+    point : array, shape (3,) [m]
+        The point, the centre, or a point of the plane or the line.
+    axis : array, shape (3,)
+        Normal of a plane or direction of a line; unit length.
+    radius : float [m]
+        Of a sphere.
+
+    """
+
+    contact: Contact
+    point: Array
+    axis: Array
+    radius: float = 0.0
+
+    @classmethod
+    def start(cls, contact: Contact, p: Array, value: Array | None) -> Surface:
+        """
+        Return the contact where tool points put it at first sight.
+
+        Parameters
+        ----------
+        contact : Contact
+        p : array, shape (m, 3) [m]
+            Tool points that touched it.
+        value : array, shape (m,) [m], optional
+            Measured distances, of kind 'length'.
+
+        """
+        middle = np.median(p, axis=0)
+        _, _, axes = np.linalg.svd(p - p.mean(axis=0), full_matrices=True)
+        if contact.kind == 'line':
+            return cls(contact, middle, axes[0])
+        if contact.kind == 'plane':
+            return cls(contact, p.mean(axis=0), axes[2])
+        if contact.kind in ('sphere', 'length'):
+            known = value if contact.kind == 'length' else None
+            if known is None and contact.radius is not None:
+                known = np.full(len(p), contact.radius)
+            return _ball(contact, p, known)
+        return cls(contact, middle, axes[2])
+
+    @property
+    def freedom(self) -> int:
+        """Return how many unknowns it has."""
+        free_radius = self.contact.kind == 'sphere' and self.contact.radius is None
+        return {'plane': 3, 'line': 4}.get(self.contact.kind, 3) + free_radius
+
+    @property
+    def across(self) -> Array:
+        """Return two directions square to the axis, shape (2, 3)."""
+        other = np.eye(3)[int(np.argmin(np.abs(self.axis)))]
+        first = np.cross(self.axis, other)
+        first /= np.linalg.norm(first)
+        return np.stack([first, np.cross(self.axis, first)])
+
+    def rows(self, p: Array, value: Array | None) -> tuple[Array, Array, Array]:
+        """
+        Return residual (m, c), what it sees of the tool point (m, c, 3), and its unknowns (m, c, z).
+
+        Parameters
+        ----------
+        p : array, shape (m, 3) [m]
+        value : array, shape (m,) [m], optional
+
+        """
+        count, away = len(p), p - self.point
+        if self.contact.kind == 'point':
+            every = np.broadcast_to(np.eye(3), (count, 3, 3))
+            return -away, every, every
+        if self.contact.kind == 'line':
+            ways = self.across
+            seen = np.broadcast_to(ways, (count, 2, 3))
+            along = (away @ self.axis)[:, None, None] * np.eye(2)
+            shift = np.broadcast_to(np.eye(2), (count, 2, 2))
+            return -away @ ways.T, seen, np.concatenate([shift, along], axis=2)
+        if self.contact.kind == 'plane':
+            seen = np.broadcast_to(self.axis, (count, 1, 3))
+            free = np.concatenate([np.ones((count, 1)), -away @ self.across.T], axis=1)
+            return -(away @ self.axis)[:, None], seen, free[:, None]
+        far = np.linalg.norm(away, axis=1)
+        seen = (away / np.maximum(far, LEAST)[:, None])[:, None]
+        radius = self.radius if self.contact.kind == 'sphere' or value is None else value
+        free = seen
+        if self.freedom == 4:
+            free = np.concatenate([seen, np.ones((count, 1, 1))], axis=2)
+        return (radius - far)[:, None], seen, free
+
+    def moved(self, step: Array) -> Surface:
+        """Return the contact after a step of its unknowns, shape (z,)."""
+        if self.contact.kind == 'plane':
+            axis = self.axis + step[1:] @ self.across
+            point = self.point + step[0] * self.axis
+        elif self.contact.kind == 'line':
+            axis = self.axis + step[2:] @ self.across
+            point = self.point + step[:2] @ self.across
+        else:
+            more = step[3] if self.freedom == 4 else 0.0
+            return replace(self, point=self.point + step[:3], radius=self.radius + more)
+        return replace(self, point=point, axis=axis / np.linalg.norm(axis))
+
+    def foot(self, p: Array) -> Array:
+        """Return the place of the contact that is nearest to tool points, shape (m, 3) [m]."""
+        away = p - self.point
+        if self.contact.kind == 'line':
+            return np.asarray(self.point + np.outer(away @ self.axis, self.axis))
+        if self.contact.kind == 'plane':
+            return np.asarray(p - np.outer(away @ self.axis, self.axis))
+        if self.contact.kind == 'point':
+            return np.broadcast_to(self.point, p.shape)
+        far = np.maximum(np.linalg.norm(away, axis=1), LEAST)
+        radius = self.radius or float(np.median(far))
+        return np.asarray(self.point + away * (radius / far)[:, None])
+
+
+def _ball(contact: Contact, p: Array, radius: Array | None) -> Surface:
+    """Return the centre of points at known or one unknown distance; linear, after subtraction."""
+    middle = p.mean(axis=0)
+    x = p - middle
+    right = (x**2).sum(axis=1) - (0.0 if radius is None else radius**2)
+    columns = np.column_stack([2.0 * x, np.ones(len(x))])
+    found = np.linalg.lstsq(columns, right, rcond=1e-9)[0]
+    size = float(np.sqrt(max(found[3] + found[:3] @ found[:3], LEAST)))
+    size = size if radius is None else float(np.median(radius))
+    return Surface(contact, middle + found[:3], np.array([0.0, 0.0, 1.0]), size)

@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How well contacts agree before and after, and on places that were not fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from ...contacts import Length, lengths, spreads
+from ..algebra.problem import Model, Problem
+from ..hypotheses.search import Search
+from ..result import ContactResult, KnownLength, Touched
+from ..unseen.unseen_stretches import Unseen
+
+
+def contact_spreads(found: Search, unseen: Unseen) -> ContactResult | None:
+    """
+    Return how far tool points are from their contacts, or None where an instrument measured.
+
+    Parameters
+    ----------
+    found : Search
+    unseen : Unseen
+        Of the final model; each place is left out in turn where there are enough.
+
+    """
+    problem = found.problem
+    if not problem.touched:
+        return None
+    before, was = _of(problem, found.baseline.model)
+    after, now = _of(problem, found.final.model)
+    held = _held_out(unseen)
+    touched = tuple(
+        Touched(
+            label,
+            before[label].size,
+            *(float(each[label].mean()) for each in (before, after, held)),
+        )
+        for label in before
+    )
+    known = tuple(
+        KnownLength(a.tie.between, a.tie.kind, a.tie.value, a.tie.sigma, a.found, b.found)
+        for a, b in zip(was, now, strict=True)
+    )
+    was_m, now_m, held_m = (
+        float(np.concatenate(list(each.values())).mean()) for each in (before, after, held)
+    )
+    return ContactResult(was_m, now_m, held_m, touched, known)
+
+
+def _of(problem: Problem, model: Model) -> tuple[dict[str, Array], list[Length]]:
+    """Return distances from every contact and what is made of known lengths, at a model."""
+    away: dict[str, Array] = {}
+    known: list[Length] = []
+    for k, recording in enumerate(problem.recordings):
+        assert recording.contacts is not None
+        points = model.twin(k).poses(recording, recording.joints.t).position
+        away |= spreads(recording.contacts, points)
+        known += lengths(recording.contacts, points)
+    return away, known
+
+
+def _held_out(unseen: Unseen) -> dict[str, Array]:
+    """Return distances from every contact as predicted where it was not fitted."""
+    parts = unseen.problem.by_sample(unseen.predict(range(len(unseen.parts))))
+    out: dict[str, Array] = {}
+    for recording, part, weight in zip(
+        unseen.problem.recordings, parts, unseen.scale.weights, strict=True
+    ):
+        contacts = recording.contacts
+        assert contacts is not None
+        rows = part * unseen.scale.position / np.sqrt(weight)[:, None]
+        for label in dict.fromkeys(contacts.labels):
+            index = contacts.of(label)
+            own = rows[index]
+            if own.shape[1] == 3:
+                own = own - own.mean(axis=0)
+            out[label] = np.linalg.norm(own, axis=1)
+    return out

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Contacts as a problem: one recording per place, the tool point to start from.
+
+A place is whatever hangs together by known lengths: one socket, two sockets on a plate, a block.
+Where it is, is not known, so no contact shows where the base is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arm.rotation import transform
+from ...arrays import Array
+from ...contacts import places
+from ...effects.effect import Effect
+from ...errors import DataError
+from ...recording import Measurements, Recording
+from ..algebra.problem import Anchor, Model, Problem
+
+NEAR = 0.02
+"""Median distance [m] of the tool point from its contacts from which a fit finds its own way."""
+ROUNDS = 20
+"""Times that the tool vector is found anew with less weight for what is off; it settles sooner."""
+FLOOR = 1e-5
+"""Distance [m] below which a contact gains no more weight."""
+FEWEST = 2
+"""Postures that one contact needs at the least: of a single one its unknown place takes everything."""
+
+
+def posed(
+    recordings: Sequence[Recording], robot: Robot, align: frozenset[str], known: Sequence[Effect]
+) -> tuple[Problem, Model]:
+    """
+    Return contacts as a problem, and the model that a search starts from.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        With contacts, all of them.
+    robot : Robot
+        The nominal model.
+    align : frozenset of str
+        'tool' where the tool point is not known; 'base' says nothing here.
+    known : sequence of Effect
+        Put into the twin first.
+
+    Raises
+    ------
+    DataError
+        Some recordings are contacts and others are not, or contacts are too few.
+
+    """
+    each = [part for recording in recordings for part in by_place(recording)]
+    bases = tuple(robot.T_world_base for _ in each)
+    model = Model(robot, bases, tuple(known))
+    if 'tool' in align:
+        model = replace(model, robot=robot.with_frames(tool=_tool(each, model)))
+    filled = [_filled(recording, model, k) for k, recording in enumerate(each)]
+    anchor = Anchor(bases, model.robot.T_flange_tool)
+    problem = Problem(tuple(filled), align & {'tool'}, anchor)
+    return problem.touching(model), model
+
+
+def by_place(recording: Recording) -> list[Recording]:
+    """
+    Return the contacts of every place as a recording of its own.
+
+    Raises
+    ------
+    DataError
+        There are no contacts, or too few of one.
+
+    """
+    contacts = recording.contacts
+    if contacts is None:
+        raise DataError(
+            f'{recording.name} holds no contacts and other recordings do; diagnose them apart'
+        )
+    for label in dict.fromkeys(contacts.labels):
+        if contacts.of(label).size < FEWEST:
+            raise DataError(
+                f'contact {label!r} of {recording.name} has {contacts.of(label).size} postures; '
+                f'touch it in at least {FEWEST}'
+            )
+    out = []
+    for index in contacts.parts():
+        part = contacts.take(index)
+        motion = replace(
+            recording.joints, t=recording.joints.t[index], q=recording.joints.q[index], qd=None
+        )
+        name = '+'.join(contact.label for contact in part.artefact.contacts)
+        out.append(replace(recording, name=name, joints=motion, contacts=part))
+    return out
+
+
+def _filled(recording: Recording, model: Model, k: int) -> Recording:
+    """Return the recording with what its contacts measure at the model, for pictures."""
+    assert recording.contacts is not None
+    points = model.twin(k).poses(recording, recording.joints.t).position
+    where = places(recording.contacts, points).foot(points)
+    return recording.with_measured(Measurements(recording.joints.t, where))
+
+
+def _tool(recordings: Sequence[Recording], model: Model) -> Array:
+    """
+    Return the tool frame whose point rests at the contacts: the many-point tool calibration.
+
+    The turn of the tool is not seen by a point and stays as given. Only contacts of points tell;
+    without them, or where the given point is near already, it stays.
+    """
+    given = model.robot.T_flange_tool
+    if _off(recordings, model) < NEAR:
+        return given
+    bare = replace(model, robot=model.robot.with_frames(tool=np.eye(4)))
+    normal = []
+    for k, recording in enumerate(recordings):
+        contacts = recording.contacts
+        assert contacts is not None
+        flange = bare.twin(k).poses(recording, recording.joints.t)
+        for contact in contacts.artefact.contacts:
+            if contact.kind == 'point':
+                index = contacts.of(contact.label)
+                normal.append((flange.position[index], flange.rotation[index]))
+    if not normal:
+        return given
+    return transform(given[:3, :3], _tool_point(normal))
+
+
+def _tool_point(touched: Sequence[tuple[Array, Array]]) -> Array:
+    """Return the vector in the flange that stays in place at every contact, shape (3,) [m]."""
+    weights: list[Array] = [np.ones(len(point)) for point, _ in touched]
+    vector: Array = np.zeros(3)
+    for _ in range(ROUNDS):
+        square, right, off = np.zeros((3, 3)), np.zeros(3), []
+        for (point, turn), weight in zip(touched, weights, strict=True):
+            share = weight / weight.sum()
+            columns = turn - np.einsum('m,mij', share, turn)
+            left = share @ point - point
+            square += np.einsum('m,mki,mkj', weight, columns, columns)
+            right += np.einsum('m,mki,mk', weight, columns, left)
+            off.append((columns, left))
+        vector = np.linalg.lstsq(square, right, rcond=1e-9)[0]
+        weights = [1.0 / np.maximum(np.linalg.norm(c @ vector - s, axis=1), FLOOR) for c, s in off]
+    return vector
+
+
+def _off(recordings: Sequence[Recording], model: Model) -> float:
+    sizes = []
+    for k, recording in enumerate(recordings):
+        assert recording.contacts is not None
+        points = model.twin(k).poses(recording, recording.joints.t).position
+        rows = places(recording.contacts, points).rows(points)[0]
+        sizes.append(np.linalg.norm(rows, axis=1))
+    return float(np.median(np.concatenate(sizes)))

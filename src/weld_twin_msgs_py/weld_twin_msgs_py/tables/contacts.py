@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A table of joint angles and what was touched, English or German, to a recording of stations."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.contacts import Artefact, Contact, Contacts
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Recording
+
+from .build import Table, joint_angles, own_epoch
+from .cells import Cells, read_cells
+from .header import joint_columns
+from .table_options import TableOptions
+from .unit_guess import METRES
+
+WORDS = {
+    'contact': {'contact', 'contacts', 'label', 'kontakt', 'beruehrung', 'berührung', 'punkt'},
+    'kind': {'kind', 'type', 'art', 'typ'},
+    'value': {'value', 'length', 'distance', 'wert', 'laenge', 'länge', 'abstand'},
+    'sigma': {'sigma', 'std', 'uncertainty', 'unsicherheit', 'streuung'},
+}
+"""Names of the columns besides the joints."""
+KINDS = {
+    'punkt': 'point',
+    'kugel': 'sphere',
+    'ebene': 'plane',
+    'flaeche': 'plane',
+    'fläche': 'plane',
+    'linie': 'line',
+    'gerade': 'line',
+    'kante': 'line',
+    'laenge': 'length',
+    'länge': 'length',
+}
+"""German words for the kinds of contact."""
+ARM = 5.0
+"""Length [m] beyond which a value is taken for millimetres: no bar of a cell is longer."""
+
+
+def read_contacts(
+    path: Path | str,
+    robot: Robot,
+    artefact: Artefact | None = None,
+    options: TableOptions | None = None,
+) -> Table:
+    """
+    Read a table of joint angles and contacts.
+
+    Parameters
+    ----------
+    path : Path or str
+        A text file with a header line: joint columns, ``contact``, and where they apply ``kind``,
+        ``value`` and ``sigma``; or ``Kontakt``, ``Art``, ``Wert``, ``Unsicherheit``.
+    robot : Robot
+        Its joint names pick the columns.
+    artefact : Artefact, optional
+        What is touched; labels that it does not have are refused. Left out, the table's kinds say.
+    options : TableOptions, optional
+        What the user knows.
+
+    Raises
+    ------
+    DataError
+        The table cannot be read; the message names line or column.
+
+    """
+    options = options or TableOptions()
+    cells = read_cells(path, options.delimiter, options.decimal)
+    said = list(cells.said)
+    columns = _columns(cells)
+    joints = joint_columns(cells.header, robot, options)
+    said.append('joint columns are ' + ', '.join(joints))
+    cells = _kept(cells, options)
+    q = joint_angles(cells, robot, joints, options, said)
+    gaps = np.flatnonzero(~np.isfinite(q).all(axis=1))
+    if gaps.size:
+        raise DataError(f"table '{path}' line {cells.lines[gaps[0]]} has an empty joint angle")
+    labels = tuple(cells.column(columns['contact']))
+    if '' in labels:
+        raise DataError(f"table '{path}' line {cells.lines[labels.index('')]} names no contact")
+    value = _lengths(cells, columns.get('value'), options, said)
+    sigma = _lengths(cells, columns.get('sigma'), options, said)
+    kinds = _kinds(cells, columns.get('kind'), labels, value)
+    known = _artefact(path, artefact, kinds)
+    contacts = Contacts(
+        known,
+        labels,
+        None if value is None else np.nan_to_num(value),
+        None if sigma is None or not np.isfinite(sigma).all() else sigma,
+    )
+    for label in dict.fromkeys(labels):
+        kind = known.named(label).kind
+        said.append(f'{contacts.of(label).size} postures touch {label!r}, a {kind}')
+    recording = Recording(
+        cells.path.stem,
+        JointMotion(np.arange(float(len(q))), q, static=True),
+        epoch_ns=own_epoch(cells.path),
+        notes=tuple(said),
+        contacts=contacts,
+    )
+    return Table(recording, tuple(said))
+
+
+def _columns(cells: Cells) -> dict[str, str]:
+    """Return the columns by use; their unit, if any, is the last word of their name."""
+    out: dict[str, str] = {}
+    for name in cells.header:
+        first = re.split(r'[^0-9a-zäöüß]+', name.lower())[0]
+        for use, words in WORDS.items():
+            if first in words:
+                out.setdefault(use, name)
+    if 'contact' not in out:
+        raise DataError(
+            f"table '{cells.path}' has no column 'contact' that says what each posture touched; "
+            'its columns are ' + ', '.join(cells.header)
+        )
+    return out
+
+
+def _kept(cells: Cells, options: TableOptions) -> Cells:
+    keep = [k for k in range(len(cells.rows)) if k + 1 not in options.skip_rows]
+    return replace(cells, rows=[cells.rows[k] for k in keep], lines=[cells.lines[k] for k in keep])
+
+
+def _lengths(
+    cells: Cells, name: str | None, options: TableOptions, said: list[str]
+) -> Array | None:
+    """Return a column of lengths [m]; millimetres where its name or its size says so."""
+    if name is None:
+        return None
+    values = cells.numbers(name)
+    if np.isnan(values).all():
+        return None
+    last = re.split(r'[^0-9a-z]+', name.lower().rstrip('])'))[-1]
+    unit = options.length_unit or (last if last in METRES else None)
+    if unit is None:
+        unit = 'mm' if np.nanmax(np.abs(values)) > ARM else 'm'
+        said.append(f'{name} is in {unit}; --length-unit decides')
+    return values * METRES[unit]
+
+
+def _kinds(
+    cells: Cells, name: str | None, labels: tuple[str, ...], value: Array | None
+) -> dict[str, str]:
+    """Return the kind of every label."""
+    texts = ['' for _ in labels] if name is None else cells.column(name)
+    out: dict[str, str] = {}
+    for k, (label, text) in enumerate(zip(labels, texts, strict=True)):
+        kind = KINDS.get(text.lower(), text.lower())
+        if not kind:
+            kind = 'length' if value is not None and np.isfinite(value[k]) else 'point'
+        if out.setdefault(label, kind) != kind:
+            raise DataError(
+                f"table '{cells.path}' line {cells.lines[k]}: contact {label!r} is a {kind} here "
+                f'and a {out[label]} above'
+            )
+    return out
+
+
+def _artefact(path: Path | str, given: Artefact | None, kinds: dict[str, str]) -> Artefact:
+    if given is None:
+        return Artefact(tuple(Contact(label, kind) for label, kind in kinds.items()))
+    for label in kinds:
+        try:
+            given.named(label)
+        except DataError as error:
+            raise DataError(f"table '{path}': {error}") from None
+    return given

@@ -58,6 +58,25 @@ def parse_urdf(
     return _of_tree(parse_tree(text, source), source, base_link, tip_link)
 
 
+def chain_of(
+    path: Path | str, base_link: str | None = None, tip_link: str | None = None
+) -> tuple[list[Joint], Array]:
+    """
+    Return the joints from base to tip, fixed ones too, and where the first hangs in the base.
+
+    Parameters
+    ----------
+    path, base_link, tip_link
+        As for `read_urdf`.
+
+    """
+    tree = read_tree(path)
+    base = _base(tree, base_link)
+    tip = _tip(tree, base, tip_link)
+    start, T_base_start = _start(tree, base, tip)
+    return _chain(tree, start, tip), T_base_start
+
+
 def _of_tree(tree: Tree, path: Path | str, base_link: str | None, tip_link: str | None) -> Robot:
     try:
         base = _base(tree, base_link)

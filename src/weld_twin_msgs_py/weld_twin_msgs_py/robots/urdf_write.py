@@ -68,6 +68,23 @@ def write_urdf(
     write_text(path, text, overwrite=overwrite)
 
 
+def joint_frames(robot: Robot) -> list[Array]:
+    """
+    Return the frame of every joint at zero, axis z, and of the tool last, (4, 4) each.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    """
+    out, ahead = [], robot.T_world_base
+    for k in range(robot.n):
+        before, after = _split_row(robot, k)
+        out.append(ahead @ before)
+        ahead = out[-1] @ after
+    return [*out, ahead @ robot.T_flange_tool]
+
+
 def _split_row(robot: Robot, k: int) -> tuple[Array, Array]:
     """Return the parts of a row before and after its motion, which is about or along z."""
     turned = turn(0, robot.alpha[k]) @ turn(1, robot.beta[k])
@@ -82,7 +99,9 @@ def _joint(root: Element, name: str, parent: str, child: str, T: Array) -> Eleme
     joint = SubElement(root, 'joint', {'name': name, 'type': 'fixed'})
     SubElement(joint, 'parent', {'link': parent})
     SubElement(joint, 'child', {'link': child})
-    SubElement(joint, 'origin', {'xyz': _numbers(T[:3, 3]), 'rpy': _numbers(_rpy(T[:3, :3]))})
+    SubElement(
+        joint, 'origin', {'xyz': numbers(T[:3, 3]), 'rpy': numbers(roll_pitch_yaw(T[:3, :3]))}
+    )
     return joint
 
 
@@ -100,12 +119,12 @@ def _motion(joint: Element, robot: Robot, k: int) -> None:
 
 def _inertial(link: Element, mass: float, com: Array) -> None:
     inertial = SubElement(link, 'inertial')
-    SubElement(inertial, 'origin', {'xyz': _numbers(com), 'rpy': '0 0 0'})
+    SubElement(inertial, 'origin', {'xyz': numbers(com), 'rpy': '0 0 0'})
     SubElement(inertial, 'mass', {'value': repr(float(mass))})
     SubElement(inertial, 'inertia', dict.fromkeys(('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'), '0'))
 
 
-def _rpy(rotation: Array) -> Array:
+def roll_pitch_yaw(rotation: Array) -> Array:
     """Return fixed-axis roll, pitch, yaw; each angle is taken out before the next is read."""
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     rest = turn(2, yaw).T @ rotation
@@ -113,5 +132,6 @@ def _rpy(rotation: Array) -> Array:
     return np.array([np.arctan2(-rest[1, 2], rest[1, 1]), pitch, yaw])
 
 
-def _numbers(values: Array) -> str:
+def numbers(values: Array) -> str:
+    """Return numbers as a URDF has them, so that they are read back as they are."""
     return ' '.join(repr(float(value)) for value in values)

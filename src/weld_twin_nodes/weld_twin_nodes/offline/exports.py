@@ -18,6 +18,7 @@ from weld_twin_core.twin.corrected import corrected, joint_offsets
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
+from weld_twin_msgs_py.robots.urdf_like import GivenUrdf, write_urdf_like
 
 _EVERYTHING = 'Every effect of the twin; goes with the nominal robot.'
 _LEFT_OVER = 'What the corrected robot.yaml cannot hold; goes with that, not with the nominal.'
@@ -70,10 +71,28 @@ FORMATS: dict[str, tuple[str, Callable[[Path, Model, Sequence[str]], None]]] = {
 """What the command line calls a form, its usual file name, and how it is written."""
 
 
-def write_all(directory: Path, model: Model, notes: Sequence[str] = ()) -> None:
-    """Write the model in every form, with notes on where it holds."""
+def write_all(
+    directory: Path, model: Model, notes: Sequence[str] = (), given: GivenUrdf | None = None
+) -> None:
+    """
+    Write the model in every form.
+
+    Parameters
+    ----------
+    directory : Path
+    model : Model
+    notes : sequence of str
+        Where it holds.
+    given : GivenUrdf, optional
+        The URDF that the robot was read from, whose names the corrected one keeps.
+
+    """
     for name, write in FORMATS.values():
         write(directory / name, model, notes)
+    if given is not None:
+        said = [*_mended(model), *notes]
+        robot = _corrected(model)[0]
+        write_urdf_like(directory / FORMATS['urdf'][0], given, robot, overwrite=True, notes=said)
 
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:

@@ -18,6 +18,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
 
 from ..offline.exports import write_all
 from ..offline.where_it_holds import where_it_holds
@@ -29,11 +30,26 @@ NEXT = 'next_experiment.yaml'
 """The motion to measure next, where one decides; the trajectory generator runs it."""
 
 
-def write_results(directory: Path, diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> None:
+def write_results(
+    directory: Path,
+    diagnosis: Diagnosis,
+    inputs: Sequence[InputFile],
+    given: GivenUrdf | None = None,
+) -> None:
     """
     Write diagnosis.json, the page, the model in every form, and what to measure next.
 
     Where the data are unsound there is no model: the page and diagnosis.json say what is wrong.
+
+    Parameters
+    ----------
+    directory : Path
+    diagnosis : Diagnosis
+    inputs : sequence of InputFile
+        What it was made from.
+    given : GivenUrdf, optional
+        The URDF that the robot was read from; ``robot.urdf`` then keeps its names.
+
     """
     wanted = diagnosis.next_experiment
     if wanted is not None and wanted.get('motion') is not None:
@@ -43,7 +59,7 @@ def write_results(directory: Path, diagnosis: Diagnosis, inputs: Sequence[InputF
     if diagnosis.status != 'unsound':
         posterior = diagnosis.posterior
         notes = [] if posterior is None else where_it_holds(posterior)
-        write_all(directory, diagnosis.model, notes)
+        write_all(directory, diagnosis.model, notes, given)
     write_text(directory / RESULT, diagnosis_text(diagnosis, inputs))
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from weld_twin_core.diagnosis import Diagnosis
     from weld_twin_core.recording import Recording
     from weld_twin_msgs_py.files.input_files import InputFile
+    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
 
 UNSOUND = 3
 """Exit code where data or set-up are wrong."""
@@ -90,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
 
     with new_directory(args.out, mark=RESULT) as place:
         diagnosis = _diagnosis(args)
-        write_results(place, diagnosis, _inputs(args))
+        write_results(place, diagnosis, _inputs(args), _given_urdf(args))
     console = Console(highlight=False)
     print_summary(diagnosis, console)
     console.print(f'report: {Path(args.out) / PAGE}', markup=False)
@@ -161,6 +162,17 @@ def _families(names: Sequence[str]) -> tuple[str, ...]:
                 + ', '.join(sorted(REGISTRY))
             )
     return tuple(names)
+
+
+def _given_urdf(args: argparse.Namespace) -> GivenUrdf | None:
+    """Return the URDF that the robot was read from, None for another robot file."""
+    from weld_twin_msgs_py.robots.load import URDF_SUFFIXES
+    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
+
+    path = Path(args.robot)
+    if path.suffix.lower() not in URDF_SUFFIXES:
+        return None
+    return GivenUrdf(path, args.base_link, args.tip_link)
 
 
 def _inputs(args: argparse.Namespace) -> list[InputFile]:

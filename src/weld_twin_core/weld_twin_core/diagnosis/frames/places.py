@@ -145,7 +145,7 @@ def _tool_point(touched: Sequence[tuple[Array, Array]]) -> Array:
             square += np.einsum('m,mki,mkj', weight, columns, columns)
             right += np.einsum('m,mki,mk', weight, columns, left)
             off.append((columns, left))
-        vector = np.linalg.lstsq(square, right, rcond=1e-9)[0]
+        vector = np.asarray(np.linalg.lstsq(square, right, rcond=1e-9)[0], dtype=float)
         weights = [1.0 / np.maximum(np.linalg.norm(c @ vector - s, axis=1), FLOOR) for c, s in off]
     return vector
 

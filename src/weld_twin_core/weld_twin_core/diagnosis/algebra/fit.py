@@ -285,17 +285,25 @@ def robust_scale(
     return Scale(sigma, sigma_turn, tuple(weights))
 
 
-def trusted(weights: Sequence[Array]) -> list[NDArray[np.bool_]]:
+def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
     """
     Return which samples count in every quoted figure, (M,) per recording.
 
-    All but outliers, and of those no more than `SET_ASIDE` (or one) are left out, the farthest: what
-    many samples do is structure, and must show in what is left.
+    All but outliers, and of those no more than `SET_ASIDE` (or a few) are left out, the farthest:
+    what many samples do is structure, and must show in what is left.
+
+    Parameters
+    ----------
+    weights : sequence of array, shape (M,)
+        Of every sample of every recording, as a robust fit gives them.
+    few : int
+        Outliers that may be left out however few samples there are.
+
     """
     every = np.concatenate(list(weights)) if weights else np.zeros(0)
-    aside = max(1, int(SET_ASIDE * every.size))
-    few = float(np.sort(every)[aside]) if every.size > aside else 0.0
-    return [weight >= min(TRUSTED, few) for weight in weights]
+    aside = max(few, int(SET_ASIDE * every.size))
+    least = float(np.sort(every)[aside]) if every.size > aside else 0.0
+    return [weight >= min(TRUSTED, least) for weight in weights]
 
 
 def robust_fit(

@@ -130,9 +130,27 @@ def _refined(
 
     Beside it, effects that would have done but that no machine has.
     """
-    best_nats = ranked[0].nats
-    slack = max(work.beliefs.close_nats, work.beliefs.close_share * best_nats)
-    close = [c for c in ranked if c.nats > best_nats - slack]
+    best, impossible = _best_of(
+        work, now, _close(work, ranked, work.beliefs.close_share), effective
+    )
+    if best is None and impossible:
+        # Part of a wave that no gear has is a plausible ratio of the gear, fitted a little worse.
+        wider = _close(work, ranked, work.beliefs.rival_share)
+        best, _ = _best_of(work, now, wider, effective)
+    return best, impossible
+
+
+def _close(work: Workspace, ranked: list[Choice], share: float) -> list[Choice]:
+    """Return the choices whose evidence is close to the best."""
+    best = ranked[0].nats
+    slack = max(work.beliefs.close_nats, share * best)
+    return [c for c in ranked if c.nats > best - slack]
+
+
+def _best_of(
+    work: Workspace, now: Fit, close: list[Choice], effective: Callable[[Fit], float]
+) -> tuple[Step | None, list[Effect]]:
+    """Return the best of some choices after a nonlinear fit of each, and those refused."""
     tried = [(c, fitted_with(work, now.model, c.effect())) for c in close[:SHORTLIST]]
     # One count for all, that of the fit which leaves least: a worse model explains less and would
     # otherwise be allowed more rows.

@@ -19,7 +19,6 @@ from import_graph import (
 LAYERS = layer_table((ROOT / 'docs/architecture.md').read_text(encoding='utf-8'))
 PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes', 'weld_twin_lab']
 FILES = module_files(ROOT / 'src')
-GRAPH = import_graph(FILES)
 
 
 def tree(folder: Path, sources: dict[str, str]) -> dict[str, Path]:
@@ -29,6 +28,11 @@ def tree(folder: Path, sources: dict[str, str]) -> dict[str, Path]:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(source)
     return module_files(folder)
+
+
+@pytest.fixture(scope='module')
+def graph():
+    return import_graph(FILES)
 
 
 def test_the_graph_finds_imports_wherever_they_stand(tmp_path):
@@ -55,17 +59,17 @@ def test_the_graph_finds_imports_wherever_they_stand(tmp_path):
     assert against_order(grouped(graph, 2), ['p.room', 'p.low', 'p.top']) == ['p.room -> p.low']
 
 
-def test_packages_point_one_way():
+def test_packages_point_one_way(graph):
     assert [house for house in LAYERS if '.' not in house] == PACKAGES
-    packages = grouped(GRAPH, 1)
+    packages = grouped(graph, 1)
     assert sorted(packages) == sorted(PACKAGES)
     assert against_order(packages, PACKAGES) == []
 
 
-def test_the_plant_knows_no_other_room():
+def test_the_plant_knows_no_other_room(graph):
     outward = {
         f'{module} -> {other}'
-        for module, others in GRAPH.items()
+        for module, others in graph.items()
         for other in others
         if module.startswith('weld_twin_lab.plant') and not other.startswith('weld_twin_lab.plant')
     }
@@ -82,9 +86,9 @@ def test_every_room_has_its_layer_in_the_architecture_page(house):
 
 
 @pytest.mark.parametrize('house', LAYERS)
-def test_rooms_point_to_rooms_below_them(house):
+def test_rooms_point_to_rooms_below_them(house, graph):
     order = [f'{house}.{room}' for room in LAYERS[house]]
-    assert against_order(grouped(GRAPH, len(house.split('.')) + 1), order) == []
+    assert against_order(grouped(graph, len(house.split('.')) + 1), order) == []
 
 
 @pytest.mark.parametrize('package', PACKAGES)
@@ -95,8 +99,8 @@ def test_tests_of_a_package_import_it_and_those_below_alone(package):
         assert named & set(PACKAGES) <= allowed, file
 
 
-def test_no_files_import_each_other_in_a_circle():
-    assert circles(GRAPH) == []
+def test_no_files_import_each_other_in_a_circle(graph):
+    assert circles(graph) == []
 
 
 def test_the_architecture_page_names_every_folder():

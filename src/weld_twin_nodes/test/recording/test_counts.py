@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -53,12 +54,21 @@ def test_health_of_somebody_else_counts_nothing(values):
 def test_a_node_is_waited_for_until_it_has_told_or_never_will():
     book = SentBook()
     book.meet('/new', 10.0)
-    assert book.silent_since(10.5, 10.5) == ['/new']
-    assert book.silent_since(10.5, 10.5 + NEW) == []  # a driver of somebody else
+    assert book.silent_since(10.5) == ['/new']
+    for look in np.arange(0.2, NEW + 0.3, 0.2):
+        book.meet('/new', 10.0 + look)
+    assert book.silent_since(10.5) == []  # a driver of somebody else
     book.take(health('/new', sent={'/x': [1, 1, 1]}), 10.2)
-    assert book.silent_since(10.5, 20.0) == ['/new']
+    assert book.silent_since(10.5) == ['/new']
     book.take(health('/new', sent={'/x': [2, 1, 2]}), 10.6)
-    assert book.silent_since(10.5, 20.0) == []
+    assert book.silent_since(10.5) == []
+
+
+def test_time_in_which_the_recorder_stood_still_is_not_time_to_tell_in():
+    book = SentBook()
+    book.meet('/new', 10.0)
+    book.meet('/new', 10.0 + 10 * NEW)
+    assert book.silent_since(10.5) == ['/new']
 
 
 @pytest.mark.parametrize(

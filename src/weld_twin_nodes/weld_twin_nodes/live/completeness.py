@@ -10,8 +10,11 @@ from typing import Any, NamedTuple
 from .outputs import NODE, RUN, Sent, read_told
 
 NEW = 3.0
-"""Seconds a node is given to tell of itself for the first time; each tells once a second. One
-that has not by then is not of this project."""
+"""Seconds a node is listened to for the first time; each tells of itself once a second. One that
+has not by then is not of this project."""
+STEP = 0.5
+"""Longest time [s] between two looks that counts as listened: a recorder that stood still, or was
+not given a processor, has not listened meanwhile."""
 
 
 class SentBook:
@@ -20,7 +23,8 @@ class SentBook:
     def __init__(self) -> None:
         self._tellers: dict[tuple[str, str], dict[str, Sent]] = {}
         self._heard: dict[str, float] = {}
-        self._met: dict[str, float] = {}
+        self._looked: dict[str, float] = {}
+        self._listened: dict[str, float] = {}
 
     def take(self, values: Mapping[str, str], now: float) -> None:
         """Take the health of a node at a time [s]; what tells of no messages is passed over."""
@@ -31,15 +35,17 @@ class SentBook:
             self._heard[node] = now
 
     def meet(self, node: str, now: float) -> None:
-        """Take note that a node publishes something that is recorded."""
-        self._met.setdefault(node, now)
+        """Take note at every look [s] that a node publishes something that is recorded."""
+        passed = now - self._looked.get(node, now)
+        self._listened[node] = self._listened.get(node, 0.0) + min(passed, STEP)
+        self._looked[node] = now
 
-    def silent_since(self, then: float, now: float) -> list[str]:
+    def silent_since(self, then: float) -> list[str]:
         """Return the nodes met that tell, or may tell, of themselves and have not since [s]."""
         out = []
-        for node, met in self._met.items():
+        for node, listened in self._listened.items():
             heard = self._heard.get(node)
-            if now - met < NEW if heard is None else heard < then:
+            if listened < NEW if heard is None else heard < then:
                 out.append(node)
         return out
 

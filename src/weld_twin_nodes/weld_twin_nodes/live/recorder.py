@@ -189,8 +189,8 @@ class Recorder(CellNode):
 
     def _untold(self) -> list[str]:
         """Return the nodes recorded here that have not told what they sent since the end."""
-        now, there = time.monotonic(), self._meet()
-        silent = self._book.silent_since(self._ending_since or now, now)
+        there = self._meet()
+        silent = self._book.silent_since(self._ending_since or time.monotonic())
         return [node for node in silent if node in there]
 
     def _meet(self) -> set[str]:

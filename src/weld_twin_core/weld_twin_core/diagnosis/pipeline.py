@@ -17,7 +17,7 @@ from .answer.refusal import refusal
 from .beliefs import Beliefs
 from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
-from .hypotheses.search import search
+from .hypotheses.search import Search, search
 from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.carried import carried
 from .levels.curved import curved
@@ -151,8 +151,7 @@ def _explained(
     signs = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks)
     progress('held against curves without a formula')
     found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)
-    final = held(found.final, found.problem, found.scale, found.precision, examined.given.robot)
-    found = replace(found, final=final)
+    found = _held(found, examined.given.robot)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
     return answer(
@@ -166,3 +165,9 @@ def _explained(
         rival=rival,
         signs=signs,
     )
+
+
+def _held(found: Search, robot: Robot) -> Search:
+    """Return what was found with its frames as near to the given ones as the data bear."""
+    final = held(found.final, found.problem, found.scale, found.precision, robot)
+    return replace(found, final=final)

@@ -34,9 +34,28 @@ def goal_measures(cases: Sequence[Case], trust: Trust) -> list[Measure]:
     trust : Trust
 
     """
-    single = [c for c in cases if c.judged.kind == 'single' and c.judged.stratum >= SEEN]
-    foreign = [c for c in cases if c.judged.kind in NOT_IN_LIBRARY]
     known = [c for c in cases if c.judged.in_library and c.judged.stratum >= SEEN]
+    return [
+        *_of_causes(cases, trust),
+        *_of_foreign([c for c in cases if c.judged.kind in NOT_IN_LIBRARY]),
+        Measure(
+            'needless_unknown',
+            'causes in the library, 1 noise or more: needlessly unknown',
+            share([c.judged.status == 'unknown' for c in known]),
+            0.02,
+            False,
+        ),
+        Measure(
+            'fia', 'mean belief in the true family, one cause detected', _fia(cases, trust), 0.93
+        ),
+        Measure('breadth', 'members of a set, median', _breadth(cases), 2.0, False),
+        Measure('seconds', 'processor seconds of a diagnosis, median', _seconds(cases)),
+    ]
+
+
+def _of_causes(cases: Sequence[Case], trust: Trust) -> list[Measure]:
+    """Return the measures of named causes, and of what is said as sure."""
+    single = [c for c in cases if c.judged.kind == 'single' and c.judged.stratum >= SEEN]
     wrong = [confidence(c, trust) > CONFIDENT and not c.right for c in cases]
     return [
         Measure('sure_wrong', 'sure (> 0.8) and wrong', share(wrong), 0.01, False),
@@ -53,6 +72,12 @@ def goal_measures(cases: Sequence[Case], trust: Trust) -> list[Measure]:
         Measure(
             'triple_named', 'three causes, each 3 noise: all named', _named(cases, 'triple'), 0.85
         ),
+    ]
+
+
+def _of_foreign(foreign: Sequence[Case]) -> list[Measure]:
+    """Return the measures of causes that the library does not have."""
+    return [
         Measure(
             'honest',
             'withheld or outside: unknown, a set that holds it, or as good on sealed data',
@@ -69,18 +94,6 @@ def goal_measures(cases: Sequence[Case], trust: Trust) -> list[Measure]:
             _removed(foreign),
             0.70,
         ),
-        Measure(
-            'needless_unknown',
-            'causes in the library, 1 noise or more: needlessly unknown',
-            share([c.judged.status == 'unknown' for c in known]),
-            0.02,
-            False,
-        ),
-        Measure(
-            'fia', 'mean belief in the true family, one cause detected', _fia(cases, trust), 0.93
-        ),
-        Measure('breadth', 'members of a set, median', _breadth(cases), 2.0, False),
-        Measure('seconds', 'processor seconds of a diagnosis, median', _seconds(cases)),
     ]
 
 

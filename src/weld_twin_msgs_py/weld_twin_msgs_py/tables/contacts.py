@@ -97,9 +97,7 @@ def read_contacts(
         None if value is None else np.nan_to_num(value),
         None if sigma is None or not np.isfinite(sigma).all() else sigma,
     )
-    for label in dict.fromkeys(labels):
-        kind = known.named(label).kind
-        said.append(f'{contacts.of(label).size} postures touch {label!r}, a {kind}')
+    said += _touched(contacts, known)
     recording = Recording(
         cells.path.stem,
         JointMotion(np.arange(float(len(q))), q, static=True),
@@ -108,6 +106,14 @@ def read_contacts(
         contacts=contacts,
     )
     return Table(recording, tuple(said))
+
+
+def _touched(contacts: Contacts, known: Artefact) -> list[str]:
+    """Return how often each thing was touched, in words."""
+    return [
+        f'{contacts.of(label).size} postures touch {label!r}, a {known.named(label).kind}'
+        for label in dict.fromkeys(contacts.labels)
+    ]
 
 
 def _columns(cells: Cells) -> dict[str, str]:

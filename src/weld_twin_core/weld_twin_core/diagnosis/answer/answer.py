@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from ...twin.posterior import Posterior
 from ..advice import actions
@@ -12,7 +13,7 @@ from ..advice.next_step import next_step
 from ..hypotheses.search import Search
 from ..levels.causes import causes
 from ..levels.curved import Curved
-from ..result import Diagnosis, Shrink
+from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
@@ -60,15 +61,7 @@ def answer(
         What explains the gap without a formula.
 
     """
-    told, shares = causes(found, unseen, verdict, rival, evidence.floor, found.work.beliefs)
-    known = Signs(
-        {**signs, 'top_share': told[0].share if told else 0.0},
-        tuple(
-            signs_of_cause(cause, k, len(told), evidence.gap, evidence.floor, rival)
-            for k, cause in enumerate(told)
-        ),
-    )
-    verdict, told = trusted(verdict, told, known, usual_trust())
+    verdict, told, shares, known = _trusted(found, unseen, evidence, verdict, signs, rival)
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
         gap=gap(found, evidence.floor),
@@ -83,7 +76,6 @@ def answer(
         unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, rival),
         next_experiment=next_step(found, verdict),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
-        checks=(*examined.checks, *untold_check(found, examined.given.may_change)),
         model=found.final.model,
         traces=traces(found),
         absent=found.library.absent,
@@ -95,7 +87,37 @@ def answer(
         shares=shares,
         unsound=examined.told(found.final.model.found),
         signs=known,
-        changed=changed(found, examined.given.may_change),
-        may_change=examined.given.may_change,
         contacts=contact_spreads(found, unseen),
+        **_compared(found, examined),
     )
+
+
+def _trusted(
+    found: Search,
+    unseen: Unseen,
+    evidence: Evidence,
+    verdict: Verdict,
+    signs: Mapping[str, float],
+    rival: Curved | None,
+) -> tuple[Verdict, tuple[Cause, ...], Shares, Signs]:
+    """Return the verdict and the causes as far as they can be trusted, shares, and all signs."""
+    told, shares = causes(found, unseen, verdict, rival, evidence.floor, found.work.beliefs)
+    known = Signs(
+        {**signs, 'top_share': told[0].share if told else 0.0},
+        tuple(
+            signs_of_cause(cause, k, len(told), evidence.gap, evidence.floor, rival)
+            for k, cause in enumerate(told)
+        ),
+    )
+    verdict, told = trusted(verdict, told, known, usual_trust())
+    return verdict, told, shares, known
+
+
+def _compared(found: Search, examined: Examined) -> dict[str, Any]:
+    """Return what recordings say of each other, and what the checks say of that."""
+    named = examined.given.may_change
+    return {
+        'checks': (*examined.checks, *untold_check(found, named)),
+        'changed': changed(found, named),
+        'may_change': named,
+    }

@@ -38,6 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'bags', nargs='+', metavar='BAG', help='recordings of the cell, of one robot'
     )
     add_robot(parser)
+    _add_setup(parser)
+    _add_causes(parser)
+    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
+    add_topics(parser)
+
+
+def _add_setup(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--holdout',
         action='append',
@@ -51,6 +58,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FRAMES',
         help='frames that are not known, and are fitted: base, tool, or base,tool',
     )
+    parser.add_argument(
+        '--apply',
+        action='store_true',
+        help='if data or set-up are wrong and one correction explains it, make it and go on',
+    )
+
+
+def _add_causes(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--effects-known',
         default='',
@@ -72,13 +87,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='errors that may differ between the recordings, such as '
         'joint_offset,tool_pose,base_pose; the result says what changed since the first',
     )
-    parser.add_argument(
-        '--apply',
-        action='store_true',
-        help='if data or set-up are wrong and one correction explains it, make it and go on',
-    )
-    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
-    add_topics(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -52,22 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write program and sheet."""
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.files.whole_files import write_text
-    from weld_twin_msgs_py.programs.writing import WRITERS, sheet
+    from weld_twin_msgs_py.programs.writing import sheet
 
     from ...offline.exporting import FAST, SLOW, Speeds, export
 
-    if args.controller not in WRITERS:
-        known = ', '.join(WRITERS)
-        raise DataError(
-            f'--controller: there is no language {args.controller!r}; known are {known}'
-        )
-    if not (0.0 <= args.dwell <= 600.0 and 0 <= args.trigger <= 9999):
-        raise DataError('--dwell must be 0 to 600 s, and --trigger the number of an output')
+    _check(args)
     out = Path(args.out)
-    if out.exists():
-        raise DataError(f"'{out}' exists already and is not overwritten")
     context = context_of(args, robot_of(args), args.controller)
     share, tool = FAST if args.full_speed else SLOW
     speed = quantity(args.speed.removesuffix('/s'), ('mm', 'm'), '--speed') if args.speed else 0.0
@@ -92,3 +83,19 @@ def run(args: argparse.Namespace) -> int:
         print(f'note: {note}')
     print(f'how to load it and to record: {guide}')
     return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse options that no program can be written with."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.programs.writing import WRITERS
+
+    if args.controller not in WRITERS:
+        known = ', '.join(WRITERS)
+        raise DataError(
+            f'--controller: there is no language {args.controller!r}; known are {known}'
+        )
+    if not (0.0 <= args.dwell <= 600.0 and 0 <= args.trigger <= 9999):
+        raise DataError('--dwell must be 0 to 600 s, and --trigger the number of an output')
+    if Path(args.out).exists():
+        raise DataError(f"'{args.out}' exists already and is not overwritten")

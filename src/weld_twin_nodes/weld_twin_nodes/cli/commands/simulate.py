@@ -19,6 +19,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default='',
         help='effects that the twin knows: an effects file or diagnosis.json',
     )
+    _add_motion(parser)
+    add_bag_output(parser)
+
+
+def _add_motion(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--path',
         metavar='P',
@@ -50,7 +55,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NS',
         help='stamp of the first sample [ns]; 0 would mean unset (default: 1 s)',
     )
-    add_bag_output(parser)
 
 
 def run(args: argparse.Namespace) -> int:

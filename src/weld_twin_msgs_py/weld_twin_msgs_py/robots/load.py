@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from weld_twin_core.arm import catalog
+from weld_twin_core.arm.lent_masses import with_lent_masses
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError
 
@@ -45,7 +46,7 @@ def load_robot(
     if suffix == '.xacro':
         raise ModelError(f"'{spec}' is a xacro file; run 'xacro {spec}' to make the URDF of it")
     if suffix in URDF_SUFFIXES:
-        return read_urdf(path, base_link, tip_link)
+        return with_lent_masses(read_urdf(path, base_link, tip_link))
     if suffix in YAML_SUFFIXES or path.is_file():
         robot = read_robot_yaml(path)
     elif spec.lower() in catalog.names():

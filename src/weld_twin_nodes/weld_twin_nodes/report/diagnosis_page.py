@@ -14,6 +14,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 from .cause_levels import levels_section
 from .cause_list import causes_section
 from .changed_section import changed_section
+from .contact_clouds import contacts_section
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
 from .headline import header, opening
@@ -52,7 +53,7 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
 def _causes(diagnosis: Diagnosis) -> tuple[Html | None, ...]:
     """Return where the gap lies, what causes it, what that brings, and what to measure next."""
     return (
-        seam_section(diagnosis),
+        seam_section(diagnosis) if diagnosis.contacts is None else contacts_section(diagnosis),
         levels_section(diagnosis),
         where_section(diagnosis),
         causes_section(diagnosis),

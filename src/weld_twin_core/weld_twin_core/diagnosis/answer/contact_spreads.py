@@ -8,6 +8,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...contacts import Length, lengths, spreads
+from ...effects import REGISTRY
+from ...effects.plausible import spreads as spreads_of
 from ..algebra.problem import Model, Problem
 from ..hypotheses.search import Search
 from ..result import ContactResult, KnownLength, Touched
@@ -46,7 +48,37 @@ def contact_spreads(found: Search, unseen: Unseen) -> ContactResult | None:
     was_m, now_m, held_m = (
         float(np.concatenate(list(each.values())).mean()) for each in (before, after, held)
     )
-    return ContactResult(was_m, now_m, held_m, touched, known)
+    return ContactResult(was_m, now_m, held_m, touched, known, not_seen(found))
+
+
+def not_seen(found: Search) -> tuple[str, ...]:
+    """
+    Return what no contact shows, in words: errors that would hide below the noise of all together.
+
+    Each constant error of a joint or a link is taken as large as machines have it; what its
+    columns move is counted once places and tool are fitted.
+    """
+    problem, model, scale = found.problem, found.final.model, found.scale
+    features = problem.features(model)
+    frames = problem.whitened(problem.frame_columns(features)[0], scale)
+    basis = np.linalg.qr(frames.T)[0] if frames.shape[0] else np.zeros((frames.shape[1], 0))
+    hidden: dict[str, list[str]] = {}
+    for kind in REGISTRY.values():
+        if kind.of not in ('joint', 'link') or not kind.cause or kind.dated:
+            continue
+        for joint in model.robot.joint_names:
+            if kind.applicable(features[0].view, joint) is not None:
+                continue
+            for effect in kind.small(features[0].view, joint, 1):
+                if effect.on != 'constant':
+                    continue
+                rows = problem.whitened(problem.effect_columns(features, effect), scale)
+                rows = rows - (rows @ basis) @ basis.T
+                size = np.linalg.norm(rows, axis=1) * spreads_of(model.robot, effect)
+                if size.max(initial=0.0) < 1.0:
+                    hidden.setdefault(effect.name.replace('_', ' '), []).append(str(effect.site))
+    listed = [f'{name} of {", ".join(sites)}' for name, sites in hidden.items()]
+    return ('where the base stands', *listed)
 
 
 def _of(problem: Problem, model: Model) -> tuple[dict[str, Array], list[Length]]:

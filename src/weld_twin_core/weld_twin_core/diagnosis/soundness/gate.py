@@ -25,6 +25,7 @@ from .evidence import Case, Mistake
 from .mending import Given
 from .slips import Slip
 from .streams import streams, velocities_checked
+from .touches import touches
 
 ROUNDS = 4
 """So often the checks are made anew after a mistake was undone; each finds what the last hid."""
@@ -102,6 +103,7 @@ def examine(
     """
     trial, mistakes, checks = given, list[Mistake](), list[Check]()
     dated: tuple[Slip, ...] = ()
+    own: tuple[Unsound, ...] = ()
     posed: tuple[Problem, Model] | None = None
     for _ in range(ROUNDS):
         found = streams(trial)
@@ -109,7 +111,12 @@ def examine(
         if not found:
             posed = aligned(trial.recordings, trial.robot, trial.align, _kept(known, given, trial))
             posed = with_changes(*posed, trial.may_change, beliefs or Beliefs())
-            checks, found, dated = _checked(*posed)
+            if posed[0].touched:
+                touched = touches(*posed)
+                posed, found, own = touched[:2], list(touched.mistakes), touched.told
+                checks = [Check('contacts', 'warning', item.sentence) for item in own]
+            else:
+                checks, found, dated = _checked(*posed)
         told = {mistake.sentence for mistake in mistakes}
         fresh = [mistake for mistake in found if mistake.sentence not in told]
         mistakes += fresh
@@ -129,7 +136,10 @@ def examine(
         trial if done else given,
         posed if done or not mistakes else None,
         (*told_first, *(checks if done or not mistakes else ())),
-        tuple(Unsound(m.kind, m.at, m.sentence, m.remedy, done, m.alike) for m in mistakes),
+        (
+            *(Unsound(m.kind, m.at, m.sentence, m.remedy, done, m.alike) for m in mistakes),
+            *own,
+        ),
         tuple(mistakes) if done else (),
         dated,
     )
@@ -148,8 +158,6 @@ def _checked(
         model = refined(problem.thinned(FIT_ROWS), model)
     case = Case(problem, model)
     out: list[Check] = []
-    if problem.touched:
-        return out, [], ()
     for name, (look, passed) in CHECKS.items():
         found = list(look(case))
         mistakes = [f.mistake for f in found if f.mistake is not None]

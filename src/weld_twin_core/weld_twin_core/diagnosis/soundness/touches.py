@@ -1,0 +1,273 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Contacts that are not what they are called: another socket, a slip, a place that was moved.
+
+An arm as wrong as machines are is fitted first, all its constant errors and springs together; what
+is far off then is no error of the arm. Such postures are told of and not fitted as what they were
+called: those of another socket are counted there, a place that moved counts as two, a slip is left
+out. Where known lengths cannot be, nothing is mended: files were mixed up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ...contacts import Artefact, Contact, Contacts, lengths
+from ...effects import REGISTRY, Effect
+from ...recording import Recording
+from ...twin.features import joints_of
+from ..algebra.fit import robust_fit, robust_scale
+from ..algebra.problem import Model, Problem
+from ..frames.places import FEWEST, posed
+from ..result import Unsound
+from .evidence import Mistake
+
+FAR = 8.0
+"""Distance from its contact, in median distances, from which a posture is a slip: of normal errors
+one in ten million is so far off; errors of gears are bounded."""
+LEAST_SLIP = 1e-3
+"""Distance [m] below which nothing is called a slip: gears and hands alone make tenths of it."""
+NEARER = 0.3
+"""A posture belongs to another contact where that is this much nearer than its own."""
+EXPLAINED = 0.75
+"""Share of a contact's squares that a move of its place must explain. What an arm's own errors leave
+follows the order of postures too; of three measured arms they explained up to 0.6."""
+STRETCH = 4
+"""Postures in a row at the least that tell of a place that moved."""
+BROKEN = 10.0
+"""Uncertainties that a known length may be off before files are taken for mixed up, and"""
+LEAST_BROKEN = 5e-3
+"""how far it must be off for that at the least [m]."""
+
+
+class Touched(NamedTuple):
+    """What is diagnosed, what was told and mended, and what cannot be mended."""
+
+    problem: Problem
+    model: Model
+    told: tuple[Unsound, ...]
+    mistakes: tuple[Mistake, ...]
+
+
+def touches(problem: Problem, model: Model) -> Touched:
+    """
+    Return contacts as they are, and what was wrong with how they were called.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of contacts.
+    model : Model
+
+    """
+    plain = _plain_fit(problem, model)
+    broken = tuple(_broken(problem, plain))
+    if broken:
+        return Touched(problem, model, (), broken)
+    points = [
+        plain.twin(k).poses(r, r.joints.t).position for k, r in enumerate(problem.recordings)
+    ]
+    usual = float(np.median(np.concatenate([_off(problem, plain, k) for k in range(len(points))])))
+    told: list[Unsound] = []
+    kept = _resorted(problem.recordings, points, usual, told)
+    if not told:
+        return Touched(problem, model, (), ())
+    again, start = posed(kept, model.robot, problem.align, model.known)
+    return Touched(again, start, tuple(told), ())
+
+
+def _plain_fit(problem: Problem, model: Model) -> Model:
+    """Return the model with all constant errors and springs fitted, outliers with little weight."""
+    view = problem.features(model)[0].view
+    every: list[Effect] = []
+    for kind in REGISTRY.values():
+        if kind.of not in ('joint', 'link') or not kind.cause or kind.dated:
+            continue
+        for joint in joints_of(kind, model.robot.joint_names):
+            if kind.applicable(view, joint) is None:
+                small = kind.small(view, joint, 1)
+                every += [effect for effect in small if effect.on in ('constant', 'load')]
+    start = model.with_found((*model.found, *{e.key: e for e in every}.values()))
+    scale = robust_scale(problem, problem.residuals(model))
+    return robust_fit(problem, start, scale)[0].model
+
+
+def _off(problem: Problem, model: Model, k: int) -> Array:
+    """Return how far postures of recording k are from their contact, shape (M,) [m]."""
+    return np.asarray(np.linalg.norm(problem.residuals(model)[k], axis=0))
+
+
+def _broken(problem: Problem, model: Model) -> Iterator[Mistake]:
+    """Yield known lengths that cannot be."""
+    for k, recording in enumerate(problem.recordings):
+        assert recording.contacts is not None
+        points = model.twin(k).poses(recording, recording.joints.t).position
+        for known in lengths(recording.contacts, points):
+            off = abs(known.found - known.tie.value)
+            if known.tie.kind != 'distance' or off < max(BROKEN * known.tie.sigma, LEAST_BROKEN):
+                continue
+            one, other = known.tie.between
+            yield Mistake(
+                'other',
+                known.tie.between,
+                f'{one!r} and {other!r} are {known.tie.value * 1e3:.4g} mm apart by the artefact '
+                f'and {known.found * 1e3:.4g} mm by the postures: files or labels are mixed up.',
+                'Check which file belongs to which contact, and the length in the artefact',
+                None,
+            )
+
+
+def _resorted(
+    recordings: tuple[Recording, ...], points: list[Array], usual: float, told: list[Unsound]
+) -> list[Recording]:
+    """Return the recordings with postures where they belong, and say what was changed."""
+    middles = _middles(recordings, points)
+    labels = [list(r.contacts.labels) for r in recordings if r.contacts is not None]
+    out: list[Recording] = []
+    for k, recording in enumerate(recordings):
+        contacts = recording.contacts
+        assert contacts is not None
+        keep = np.ones(contacts.size, dtype=bool)
+        for contact in contacts.artefact.contacts:
+            index = contacts.of(contact.label)
+            if contact.kind != 'point':
+                continue
+            _strays(contact.label, index, points[k], middles, usual, labels[k], keep, told)
+            _moved(contact.label, index[keep[index]], points[k], usual, labels[k], told)
+        out.append(_relabelled(recording, labels[k], keep))
+    return out
+
+
+def _middles(recordings: tuple[Recording, ...], points: list[Array]) -> dict[str, Array]:
+    """Return where every contact of a point is, by the median of its postures."""
+    out = {}
+    for recording, own in zip(recordings, points, strict=True):
+        assert recording.contacts is not None
+        for contact in recording.contacts.artefact.contacts:
+            if contact.kind == 'point':
+                out[contact.label] = np.median(own[recording.contacts.of(contact.label)], axis=0)
+    return out
+
+
+def _strays(
+    label: str,
+    index: np.ndarray,
+    points: Array,
+    middles: dict[str, Array],
+    usual: float,
+    labels: list[str],
+    keep: np.ndarray,
+    told: list[Unsound],
+) -> None:
+    """Leave out postures that rest elsewhere, and name where; a row of them may have moved."""
+    away = np.linalg.norm(points[index] - middles[label], axis=1)
+    far = away > max(FAR * usual, LEAST_SLIP)
+    elsewhere: dict[str, list[int]] = {}
+    for row, (k, off) in enumerate(zip(index, away, strict=True)):
+        if far[row]:
+            distances = {
+                name: float(np.linalg.norm(points[k] - middle))
+                for name, middle in middles.items()
+                if name != label
+            }
+            nearest = min(distances, key=lambda name: distances[name], default='')
+            found = nearest if nearest and distances[nearest] < NEARER * off else ''
+            elsewhere.setdefault(found, []).append(row)
+    for name, rows in elsewhere.items():
+        if not name and len(rows) >= STRETCH and np.ptp(rows) == len(rows) - 1:
+            continue
+        keep[index[rows]] = False
+        told.append(_told_stray(label, name, rows, float(away[rows].max())))
+
+
+def _told_stray(label: str, name: str, rows: list[int], off: float) -> Unsound:
+    which = _numbered(rows)
+    if name:
+        sentence = f'{which} of {label!r} rest in {name!r}, {off * 1e3:.1f} mm away.'
+        return Unsound('other', (label, name), sentence, f'Label them {name!r}', True)
+    sentence = f'{which} of {label!r} are up to {off * 1e3:.1f} mm off: the contact slipped.'
+    return Unsound('other', (label,), sentence, 'Touch again in these postures', True)
+
+
+def _numbered(rows: list[int]) -> str:
+    """Return postures by their number among those of a contact, counted from 1."""
+    numbers = [str(row + 1) for row in rows]
+    return f'Posture{"s" if len(rows) > 1 else ""} ' + ', '.join(numbers)
+
+
+def _moved(
+    label: str,
+    index: np.ndarray,
+    points: Array,
+    usual: float,
+    labels: list[str],
+    told: list[Unsound],
+) -> None:
+    """Give postures in a row that rest together elsewhere a contact of their own."""
+    if index.size < 2 * STRETCH:
+        return
+    first, last, shift, explained = _stretch(points[index])
+    if explained < EXPLAINED or shift < max(2.0 * usual, LEAST_SLIP):
+        return
+    for k in index[first:last]:
+        labels[k] = f'{label} moved'
+    told.append(
+        Unsound(
+            'other',
+            (label,),
+            f'Postures {first + 1} to {last} of {label!r} rest {shift * 1e3:.1f} mm from the '
+            'others: its place was moved while it was measured.',
+            'Fasten the artefact, and measure this place again',
+            True,
+        )
+    )
+
+
+def _stretch(points: Array) -> tuple[int, int, float, float]:
+    """Return the postures in a row that lie most apart: first, end, shift [m], share explained."""
+    x = points - points.mean(axis=0)
+    total = float((x**2).sum())
+    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])
+    m, best = len(x), (0, 0, 0.0, 0.0)
+    for i in range(m - STRETCH + 1):
+        for j in range(i + STRETCH, m + 1):
+            inside, outside = j - i, m - (j - i)
+            if outside < STRETCH:
+                continue
+            part = sums[j] - sums[i]
+            gain = float(part @ part) * (1.0 / inside + 1.0 / outside)
+            if gain > best[3] * total:
+                shift = float(np.linalg.norm(part)) * (1.0 / inside + 1.0 / outside)
+                best = (i, j, shift, gain / max(total, 1e-300))
+    first, last, shift, share = best
+    # The shorter part is what is told of.
+    if first == 0 and last > m // 2:
+        first, last = last, m
+    return first, last, shift, share
+
+
+def _relabelled(recording: Recording, labels: list[str], keep: np.ndarray) -> Recording:
+    """Return the recording with some postures left out and others under new labels."""
+    contacts = recording.contacts
+    assert contacts is not None
+    index = np.flatnonzero(keep)
+    few = {label for label in labels if sum(labels[k] == label for k in index) < FEWEST}
+    index = np.array([k for k in index if labels[k] not in few], dtype=int)
+    new = dict.fromkeys(labels[k] for k in index)
+    known = {contact.label: contact for contact in contacts.artefact.contacts}
+    artefact = Artefact(
+        (*known.values(), *(Contact(label) for label in new if label not in known)),
+        contacts.artefact.ties,
+    )
+    part = contacts.take(index)
+    touched = Contacts(artefact, tuple(labels[k] for k in index), part.value, part.sigma)
+    motion = replace(
+        recording.joints, t=recording.joints.t[index], q=recording.joints.q[index], qd=None
+    )
+    return replace(recording, joints=motion, measured=None, contacts=touched)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ...contacts import Artefact, Contact, Contacts, lengths
+from ...contacts import Artefact, Contact, Contacts
 from ...effects import REGISTRY, Effect
 from ...recording import Recording
 from ...twin.features import joints_of
@@ -67,12 +67,12 @@ def touches(problem: Problem, model: Model) -> Touched:
 
     """
     plain = _plain_fit(problem, model)
-    broken = tuple(_broken(problem, plain))
-    if broken:
-        return Touched(problem, model, (), broken)
     points = [
         plain.twin(k).poses(r, r.joints.t).position for k, r in enumerate(problem.recordings)
     ]
+    broken = tuple(_broken(problem.recordings, points))
+    if broken:
+        return Touched(problem, model, (), broken)
     usual = float(np.median(np.concatenate([_off(problem, plain, k) for k in range(len(points))])))
     told: list[Unsound] = []
     kept = _resorted(problem.recordings, points, usual, told)
@@ -103,21 +103,23 @@ def _off(problem: Problem, model: Model, k: int) -> Array:
     return np.asarray(np.linalg.norm(problem.residuals(model)[k], axis=0))
 
 
-def _broken(problem: Problem, model: Model) -> Iterator[Mistake]:
-    """Yield known lengths that cannot be."""
-    for k, recording in enumerate(problem.recordings):
+def _broken(recordings: tuple[Recording, ...], points: list[Array]) -> Iterator[Mistake]:
+    """Yield known lengths that cannot be; a few postures in a wrong socket do not move a median."""
+    middles = _middles(recordings, points)
+    for recording in recordings:
         assert recording.contacts is not None
-        points = model.twin(k).poses(recording, recording.joints.t).position
-        for known in lengths(recording.contacts, points):
-            off = abs(known.found - known.tie.value)
-            if known.tie.kind != 'distance' or off < max(BROKEN * known.tie.sigma, LEAST_BROKEN):
+        for tie in recording.contacts.artefact.ties:
+            if not set(tie.between) <= set(middles):
                 continue
-            one, other = known.tie.between
+            one, other = tie.between
+            found = float(np.linalg.norm(middles[one] - middles[other]))
+            if abs(found - tie.value) < max(BROKEN * tie.sigma, LEAST_BROKEN):
+                continue
             yield Mistake(
                 'other',
-                known.tie.between,
-                f'{one!r} and {other!r} are {known.tie.value * 1e3:.4g} mm apart by the artefact '
-                f'and {known.found * 1e3:.4g} mm by the postures: files or labels are mixed up.',
+                tie.between,
+                f'{one!r} and {other!r} are {tie.value * 1e3:.4g} mm apart by the artefact '
+                f'and {found * 1e3:.4g} mm by the postures: files or labels are mixed up.',
                 'Check which file belongs to which contact, and the length in the artefact',
                 None,
             )
@@ -189,9 +191,11 @@ def _strays(
 def _told_stray(label: str, name: str, rows: list[int], off: float) -> Unsound:
     which = _numbered(rows)
     if name:
-        sentence = f'{which} of {label!r} rest in {name!r}, {off * 1e3:.1f} mm away.'
+        rest = 'rest' if len(rows) > 1 else 'rests'
+        sentence = f'{which} of {label!r} {rest} in {name!r}, {off * 1e3:.1f} mm away.'
         return Unsound('other', (label, name), sentence, f'Label them {name!r}', True)
-    sentence = f'{which} of {label!r} are up to {off * 1e3:.1f} mm off: the contact slipped.'
+    lie = 'are up to' if len(rows) > 1 else 'is'
+    sentence = f'{which} of {label!r} {lie} {off * 1e3:.1f} mm off: the contact slipped.'
     return Unsound('other', (label,), sentence, 'Touch again in these postures', True)
 
 

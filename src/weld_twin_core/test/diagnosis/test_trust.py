@@ -72,6 +72,12 @@ def test_an_answer_that_nothing_was_learned_of_stays_as_it_is():
     assert trusted_verdict(NAMED, {}, taught()) == NAMED
 
 
+def test_many_small_errors_are_not_learned_from_single_ones():
+    trust = taught(sure_from=0.5, answer_named=(0.0, {}))
+    assert trusted_verdict(NAMED, {'families': 2.0}, trust).confidence == 0.95
+    assert trusted_verdict(NAMED, {'families': 0.0}, trust).confidence == 0.5
+
+
 def test_the_first_place_has_what_was_learned_and_the_others_share_the_rest():
     cause = Cause((('tool', 0.6), ('wrist', 0.3), ('base', 0.1)), (), (), 1.0, (1.0, 1.0))
     trust = taught(sure_from=0.5, place_unknown=(math.log(4.0), {}))

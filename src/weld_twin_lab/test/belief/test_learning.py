@@ -79,10 +79,22 @@ def test_the_limit_is_where_so_few_wrong_ones_are_rare():
 def test_the_threshold_is_the_lowest_that_keeps_the_risk():
     probability = np.linspace(0.5, 0.999, 1000)
     right = probability > 0.7
-    bound = bounded(probability, right, 0.02, 0.1)
+    bound = bounded(probability, right, 0.02)
     wrong = np.sum((probability >= bound.sure_from) & ~right)
+    lower = np.sum((probability >= bound.sure_from - 0.005) & ~right)
     assert bound.wrong == wrong
-    assert upper_limit(int(wrong), 1000, 0.1) <= 0.02 < upper_limit(int(wrong) + 12, 1000, 0.1)
+    assert (wrong + 1) / 1001 <= 0.02 < (lower + 1) / 1001
+
+
+def test_one_more_case_is_sure_and_wrong_as_seldom_as_promised():
+    rng = np.random.default_rng(8)
+    missed = []
+    for _ in range(400):
+        p = rng.beta(6.0, 2.0, 301)
+        right = rng.random(301) < p**1.5  # worse than it says, by a law unknown to the bound
+        bound = bounded(p[:-1], right[:-1], 0.05)
+        missed.append(p[-1] >= bound.sure_from and not right[-1])
+    assert np.mean(missed) <= 0.05 + 2.0 * np.sqrt(0.05 * 0.95 / 400)
 
 
 def test_the_mix_has_its_shares():

@@ -3,16 +3,15 @@
 """
 From where an answer may be told as sure, so that being sure and wrong is bounded.
 
-Learn then test [1]_ with fixed-sequence testing: thresholds are tried from the highest down, each
-by the exact binomial bound [2]_ on the share of cases that are sure and wrong, and the last one
-that passes before the first that does not is taken. The bound holds, with the confidence asked
-for, for cases that are exchangeable with those it was made from, and that took no part in the
-fit.
+Conformal risk control [1]_: of N cases that took no part in the fit, the lowest threshold is taken
+at which (wrong and sure + 1) / (N + 1) stays below the risk. One more case, exchangeable with
+these, is then sure and wrong with at most that probability. How far the share itself may be off
+is told by the exact binomial limit [2]_.
 
 References
 ----------
-.. [1] A. Angelopoulos, S. Bates, E. Candes, M. Jordan, L. Lei, "Learn then test: calibrating
-   predictive algorithms to achieve risk control", Ann. Appl. Statist. 19, 2025.
+.. [1] A. Angelopoulos, S. Bates, A. Fisch, L. Lei, T. Schuster, "Conformal risk control", ICLR
+   2024.
 .. [2] C. Clopper, E. Pearson, "The use of confidence or fiducial limits illustrated in the case
    of the binomial", Biometrika 26, 1934.
 
@@ -23,6 +22,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import beta
 
 from weld_twin_core.arrays import Array
@@ -38,8 +38,10 @@ class Bound(NamedTuple):
         Above 1 where no threshold keeps the risk: then nothing is told as sure.
     wrong, cases : int
         Sure and wrong at this threshold, of how many cases.
+    expected : float
+        Bound on the probability that one more such case is sure and wrong.
     most : float
-        Upper limit of the share that is sure and wrong.
+        Upper limit of the share that is sure and wrong, with 90 % confidence.
     sure : float
         Share of the cases that are sure.
 
@@ -48,6 +50,7 @@ class Bound(NamedTuple):
     sure_from: float
     wrong: int
     cases: int
+    expected: float
     most: float
     sure: float
 
@@ -56,11 +59,13 @@ NEVER = 1.01
 """A threshold that no probability reaches."""
 GRID = np.linspace(0.995, 0.5, 100)
 """Thresholds tried, chosen before any data: half a per cent apart."""
+ERROR = 0.1
+"""How often the upper limit of the share may fail to hold."""
 
 
-def bounded(probability: Array, right: Array, risk: float, error: float) -> Bound:
+def bounded(probability: Array, right: Array, risk: float) -> Bound:
     """
-    Return the lowest threshold that keeps the share of cases sure and wrong below a risk.
+    Return the lowest threshold at which one more case is sure and wrong too seldom to matter.
 
     Parameters
     ----------
@@ -68,21 +73,26 @@ def bounded(probability: Array, right: Array, risk: float, error: float) -> Boun
         Of cases that took no part in the fit.
     right : array of bool, shape (N,)
     risk : float
-        Share of all cases that may be sure and wrong.
-    error : float
-        Probability that the bound does not hold.
+        Probability that a case may be sure and wrong.
 
     """
     p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
-    best = Bound(NEVER, 0, p.size, upper_limit(0, p.size, error), 0.0)
+    best = _at(NEVER, p, good)
     for threshold in GRID:
-        sure = p >= threshold
-        wrong = int((sure & ~good).sum())
-        most = upper_limit(wrong, p.size, error)
-        if most > risk:
+        tried = _at(float(threshold), p, good)
+        if tried.expected > risk:
             break
-        best = Bound(float(threshold), wrong, p.size, most, float(sure.mean()))
+        best = tried
     return best
+
+
+def _at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
+    sure = probability >= threshold
+    wrong, cases = int((sure & ~right).sum()), probability.size
+    expected = (wrong + 1) / (cases + 1)
+    return Bound(
+        threshold, wrong, cases, expected, upper_limit(wrong, cases, ERROR), float(sure.mean())
+    )
 
 
 def upper_limit(wrong: int, cases: int, error: float) -> float:

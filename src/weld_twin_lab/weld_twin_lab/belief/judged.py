@@ -137,7 +137,7 @@ def examples_of(cases: Sequence[Case]) -> list[Example]:
 
 def _examples(case: Case) -> Iterator[Example]:
     row, status = case.row, case.judged.status
-    name, group = str(row['name']), group_of(status)
+    name, group = str(row['name']), group_of(status, row['signs'])
     causes = row['verdict']['causes']
     signs = {**row['signs'], 'top_share': causes[0]['share'] if causes else 0.0}
     yield Example(name, f'answer {group}', signs, case.right, signs['belief'])
@@ -156,7 +156,7 @@ def _examples(case: Case) -> Iterator[Example]:
             hit = any(on in truth.dependences for truth in truths)
             yield Example(name, f'dependence {group}', both, hit, more['dependence'])
         sites = [(item['effect'], item['joint']) for item in cause['name']]
-        if sites and group == 'named':
+        if sites and status in NAMING:
             hit = any(site in at_work for site in sites)
             told = sum(item for key, item in more.items() if key in ('name', 'name_second'))
             yield Example(name, f'name {group}', both, hit, min(told, 1.0))

@@ -24,8 +24,8 @@ FOLDS = 8
 """Parts of the cases that take turns in being unseen."""
 FEWEST = 20
 """Examples of a level from which on it is learned at all."""
-RISK, ERROR = 0.01, 0.1
-"""Share of all cases that may be sure and wrong, and how often the bound may fail to hold."""
+RISK = 0.01
+"""Probability that a case may be sure and wrong."""
 TOLD_UNSURE = 0.8
 """What is not sure by the bound is told as this at the most; above it counts as sure."""
 BEFORE = frozenset({'belief', 'place', 'dependence', 'name'})
@@ -95,11 +95,11 @@ def trust_of(examples: Sequence[Example]) -> Trust:
 
 def _bound(pairs: Sequence[tuple[Array, Array]]) -> Bound:
     probability, right = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
-    return bounded(probability, right, RISK, ERROR)
+    return bounded(probability, right, RISK)
 
 
 def _told(bound: Bound) -> dict[str, Any]:
-    return {**bound._asdict(), 'risk': RISK, 'error': ERROR}
+    return {**bound._asdict(), 'risk': RISK}
 
 
 def _level(examples: Sequence[Example], name: str) -> Level:

@@ -46,7 +46,10 @@ def fitted(
         Of every example.
 
     """
-    target = np.asarray(right, dtype=float)
+    # One more case of each outcome, with every sign at its middle: few cases are never certain.
+    columns = np.concatenate([columns, np.zeros((2, columns.shape[1]))])
+    target = np.concatenate([np.asarray(right, dtype=float), [0.0, 1.0]])
+    weight = np.concatenate([weight, [1.0, 1.0]])
     share = float(np.clip((weight * target).sum() / weight.sum(), 0.02, 0.98))
 
     def loss(x: Array) -> tuple[float, Array]:

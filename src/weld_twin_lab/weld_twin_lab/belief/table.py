@@ -66,15 +66,14 @@ def page(result: Mapping[str, Any]) -> str:
 
 def _bound(bound: Mapping[str, Any]) -> str:
     if bound['sure_from'] > 1.0:
-        return (
-            f'With {bound["cases"]} cases no threshold keeps the bound, so nothing is told as '
-            'sure.'
-        )
+        return f'{bound["cases"]} cases are too few for the bound: nothing is told as sure.'
+
     return (
         f'An answer is told as sure from {bound["sure_from"]:.3f} on: of {bound["cases"]} cases, '
         f'each judged by weights that had not seen it, {100.0 * bound["sure"]:.0f} % were then '
-        f'sure and {bound["wrong"]} of them wrong, and at most {100.0 * bound["most"]:.2f} % of '
-        f'such cases are sure and wrong ({100.0 * (1.0 - bound["error"]):.0f} % confidence).'
+        f'sure and {bound["wrong"]} of them wrong. One more such case is sure and wrong with a '
+        f'probability of at most {100.0 * bound["expected"]:.2f} %; the share is below '
+        f'{100.0 * bound["most"]:.2f} % with 90 % confidence.'
     )
 
 

@@ -141,5 +141,5 @@ def confidence(case: Case, trust: Trust) -> float:
 
     """
     signs: Mapping[str, float] = case.row['signs']
-    told = trust.told('answer', group_of(case.judged.status), signs)
+    told = trust.told('answer', group_of(case.judged.status, signs), signs)
     return float(signs['belief'] if told is None else told)

@@ -17,8 +17,22 @@ Key = TypeVar('Key')
 NAMING = ('identified', 'ambiguous')
 
 
-def group_of(status: str) -> str:
-    """Return which answers are learned from together: those that name something are one group."""
+def group_of(status: str, signs: Mapping[str, float]) -> str:
+    """
+    Return which answers are learned from together.
+
+    Those that name something are one group; many small errors are another, as nothing in them has
+    rivals.
+
+    Parameters
+    ----------
+    status : str
+    signs : mapping from str to float
+        Of the answer.
+
+    """
+    if signs.get('families', 0.0) > 0.0:
+        return 'families'
     return 'named' if status in NAMING else status
 
 
@@ -56,7 +70,7 @@ def trusted_verdict(verdict: Verdict, signs: Mapping[str, float], trust: Trust) 
     trust : Trust
 
     """
-    told = trust.told('answer', group_of(verdict.status), signs)
+    told = trust.told('answer', group_of(verdict.status, signs), signs)
     return verdict if told is None else replace(verdict, confidence=told)
 
 
@@ -75,7 +89,7 @@ def trusted_cause(cause: Cause, status: str, signs: Mapping[str, float], trust: 
 
     """
 
-    group = group_of(status)
+    group = group_of(status, signs)
     place, dependence, name = (
         trust.told(level, group, signs) for level in ('place', 'dependence', 'name')
     )

@@ -71,6 +71,16 @@ def test_a_dent_nobody_has_a_name_for_is_placed(dented):
     assert cause.share > 0.5
 
 
+def test_by_joint_says_what_the_causes_say(dented):
+    shares = dict(dented.where.joints)
+    told = {cause.place[0][0]: cause.share for cause in dented.causes}
+    elbow = dented.model.robot.joint_names[ELBOW]
+    assert dented.where.joints[0][0] == elbow
+    assert shares[elbow] == pytest.approx(told[elbow], abs=0.05)
+    assert sum(shares.values()) <= sum(cause.share for cause in dented.causes) + 1e-9
+    assert dented.where.regimes['static'] > 0.8
+
+
 def test_its_curve_is_carried_and_shrinks_the_gap_of_another_motion(dented):
     assert {effect.name for effect in dented.model.found} == {'joint_curve'}
     assert dented.shrink.held_out == 'bent'

@@ -65,7 +65,7 @@ def answer(
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
         gap=gap(found, evidence.floor),
-        where=locate(found, unseen),
+        where=locate(found, unseen, told),
         status=verdict.status,
         effects=effects,
         confidence=verdict.confidence,

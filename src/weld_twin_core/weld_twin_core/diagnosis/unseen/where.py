@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...arrays import Array
@@ -11,7 +13,7 @@ from ...twin.features import Features
 from ..algebra.fit import trusted
 from ..algebra.problem import Model, Problem
 from ..hypotheses.search import Search
-from ..result import Where
+from ..result import Cause, Where
 from .unseen_stretches import Unseen
 
 REGRESSORS = (
@@ -38,7 +40,7 @@ STRETCHES = 12
 """Stretches of time that the gap is told for: as many as a figure can show."""
 
 
-def locate(found: Search, final: Unseen) -> Where:
+def locate(found: Search, final: Unseen, causes: Sequence[Cause] = ()) -> Where:
     """
     Return where the gap lies.
 
@@ -48,13 +50,19 @@ def locate(found: Search, final: Unseen) -> Where:
         Its baseline is the model before any effect was found.
     final : Unseen
         Of the final model.
+    causes : sequence of Cause
+        Of the answer, if there are any: joints and regimes are then theirs, so that they say what
+        the answer says, also where a cause sits at no joint or its place is not certain.
 
     """
     problem, start = found.problem, found.baseline.model
     baseline = Unseen.of(problem, found.scale, found.baseline, np.zeros(0))
     shares = _map(problem, baseline, start)
-    joints, regimes = _explained(final, found.final.model)
-    if not found.final.model.found:
+    if causes:
+        joints, regimes = _of_causes(causes, start.robot.joint_names)
+    elif found.final.model.found:
+        joints, regimes = _explained(final, found.final.model)
+    else:
         joints = {
             name: float(row.max())
             for name, row in zip(start.robot.joint_names, shares, strict=True)
@@ -70,6 +78,21 @@ def locate(found: Search, final: Unseen) -> Where:
         map_regressors=REGRESSORS,
         map_shares=tuple(tuple(float(v) for v in row) for row in shares),
     )
+
+
+def _of_causes(
+    causes: Sequence[Cause], names: Sequence[str]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the shares of the causes by their places and dependences, as far as believed."""
+    joints, regimes = dict.fromkeys(names, 0.0), dict.fromkeys(REGIMES, 0.0)
+    for cause in causes:
+        at, on = (sum(p for _, p in told) for told in (cause.place, cause.dependence))
+        for place, p in cause.place:
+            if place in joints:
+                joints[place] += cause.share * p / at
+        for dependence, p in cause.dependence:
+            regimes[REGIME_OF[dependence]] += cause.share * p / on
+    return joints, regimes
 
 
 def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str, float]]:

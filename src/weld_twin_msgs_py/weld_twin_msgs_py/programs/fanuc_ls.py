@@ -150,9 +150,9 @@ class _Reader:
 
     def _statement(self, found: re.Match[str]) -> None:
         text, where = found[2].strip(), self.source.where(found.start(2))
-        wait = re.match(r'WAIT\s+([\d.]+)\s*\(sec\)', text)
-        if wait is not None and wait[1].strip('.'):
-            self.program.dwell(float(wait[1].rstrip('.') or 0.0))
+        wait = re.match(rf'WAIT\s+({NUMBER})\s*\(sec\)', text)
+        if wait is not None:
+            self.program.dwell(max(float(wait[1]), 0.0))
         move = _MOVE.match(text)
         if move is None:
             return

@@ -30,7 +30,7 @@ from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere
 from .context import Context
 from .controllers import Controller, Frame
 from .notation import KUKA_POSE
-from .source import Number, Source, closing, masked, number_at, split_outside, stripped
+from .source import NUMBER, Number, Source, closing, masked, number_at, split_outside, stripped
 
 NAME = 'krl'
 KINDS: dict[str, Kind] = {'PTP': 'joint', 'LIN': 'linear', 'CIRC': 'circular'}
@@ -329,7 +329,7 @@ class _Reader:
 
     def _step(self, kind: Kind, where: str, ends: Sequence[int], tail: str) -> Step:
         speed = self.state.joint_speed if kind == 'joint' else self.state.speed
-        own = re.search(r'\$VEL\.CP\s*=\s*([\d.]+)', tail)
+        own = re.search(rf'\$VEL\.CP\s*=\s*({NUMBER})', tail)
         return Step(
             kind,
             where,

@@ -47,9 +47,10 @@ def next_experiment(
     -------
     dict or None
         'kind', 'sentence', 'reason', 'expected_separation_sigma' (None where nothing is compared),
-        'cost' [min] and 'motion': 'static', 'joint_names', 't' [s] and 'q' [rad, m]; 'motion' is
-        None when no motion decides. 'skipped' says which measurements could not be foreseen.
-        None when none could.
+        'cost' [min], 'between' (the two explanations it parts, each a list of effect and joint;
+        None where nothing is compared) and 'motion': 'static', 'joint_names', 't' [s] and 'q'
+        [rad, m]; 'motion' is None when no motion decides. 'skipped' says which measurements could
+        not be foreseen. None when none could.
 
     """
     options = list(candidates(problem, model))
@@ -93,6 +94,7 @@ def _chosen(
         _reason(alternatives, pair, before, tables[best]),
         float(tables[best][pair]),
         model,
+        _sides(alternatives[pair[0]], alternatives[pair[1]]),
     )
 
 
@@ -127,10 +129,21 @@ def _outside(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> dict[str,
         'kind': 'outside',
         'motion': None,
         'cost': None,
+        'between': _sides(first, second),
         'expected_separation_sigma': 0.0,
         'sentence': f'No motion tells {one} from {other}: {way(sorted(families))}.',
         'reason': 'Both move the tool alike wherever the joints go.',
     }
+
+
+def _sides(
+    first: tuple[Effect, ...], second: tuple[Effect, ...]
+) -> list[list[dict[str, str | None]]]:
+    """Return what each of two explanations has that the other has not."""
+    return [
+        [{'effect': e.name, 'joint': str(e.site) if e.site else None} for e in _only(one, other)]
+        for one, other in ((first, second), (second, first))
+    ]
 
 
 def _differing(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> tuple[str, str]:
@@ -150,7 +163,11 @@ def _named(effects: Sequence[Effect]) -> str:
 
 
 def _entry(
-    option: Candidate, reason: str, separation: float | None, model: Model
+    option: Candidate,
+    reason: str,
+    separation: float | None,
+    model: Model,
+    between: list[list[dict[str, str | None]]] | None = None,
 ) -> dict[str, Any]:
     return {
         'kind': option.kind,
@@ -158,6 +175,7 @@ def _entry(
         'reason': reason,
         'expected_separation_sigma': separation,
         'cost': option.cost,
+        'between': between,
         'motion': _motion(option.recording.joints, model.robot.joint_names),
     }
 

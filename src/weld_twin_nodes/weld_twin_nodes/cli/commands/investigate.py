@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnose, say what to measure next, take the recording in, and go on until it is decided.
+
+Begin with a directory and recordings; --robot and --budget belong to the beginning. Record the
+experiment that it asks for (experiment.yaml, and a program with --controller), and go on with the
+directory and the new bag. The directory alone tells where it stands. It ends when the cause is sure,
+when the budget is spent, or when nothing would part what is left, and says which.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from ..options import add_robot
+
+EXPERIMENT = 'experiment.yaml'
+BUDGET = 60.0
+"""Minutes of experiments, with what has to be set up for them, unless told: one visit to a cell."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('directory', metavar='DIR', help='the investigation')
+    parser.add_argument('bags', nargs='*', metavar='BAG', help='recordings to begin or go on with')
+    add_robot(parser, required=False)
+    parser.add_argument(
+        '--budget', type=float, metavar='MIN', help=f'minutes of experiments (default: {BUDGET:g})'
+    )
+    parser.add_argument('--align', default='', metavar='FRAMES', help='as for diagnose')
+    parser.add_argument('--effects-known', default='', metavar='FILE', help='as for diagnose')
+    parser.add_argument(
+        '--controller',
+        default='',
+        metavar='L',
+        help='write the experiment as a program too, as export-program does',
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Begin, go on, or tell where it stands."""
+    from weld_twin_core.errors import DataError
+
+    from ...offline.investigation import STATE, read_state
+    from ...report.investigation_page import headline
+
+    directory = Path(args.directory)
+    begun = (directory / STATE).exists()
+    if not args.bags:
+        if not begun:
+            raise DataError(f"'{directory}' is no investigation; begin one with recordings")
+        print(headline(read_state(directory)))
+        return 0
+    state = _continued(args, directory) if begun else _begun(args, directory)
+    return _round(args, directory, state)
+
+
+def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
+    from weld_twin_core.errors import DataError
+
+    from ...offline.investigation import begin
+
+    if not args.robot:
+        raise DataError('an investigation begins with --robot')
+    if directory.exists() and any(directory.iterdir()):
+        raise DataError(f"'{directory}' holds something else already; choose another place")
+    budget = BUDGET if args.budget is None else args.budget
+    if not 0.0 <= budget < 1e6:
+        raise DataError(f'--budget must be minutes, got {budget}')
+    words = [('--align', args.align), ('--effects-known', args.effects_known)]
+    words += [('--base-link', args.base_link), ('--tip-link', args.tip_link)]
+    options = [part for word, value in words if value for part in (word, value)]
+    return begin(args.robot, options, budget)
+
+
+def _continued(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
+    from weld_twin_core.errors import DataError
+
+    from ...offline.investigation import read_state
+
+    state = read_state(directory)
+    if args.robot and args.robot != state['robot']:
+        raise DataError(
+            f"the investigation is of robot '{state['robot']}', not of '{args.robot}'; begin another"
+        )
+    if args.budget is not None:
+        state['budget_min'] = args.budget
+        state['state'] = 'open'
+    if state['state'] != 'open':
+        raise DataError(
+            f'the investigation has ended, {state["state"]}: {state["why"]}; '
+            'a larger --budget opens it again'
+        )
+    return state
+
+
+def _round(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> int:
+    """Diagnose everything so far, and ask or end."""
+    from weld_twin_msgs_py.files.whole_files import write_text
+
+    from ...offline.investigation import PAGE, recordings, take_in, write_state
+    from ...report.diagnosis_files import RESULT
+    from ...report.investigation_page import headline, investigation_page
+
+    bags = [*recordings(state), *args.bags]
+    place = directory / f'round-{len(state["rounds"])}'
+    _diagnosed(bags, state, place)
+    found = json.loads((place / RESULT).read_text(encoding='utf-8'))
+    state = take_in(state, args.bags, found)
+    asked = state['rounds'][-1]['asked']
+    if asked is not None:
+        _write_experiment(args, place, state, asked)
+    write_state(directory, state)
+    write_text(directory / PAGE, investigation_page(state), overwrite=True)
+    print(headline(state))
+    if asked is not None:
+        print(asked['reason'])
+        print(f'record {place / EXPERIMENT}, then: weld-twin investigate {directory} BAG')
+    print(f'page: {directory / PAGE}')
+    return 0
+
+
+def _diagnosed(bags: list[str], state: dict[str, Any], place: Path) -> None:
+    """Run the diagnosis as its own command does."""
+    from . import diagnose
+
+    parser = argparse.ArgumentParser()
+    diagnose.add_arguments(parser)
+    words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
+    diagnose.run(parser.parse_args(words))
+
+
+def _write_experiment(
+    args: argparse.Namespace, place: Path, state: dict[str, Any], asked: dict[str, Any]
+) -> None:
+    """Write the experiment for the generator, and as a program where a controller is named."""
+    from weld_twin_core.errors import TwinError
+    from weld_twin_msgs_py.files.joint_file import write_joint_motion
+    from weld_twin_msgs_py.programs.languages import LANGUAGES
+
+    from . import export_program
+
+    write_joint_motion(place / EXPERIMENT, asked.pop('motion'), asked['sentence'])
+    if not args.controller:
+        return
+    suffix = LANGUAGES[args.controller].extensions[0] if args.controller in LANGUAGES else '.txt'
+    parser = argparse.ArgumentParser()
+    export_program.add_arguments(parser)
+    words = [str(place / EXPERIMENT), '--robot', state['robot']]
+    words += ['--controller', args.controller, '--out', str(place / f'experiment{suffix}')]
+    try:
+        export_program.run(parser.parse_args(words))
+    except TwinError as error:
+        print(f'note: no program was written: {error}')

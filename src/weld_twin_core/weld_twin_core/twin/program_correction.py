@@ -22,7 +22,7 @@ from ..arrays import Array
 from ..errors import DataError, PathError
 from ..motion.inverse.newton import chain_jacobian, least_step
 from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
-from ..motion.programs.travel import repeated
+from ..motion.programs.repeated import repeated
 from ..recording import JointMotion
 from .posterior import largest_sigma
 from .program_model import ProgramModel, missing
@@ -127,7 +127,8 @@ def correct_program(
         Joint positions before the first move.
 
     """
-    work = _Work(model, program, travel(model.robot, program, start), caps or Caps())
+    way = travel(model.robot, program, start, model.recorded if model.posterior else None)
+    work = _Work(model, program, way, caps or Caps())
     left = dict(work.travel.lost)
     for seam, why in _held_seams(program, held or {}).items():
         left.setdefault(seam, why)

@@ -114,6 +114,13 @@ class ProgramModel:
         domain: Domain = self.posterior.domain
         return domain.outside(motion.q, motion.velocity, None, warm)
 
+    def recorded(self, q: Array) -> Array:
+        """Tell which postures, shape (K, n), are among those recorded, shape (K,)."""
+        if self.posterior is None:
+            return np.ones(len(q), dtype=bool)
+        domain = self.posterior.domain
+        return np.asarray((domain.beyond(q) <= np.array(domain.margins)).all(axis=1))
+
     def recording(self, motion: JointMotion) -> Recording:
         """Return a motion as the twin takes it."""
         warm = None

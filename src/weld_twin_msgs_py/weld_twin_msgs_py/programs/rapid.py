@@ -254,7 +254,9 @@ class _Reader:
         places = [ref for ref in refs if ref is not None]
         tool, base = self._frames(*parts[-1])
         speed, stop = self._travel(kind, parts, wanted)
-        suits = self.suits.get(places[-1].point) if kind == 'joint' and self.config['j'] else None
+        # Of a linear move it counts only where nobody knows where the arm comes from.
+        asked = self.config['j' if kind == 'joint' else 'l']
+        suits = self.suits.get(places[-1].point) if asked else None
         via = places[0] if kind == 'circular' else None
         self.program.add(Step(kind, where, places[-1], via, tool, base, speed, stop, suits=suits))
 

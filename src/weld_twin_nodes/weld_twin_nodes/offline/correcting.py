@@ -139,7 +139,11 @@ def corrected_program(
         Source(source.name, text) for source, text in zip(program.sources, texts, strict=True)
     ]
     check_written(program, read_sources(again, context, program.language), found.program.points)
-    return CorrectedProgram(program, tuple(texts), found, tuple(_notes(program, context, model)))
+    notes = _notes(program, context, model) + [
+        f'{where} names no posture; the only one that was recorded was taken'
+        for where in found.travel.assumed
+    ]
+    return CorrectedProgram(program, tuple(texts), found, tuple(notes))
 
 
 def _led(found: ProgramCorrection) -> list[int]:

@@ -11,7 +11,7 @@ not known, and does not matter for where the point itself has to be.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -76,11 +76,28 @@ class Travel(NamedTuple):
     pieces : tuple of Piece
     lost : dict of int to str
         Seams that could not be followed, with the reason.
+    assumed : tuple of str
+        Where the program names no posture and the only known one was taken: file and line.
 
     """
 
     pieces: tuple[Piece, ...]
     lost: dict[int, str]
+    assumed: tuple[str, ...] = ()
+
+
+Known = Callable[[Array], Array]
+"""Tells which joint positions (K, n) are postures that the arm is known to work in."""
+
+
+class _Course(NamedTuple):
+    """What moves are followed with."""
+
+    robot: Robot
+    program: MoveProgram
+    known: Known | None
+    lost: dict[int, str]
+    assumed: list[str]
 
 
 class _Reached(NamedTuple):
@@ -91,7 +108,9 @@ class _Reached(NamedTuple):
     via: int
 
 
-def travel(robot: Robot, program: MoveProgram, start: Array | None = None) -> Travel:
+def travel(
+    robot: Robot, program: MoveProgram, start: Array | None = None, known: Known | None = None
+) -> Travel:
     """
     Return the motion of a program; seams that cannot be followed are left out, with the reason.
 
@@ -102,31 +121,28 @@ def travel(robot: Robot, program: MoveProgram, start: Array | None = None) -> Tr
     program : MoveProgram
     start : array, shape (n,), optional
         Joint positions before the first move of every piece.
+    known : callable, optional
+        Tells the postures that the arm is known to work in, shape (K, n) to (K,). Where a program
+        names no posture and one of them alone is known, it is taken.
 
     """
-    lost: dict[int, str] = {}
+    course = _Course(robot, program, known, {}, [])
     pieces: list[Piece] = []
     for moves in program.pieces:
-        pieces += _pieces(robot, program, moves, start, lost)
-    return Travel(tuple(pieces), lost)
+        pieces += _pieces(course, moves, start)
+    return Travel(tuple(pieces), course.lost, tuple(course.assumed))
 
 
-def _pieces(
-    robot: Robot,
-    program: MoveProgram,
-    moves: Sequence[Move],
-    start: Array | None,
-    lost: dict[int, str],
-) -> list[Piece]:
+def _pieces(course: _Course, moves: Sequence[Move], start: Array | None) -> list[Piece]:
     """Return the motion of moves that follow each other, in parts where one cannot be followed."""
     out: list[Piece] = []
     done: list[tuple[Move, _Reached]] = []
     q = start
     for move in moves:
         try:
-            reached = _followed(robot, program, move, q)
+            reached = _followed(course, move, q)
         except (PathError, DataError) as error:
-            lost.setdefault(move.seam, f'{move.where}: {error}')
+            course.lost.setdefault(move.seam, f'{move.where}: {error}')
             if done:
                 out.append(_joined(done))
             done, q = [], None
@@ -138,19 +154,19 @@ def _pieces(
     return out
 
 
-def _followed(robot: Robot, program: MoveProgram, move: Move, q: Array | None) -> _Reached:
+def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     """Return the samples of a move that begins at joint positions, None for an unknown place."""
     if move.end is None:
         raise PathError(move.why or 'this move is not understood')
-    arm = robot.with_frames(base=np.eye(4), tool=move.tool)
-    if move.kind == 'joint':
-        return _joint_move(arm, program, move, q)
+    arm = course.robot.with_frames(base=np.eye(4), tool=move.tool)
+    if move.kind == 'joint' or (q is None and move.via is None):
+        return _joint_move(arm, course, move, q)
     if q is None:
         raise PathError(
             'where the arm comes from is not known; let a joint move lead there, or say the '
             'joints with --start'
         )
-    poses, via = tool_way(arm, program, move, forward(arm, q))
+    poses, via = tool_way(arm, course.program, move, forward(arm, q))
     way = _on_the_way(arm, poses, q)
     arm.check_positions(way)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
@@ -173,10 +189,11 @@ def _on_the_way(arm: Robot, poses: Array, q: Array) -> Array:
     return found
 
 
-def _joint_move(arm: Robot, program: MoveProgram, move: Move, q: Array | None) -> _Reached:
+def _joint_move(arm: Robot, course: _Course, move: Move, q: Array | None) -> _Reached:
+    """Return the samples of a joint move; where it comes from may not be known."""
     assert move.end is not None
-    place = program.place(move.end)
-    end = place if place.ndim == 1 else _posture(arm, place, move, q)
+    place = course.program.place(move.end)
+    end = place if place.ndim == 1 else _posture(arm, place, course, move, q)
     arm.check_positions(end[None])
     if q is None:
         return _Reached(end[None], np.zeros(1), -1)
@@ -187,20 +204,32 @@ def _joint_move(arm: Robot, program: MoveProgram, move: Move, q: Array | None) -
     return _Reached(q + share * (end - q), times, -1)
 
 
-def _posture(arm: Robot, pose: Array, move: Move, q: Array | None) -> Array:
-    """Return the joint positions in which a joint move reaches a pose."""
-    found = _turned(arm, solve(arm, pose, q))
+def _posture(arm: Robot, pose: Array, course: _Course, move: Move, q: Array | None) -> Array:
+    """Return the joint positions in which a move reaches a pose."""
+    found = solve(arm, pose, q)
     if move.suits is not None:
+        found = _turned(arm, found)
         found = found[move.suits(found)]
         if not len(found):
             raise ReachError('no posture of this robot there is the one that the program names')
-    if q is None and len(found) > 1 and move.suits is None:
+    elif q is not None:
+        found = _turned(arm, found)
+    elif len(found) > 1:
+        found = _known(found, course, move)
+    near = np.zeros(arm.n) if q is None else q
+    return np.asarray(found[np.abs(found - near).sum(axis=1).argmin()])
+
+
+def _known(found: Array, course: _Course, move: Move) -> Array:
+    """Return the one posture that is known, where the program names none."""
+    known = found if course.known is None else found[course.known(found)]
+    if len(known) != 1:
         raise ReachError(
             f'{len(found)} postures reach this point and the program names none; '
             'let a move to joint positions come first, or say the joints with --start'
         )
-    near = np.zeros(arm.n) if q is None else q
-    return np.asarray(found[np.abs(found - near).sum(axis=1).argmin()])
+    course.assumed.append(move.where)
+    return known
 
 
 def _turned(arm: Robot, found: Array) -> Array:
@@ -319,68 +348,3 @@ def _eased(t: Array, from_rest: bool, to_rest: bool) -> Array:
     pace = 1.0 / speed
     steps = 0.5 * (pace[1:] + pace[:-1]) * np.diff(t)
     return np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
-    """
-    Return the motion of a piece with the same samples between points that moved a little.
-
-    Parameters
-    ----------
-    robot : Robot
-    program : MoveProgram
-        With the points moved.
-    piece : Piece
-        As they were.
-
-    Raises
-    ------
-    ReachError
-        A pose is out of reach now.
-
-    """
-    q = np.array(piece.motion.q)
-    for k, move in enumerate(piece.moves):
-        first = 0 if k == 0 else int(piece.ends[k - 1])
-        last = int(piece.ends[k])
-        way = _way_length(piece, k)
-        assert move.end is not None
-        arm = robot.with_frames(base=np.eye(4), tool=move.tool)
-        if move.kind == 'joint':
-            part = _joint_part(arm, program, move, q, first, way)
-        else:
-            at = max(int(piece.vias[k]) - first, 0)
-            poses, _ = tool_way(arm, program, move, forward(arm, q[first]), way, at)
-            part = _closed(arm, piece.motion.q[first : first + way], poses, move)
-        q[first : first + way] = part
-        q[first + way : last + 1] = part[-1]
-    return JointMotion(piece.motion.t, q)
-
-
-def _way_length(piece: Piece, k: int) -> int:
-    """Return the number of samples of a move from where it begins to where it arrives."""
-    first = 0 if k == 0 else int(piece.ends[k - 1])
-    q = piece.motion.q[first : int(piece.ends[k]) + 1]
-    stays = piece.moves[k].stop or k == len(piece.moves) - 1
-    return len(q) - 3 if stays else len(q)
-
-
-def _joint_part(
-    arm: Robot, program: MoveProgram, move: Move, q: Array, first: int, way: int
-) -> Array:
-    assert move.end is not None
-    place = program.place(move.end)
-    end = place
-    if place.ndim == 2:
-        end = _closed(arm, q[first + way - 1][None], place[None], move)[0]
-    if way == 1:
-        return np.asarray(end[None])
-    share = np.linspace(0.0, 1.0, way)[:, None]
-    return np.asarray(q[first] + share * (end - q[first]))
-
-
-def _closed(arm: Robot, q: Array, poses: Array, move: Move) -> Array:
-    found, error = polish(arm, q, poses)
-    if np.abs(error).max() > CLOSED:
-        raise ReachError(f'{move.where}: out of reach, or at a singularity')
-    return found

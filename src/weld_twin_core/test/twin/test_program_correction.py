@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Points of a program are moved by what the real tool misses there, seams whole or not at all."""
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.motion.programs import Move, MoveProgram, Use, travel
+from weld_twin_core.twin.program_correction import Caps, correct_program
+from weld_twin_core.twin.program_model import ProgramModel
+
+START = np.array([0.3, -1.4, 1.7, -1.9, -1.5, 0.2])
+EYE = np.eye(4)
+
+
+def use(point, leads=True):
+    return Use(point, EYE, EYE, leads)
+
+
+def moved(pose, *by):
+    out = pose.copy()
+    out[:3, 3] += by
+    return out
+
+
+def seam(ur5, *moves):
+    """Return a program that starts at START; points lie 0.1 m from each other."""
+    pose = wt.forward(ur5, START)
+    away = ((0.1, 0, 0), (0.1, 0.1, 0), (0, 0.1, 0), (0.1, 0.2, 0))
+    points = (START, *(moved(pose, *by) for by in away))
+    return MoveProgram(points, ((Move('joint', use(0), EYE), *moves),))
+
+
+def test_an_arc_passes_the_place_on_its_way_and_keeps_its_radius(ur5):
+    arc = Move('circular', use(2), EYE, via=use(1))
+    program = seam(ur5, arc)
+    (piece,) = travel(ur5, program).pieces
+    at = wt.forward(ur5, piece.motion.q)[:, :3, 3]
+    np.testing.assert_allclose(at[piece.vias[1]], program.points[1][:3, 3], atol=1e-9)
+    corners = [at[0], program.points[1][:3, 3], program.points[2][:3, 3]]
+    middle = 0.5 * (corners[0] + corners[2])  # a right angle at the place on the way
+    radius = np.linalg.norm(at - middle, axis=1)
+    np.testing.assert_allclose(radius, 0.1 / np.sqrt(2.0), atol=1e-9)
+
+
+def test_a_posture_that_nobody_names_is_taken_only_where_one_is_known(ur5):
+    pose = wt.forward(ur5, START)
+    program = MoveProgram((pose,), ((Move('linear', use(0), EYE, where='line 1'),),))
+    assert 'postures reach this point' in travel(ur5, program).lost[0]
+
+    def known(q):
+        return np.abs(q - START).max(axis=1) < 0.1
+
+    found = travel(ur5, program, known=known)
+    assert found.assumed == ('line 1',)
+    np.testing.assert_allclose(found.pieces[0].motion.q[0], START, atol=1e-9)
+
+
+def test_a_point_approached_from_two_sides_gets_the_mean_and_says_what_is_left(ur5):
+    # Play of 0.2 mrad about the base: coming from -y and from +y the tool misses point 2 to
+    # opposite sides.
+    play = wt.effects.Backlash('shoulder_pan_joint', width=2e-4)
+    there = seam(ur5, *(Move('linear', use(k), EYE) for k in (1, 2, 4, 2)))
+    found = correct_program(ProgramModel(ur5, (play,)), there, caps=Caps(1e-3, 0.01))
+    ends = [found.results[k].after for k in (2, 4)]
+    reach = np.linalg.norm(there.points[2][:2, 3])
+    np.testing.assert_allclose(ends, 1e-4 * reach, rtol=0.05)
+    alone = [found.results[k].after for k in (1, 3)]
+    assert max(alone) < 1e-8
+
+
+@pytest.mark.parametrize(('cap', 'left'), [(1e-3, set()), (1e-4, {0})])
+def test_a_seam_is_corrected_whole_or_not_at_all(ur5, cap, left):
+    off = wt.effects.JointOffset('shoulder_lift_joint', offset=5e-4)
+    program = seam(ur5, Move('linear', use(1), EYE), Move('linear', use(2), EYE))
+    found = correct_program(ProgramModel(ur5, (off,)), program, caps=Caps(cap, 0.01))
+    assert set(found.left) == left
+    for old, new in zip(program.points[:3], found.program.points, strict=False):
+        assert np.array_equal(old, new) == bool(left)
+
+
+def test_what_was_found_of_another_tool_is_left_out(ur5):
+    bent = wt.effects.ToolPose(xyz=[1e-3, 0.0, 0.0])
+    model = ProgramModel(ur5, (bent,))
+    assert len(model.twin(EYE).effects) == 1
+    assert not model.twin(moved(EYE, 0, 0, 0.1)).effects

@@ -9,10 +9,10 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from .arrays import Array, increasing, readonly
 from .contacts import Contacts
+from .cubics import hermite
 from .errors import DataError
 
 WRENCH_FRAMES = ('tool', 'base')
@@ -87,10 +87,6 @@ class JointMotion:
             object.__setattr__(self, 'qd', readonly(self.qd, q.shape, 'joint velocities'))
 
     @cached_property
-    def _spline(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.t, self.q, self.velocity, axis=0)
-
-    @cached_property
     def velocity(self) -> Array:
         """Return joint velocity, shape (N, n): as measured, else by second-order differences."""
         if self.qd is not None and not self.static:
@@ -144,7 +140,8 @@ class JointMotion:
             return self.q[index], np.zeros(np.shape(t) + self.q.shape[1:])
         inside = np.clip(t, self.t[0], self.t[-1])
         moving = (inside == t)[..., None]
-        return self._spline(inside), np.where(moving, self._spline(inside, 1), 0.0)
+        q, qd = hermite(self.t, self.q, self.velocity, inside)
+        return q, np.where(moving, qd, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,12 +15,13 @@ References
 ----------
 .. [1] J. Sola, J. Deray, D. Atchuthan, "A micro Lie theory for state estimation in robotics",
    arXiv:1812.01537, eqs. 132-146.
+.. [2] F. L. Markley, "Unit quaternion from rotation matrix", J. Guidance, Control, and Dynamics 31,
+   2008.
 
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from ..arrays import Array, readonly
 from ..errors import DataError
@@ -79,16 +80,20 @@ def rotation_vector(matrix: Array) -> Array:
     )
     cosine = 0.5 * (np.trace(matrix, axis1=-2, axis2=-1) - 1.0)
     if cosine.min() < LARGE_TURN:
-        return np.reshape(_rotations(matrix).as_rotvec(), matrix.shape[:-2] + (3,))
+        return _from_quaternion(quaternion_from_matrix(matrix))
     length = np.sqrt((sine**2).sum(axis=-1))
     angle = np.arctan2(length, cosine)
     ratio = np.divide(angle, length, out=np.ones_like(angle), where=length > 0.0)
     return np.asarray(ratio[..., None] * sine)
 
 
-def _rotations(matrix: Array) -> Rotation:
-    """Return scipy's rotations; before 1.12 it takes neither read-only arrays nor none at all."""
-    return Rotation.from_matrix(np.array(matrix).reshape(-1, 3, 3))
+def _from_quaternion(quaternion: Array) -> Array:
+    """Return rotation vectors, shape (..., 3), of quaternions with w >= 0."""
+    vector, w = quaternion[..., :3], quaternion[..., 3]
+    length = np.linalg.norm(vector, axis=-1)
+    angle = 2.0 * np.arctan2(length, w)
+    ratio = np.divide(angle, length, out=np.full(angle.shape, 2.0), where=length > 0.0)
+    return np.asarray(ratio[..., None] * vector)
 
 
 def matrix_from_quaternion(quaternion: ArrayLike, name: str = 'quaternion') -> Array:
@@ -110,13 +115,27 @@ def matrix_from_quaternion(quaternion: ArrayLike, name: str = 'quaternion') -> A
             f'{name} {k} has length {length[k]:.4g}, a rotation needs 1; '
             'check the order (x y z w) and that it is not left at zero'
         )
-    matrices = Rotation.from_quat(np.array(flat)).as_matrix() if flat.size else np.zeros(0)
+    vector, w = flat[:, :3] / length[:, None], (flat[:, 3] / length)[:, None, None]
+    cross = skew(vector)
+    matrices = np.eye(3) + 2.0 * (w * cross + cross @ cross)
     return np.reshape(matrices, values.shape[:-1] + (3, 3))
 
 
 def quaternion_from_matrix(matrix: Array) -> Array:
     """Return quaternions x y z w with w >= 0, shape (..., 4), of rotation matrices."""
-    values = _rotations(matrix).as_quat() if matrix.size else np.zeros((0, 4))
+    m = np.moveaxis(np.reshape(matrix, (-1, 3, 3)), 0, -1)
+    trace = m[0, 0] + m[1, 1] + m[2, 2]
+    # Four ways to the same quaternion; the one with the largest divisor loses no digits [2]_.
+    ways = np.empty((4, 4, trace.size))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        ways[i, i] = 1.0 - trace + 2.0 * m[i, i]
+        ways[i, j] = ways[j, i] = m[i, j] + m[j, i]
+        ways[i, 3] = ways[3, i] = m[k, j] - m[j, k]
+    ways[3, 3] = 1.0 + trace
+    best = np.argmax([m[0, 0], m[1, 1], m[2, 2], trace], axis=0)
+    values = ways[best, :, np.arange(trace.size)]
+    values /= np.linalg.norm(values, axis=1, keepdims=True)
     canonical = np.where(values[:, 3:] < 0.0, -values, values)
     return np.reshape(canonical, matrix.shape[:-2] + (4,))
 

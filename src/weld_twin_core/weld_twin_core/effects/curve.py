@@ -9,10 +9,10 @@ from functools import lru_cache
 from numbers import Real
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..arm.dynamics import chain_gravity_torque, wrench_torque
 from ..arrays import Array
+from ..cubics import hermite, spline_slopes
 from ..errors import DataError, ModelError
 from .view import View
 
@@ -101,20 +101,25 @@ def basis(knots: Sequence[float], x: Array) -> Array:
     """
     if len(knots) == 1:
         return np.ones((1, *np.shape(x)))
-    spline = _cardinal(tuple(float(k) for k in knots))
-    return np.asarray(np.moveaxis(spline(np.clip(x, knots[0], knots[-1])), -1, 0))
+    values, _ = _cardinal(tuple(float(k) for k in knots), np.clip(x, knots[0], knots[-1]))
+    return np.asarray(np.moveaxis(values, -1, 0))
 
 
 def basis_slope(knots: Sequence[float], x: Array) -> Array:
     """Return the derivative of `basis` by x, shape (K, ...); 0 beyond the knots."""
-    spline = _cardinal(tuple(float(k) for k in knots))
+    _, rates = _cardinal(tuple(float(k) for k in knots), np.clip(x, knots[0], knots[-1]))
     inside = (x >= knots[0]) & (x <= knots[-1])
-    return np.asarray(np.moveaxis(spline(np.clip(x, knots[0], knots[-1]), 1), -1, 0) * inside)
+    return np.asarray(np.moveaxis(rates, -1, 0) * inside)
+
+
+def _cardinal(knots: tuple[float, ...], x: Array) -> tuple[Array, Array]:
+    """Return the natural splines that are one at one knot each, and their slopes."""
+    return hermite(np.array(knots), np.eye(len(knots)), _slopes(knots), x)
 
 
 @lru_cache(maxsize=256)
-def _cardinal(knots: tuple[float, ...]) -> CubicSpline:
-    return CubicSpline(knots, np.eye(len(knots)), bc_type='natural')
+def _slopes(knots: tuple[float, ...]) -> Array:
+    return spline_slopes(np.array(knots), np.eye(len(knots)), natural=True)
 
 
 def check_knots(name: str, over: str, knots: Sequence[float], count: int) -> None:

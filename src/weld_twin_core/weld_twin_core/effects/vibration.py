@@ -154,8 +154,6 @@ class Vibration(MemoryEffect):
 
         On evenly spaced stamps, on which the recursion is a plain filter.
         """
-        from scipy.signal import lfilter  # half a second that only a diagnosis has to wait for
-
         if zoom or view.static or view.t.size < 3:
             return None
         step = float(np.median(np.diff(view.t)))
@@ -167,14 +165,20 @@ class Vibration(MemoryEffect):
             for f in FREQUENCIES[FREQUENCIES * step < HIGHEST]
             for z in DAMPINGS
         ]
-        out = np.empty((len(modes), view.t.size))
-        for k, mode in enumerate(modes):
-            pole, damped = mode._mode()
-            decay = np.exp(pole * step)
-            response = lfilter([-decay / damped], [1.0, -decay], kick).imag
-            out[k] = np.interp(view.t, t, response)
-        return list(modes), out
+        poles, damped = (np.array(part) for part in zip(*(m._mode() for m in modes), strict=True))
+        response = _ringing(np.exp(poles * step), damped, kick)
+        return list(modes), np.stack([np.interp(view.t, t, own) for own in response])
 
     def from_atoms(self, coefficients: Array) -> Vibration:
         """Return the mode whose gain is the in-phase coefficient."""
         return Vibration(self.joint, self.frequency, self.damping, float(coefficients[0]))
+
+
+def _ringing(decay: Array, damped: Array, kick: Array) -> Array:
+    """Return the responses of many modes to even kicks, shape (modes, N): sample by sample, all."""
+    z, out = np.zeros(decay.shape, complex), np.empty((kick.size, decay.size))
+    gain = -decay / damped
+    for k, push in enumerate(kick):
+        z = decay * z + gain * push
+        out[k] = z.imag
+    return np.ascontiguousarray(out.T)

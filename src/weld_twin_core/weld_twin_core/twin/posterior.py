@@ -19,13 +19,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats.qmc import Halton
 
 from ..arm.robot import Robot
 from ..arrays import Array, readonly
 from ..effects.effect import Effect
 from ..errors import DataError, ModelError
 from ..recording import JointMotion, Recording, Signal
+from ..sequences import halton
 from .domain import Domain
 from .features import Features
 from .twin import Twin
@@ -330,7 +330,7 @@ def postures_within_limits(robot: Robot, count: int) -> Array:
     """Return postures spread evenly over what the joints' limits allow, shape (count, n)."""
     reach = np.where(robot.prismatic, 1.0, np.pi)
     low, high = np.maximum(robot.lower, -reach), np.minimum(robot.upper, reach)
-    drawn = Halton(robot.n, scramble=False).random(count + 1)[1:]
+    drawn = halton(robot.n, count)
     return np.asarray(low + drawn * (high - low))
 
 

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Instruments: noise, clocks, losses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plant_cells import UR5, dh_positions, record, stations, weave
@@ -95,3 +97,19 @@ def test_same_seed_same_recording():
 def test_bad_commands_are_refused(t, q, match):
     with pytest.raises(ValueError, match=match):
         Command(np.array(t), q)
+
+
+def test_a_motion_recorded_again_is_what_a_fresh_simulation_says():
+    """The physics of a motion is simulated once; instruments and their draws are not."""
+    lot = [
+        {'effect': 'backlash', 'joint': 'j1', 'width': 1e-3},
+        {'effect': 'servo_lag', 'joint': 'j2', 'time_constant': 0.02},
+        {'effect': 'friction_wander', 'joint': 'j3', 'amplitude': 1e-4, 'time_constant': 1.0},
+    ]
+    command = weave(UR5, 1.0)
+    record(UR5, lot, command)
+    record(UR5, lot[:1], command)
+    again = record(UR5, lot, command, Tracker(sigma=3e-5, drop=0.1), seed=5)
+    fresh = record(UR5, lot, replace(command), Tracker(sigma=3e-5, drop=0.1), seed=5)
+    np.testing.assert_array_equal(again.position, fresh.position)
+    np.testing.assert_array_equal(again.t_measured, fresh.t_measured)

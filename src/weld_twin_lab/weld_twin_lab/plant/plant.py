@@ -8,8 +8,10 @@ under load (`tree`, `compliance`) -> geometry as built (`geometry`) -> tool unde
 instrument and clocks (`tracker`). Nothing here is shared with the twin that is to diagnose it.
 """
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -26,6 +28,9 @@ from .textbook_effects import Causes
 from .tracker import Tracker
 
 KNOWN = library.LIBRARY | outside_causes.OUTSIDE
+KEPT = 4
+"""Cells kept with what was simulated of them: a study records one motion with the same flaws several
+times, once for each instrument, and MuJoCo would say the same each time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +47,41 @@ class _Cell:
     def start(self) -> float:
         """The recording's first stamp [s]."""
         return float(self.course.command.t[0])
+
+    @cached_property
+    def compliant(self) -> Compliant:
+        """What gives between motors and links."""
+        return Compliant(self.robot, self.arm, self.causes, self.richness)
+
+    @cached_property
+    def lost(self) -> CubicSpline | None:
+        """How far the motors are from the command, over time."""
+        return drives.displacement(self.causes, self.course, self.richness)
+
+    @cached_property
+    def grid(self) -> np.ndarray:
+        """The instants at which the moving arm is simulated [s]."""
+        times = self.course.command.t
+        return rollout.grid(times[0], times[-1], tree.STEP)
+
+    @cached_property
+    def geared(self) -> np.ndarray:
+        """The positions behind the gears at these instants, shape (N, n)."""
+        motor = self.course.q(self.grid) + (0.0 if self.lost is None else self.lost(self.grid))
+        return np.asarray(motor + library.gearing(self.causes, motor))
+
+    @cached_property
+    def torque(self) -> np.ndarray:
+        """The load torque there, shape (N, n)."""
+        return self.compliant.torque(self.geared, self.course.wrench(self.grid))
+
+    @cached_property
+    def sprung(self) -> np.ndarray | float:
+        """What gaps and springs give there, shape (N, n)."""
+        if self.compliant.rigid:
+            return 0.0
+        motor = CubicSpline(self.grid, self.geared)
+        return tree.moving(self.compliant, self.grid, motor, self.course.wrench(self.grid))
 
 
 def run(
@@ -76,14 +116,22 @@ def run(
     """
     if not 0.0 <= richness <= 3.0:
         raise ValueError(f'richness must be within 0 and 3, got {richness}')
+    described = json.dumps(
+        [robot, list(effects)], default=lambda value: np.asarray(value).tolist()
+    )
+    return _record(_cell(described, command, richness), tracker, rng)
+
+
+@lru_cache(maxsize=KEPT)
+def _cell(described: str, command: Command, richness: float) -> _Cell:
+    robot, effects = json.loads(described)
     arm = exponentials.arm_from(robot)
     if command.q.shape[1] != len(arm.names):
         raise ValueError(
             f'the command moves {command.q.shape[1]} joints, the robot has {len(arm.names)}'
         )
     causes = library.causes_from(effects, arm, KNOWN)
-    cell = _Cell(robot, arm, causes, Course(command), richness)
-    return _record(cell, tracker, rng)
+    return _Cell(robot, arm, causes, Course(command), richness)
 
 
 def _record(cell: _Cell, instrument: Tracker, rng: np.random.Generator) -> PlantRecording:
@@ -138,22 +186,20 @@ def _link_side(
     cell: _Cell, t: np.ndarray, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the links' and the motors' positions at times t, each (M, n)."""
-    compliant = Compliant(cell.robot, cell.arm, cell.causes, cell.richness)
-    lost = drives.displacement(cell.causes, cell.course, cell.richness)
-    motor = cell.course.q(t) + (0.0 if lost is None else lost(t))
+    motor = cell.course.q(t) + (0.0 if cell.lost is None else cell.lost(t))
     geared = motor + library.gearing(cell.causes, motor)
     rounding = library.rounding(cell.causes, motor)
     give: np.ndarray | float
     if cell.course.command.static:
-        give = _at_rest(cell, compliant, rng)[np.searchsorted(cell.course.command.t, t)]
+        give = _at_rest(cell, rng)[np.searchsorted(cell.course.command.t, t)]
     else:
-        give = _in_motion(cell, compliant, lost, rng)(t)
+        give = _in_motion(cell, rng)(t)
     return geared + rounding + give, motor
 
 
-def _at_rest(cell: _Cell, compliant: Compliant, rng: np.random.Generator) -> np.ndarray:
+def _at_rest(cell: _Cell, rng: np.random.Generator) -> np.ndarray:
     """Return what gives at every station, in the order they are visited, shape (N, n)."""
-    command = cell.course.command
+    command, compliant = cell.course.command, cell.compliant
     q = command.q + library.gearing(cell.causes, command.q)
     give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, command.wrench)
     flaws = outside_causes.on_joints(
@@ -163,21 +209,12 @@ def _at_rest(cell: _Cell, compliant: Compliant, rng: np.random.Generator) -> np.
 
 
 def _in_motion(
-    cell: _Cell, compliant: Compliant, lost: CubicSpline | None, rng: np.random.Generator
+    cell: _Cell, rng: np.random.Generator
 ) -> Callable[[np.ndarray], np.ndarray | float]:
     """Return what gives as a function of time."""
     flawed = any(item['effect'] in outside_causes.JOINT_LEVEL for item in cell.causes.items)
-    if compliant.rigid and not flawed:
+    if cell.compliant.rigid and not flawed:
         return lambda _: 0.0
-    times = cell.course.command.t
-    grid = rollout.grid(times[0], times[-1], tree.STEP)
-    motor = cell.course.q(grid) + (0.0 if lost is None else lost(grid))
-    geared = motor + library.gearing(cell.causes, motor)
-    wrench = cell.course.wrench(grid)
-    give = outside_causes.on_joints(
-        cell.causes, grid, geared, lambda: compliant.torque(geared, wrench), rng
-    )
-    if not compliant.rigid:
-        give = give + tree.moving(compliant, grid, CubicSpline(grid, geared), wrench)
-    spline: Callable[[np.ndarray], np.ndarray] = CubicSpline(grid, give)
+    give = outside_causes.on_joints(cell.causes, cell.grid, cell.geared, lambda: cell.torque, rng)
+    spline: Callable[[np.ndarray], np.ndarray] = CubicSpline(cell.grid, give + cell.sprung)
     return spline

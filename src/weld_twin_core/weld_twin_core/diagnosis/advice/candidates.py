@@ -8,13 +8,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.stats import qmc
 
 from ...arm.robot import Robot
 from ...arm.rotation import transform
 from ...arrays import Array
+from ...cubics import hermite, spline_slopes
 from ...recording import JointMotion, Recording, Signal
+from ...sequences import halton
 from ..algebra.problem import Model, Problem
 
 NAME = 'next measurement'
@@ -191,7 +191,7 @@ def _range(problem: Problem, robot: Robot) -> tuple[Array, Array]:
 def _spread(problem: Problem, robot: Robot, count: int) -> Array:
     """Return stations that fill the range evenly, shape (count, n)."""
     low, high = _range(problem, robot)
-    unit = qmc.Halton(robot.n, scramble=False).random(count + 1)[1:]
+    unit = halton(robot.n, count)
     return np.asarray(low + unit * (high - low))
 
 
@@ -208,8 +208,9 @@ def sweep(problem: Problem, robot: Robot) -> JointMotion:
     joint = np.arange(robot.n)
     phase = turn[:, None] * (1 + joint % 3) + joint / 7.0
     waves = np.sin(2.0 * np.pi * phase)
-    path = CubicSpline(turn, 0.5 * (low + high) + 0.25 * (high - low) * waves)
-    fine = path(np.linspace(0.0, 1.0, 500), 1)
+    knots = 0.5 * (low + high) + 0.25 * (high - low) * waves
+    slopes = spline_slopes(turn, knots)
+    fine = hermite(turn, knots, slopes, np.linspace(0.0, 1.0, 500))[1]
     finite = np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)
     # s = (1 - cos)/2 is pi/2 times faster than its mean.
     fastest = 0.5 * np.pi * float((np.abs(fine) / finite).max()) / FASTEST
@@ -220,7 +221,9 @@ def sweep(problem: Problem, robot: Robot) -> JointMotion:
         shares.append(0.5 * (1.0 - np.cos(2.0 * np.pi * t / span)))
         times.append(start + t)
         start += t[-1] + 1.0 / RATE
-    return JointMotion(np.concatenate(times), path(np.concatenate(shares)))
+    return JointMotion(
+        np.concatenate(times), hermite(turn, knots, slopes, np.concatenate(shares))[0]
+    )
 
 
 def _pressed(recording: Recording) -> Recording:

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import erf
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from ...arrays import Array
 from ..algebra.fit import solve_scaled
@@ -191,7 +191,7 @@ def _predicted(
 
 def _size(errors: Array, moments: Array, shape: Array) -> float:
     """Return the factor of a shape's root that makes regions hold as many errors as they shall."""
-    limit = float(chi2.ppf(HOLD, 3))
+    limit = _limit(HOLD)
     # Of few errors the largest say more of those to come than their count: conformal level.
     wanted = min(HOLD * (1.0 + 1.0 / len(errors)), 1.0)
 
@@ -210,6 +210,18 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if held(middle) >= wanted else (middle, high)
     return float(np.sqrt(high))
+
+
+def _limit(hold: float) -> float:
+    """Return the squared length that a normal vector of three axes keeps with a probability."""
+    low, high = 0.0, 100.0
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        # chi-square with three degrees of freedom, in closed form
+        tail = np.sqrt(2.0 * middle / np.pi) * np.exp(-0.5 * middle)
+        inside = erf(np.sqrt(0.5 * middle)) - tail
+        low, high = (middle, high) if inside < hold else (low, middle)
+    return high
 
 
 def _quiet(problem: Problem, size: float, floor: NoiseFloor) -> float:

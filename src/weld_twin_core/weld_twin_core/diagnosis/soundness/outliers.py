@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import median_filter
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ...arrays import Array
 from .evidence import Case, Finding, distance, length
@@ -51,9 +51,16 @@ def outliers(case: Case) -> Sequence[Finding]:
     return out
 
 
+def _running_median(part: Array) -> Array:
+    """Return the median of every component over its neighbours in time; the ends repeat."""
+    side = WINDOW // 2
+    padded = np.pad(part, ((0, 0), (side, side)), mode='edge')
+    return np.asarray(np.median(sliding_window_view(padded, WINDOW, axis=1), axis=-1))
+
+
 def _samples(part: Array) -> Array:
     """Return how far samples are off a running median where that is too far, else 0, (M,) [m]."""
-    smooth = median_filter(part[:3], size=(1, WINDOW), mode='nearest')
+    smooth = _running_median(part[:3])
     off = np.linalg.norm(part[:3] - smooth, axis=0)
     # Vibration comes and goes: what one sample in ten does is no outlier.
     limit = max(FAR * float(np.median(off)), 4.0 * float(np.quantile(off, 0.9)))
@@ -76,5 +83,5 @@ def _stations(part: Array) -> Array:
     off = distance(part - np.median(part, axis=1, keepdims=True))
     limit = max(STATION_FAR * float(np.median(off)), 1e-9)
     # Far off together means that the set-up moved; an outlier is alone.
-    alone = distance(part[:3] - median_filter(part[:3], size=(1, WINDOW), mode='nearest'))
+    alone = distance(part[:3] - _running_median(part[:3]))
     return np.where((off > limit) & (alone > 0.5 * off), off, 0.0)

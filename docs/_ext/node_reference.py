@@ -11,6 +11,7 @@ from sphinx.application import Sphinx
 
 from weld_twin_msgs_py.messages.topics import TOPICS, VOLATILE, Qos
 from weld_twin_nodes.live.cell_node import SHARED, CellNode
+from weld_twin_nodes.live.contact_marker import ContactMarker
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.deviation_markers import DeviationMarkers
 from weld_twin_nodes.live.error_injector import ErrorInjector
@@ -26,6 +27,7 @@ NODES: dict[str, type[CellNode]] = {
     'forward_kinematics_twin': ForwardKinematicsTwin,
     'deviation_analyzer': DeviationAnalyzer,
     'deviation_markers': DeviationMarkers,
+    'contact_marker': ContactMarker,
     'live_diagnosis': LiveDiagnosis,
     'recorder': Recorder,
 }

@@ -35,6 +35,7 @@ setup(
             'recorder = weld_twin_nodes.live.recorder:main',
             'live_diagnosis = weld_twin_nodes.live.live_diagnosis:main',
             'deviation_markers = weld_twin_nodes.live.deviation_markers:main',
+            'contact_marker = weld_twin_nodes.live.contact_marker:main',
         ]
     },
 )

@@ -19,6 +19,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--arms', default='', metavar='A,B', help='panda_1, panda_2, kuka_14; all when left out'
     )
+    parser.add_argument(
+        '--sealed',
+        type=int,
+        default=0,
+        metavar='N',
+        help='also make and open N cases of the plant',
+    )
     parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
 
 
@@ -48,4 +55,10 @@ def run(args: argparse.Namespace) -> int:
     )
     write_text(out / 'contacts.md', table(entries), overwrite=True)
     print(table(entries), end='')
+    if args.sealed:
+        from ...contacts.sealed import sealed
+
+        score = sealed(args.sealed, out / 'sealed', tell)
+        write_text(out / 'sealed.json', json.dumps(score, indent=1) + '\n', overwrite=True)
+        print(', '.join(f'{key} {value}' for key, value in score.items()))
     return 0

@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Sealed contacts: the plant touches sockets with one flaw and some slack; is the flaw named?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import forward, jacobian
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, spreads
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_msgs_py.files.whole_files import write_text
+
+from ..blind.cause_sizes import draw, scaled, site
+from ..blind.simulator import require_simulator
+
+ARMS = ('ur5', 'ur10', 'kuka_iiwa14', 'franka_panda')
+"""Arms of which link masses are known, so that every cause can act."""
+FAMILIES = (
+    'joint_offset',
+    'link_length',
+    'link_offset',
+    'link_twist',
+    'gear_ratio',
+    'transmission_ripple',
+    'joint_compliance',
+    'joint_coupling',
+    'tool_pose',
+    'base_pose',
+)
+"""Causes drawn; the last one no contact sees."""
+SOCKETS = np.array([[0.5, 0.1, 0.15], [0.1, 0.5, 0.35], [0.35, -0.35, 0.25]])
+"""Places [m] within reach of all of them."""
+APART = np.array([0.0, 0.05, 0.0])
+"""From one socket of a place to the other [m]."""
+EACH = 10
+"""Postures per socket."""
+SLACK = (5e-6, 5e-5)
+"""Of the ball in its socket [m], standard deviation of each coordinate."""
+SIZE = (3.0, 15.0)
+"""What a cause moves, in slacks."""
+SHOWN = 0.3
+"""A cause that moves less than this many slacks at its largest believable size is not seen."""
+LARGEST = 10.0
+"""Factor on a drawn cause beyond which it is larger than machines have it."""
+SURE = 0.9
+"""Confidence from which a wrong answer counts as sure."""
+ROUNDS = 4
+"""Newton steps in which the plant is made to touch: each leaves a hundredth of what was off."""
+
+
+def case(seed: int) -> dict[str, Any]:
+    """
+    Return one sealed case, diagnosed and opened.
+
+    Parameters
+    ----------
+    seed : int
+        Decides the arm, the cause, its size, the slack and the postures.
+
+    """
+    rng = np.random.default_rng(seed)
+    tool = np.eye(4)
+    tool[:3, 3] = [0.02, -0.03, 0.15]
+    robot = catalog.load(ARMS[seed % len(ARMS)]).with_frames(tool=tool)
+    cause = draw(str(rng.choice(FAMILIES)), robot, 1.0, rng)
+    slack, size = float(rng.uniform(*SLACK)), float(rng.uniform(*SIZE))
+    start, labels, places = _starts(robot, rng)
+    recording = _touching(robot, cause, start, labels, places, rng)
+    shown = _shown(robot, recording)
+    factor = min(size * slack / max(shown, 1e-12), LARGEST)
+    cause = scaled(cause, factor)
+    loose = places + rng.normal(0.0, slack, places.shape)
+    recording = _touching(robot, cause, start, labels, loose, rng)
+    found = diagnose(recording, robot)
+    truth = site(cause)
+    named = [(item.effect.name, item.effect.site) for item in found.effects]
+    alike = {(s.effect, s.joint) for group in found.indistinguishable for s in group}
+    seen = shown * factor >= SHOWN * slack
+    right = truth in named or truth in alike
+    return {
+        'seed': seed,
+        'robot': robot.name,
+        'truth': list(truth),
+        'slacks': shown * factor / slack,
+        'seen': seen,
+        'status': found.status,
+        'confidence': found.confidence,
+        'named': [list(item) for item in named],
+        'right': right if seen else truth not in named,
+        'sure_and_wrong': found.status == 'identified' and found.confidence >= SURE and not right,
+        'spread_m': None if found.contacts is None else found.contacts.held_out_spread_m,
+    }
+
+
+def _starts(robot: Robot, rng: np.random.Generator) -> tuple[Array, list[str], Array]:
+    """Return nominal postures at every socket, their labels, and where each socket is."""
+    q, labels, places = [], [], []
+    for k, middle in enumerate(SOCKETS):
+        for socket in (0, 1):
+            place = middle + socket * APART
+            found = _at(robot, place, rng)
+            q.append(found)
+            labels += [f'{k}/{socket}'] * len(found)
+            places.append(np.tile(place, (len(found), 1)))
+    return np.concatenate(q), labels, np.concatenate(places)
+
+
+def _at(robot: Robot, place: Array, rng: np.random.Generator) -> Array:
+    """Return nominal postures in which the tool point is at a place, within the limits."""
+    low, high = np.maximum(robot.lower, -2.5), np.minimum(robot.upper, 2.5)
+    q = rng.uniform(low, high, (60 * EACH, robot.n))
+    for _ in range(80):
+        q = q + np.clip(_step(robot, q, place - forward(robot, q)[:, :3, 3]), -0.2, 0.2)
+    near = np.linalg.norm(place - forward(robot, q)[:, :3, 3], axis=1) < 1e-9
+    return q[near & (q > low).all(axis=1) & (q < high).all(axis=1)][:EACH]
+
+
+def _step(robot: Robot, q: Array, off: Array) -> Array:
+    """Return the least joint step, (M, n), that moves the tool point by ``off``, (M, 3)."""
+    turn = jacobian(robot, q)[:, :3]
+    inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + 1e-6 * np.eye(3))
+    return np.asarray(np.einsum('mji,mjk,mk->mi', turn, inverse, off))
+
+
+def _touching(
+    robot: Robot,
+    cause: Mapping[str, Any],
+    q: Array,
+    labels: list[str],
+    places: Array,
+    rng: np.random.Generator,
+) -> Recording:
+    """Return the joint readings at which the plant's own tool point touches."""
+    from ..plant.plant import run
+    from ..plant.plant_recording import Command
+    from ..plant.tracker import Tracker
+
+    t = 1.0 + np.arange(float(len(q)))
+    for _ in range(ROUNDS):
+        real = run(robot.to_mapping(), [cause], Command(t, q, static=True), Tracker(), rng)
+        q = q + _step(robot, q, places - real.position)
+    names = dict.fromkeys(labels)
+    ties = [Tie((f'{k}/0', f'{k}/1'), 0.05, 2e-5) for k in range(len(SOCKETS))]
+    artefact = Artefact(tuple(Contact(name) for name in names), tuple(ties))
+    motion = JointMotion(t, q, static=True)
+    return Recording('sealed', motion, contacts=Contacts(artefact, tuple(labels)))
+
+
+def _shown(robot: Robot, recording: Recording) -> float:
+    """Return the spread of the nominal tool point per coordinate, RMS [m]."""
+    assert recording.contacts is not None
+    points = forward(robot, recording.joints.q)[:, :3, 3]
+    away = np.concatenate(list(spreads(recording.contacts, points).values()))
+    return float(np.sqrt((away**2).mean() / 3.0))
+
+
+def sealed(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """
+    Return how many of some sealed cases were named.
+
+    Parameters
+    ----------
+    count : int
+    out : Path
+        Keeps a file per case; those that are there are not made again.
+    tell : callable
+        Told of every case.
+
+    """
+    require_simulator()
+    out.mkdir(parents=True, exist_ok=True)
+    cases = []
+    for seed in range(count):
+        path = out / f'case_{seed:04d}.json'
+        if not path.is_file():
+            entry = case(seed)
+            tell(f'case {seed}: {entry["truth"]} {entry["status"]} right={entry["right"]}')
+            write_text(path, json.dumps(entry, indent=1, default=float) + '\n')
+        cases.append(json.loads(path.read_text()))
+    seen = [c for c in cases if c['seen'] and c['slacks'] >= SIZE[0]]
+    hidden = [c for c in cases if not c['seen']]
+    return {
+        'cases': len(cases),
+        'seen': len(seen),
+        'named': sum(c['right'] for c in seen),
+        'hidden': len(hidden),
+        'hidden_named': sum(not c['right'] for c in hidden),
+        'sure_and_wrong': sum(c['sure_and_wrong'] for c in cases),
+    }

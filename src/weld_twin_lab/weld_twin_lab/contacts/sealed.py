@@ -122,7 +122,8 @@ def _at(robot: Robot, place: Array, rng: np.random.Generator) -> Array:
     for _ in range(80):
         q = q + np.clip(_step(robot, q, place - forward(robot, q)[:, :3, 3]), -0.2, 0.2)
     near = np.linalg.norm(place - forward(robot, q)[:, :3, 3], axis=1) < 1e-9
-    return q[near & (q > low).all(axis=1) & (q < high).all(axis=1)][:EACH]
+    within = (q > low).all(axis=1) & (q < high).all(axis=1)
+    return np.asarray(q[near & within][:EACH])
 
 
 def _step(robot: Robot, q: Array, off: Array) -> Array:

@@ -16,7 +16,7 @@ from weld_twin_core.arm.chain import forward, jacobian
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, spreads
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_msgs_py.files.whole_files import write_text
 
@@ -81,17 +81,20 @@ def case(seed: int) -> dict[str, Any]:
     cause = scaled(cause, factor)
     loose = places + rng.normal(0.0, slack, places.shape)
     recording = _touching(robot, cause, start, labels, loose, rng)
-    found = diagnose(recording, robot)
-    truth = site(cause)
+    return {'seed': seed, 'robot': robot.name} | _opened(
+        diagnose(recording, robot), site(cause), shown * factor / slack
+    )
+
+
+def _opened(found: Diagnosis, truth: tuple[str, str | None], slacks: float) -> dict[str, Any]:
+    """Return what a diagnosis says of a cause that moves so many slacks, and whether it is right."""
     named = [(item.effect.name, item.effect.site) for item in found.effects]
     alike = {(s.effect, s.joint) for group in found.indistinguishable for s in group}
-    seen = shown * factor >= SHOWN * slack
+    seen = slacks >= SHOWN
     right = truth in named or truth in alike
     return {
-        'seed': seed,
-        'robot': robot.name,
         'truth': list(truth),
-        'slacks': shown * factor / slack,
+        'slacks': slacks,
         'seen': seen,
         'status': found.status,
         'confidence': found.confidence,

@@ -100,44 +100,15 @@ def _picture(label: str, before: Array, after: Array) -> Html:
     clouds = [(cloud - cloud.mean(axis=0))[:, :2] * 1e3 for cloud in (before, after)]
     most = float(max(np.abs(cloud).max(initial=0.0) for cloud in clouds))
     half = next((step for step in _STEPS if step >= most), most)
-    dots = []
-    for cloud, filled in zip(clouds, (False, True), strict=True):
-        colour = 'var(--after)' if filled else 'var(--before)'
-        for x, y in cloud * (_SIZE / half):
-            dots.append(
-                tag(
-                    'circle',
-                    cx=f'{x:.1f}',
-                    cy=f'{-y:.1f}',
-                    r='3',
-                    fill=colour if filled else 'none',
-                    stroke=colour,
-                )
-            )
-    edge = _SIZE * 1.05
-    cross = [
-        tag(
-            'line',
-            x1=f'{-edge}',
-            x2=f'{edge}',
-            y1='0',
-            y2='0',
-            stroke='currentColor',
-            opacity='.2',
-        ),
-        tag(
-            'line',
-            y1=f'{-edge}',
-            y2=f'{edge}',
-            x1='0',
-            x2='0',
-            stroke='currentColor',
-            opacity='.2',
-        ),
+    dots = [
+        dot
+        for cloud, filled in zip(clouds, (False, True), strict=True)
+        for dot in _dots(cloud * (_SIZE / half), filled)
     ]
+    edge = _SIZE * 1.05
     picture = tag(
         'svg',
-        *cross,
+        *_cross(edge),
         *dots,
         viewBox=f'{-edge} {-edge} {2 * edge} {2 * edge}',
         role='img',
@@ -148,3 +119,28 @@ def _picture(label: str, before: Array, after: Array) -> Html:
         picture,
         tag('figcaption', f'{label}: from the middle to the edge {half:g} mm'),
     )
+
+
+def _dots(cloud: Array, filled: bool) -> list[Html]:
+    """Return the dots of a cloud, (m, 2) in units of the picture."""
+    colour = 'var(--after)' if filled else 'var(--before)'
+    return [
+        tag(
+            'circle',
+            cx=f'{x:.1f}',
+            cy=f'{-y:.1f}',
+            r='3',
+            fill=colour if filled else 'none',
+            stroke=colour,
+        )
+        for x, y in cloud
+    ]
+
+
+def _cross(edge: float) -> list[Html]:
+    """Return faint lines through the middle."""
+    ends = ((-edge, 0.0, edge, 0.0), (0.0, -edge, 0.0, edge))
+    return [
+        tag('line', x1=a, y1=b, x2=c, y2=d, stroke='currentColor', opacity='.2')
+        for a, b, c, d in ends
+    ]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from ...effects.effect import Effect
 from ...recording import Recording
@@ -101,22 +102,14 @@ def examine(
         There is nothing to work on.
 
     """
-    trial, mistakes, checks = given, list[Mistake](), list[Check]()
-    dated: tuple[Slip, ...] = ()
-    own: tuple[Unsound, ...] = ()
-    posed: tuple[Problem, Model] | None = None
+    trial, mistakes, look = given, list[Mistake](), _Look()
     for _ in range(ROUNDS):
         found = streams(trial)
-        posed = None
+        look = _Look()
         if not found:
             posed = aligned(trial.recordings, trial.robot, trial.align, _kept(known, given, trial))
-            posed = with_changes(*posed, trial.may_change, beliefs or Beliefs())
-            if posed[0].touched:
-                touched = touches(*posed)
-                posed, found, own = touched[:2], list(touched.mistakes), touched.told
-                checks = [Check('contacts', 'warning', item.sentence) for item in own]
-            else:
-                checks, found, dated = _checked(*posed)
+            look = _looked(*with_changes(*posed, trial.may_change, beliefs or Beliefs()))
+            found = look.found
         told = {mistake.sentence for mistake in mistakes}
         fresh = [mistake for mistake in found if mistake.sentence not in told]
         mistakes += fresh
@@ -125,24 +118,47 @@ def examine(
         for mistake in fresh:
             if mistake.mend is not None:
                 trial = mistake.mend(trial)
-    done = apply and posed is not None and all(m.mend is not None for m in mistakes)
-    if posed is not None:
-        problem = replace(posed[0], dated=tuple(slip.effect() for slip in dated))
-        posed = problem, replace(posed[1], mended=tuple(m.sentence for m in mistakes))
+    done = apply and look.posed is not None and all(m.mend is not None for m in mistakes)
     what = 'mended' if done else 'data and set-up'
     # What the checks say of data mended on trial holds for nothing that was given.
     told_first = [Check(what, 'unsound', m.sentence) for m in mistakes]
     return Examined(
         trial if done else given,
-        posed if done or not mistakes else None,
-        (*told_first, *(checks if done or not mistakes else ())),
+        look.marked(mistakes) if done or not mistakes else None,
+        (*told_first, *(look.checks if done or not mistakes else ())),
         (
             *(Unsound(m.kind, m.at, m.sentence, m.remedy, done, m.alike) for m in mistakes),
-            *own,
+            *look.told,
         ),
         tuple(mistakes) if done else (),
-        dated,
+        look.dated,
     )
+
+
+class _Look(NamedTuple):
+    """What a look found: the problem, what checks say, mistakes, what gave way, what was mended."""
+
+    posed: tuple[Problem, Model] | None = None
+    checks: tuple[Check, ...] = ()
+    found: list[Mistake] = []
+    dated: tuple[Slip, ...] = ()
+    told: tuple[Unsound, ...] = ()
+
+    def marked(self, mistakes: Sequence[Mistake]) -> tuple[Problem, Model] | None:
+        """Return the problem with what gave way, and the model with what was undone."""
+        if self.posed is None:
+            return None
+        problem = replace(self.posed[0], dated=tuple(slip.effect() for slip in self.dated))
+        return problem, replace(self.posed[1], mended=tuple(m.sentence for m in mistakes))
+
+
+def _looked(problem: Problem, model: Model) -> _Look:
+    if problem.touched:
+        touched = touches(problem, model)
+        said = tuple(Check('contacts', 'warning', item.sentence) for item in touched.told)
+        return _Look(touched[:2], said, list(touched.mistakes), (), touched.told)
+    checks, found, dated = _checked(problem, model)
+    return _Look((problem, model), tuple(checks), found, dated)
 
 
 def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, ...]:

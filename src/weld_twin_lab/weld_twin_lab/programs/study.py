@@ -22,11 +22,30 @@ RESULTS, TABLE, PARTS = 'programs.json', 'programs.md', 'parts'
 SCHEMA = 'weld_twin/programs/1'
 MADE = Path('test/programs/made')
 """Programs as users have them, from the top of the source tree; left out where there are none."""
+SEAM_HEADS = (
+    'language',
+    'robot',
+    'causes',
+    'verdict',
+    'worst before, mm',
+    'after',
+    'true causes',
+    'RMS before, mm',
+    'after',
+    'true causes',
+    'worst, over true causes',
+)
+"""Heads of the table of corrected seams."""
 Tell = Callable[[str], None]
 
 
 def study(
-    out: Path, drawn: int, broken: int, made: Path = MADE, tell: Tell = lambda text: None
+    out: Path,
+    drawn: int,
+    broken: int,
+    seams: int,
+    made: Path = MADE,
+    tell: Tell = lambda text: None,
 ) -> dict[str, Any]:
     """
     Try every language that was not tried yet, and write the results.
@@ -37,6 +56,8 @@ def study(
         Keeps a file for every part; a run that was interrupted goes on from there.
     drawn, broken : int
         Programs of each language.
+    seams : int
+        Seams of each language that are recorded, diagnosed, corrected and driven.
     made : Path
         Folder of programs as users have them.
     tell : callable
@@ -50,10 +71,31 @@ def study(
         trips.append(_kept(out, f'round_trips_{language}', trip, tell))
         trial = partial(fuzz, language, broken, _whole(language, made))
         fuzzed.append(_kept(out, f'fuzz_{language}', trial, tell))
-    result = {'schema': SCHEMA, 'version': __version__, 'round_trips': trips, 'fuzz': fuzzed}
+    driven = [
+        _kept(out, f'seam_{seed}_{language}', partial(_correction, language, seed), tell)
+        for seed in range(seams)
+        for language in CELLS
+    ]
+    result = {
+        'schema': SCHEMA,
+        'version': __version__,
+        'round_trips': trips,
+        'fuzz': fuzzed,
+        'corrections': driven,
+    }
     write_text(out / RESULTS, json.dumps(result, indent=1) + '\n', overwrite=True)
     write_text(out / TABLE, summary(result), overwrite=True)
     return result
+
+
+def _correction(language: str, seed: int) -> dict[str, Any]:
+    """Return what a correction does; the simulator is loaded where it is needed."""
+    from ..blind.simulator import require_simulator
+
+    require_simulator()
+    from .corrections import correction
+
+    return correction(language, seed)
 
 
 def _whole(language: str, made: Path) -> list[list[str]]:
@@ -92,6 +134,7 @@ def summary(result: dict[str, Any]) -> str:
         )
         for e in result['fuzz']
     ]
+    driven = [_seam_row(entry) for entry in result['corrections']]
     heads = ('language', 'broken programs', 'refused', 'read', 'tracebacks', 'silently changed')
     return '\n'.join(
         [
@@ -103,5 +146,21 @@ def summary(result: dict[str, Any]) -> str:
             '',
             markdown.table(heads, *fuzzed),
             '',
+            '## Corrected seams, run by the plant',
+            '',
+            markdown.table(SEAM_HEADS, *driven),
+            '',
         ]
     )
+
+
+def _seam_row(entry: dict[str, Any]) -> tuple[str, ...]:
+    worst, rms = entry['path_error_m'], entry['rms_m']
+    causes = ', '.join(f'{cause["effect"]} of {cause["joint"]}' for cause in entry['causes'])
+    columns = [
+        f'{1e3 * size[key]:.3f}'
+        for size in (worst, rms)
+        for key in ('before', 'after', 'true_causes')
+    ]
+    ratio = worst['after'] / max(worst['true_causes'], 1e-9)
+    return (entry['language'], entry['robot'], causes, entry['status'], *columns, f'{ratio:.2f}')

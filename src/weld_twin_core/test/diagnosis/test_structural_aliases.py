@@ -64,3 +64,33 @@ def test_an_excluded_error_that_is_no_twin_is_not_told():
     assert [(s.effect, s.joint) for s in found.indistinguishable[0]] == [
         ('joint_offset', 'elbow_joint')
     ]
+
+
+def swinging(effects, noise):
+    robot = wt.load('ur5')
+    t = np.arange(0.0, 12.0, 0.02)
+    q = np.array([0.0, -1.2, 1.4, -1.0, -1.5, 0.0]) + 0.4 * np.sin(
+        np.outer(t, 0.9 + 0.31 * np.arange(6))
+    )
+    commanded = wt.Recording('swing', wt.JointMotion(t, q))
+    real = wt.Twin(robot, effects).poses(commanded)
+    drawn = np.random.default_rng(3).normal(scale=noise, size=real.position.shape)
+    return commanded.with_measured(wt.Measurements(t, real.position + drawn))
+
+
+def test_play_that_was_taken_out_is_told_beside_friction_where_noise_hides_their_curves():
+    recording = swinging([wt.effects.Backlash('elbow_joint', width=4e-4)], 8e-5)
+    found = wt.diagnose(recording, wt.load('ur5'), exclude=('backlash',))
+    assert found.status == 'ambiguous'
+    (group,) = found.indistinguishable
+    assert {('friction', 'elbow_joint'), ('backlash', 'elbow_joint')} <= {
+        (site.effect, site.joint) for site in group
+    }
+
+
+def test_nothing_stands_in_for_play_that_was_taken_out_where_its_curve_shows():
+    recording = swinging([wt.effects.Backlash('elbow_joint', width=3e-3)], 1e-5)
+    found = wt.diagnose(recording, wt.load('ur5'), exclude=('backlash',))
+    assert found.status == 'unknown'
+    assert found.effects == ()
+    assert not any(candidate.site.effect == 'backlash' for candidate in found.candidates)

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
+from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
 
@@ -147,6 +148,29 @@ def thermal_growth(cell):
             cell.table[(key, i)] = growth * getattr(cell.robot, key)[i]
 
 
+def loaded_play(cell):
+    torque = cell.textbook.load_torque(cell.robot, cell.q, cell.wrench)[1]
+    cell.q[1] += 0.5 * 2e-3 * np.sin(np.arctan2(torque, 5.0))
+
+
+def bearing_tilt(cell):
+    angle, standard = cell.q[0], cell.robot.convention == 'standard'
+    x, y = 2e-3 * np.cos(angle) + 1e-3 * np.sin(angle), 3e-3 * np.sin(angle)
+    if standard:
+        axes = cell.robot.T_world_base[:3, :2]
+        turn = Rotation.from_rotvec(axes @ [x, y]).as_matrix()
+        cell.base = np.array(cell.robot.T_world_base)
+        cell.base[:3, :3] = turn @ cell.base[:3, :3]
+    else:
+        cell.table = {('alpha', 0): x, ('beta', 0): y}
+
+
+def wear(cell):
+    worn = np.eye(4)
+    worn[2, 3] = -1e-3 * cell.elapsed
+    cell.tool = cell.robot.T_flange_tool @ worn
+
+
 def drift(cell):
     def move(pose):
         out = pose.copy()
@@ -210,10 +234,15 @@ DEFINITIONS = {
     'cartesian_compliance': ({'compliance': [1e-4, 2e-4, 3e-4]}, cartesian_compliance),
     'thermal_growth': ({'coefficient': 2e-4}, thermal_growth),
     'drift': ({'xyz_rate': SMALL}, drift),
+    'loaded_play': ({'joint': 'j1', 'width': 2e-3, 'torque': 5.0}, loaded_play),
+    'bearing_tilt': ({'joint': 'j0', 'lean': [2e-3, 1e-3, 0.0, 3e-3]}, bearing_tilt),
+    'wear': ({'rate': 1e-3}, wear),
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
     'measurement_noise': ({'sigma': 1e-3}, nothing),
 }
 IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay'}
+LOST_MOTION = {'friction', 'hysteresis'}
+"""Tested in test_lost_motion."""
 
 
 def effect(name, **values):
@@ -228,7 +257,7 @@ def with_helpers(name, effects):
 
 def test_every_registered_effect_is_tested_here():
     bundled = {name for name, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')}
-    assert bundled == set(DEFINITIONS) | IN_TIME
+    assert bundled == set(DEFINITIONS) | IN_TIME | LOST_MOTION
 
 
 @pytest.mark.parametrize('name', DEFINITIONS)
@@ -337,6 +366,39 @@ def test_servo_lag_solves_its_differential_equation(arm, make_recording, tau):
         expected.append(y[0])
     found = joint_under(arm, [effect('servo_lag', joint='j3', time_constant=tau)], recording, 'j3')
     np.testing.assert_allclose(found, expected, atol=2e-8)
+
+
+@pytest.mark.parametrize(('tau', 'damping'), [(0.02, 0.4), (0.05, 1.0), (0.3, 3.0)])
+def test_a_lag_that_swings_solves_its_differential_equation(arm, make_recording, tau, damping):
+    recording = make_recording(arm)
+    t, q = recording.joints.t, recording.joints.q[:, 3]
+    omega = 2.0 * damping / tau
+
+    def law(now, state):
+        return [state[1], omega**2 * (np.interp(now, t, q) - state[0] - tau * state[1])]
+
+    expected, state = [q[0]], np.array([q[0], 0.0])
+    for start, end in pairwise(t):
+        state = solve_ivp(law, (start, end), state, rtol=1e-10, atol=1e-13).y[:, -1]
+        expected.append(state[0])
+    lag = effect('servo_lag', joint='j3', time_constant=tau, damping=damping)
+    np.testing.assert_allclose(joint_under(arm, [lag], recording, 'j3'), expected, atol=5e-8)
+
+
+def test_a_lag_that_swings_is_the_same_step_by_step_and_nothing_at_zero(arm, make_recording):
+    recording = make_recording(arm, 60)
+    motion = recording.joints
+    lag = effect('servo_lag', joint='j3', time_constant=0.05, damping=0.4)
+    live = Twin(arm, (lag,)).live()
+    steps = [
+        live.step(t, q, qd)[0]
+        for t, q, qd in zip(motion.t, motion.q, motion.velocity, strict=True)
+    ]
+    np.testing.assert_allclose(steps, Twin(arm, (lag,)).joints(recording), atol=1e-13)
+    none = effect('servo_lag', joint='j3', time_constant=0.0, damping=0.4)
+    np.testing.assert_allclose(Twin(arm, (none,)).joints(recording), motion.q, atol=1e-7)
+    with pytest.raises(ModelError, match='damping must be between'):
+        Twin(arm, (effect('servo_lag', joint='j3', time_constant=0.1, damping=-1.0),))
 
 
 def test_vibration_solves_its_differential_equation(arm, make_recording):

@@ -19,11 +19,14 @@ Examples
 from .axis_parallelism import AxisParallelism
 from .backlash import Backlash
 from .base_pose import BasePose
+from .bearing_tilt import BearingTilt
 from .cartesian_compliance import CartesianCompliance
 from .drift import Drift
 from .effect import Effect, MemoryEffect
 from .frame_curve import FrameCurve
+from .friction import Friction
 from .gear_ratio import GearRatio
+from .hysteresis import Hysteresis
 from .instrument_knock import InstrumentKnock
 from .joint_compliance import JointCompliance
 from .joint_coupling import JointCoupling
@@ -33,6 +36,7 @@ from .joint_slip import JointSlip
 from .link_length import LinkLength
 from .link_offset import LinkOffset
 from .link_twist import LinkTwist
+from .loaded_play import LoadedPlay
 from .measurement_noise import MeasurementNoise
 from .measurement_scale import MeasurementScale
 from .payload import Payload
@@ -48,17 +52,21 @@ from .tool_slip import ToolSlip
 from .transmission_ripple import TransmissionRipple
 from .vibration import Vibration
 from .view import Parameter, Stage, View
+from .wear import Wear
 
 __all__ = [
     'REGISTRY',
     'AxisParallelism',
     'Backlash',
     'BasePose',
+    'BearingTilt',
     'CartesianCompliance',
     'Drift',
     'Effect',
     'FrameCurve',
+    'Friction',
     'GearRatio',
+    'Hysteresis',
     'InstrumentKnock',
     'JointCompliance',
     'JointCoupling',
@@ -68,6 +76,7 @@ __all__ = [
     'LinkLength',
     'LinkOffset',
     'LinkTwist',
+    'LoadedPlay',
     'MeasurementNoise',
     'MeasurementScale',
     'MemoryEffect',
@@ -85,6 +94,7 @@ __all__ = [
     'TransmissionRipple',
     'Vibration',
     'View',
+    'Wear',
     'effect_from_mapping',
     'effects_from_list',
     'register',

@@ -12,6 +12,7 @@ References
 ----------
 .. [1] G. E. Blelloch, "Prefix sums and their applications", CMU-CS-90-190, 1990.
 .. [2] A. Visintin, "Differential Models of Hysteresis", Springer 1994, ch. III (play).
+.. [3] P. R. Dahl, "A solid friction model", Aerospace Corporation TOR-0158(3107-18)-1, 1968.
 
 """
 
@@ -21,6 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
+
+STILL = 1e-9
+"""Part of a travel, or of the time to let go, below which bristles are moved straight."""
 
 
 def play(q: Array, width: Array | float, start: Array) -> Array:
@@ -72,6 +76,66 @@ def _play_of_many(q: Array, half: Array, start: Array) -> Array:
             np.minimum(before, stretch + half, out=out[..., first + 1 : last + 1])
         before = out[..., last : last + 1]
     return out
+
+
+def bristle(step: Array, travel: Array | float, leak: Array | float, start: Array) -> Array:
+    r"""
+    Return how far bristles between two rubbing parts are bent, from -1 to 1.
+
+    .. math:: dz = (\mathrm{sign}(dq) - z)\,|dq| / \mathrm{travel} - z\,\mathrm{leak}
+
+    Dahl's model [3]_, with a leak by which what is bent lets go in time; solved exactly for steps
+    that are even between samples.
+
+    Parameters
+    ----------
+    step : array, shape (..., N) [rad or m]
+        By how much the input moved since the sample before.
+    travel : float or array, broadcasts with step [rad or m]
+        Over which bristles bend.
+    leak : float or array, broadcasts with step
+        What is lost since the sample before: the time over that in which bristles let go.
+    start : array, shape (...)
+        z before the first sample.
+
+    Returns
+    -------
+    array, shape (..., N)
+
+    """
+    bent = np.abs(step) / travel
+    whole = bent + leak
+    share = bent / np.where(whole > STILL, whole, 1.0)
+    drive = np.where(whole > STILL, -share * np.expm1(-whole), bent)
+    return linear(np.exp(-whole), np.sign(step) * drive, start)
+
+
+def bristle_tangent(
+    step: Array, travel: Array | float, leak: Array | float, z: Array, change: Array
+) -> Array:
+    """
+    Return how a small change of the steps, or of the travel, comes out in `bristle` from rest.
+
+    Parameters
+    ----------
+    step, travel, leak
+        As for `bristle`.
+    z : array, shape (..., N)
+        What `bristle` returned, from rest.
+    change : array, shape (..., N)
+        Of step over travel, along the direction of the step.
+
+    """
+    bent = np.abs(step) / travel
+    whole = bent + leak
+    left, moving = np.exp(-whole), whole > STILL
+    safe = np.where(moving, whole, 1.0)
+    drive = (leak / safe * -np.expm1(-whole) + bent * left) / safe
+    before = np.concatenate([np.zeros_like(z[..., :1]), z[..., :-1]], axis=-1)
+    way = np.where(step < 0.0, -1.0, 1.0)
+    rise = way * np.where(moving, drive, 1.0) - left * before
+    slope: Array = linear(left, change * rise, np.zeros(np.shape(rise)[:-1]))
+    return slope
 
 
 def last_true(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

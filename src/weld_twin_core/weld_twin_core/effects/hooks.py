@@ -188,7 +188,9 @@ class Hooks(Parametric, ABC):
 
     def coordinate_shifts(self, view: View) -> list[Shift]:
         """Return d displacement / d fit coordinates."""
-        return [shift for shift in self.gradient(view) if shift is not None]
+        gradient = self.gradient(view)
+        shifts = (gradient[k] for k in self.fitted())
+        return [shift for shift in shifts if shift is not None]
 
     # Many small errors at once ------------------------------------------------------------------
 

@@ -125,28 +125,26 @@ class Parametric:
     # Fit coordinates: what a least-squares fit turns. Most effects fit their parameters; an effect
     # whose parameters bend (amplitude and phase) gives coordinates in which it is straight.
 
+    def fitted(self) -> list[int]:
+        """Return which components a fit turns, as places in `components`."""
+        return [k for k, (p, _) in enumerate(self.components()) if p.differentiable]
+
     def coordinates(self) -> Array:
         """Return the fit coordinates, shape (K,)."""
-        return np.array(
-            [
-                value
-                for (p, _), value in zip(self.components(), self.vector(), strict=True)
-                if p.differentiable
-            ]
-        )
+        return np.asarray(self.vector()[self.fitted()])
 
     def with_coordinates(self: P, values: Array) -> P:
         """Return the same at other fit coordinates, kept inside the physical bounds."""
         vector = np.array(self.vector())
         specs = self.components()
-        free = [k for k, (p, _) in enumerate(specs) if p.differentiable]
-        for k, value in zip(free, values, strict=True):
+        for k, value in zip(self.fitted(), values, strict=True):
             vector[k] = min(max(float(value), specs[k][0].lower), specs[k][0].upper)
         return self.with_vector(vector)
 
     def coordinate_scales(self) -> Array:
         """Return the typical size of every fit coordinate, shape (K,)."""
-        return np.array([p.typical for p, _ in self.components() if p.differentiable])
+        specs = self.components()
+        return np.array([specs[k][0].typical for k in self.fitted()])
 
     def errors(self, std: Array) -> dict[str, Any]:
         """
@@ -160,9 +158,8 @@ class Parametric:
         """
         out: dict[str, Any] = {}
         values = iter(None if np.isnan(value) else float(value) for value in std)
-        for parameter, index in self.components():
-            if not parameter.differentiable:
-                continue
+        specs = self.components()
+        for parameter, index in (specs[k] for k in self.fitted()):
             if index is None:
                 out[parameter.name] = next(values)
             else:

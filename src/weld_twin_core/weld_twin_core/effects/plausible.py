@@ -98,6 +98,49 @@ TABLE: dict[tuple[str, str], Plausible] = {
     ('backlash', 'width'): Plausible(
         5e-4, 0.0, 2e-2, f'{RV}; range derived: a degree is a gear that is broken'
     ),
+    ('friction', 'windup'): Plausible(
+        2e-4,
+        0.0,
+        5e-3,
+        'derived: a loop of 10 Hz lets a robot joint trail by tenths of a milliradian; range '
+        'derived: a third of a degree stops a motion',
+    ),
+    ('friction', 'asymmetry'): _even(
+        0.2,
+        0.6,
+        'a servo axis trails by 11.8 um with 2.3 um between its two ways (recording EMPS, '
+        'docs/transfer.md), 0.2; range derived: beyond, one way hardly rubs at all',
+    ),
+    ('friction', 'travel'): Plausible(
+        1e-3,
+        1e-6,
+        2e-3,
+        'derived: contacts of bearings and seals bend by micrometres on centimetres; a longer '
+        'travel is a loop of the gear, hysteresis',
+    ),
+    ('hysteresis', 'amplitude'): Plausible(
+        2e-4,
+        0.0,
+        3e-3,
+        'loops of strain-wave joints are 20 arcsec to 1 arcmin wide at 2 % of their torque '
+        '(robotics.zhinno.com, robot-joint-backlash-explained); range derived: a gear worn out',
+    ),
+    ('hysteresis', 'travel'): Plausible(
+        0.1,
+        2e-3,
+        0.5,
+        'derived: a shorter loop is a gap, backlash; a longer one a gear ratio that differs by '
+        'direction',
+    ),
+    ('bearing_tilt', 'lean'): _even(
+        2e-4, 3e-3, 'derived: two hundredths of a millimetre of run-out on a bearing of 0.1 m'
+    ),
+    ('loaded_play', 'width'): Plausible(5e-4, 0.0, 2e-2, f'{RV}; see backlash'),
+    ('wear', 'rate'): _even(
+        2e-6,
+        1e-4,
+        'derived: a tip that loses a millimetre in ten minutes; 6 mm in a minute is cut',
+    ),
     ('joint_compliance', 'compliance'): Plausible(
         3e-5,
         -1e-5,
@@ -178,6 +221,25 @@ PRISMATIC: dict[tuple[str, str], Plausible] = {
         2e-5, 1e-3, 'derived: a turn of a screw repeats within hundredths of a millimetre'
     ),
     ('backlash', 'width'): Plausible(
+        5e-5, 0.0, 5e-3, 'derived: nuts have hundredths of a millimetre of play'
+    ),
+    ('friction', 'windup'): Plausible(
+        2e-5,
+        0.0,
+        1e-3,
+        'a servo axis trails by 11.8 um (recording EMPS, docs/transfer.md); range derived: a '
+        'millimetre is stuck',
+    ),
+    ('friction', 'travel'): Plausible(
+        1e-4, 1e-7, 2e-4, 'derived: rolling guides bend by micrometres to a tenth of a millimetre'
+    ),
+    ('hysteresis', 'amplitude'): Plausible(
+        2e-5, 0.0, 1e-3, 'derived: guides and nuts lose hundredths of a millimetre'
+    ),
+    ('hysteresis', 'travel'): Plausible(
+        1e-2, 2e-4, 0.05, 'derived: a shorter loop is a gap, a longer one a wrong scale'
+    ),
+    ('loaded_play', 'width'): Plausible(
         5e-5, 0.0, 5e-3, 'derived: nuts have hundredths of a millimetre of play'
     ),
     ('joint_compliance', 'compliance'): Plausible(
@@ -270,11 +332,8 @@ def beyond(robot: Robot, effect: Effect) -> list[tuple[str, float, float]]:
 
 
 def _each(robot: Robot, effect: Effect) -> list[Plausible]:
-    return [
-        plausible(robot, effect.name, parameter.name, effect.site)
-        for parameter, _ in effect.components()
-        if parameter.differentiable
-    ]
+    specs = effect.components()
+    return [plausible(robot, effect.name, specs[k][0].name, effect.site) for k in effect.fitted()]
 
 
 def _narrowed(found: Plausible, given: Mapping[str, float] | None) -> Plausible:

@@ -1,6 +1,15 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Servo lag: first-order lag of the commanded motion, tau y' + y = theta."""
+"""
+Servo lag: first-order lag of the commanded motion, tau y' + y = theta.
+
+A position loop round a velocity loop has inertia beside its gains and can swing. With ``damping``
+given the lag is that of second order with the same trail on a ramp,
+
+    y'' / w^2 + tau y' + y = theta,  w = 2 damping / tau,
+
+whose two poles run as one linear recursion each.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +19,41 @@ from typing import Any
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
+from ..errors import ModelError
 from .associative_scan import linear
 from .effect import MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
+DAMPINGS = (0.3, 0.4, 0.55, 0.75)
+"""Dampings of loops that a search starts from; a stiffer one is hardly told from first order."""
+APART = 1e-6
+"""Distance of a damping from one at the least: there the two poles meet."""
+SHORTEST = 1e-9
+"""Time constant [s] that a loop has at the least."""
+
 
 @register
 @dataclass(frozen=True, eq=False)
 class ServoLag(MemoryEffect):
-    """The joint trails its command; exact for a command that is straight between samples."""
+    """
+    The joint trails its command; exact for a command that is straight between samples.
+
+    ``damping`` is that of a loop of second order; None is a lag of first order.
+    """
 
     joint: str
     time_constant: Value = 0.0
+    damping: float | None = None
 
     name = 'servo_lag'
     depends_on = 'speed'
     of = 'joint'
     stage = Stage.SERVO
     parameters = (Parameter('time_constant', 's', typical=5e-3, lower=0.0, linear=False),)
+    options = ('damping',)
     needs = frozenset({'velocity', 'time'})
 
     def _coefficients(self, dt: Array) -> tuple[Array, Array]:
@@ -45,6 +69,9 @@ class ServoLag(MemoryEffect):
         q = view.joint(i)
         if view.static:
             return {('q', i): np.zeros_like(q)}, None
+        if self.damping is not None:
+            trail, state = self._swing(view.t, q, state)
+            return {('q', i): trail}, state
         t0, q0, x0 = (view.t[0], q[..., 0], np.zeros(q.shape[:-1])) if state is None else state
         dt = np.diff(view.t, prepend=t0)
         change = np.diff(q, axis=-1, prepend=np.asarray(q0)[..., None])
@@ -52,8 +79,49 @@ class ServoLag(MemoryEffect):
         x = linear(decay, -weight * change, x0)
         return {('q', i): x}, (view.t[-1], q[..., -1], x[..., -1])
 
+    def check(self, robot: Robot) -> None:
+        """Refuse a loop that does not come to rest."""
+        super().check(robot)
+        if self.damping is not None and not 0.05 <= float(self.damping) <= 20.0:
+            raise ModelError(
+                f'servo_lag: damping must be between 0.05 and 20, got {self.damping!r}; leave it '
+                'out for a lag of first order'
+            )
+
+    def _poles(self) -> tuple[Array, Array]:
+        """Return the two poles of the loop [1/s]."""
+        zeta = float(self.damping or 1.0)
+        zeta += APART * (abs(zeta - 1.0) < APART)
+        w = 2.0 * zeta / np.maximum(self.number('time_constant'), SHORTEST)
+        root = np.sqrt(complex(zeta**2 - 1.0))
+        return w * (-zeta + root), w * (-zeta - root)
+
+    def _swing(self, t: Array, q: Array, state: Any) -> tuple[Array, Any]:
+        """
+        Return output minus input of the loop of second order, and what to carry.
+
+        On a straight stretch what is beside the trail swings freely; each pole has its share of
+        it, and every kink of the command kicks both.
+        """
+        tau = np.maximum(self.number('time_constant'), SHORTEST)
+        one, other = self._poles()
+        rest = np.zeros(q.shape[:-1], complex)
+        t0, q0, rate0, left0, right0 = state or (t[0], q[..., 0], 0.0 * q[..., 0], rest, rest)
+        dt = np.diff(t, prepend=t0)
+        change = np.diff(q, axis=-1, prepend=np.asarray(q0)[..., None])
+        before = np.broadcast_to(np.asarray(rate0)[..., None], change[..., :1].shape)
+        rate = np.where(dt > 0.0, change / np.where(dt > 0.0, dt, 1.0), 0.0)
+        rate = np.where(dt > 0.0, rate, np.concatenate([before, rate[..., :-1]], axis=-1))
+        kick = np.diff(rate, axis=-1, prepend=before)
+        left = linear(np.exp(one * dt), -np.exp(one * dt) * (1.0 + other * tau) * kick, left0)
+        right = linear(np.exp(other * dt), -np.exp(other * dt) * (1.0 + one * tau) * kick, right0)
+        free = ((left - right) / (one - other)).real
+        return free - tau * rate, (t[-1], q[..., -1], rate[..., -1], left[..., -1], right[..., -1])
+
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return dx/dtau by the recursion's own derivative."""
+        """Return dx/dtau by the recursion's own derivative; of a loop, by differences."""
+        if self.damping is not None and not view.static:
+            return super().gradient(view)
         i = view.robot.index(self.joint)
         q = view.joint(i)
         if view.static:
@@ -73,6 +141,8 @@ class ServoLag(MemoryEffect):
         """Filter the tangent like the motion itself; the lag is linear in its input."""
         if view.static:
             return tangent
+        if self.damping is not None:
+            return np.asarray(tangent + self._swing(view.t, tangent, None)[0])
         dt = np.diff(view.t, prepend=view.t[0])
         change = np.diff(tangent, axis=-1, prepend=tangent[..., :1])
         decay, weight = self._coefficients(dt)
@@ -95,7 +165,10 @@ class ServoLag(MemoryEffect):
             scale].
 
         """
-        return [] if view.static else [cls(str(joint), tau) for tau in (2e-3, 3e-2)]
+        if view.static:
+            return []
+        plain = [cls(str(joint), tau) for tau in (2e-3, 3e-2)]
+        return plain + [cls(str(joint), 1e-2, damping) for damping in DAMPINGS]
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the displacement per second of time constant."""
@@ -103,4 +176,4 @@ class ServoLag(MemoryEffect):
 
     def from_atoms(self, coefficients: Array) -> ServoLag:
         """Return the lag whose time constant is the coefficient, never negative."""
-        return ServoLag(self.joint, max(float(coefficients[0]), 0.0))
+        return ServoLag(self.joint, max(float(coefficients[0]), 0.0), self.damping)

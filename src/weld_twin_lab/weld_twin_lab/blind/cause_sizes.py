@@ -36,30 +36,41 @@ SIZES: dict[str, tuple[str, ...]] = {
     'vibration': ('gain',),
     'quantization': ('step',),
     'measurement_scale': ('scale',),
-    'bearing_tilt': ('tilt',),
     'station_step': ('xyz', 'rotvec'),
     'tool_slip': ('xyz', 'rotvec'),
     'quadratic_scale': ('coefficient',),
     'column_bend': ('rotvec',),
     'stick_slip': ('amplitude',),
     'friction_wander': ('amplitude',),
-    'loaded_play': ('width',),
     'dress_pack': ('amplitude',),
+    'friction': ('windup',),
+    'hysteresis': ('amplitude',),
+    'bearing_tilt': ('tilt',),
+    'loaded_play': ('width',),
+    'wear': ('rate',),
 }
 """The parameters of every cause that grow with it."""
 OUTSIDE = (
-    'bearing_tilt',
     'station_step',
     'tool_slip',
     'quadratic_scale',
     'column_bend',
     'stick_slip',
     'friction_wander',
-    'loaded_play',
     'dress_pack',
 )
 FAMILIES = tuple(name for name in SIZES if name not in OUTSIDE)
-MOVING = frozenset({'servo_lag', 'time_delay', 'vibration', 'friction_wander', 'stick_slip'})
+MOVING = frozenset(
+    {
+        'servo_lag',
+        'time_delay',
+        'vibration',
+        'friction_wander',
+        'stick_slip',
+        'friction',
+        'hysteresis',
+    }
+)
 """Causes that stations at rest cannot show."""
 SPREAD = (0.02, 20.0)
 """How many times its typical size a cause may be and still be plausible."""
@@ -70,6 +81,8 @@ MOST = {
     'quantization': 5.0,
     'payload': 10.0,
     'thermal_growth': 2.4,
+    'friction': 10.0,
+    'hysteresis': 8.0,
 }
 """The same for causes that become absurd sooner."""
 LEAST = {'servo_lag': 0.15, 'joint_compliance': 0.1}
@@ -131,6 +144,8 @@ _POSITIVE = frozenset(
         'stick_slip',
         'friction_wander',
         'loaded_play',
+        'friction',
+        'hysteresis',
     }
 )
 
@@ -211,6 +226,16 @@ def _wander(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     return {'joint': _joint(robot, rng), 'amplitude': 4e-4, 'time_constant': 0.15 * span}
 
 
+def _friction(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+    uneven = float(rng.uniform(-0.3, 0.3))
+    return {'joint': _joint(robot, rng), 'windup': 3e-4, 'asymmetry': uneven}
+
+
+def _hysteresis(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+    travel = float(np.exp(rng.uniform(*np.log((0.01, 0.1)))))
+    return {'joint': _joint(robot, rng), 'amplitude': 3e-4, 'travel': travel}
+
+
 _DRAWN: dict[str, Callable[..., Cause]] = {
     'joint_offset': _one('offset', 5e-4),
     'link_length': _one('da', 3e-4),
@@ -245,4 +270,7 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'friction_wander': _wander,
     'loaded_play': _one('width', 6e-4),
     'dress_pack': _one('amplitude', 5e-4),
+    'friction': _friction,
+    'hysteresis': _hysteresis,
+    'wear': lambda robot, span, rng: {'rate': 1e-5, 'slower': float(span * rng.uniform(1.5, 4.0))},
 }

@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from . import drives, exponentials, outside_causes, rollout, screws, tree
+from . import drives, exponentials, lost_motion, outside_causes, rollout, screws, tree
 from . import textbook_effects as library
 from . import tracker as sensors
 from .compliance import Compliant
@@ -176,6 +176,7 @@ def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
     base, tool = library.frames(causes, arm)
     base = screws.compose(base, outside_causes.frame_error(causes, 'column_bend', since))
     tool = screws.compose(tool, outside_causes.frame_error(causes, 'tool_slip', since))
+    tool = screws.compose(tool, library.worn(causes, since))
     flange = exponentials.flange(arm, exponentials.home(arm, rows), q, lean)
     pose = screws.compose(base, flange, tool)
     pose = library.yielding(causes, pose, cell.course.wrench(t))
@@ -205,6 +206,7 @@ def _at_rest(cell: _Cell, rng: np.random.Generator) -> np.ndarray:
     flaws = outside_causes.on_joints(
         cell.causes, command.t, q, lambda: compliant.torque(q, command.wrench), rng
     )
+    flaws += lost_motion.on_joints(cell.causes, command.t, q, cell.richness)
     return np.asarray(give + flaws)
 
 
@@ -212,9 +214,11 @@ def _in_motion(
     cell: _Cell, rng: np.random.Generator
 ) -> Callable[[np.ndarray], np.ndarray | float]:
     """Return what gives as a function of time."""
-    flawed = any(item['effect'] in outside_causes.JOINT_LEVEL for item in cell.causes.items)
+    flaws = outside_causes.JOINT_LEVEL | {'friction', 'hysteresis'}
+    flawed = any(item['effect'] in flaws for item in cell.causes.items)
     if cell.compliant.rigid and not flawed:
         return lambda _: 0.0
     give = outside_causes.on_joints(cell.causes, cell.grid, cell.geared, lambda: cell.torque, rng)
+    give = give + lost_motion.on_joints(cell.causes, cell.grid, cell.geared, cell.richness)
     spline: Callable[[np.ndarray], np.ndarray] = CubicSpline(cell.grid, give + cell.sprung)
     return spline

@@ -122,6 +122,44 @@ def _backlash(effect: Effect, robot: Robot) -> str:
     ).replace('+', '')
 
 
+def _hysteresis(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Compensate the lost motion of {effect.site}, or approach seams from one side: it trails '
+        f'by {radians(_value(effect, "amplitude"))} once it has turned '
+        f'{radians(3.0 * _value(effect, "travel"))} one way; see to its gear if that grows.'
+    ).replace('+', '')
+
+
+def _friction(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Give the controller of {effect.site} feed-forward against friction, and see to its '
+        f'lubrication: in motion it trails by {radians(_value(effect, "windup"))}.'
+    ).replace('+', '')
+
+
+def _loaded_play(effect: Effect, robot: Robot) -> str:
+    return (
+        f'Service or preload the gear of {effect.site}: its load lays it on one flank or the other '
+        f'of {radians(_value(effect, "width"))} of play.'
+    ).replace('+', '')
+
+
+def _bearing_tilt(effect: Effect, robot: Robot) -> str:
+    lean = float(np.linalg.norm(np.asarray(effect.lean)))  # type: ignore[attr-defined]
+    return (
+        f'Look at the bearing of {effect.site}: its axis leans by {radians(lean)} once per turn; '
+        'compensate the poses until it is replaced.'
+    ).replace('+', '')
+
+
+def _wear(effect: Effect, robot: Robot) -> str:
+    hour = _value(effect, 'rate') * 3.6e6
+    return (
+        f'Renew or measure the tip of the tool: along its axis it draws back by {number(hour)} mm '
+        'per hour.'
+    )
+
+
 def _joint_compliance(effect: Effect, robot: Robot) -> str:
     compliance = _value(effect, 'compliance')
     stiffness = f'{1.0 / compliance:.3g} N m/rad' if compliance > 0.0 else 'no physical stiffness'
@@ -267,6 +305,11 @@ _SENTENCES: dict[str, Sentence] = {
     'transmission_ripple': _ripple,
     'joint_coupling': _joint_coupling,
     'backlash': _backlash,
+    'hysteresis': _hysteresis,
+    'friction': _friction,
+    'loaded_play': _loaded_play,
+    'bearing_tilt': _bearing_tilt,
+    'wear': _wear,
     'joint_compliance': _joint_compliance,
     'cartesian_compliance': _cartesian_compliance,
     'payload': _payload,

@@ -14,6 +14,8 @@ _WAYS: dict[frozenset[str], str] = {
     frozenset({'base_pose', 'tool_pose'}): 'measure the tool by itself',
     frozenset({'time_delay', 'servo_lag'}): 'record commanded and measured joints side by '
     'side, or trigger both recordings with one signal',
+    frozenset({'backlash', 'friction'}): 'push the link to and fro while the motor holds: only '
+    'play gives way',
     frozenset({'joint_compliance', 'payload'}): 'weigh what hangs on the flange',
     frozenset({'link_offset'}): 'only their sum moves the tool, so mending either mends both',
     frozenset({'joint_offset'}): 'master one of the joints with its own gauge',

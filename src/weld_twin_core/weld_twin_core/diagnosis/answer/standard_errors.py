@@ -94,7 +94,7 @@ def _free(model: Model) -> NDArray[np.bool_]:
     """Return which fit coordinates are off their bounds, shape (K,)."""
     out: list[bool] = []
     for effect in model.found:
-        specs = [p for p, _ in effect.components() if p.differentiable]
+        specs = [effect.components()[k][0] for k in effect.fitted()]
         out += [
             p.lower < value < p.upper for p, value in zip(specs, effect.coordinates(), strict=True)
         ]
@@ -122,5 +122,5 @@ def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: floa
 
 def _idealised(effect: Effect) -> Array:
     """Return how far real arms differ from the formulas, per coordinate."""
-    specs = [p for p, _ in effect.components() if p.differentiable]
+    specs = [effect.components()[k][0] for k in effect.fitted()]
     return np.array([p.idealised for p in specs]) * np.abs(effect.coordinates())

@@ -104,7 +104,8 @@ def profile(
 
 def _prior(effects: list[Effect]) -> Array:
     """Return how plausible instances are by the size of what bends them, shape (D,) [nats]."""
-    bent = [k for k, p in enumerate(effects[0].parameters) if not p.linear]
+    sizes = enumerate(effects[0].parameters)
+    bent = [k for k, p in sizes if not p.linear and p.lower >= 0.0]
     typical = np.array([effects[0].parameters[k].typical for k in bent])
     values = np.array([effect.vector()[bent] for effect in effects])
     return np.asarray(-0.5 * ((np.log(values / typical) / USUAL) ** 2).sum(axis=1))
@@ -188,9 +189,9 @@ class _Looker:
 
 def _sized(effects: list[Effect], pull: Array, mass: Array) -> Profile:
     """Return the instances with their linear parameter fitted, where they have one."""
-    names = [p.name for p in effects[0].parameters if p.linear]
-    if not names:
+    linear = [p for p in effects[0].parameters if p.linear]
+    if not linear:
         return Profile(effects, 2.0 * pull - mass)
-    best = pull / mass
-    sized = [replace(e, **{names[0]: float(b)}) for e, b in zip(effects, best, strict=True)]
-    return Profile(sized, pull * best)
+    best = np.clip(pull / mass, linear[0].lower, linear[0].upper)
+    sized = [replace(e, **{linear[0].name: float(b)}) for e, b in zip(effects, best, strict=True)]
+    return Profile(sized, best * (2.0 * pull - best * mass))

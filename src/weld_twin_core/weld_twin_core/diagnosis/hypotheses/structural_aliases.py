@@ -5,6 +5,11 @@ Constant errors that no motion tells apart, whatever the data: they follow from 
 
 The offset of the first link lifts the tool exactly as a higher base does. Such a pair is told as
 a set even where one of the two was taken out of the library, the simplest member first.
+
+Effects of one joint that come out by the same thing, such as play and friction by the direction,
+are alike in all but their curve. Where one of them is found and another was taken out that fits as
+well, no data can vouch for the name alone, and they are a set too. Where the other fits clearly
+better, what was found stands in for a cause that the library lacks.
 """
 
 from __future__ import annotations
@@ -34,6 +39,8 @@ LEVER = 0.5
 """Metres of tool motion that a radian of turn counts as; it only scales a comparison."""
 SAME = 1e-6
 """Share of an error that may lie outside what another one spans; far above rounding."""
+MOST_SEEDS = 3
+"""Instances of an excluded kind that are fitted at most; between them lie sizes ten times apart."""
 SEED = 7
 """Of the postures: any generic set gives the same answer."""
 
@@ -50,14 +57,55 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
     beliefs : Beliefs
 
     """
-    kinds = [name for name in exclude if name in REGISTRY and _constant(REGISTRY[name])]
-    if not kinds or not found.slots:
+    known = [name for name in exclude if name in REGISTRY and REGISTRY[name].cause]
+    kinds = [name for name in known if _constant(REGISTRY[name])]
+    if not known or not found.slots:
         return found
-    slots = [
-        _extended(found, k, slot, kinds, beliefs) if k < len(found.small.model.found) else slot
-        for k, slot in enumerate(found.slots)
+    slots, better = [], list(found.refused)
+    for k, slot in enumerate(found.slots):
+        if k < len(found.small.model.found):
+            kin = _fitted_kin(found, k, _kin(found.small.model.found[k], known))
+            slot = _extended(found, k, slot, kinds, beliefs) if kinds else slot
+            most = max(rival.nats for rival in slot)
+            clearly = [rival for rival in kin if rival.nats > most + beliefs.enter_nats]
+            better += [rival.fit.model.found[-1] for rival in clearly]
+            alike = [replace(r, nats=min(r.nats, most)) for r in kin if r not in clearly]
+            slot = weighed([*slot, *alike], beliefs.temperature) if alike else slot
+        slots.append(slot)
+    return replace(found, slots=tuple(slots), refused=tuple(better))
+
+
+def _kin(effect: Effect, excluded: Sequence[str]) -> list[type[Effect]]:
+    """Return the excluded kinds that differ from an effect of a joint by their curve alone."""
+    if effect.of != 'joint' or _constant(type(effect)):
+        return []
+    kinds = [REGISTRY[name] for name in excluded]
+    return [
+        kind
+        for kind in kinds
+        if kind is not type(effect)
+        and (kind.of, kind.place, kind.depends_on) == ('joint', effect.place, effect.depends_on)
     ]
-    return replace(found, slots=tuple(slots))
+
+
+def _fitted_kin(found: Search, k: int, kin: Sequence[type[Effect]]) -> list[Rival]:
+    """Return excluded kin of found effect k, each fitted in its place."""
+    if not kin:
+        return []
+    effect, work = found.small.model.found[k], found.work
+    rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
+    count, maker = found.effective(found.small), work.problem.features(rest.model)[0]
+    out = []
+    for kind in kin:
+        if kind.applicable(maker.view, effect.site) is not None:
+            continue
+        seeds = maker.seeds(kind, effect.site)[0][:MOST_SEEDS]
+        tried = [fitted_with(work, rest.model, seed) for seed in seeds]
+        if tried:
+            best = min(tried, key=lambda one: one.rss)
+            nats = nats_in_place(rest, best, count)
+            out.append(Rival(Site(kind.name, effect.site), nats, best))
+    return out
 
 
 def _constant(kind: type[Effect]) -> bool:

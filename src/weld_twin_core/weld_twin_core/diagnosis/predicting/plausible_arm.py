@@ -86,7 +86,7 @@ def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
         if effect.waves is not None:
             straight = [(effect.name, effect.site) not in dense] * effect.coordinates().size
         else:
-            straight = [p.linear for p, _ in effect.components() if p.differentiable]
+            straight = [effect.components()[j][0].linear for j in effect.fitted()]
         out.append(np.where(straight, -effect.coordinates(), 0.0))
     return np.concatenate(out)
 

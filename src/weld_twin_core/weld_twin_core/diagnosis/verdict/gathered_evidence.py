@@ -72,7 +72,9 @@ def _parts(unseen: Unseen) -> tuple[float, ...]:
 
 
 def _refused(robot: Robot, effect: Effect) -> str:
-    """Return an effect that no machine has, with the values that say so."""
+    """Return an effect that no machine has, with the values that say so, or one taken out."""
+    if not beyond(robot, effect):
+        return f'{Site(effect.name, effect.site)}, which was taken out of the library'
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
     values = ', '.join(
         f'{name} {value:.3g} {units[name]} (a machine has {limit:.3g} at most)'

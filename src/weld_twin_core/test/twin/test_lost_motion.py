@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Lost motion: friction against the drive's loop, and the loop of a strain-wave gear."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.effects import Friction, Hysteresis, effect_from_mapping, effects_from_list
+from weld_twin_core.errors import ModelError
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.twin import Twin
+
+
+def under(arm, effect, recording):
+    """Return how far the effect's joint is from its command."""
+    i = arm.index(effect.joint)
+    return Twin(arm, (effect,)).joints(recording)[..., i] - recording.joints.q[..., i]
+
+
+def swung(q, rate=100.0):
+    """Return a recording in which joint j2 goes through positions."""
+    joints = np.zeros((len(q), 6))
+    joints[:, 2] = q
+    return Recording('swing', JointMotion(np.arange(len(q)) / rate, joints))
+
+
+def test_hysteresis_solves_its_differential_equation(arm):
+    turns = [0.0, 0.3, 0.1, 0.15, -0.2]
+    path = np.concatenate([np.linspace(a, b, 40, endpoint=False) for a, b in pairwise(turns)])
+    z, expected = 0.0, [0.0]
+
+    def law(_, z, way):
+        return way * (1.0 - way * z) / 0.05
+
+    for step in np.diff(path):
+        more = {'args': (np.sign(step),), 'rtol': 1e-10, 'atol': 1e-13}
+        z = solve_ivp(law, (0.0, abs(step)), [z], **more).y[0, -1]
+        expected.append(-1e-3 * z)
+    found = under(arm, Hysteresis('j2', amplitude=1e-3, travel=0.05), swung(path))
+    np.testing.assert_allclose(found, expected, atol=1e-11)
+
+
+def test_a_wide_swing_closes_the_loop_and_a_small_one_hardly_opens_it(arm):
+    effect = Hysteresis('j2', amplitude=1e-3, travel=0.01)
+    wide = under(arm, effect, swung(np.r_[np.linspace(0, 0.5, 50), np.linspace(0.5, 0, 50)]))
+    assert wide[49] == pytest.approx(-1e-3, rel=1e-9)
+    assert wide[-1] == pytest.approx(1e-3, rel=1e-9)
+    small = under(arm, effect, swung(1e-4 * np.sin(np.arange(100.0))))
+    assert np.abs(small).max() < 0.03e-3
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(-0.5, 0.5), min_size=3, max_size=40), st.floats(1e-3, 1.0))
+def test_a_loop_stays_within_its_amplitude_and_does_not_care_how_finely_it_is_sampled(q, travel):
+    arm = Robot.from_mapping({'joints': [{'name': f'j{k}'} for k in range(6)]})
+    effect = Hysteresis('j2', 1.0, travel)
+    coarse = under(arm, effect, swung(q))
+    assert np.abs(coarse).max() <= 1.0 + 1e-12
+    fine = np.interp(np.arange(0, len(q) - 0.75, 0.25), np.arange(len(q)), q)
+    np.testing.assert_allclose(under(arm, effect, swung(fine))[::4], coarse, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    'effect',
+    [
+        Hysteresis('j2', amplitude=2e-3, travel=0.05),
+        Friction('j2', windup=2e-3, asymmetry=0.2, travel=0.05),
+    ],
+)
+def test_step_by_step_as_over_the_whole_motion(arm, make_recording, effect):
+    recording = make_recording(arm, 60)
+    live = Twin(arm, (effect,)).live()
+    motion = recording.joints
+    steps = zip(motion.t, motion.q, motion.velocity, strict=True)
+    found = [live.step(t, q, qd)[0] for t, q, qd in steps]
+    np.testing.assert_allclose(found, Twin(arm, (effect,)).joints(recording), atol=1e-14)
+
+
+def test_friction_solves_its_differential_equation(arm):
+    path = np.r_[np.linspace(0.0, 0.05, 20), np.full(10, 0.05), np.linspace(0.05, -0.02, 20)]
+    both, expected = np.zeros(2), [0.0]
+
+    def law(_, both, rate):
+        return (np.array([np.sign(rate), 1.0]) - both) * abs(rate) / 0.02 - both / 0.08
+
+    for step in np.diff(path):
+        more = {'args': (step / 0.01,), 'rtol': 1e-10, 'atol': 1e-13}
+        both = solve_ivp(law, (0.0, 0.01), both, **more).y[:, -1]
+        expected.append(-1e-3 * (both[0] - 0.3 * both[1]))
+    effect = Friction('j2', windup=1e-3, asymmetry=-0.3, travel=0.02, release=0.08)
+    np.testing.assert_allclose(under(arm, effect, swung(path)), expected, atol=1e-11)
+
+
+def test_friction_trails_by_its_wind_up_more_in_one_direction_and_lets_go_at_rest(arm):
+    path = np.cumsum(np.repeat([5e-3, -5e-3, 0.0], 100))
+    found = under(arm, Friction('j2', 1e-3, 0.25, release=0.1), swung(path))
+    np.testing.assert_allclose(found[[80, 180, 280]], [-1.25e-3, 0.75e-3, 0.0], atol=1e-5)
+
+
+def test_slow_motion_hardly_winds_up(arm):
+    fast, slow = (
+        under(arm, Friction('j2', 1e-3, travel=1e-3, release=0.1), swung(np.arange(300) * step))
+        for step in (1e-2, 1e-5)
+    )
+    assert fast[-1] == pytest.approx(-1e-3, rel=0.02)
+    assert slow[-1] == pytest.approx(-1e-3 / 11.0, rel=0.02)
+
+
+def test_a_fit_leaves_even_friction_even():
+    even, uneven = Friction('j2', 1e-3, travel=2e-4), Friction('j2', 1e-3, 0.1, 2e-4)
+    assert even.coordinates().tolist() == [1e-3, 2e-4]
+    moved = even.with_coordinates(np.array([2e-3, 3e-4]))
+    assert moved.vector().tolist() == [2e-3, 0.0, 3e-4]
+    moved = uneven.with_coordinates(np.array([2e-3, 0.2, 3e-4]))
+    assert moved.vector().tolist() == [2e-3, 0.2, 3e-4]
+    assert uneven.errors(np.array([1e-5, 0.05, 1e-5])) == {
+        'windup': 1e-5,
+        'asymmetry': 0.05,
+        'travel': 1e-5,
+    }
+    assert even.errors(np.array([1e-5, 2e-5])) == {'windup': 1e-5, 'travel': 2e-5}
+
+
+def test_friction_is_nothing_to_stations(arm, make_recording):
+    recording = make_recording(arm, static=True)
+    assert not under(arm, Friction('j1', windup=1e-2), recording).any()
+
+
+def test_a_friction_that_pushes_is_refused(arm):
+    for wrong in ({'windup': -1e-3}, {'windup': 1e-3, 'asymmetry': 0.9}):
+        with pytest.raises(ModelError, match='outside'):
+            effects_from_list([{'effect': 'friction', 'joint': 'j1', **wrong}], arm)
+
+
+@pytest.mark.parametrize(
+    ('entry', 'coefficients', 'expected'),
+    [
+        ({'effect': 'friction', 'asymmetry': 1e-9}, [2e-4, 5e-5], [2e-4, 0.25, 3e-4]),
+        ({'effect': 'friction', 'asymmetry': 1e-9}, [-2e-4, 5e-5], [0.0, 1e-9, 3e-4]),
+        ({'effect': 'friction'}, [2e-4], [2e-4, 0.0, 3e-4]),
+        ({'effect': 'hysteresis', 'travel': 0.2}, [3e-4], [3e-4, 0.2]),
+        ({'effect': 'hysteresis', 'travel': 0.2}, [-3e-4], [0.0, 0.2]),
+    ],
+)
+def test_features_stand_for_an_instance(arm, make_recording, entry, coefficients, expected):
+    effect = effect_from_mapping({**entry, 'joint': 'j2'})
+    found = effect.from_atoms(np.array(coefficients))
+    np.testing.assert_allclose(found.vector(), expected)
+    view = Twin(arm).joint_view(make_recording(arm))
+    total = sum(c * atom['q', 2] for c, atom in zip(coefficients, effect.atoms(view), strict=True))
+    if coefficients[0] > 0.0:
+        np.testing.assert_allclose(found.displace(view)['q', 2], total, atol=1e-15)

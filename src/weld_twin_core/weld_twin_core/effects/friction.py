@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Friction: the drive winds up against it, theta -> theta - windup (z + asymmetry u).
+
+A position loop needs an error to make the torque that friction takes: Coulomb friction over the
+stiffness of the loop, against the motion. z goes from -1 to 1 with the bristles between the parts
+that rub: they bend over ``travel`` after every reversal (pre-sliding), and let go within
+``release`` once the joint rests, by creep and by the integral action of the loop. Slow motion
+makes up for what lets go, so that z is the sign of the motion, soft below travel / release. u is
+the same whichever way the joint moves: one while it does, and gone once it rests.
+Viscous friction does what a lag does, and is `servo_lag`.
+
+A loop that never lets go trails as play does, and is told as `backlash`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arm.channels import Shift
+from ..arrays import Array
+from .associative_scan import bristle, bristle_tangent
+from .effect import Effect, MemoryEffect
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+SHORTEST, LONGEST = 3e-5, 1.8e-3
+"""Pre-sliding travels [rad] that a search considers: a longer one is a loop, `hysteresis`."""
+SLIDING = 0.1
+"""Metres of a joint that slides which are looked at as a radian of one that turns."""
+UNEVEN = 0.6
+"""Asymmetry beyond which one direction would hardly rub at all. A judgement."""
+A_LITTLE = 1e-9
+"""Asymmetry of friction that may become uneven in a fit."""
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class Friction(MemoryEffect):
+    """
+    Lost motion that is there while the joint moves and goes when it rests.
+
+    Going up the joint trails by windup (1 + asymmetry), going down by windup (1 - asymmetry).
+    Friction that is even stays so in a fit.
+    """
+
+    joint: str
+    windup: Value = 0.0
+    asymmetry: Value = 0.0
+    travel: Value = 3e-4
+    release: float = 0.3
+
+    name = 'friction'
+    depends_on = 'direction'
+    of = 'joint'
+    stage = Stage.PLAY
+    common = False
+    by_motion = True
+    parameters = (
+        Parameter('windup', 'rad', typical=2e-4, lower=0.0, idealised=0.03),
+        Parameter('asymmetry', '-', typical=0.1, lower=-UNEVEN, upper=UNEVEN, linear=False),
+        Parameter('travel', 'rad', typical=3e-4, lower=1e-7, linear=False, idealised=0.3),
+    )
+    options = ('release',)
+    needs = frozenset({'velocity', 'time'})
+
+    def _bent(self, view: View, state: Any) -> tuple[Array, Array, Array, Any]:
+        """Return z and u stacked, shape (..., 2, N), the steps, what is lost, what to carry."""
+        q = view.joint(view.robot.index(self.joint))
+        travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
+        samples = np.broadcast_shapes(q.shape[:-1], travel.shape[:-2])
+        start = (view.t[0], q[..., 0], np.zeros((*samples, 2)))
+        t0, before, z0 = start if state is None else state
+        step = np.diff(q, axis=-1, prepend=np.asarray(before)[..., None])
+        lost = np.diff(view.t, prepend=t0) / self.release
+        both = np.stack([step, np.abs(step)], axis=-2)
+        z = bristle(both, travel, lost, z0)
+        return z, both, lost, (view.t[-1], q[..., -1], z[..., -1])
+
+    def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
+        """Return minus the wind-up, larger in the direction that rubs more."""
+        i = view.robot.index(self.joint)
+        if view.static:
+            return {('q', i): np.zeros_like(view.joint(i))}, None
+        z, _, _, state = self._bent(view, state)
+        return {('q', i): -self.number('windup') * self._mixed(z)}, state
+
+    def _mixed(self, both: Array) -> Array:
+        """Return the even part and the asymmetry's share of the uneven one, shape (..., N)."""
+        return np.asarray(both[..., 0, :] + self.number('asymmetry') * both[..., 1, :])
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return d/d windup, d/d asymmetry and d/d travel."""
+        i = view.robot.index(self.joint)
+        if view.static:
+            return [{('q', i): np.zeros_like(view.joint(i))}] * 3
+        z, both, lost, _ = self._bent(view, None)
+        travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
+        slope = bristle_tangent(both, travel, lost, z, -np.abs(both) / travel**2)
+        windup = self.number('windup')
+        parts = (self._mixed(z), windup * z[..., 1, :], windup * self._mixed(slope))
+        return [{('q', i): -part} for part in parts]
+
+    def push(self, view: View, tangent: Array) -> Array:
+        """Add how the bristles follow the tangent's own steps."""
+        if view.static:
+            return tangent
+        z, both, lost, _ = self._bent(view, None)
+        travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
+        own = np.diff(tangent, axis=-1, prepend=tangent[..., :1])[..., None, :]
+        change = np.where(both[..., :1, :] < 0.0, -own, own) / travel
+        slope = bristle_tangent(both, travel, lost, z, change)
+        return np.asarray(tangent - self.number('windup') * self._mixed(slope))
+
+    @property
+    def _even(self) -> bool:
+        return np.ndim(self.asymmetry) == 0 and self.asymmetry == 0.0
+
+    def fitted(self) -> list[int]:
+        """Return wind-up and travel, and the asymmetry where there is any."""
+        return [0, 2] if self._even else [0, 1, 2]
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """
+        Yield friction of short and long pre-sliding, even and uneven.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it would sit on; None for the robot as a whole.
+        pull : array, shape (N,), optional
+            How strongly the residual would move the joint at every sample [rad or m, up to
+            scale].
+
+        """
+        unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
+        for travel in (1e-4, 6e-4):
+            for asymmetry in (0.0, A_LITTLE):
+                yield cls(str(joint), 0.0, asymmetry, travel * unit)
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
+        """Return friction of all travels: a start that is far off ends beside the best."""
+        if zoom or view.static:
+            return None
+        unit = SLIDING if view.robot.prismatic[view.robot.index(self.joint)] else 1.0
+        travels = unit * np.geomspace(SHORTEST, LONGEST, 7)
+        each = [Friction(self.joint, 1.0, self.asymmetry, float(x), self.release) for x in travels]
+        many = Friction(self.joint, 1.0, self.asymmetry, travels, self.release)
+        return each, many.run(view)[0]['q', view.robot.index(self.joint)]
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return the even part, and the uneven one where there is any: both are linear."""
+        i = view.robot.index(self.joint)
+        if view.static:
+            return [{('q', i): np.zeros_like(view.joint(i))}]
+        z = self._bent(view, None)[0]
+        return [{('q', i): -z[..., k, :]} for k in range(1 if self._even else 2)]
+
+    def from_atoms(self, coefficients: Array) -> Friction:
+        """Return the wind-up of the even part; what the uneven part is of it is the asymmetry."""
+        windup = max(float(coefficients[0]), 0.0)
+        asymmetry = 0.0
+        if len(coefficients) > 1:
+            uneven = float(coefficients[1]) / windup if windup > 0.0 else 0.0
+            asymmetry = float(np.clip(uneven, -UNEVEN, UNEVEN)) or A_LITTLE
+        return Friction(self.joint, windup, asymmetry, self.travel, self.release)

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+r"""
+Hysteresis: a loop of lost motion that closes over a travel, as in a strain-wave gear.
+
+Teeth and flexspline rub over many contacts that let go one after the other. The output trails by
+``amplitude`` times z, which forgets where it came from over ``travel``:
+
+.. math:: \frac{dz}{d\theta} = \frac{1 - z\,\mathrm{sign}(\dot\theta)}{\mathrm{travel}}
+
+That is Dahl's model, and Bouc and Wen's [1]_ with n = 1 and beta = gamma. After a reversal backlash
+loses its width at once and nothing more; here the loss builds up, and 95 % are reached after three
+travels. On a joint that is straight between samples z is an affine recursion, and so a scan.
+
+References
+----------
+.. [1] Y.-K. Wen, "Method for random vibration of hysteretic systems", J. Eng. Mech. Div. 102, 1976.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arm.channels import Shift
+from ..arrays import Array
+from .associative_scan import bristle, bristle_tangent
+from .effect import Effect, MemoryEffect
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+SHORTEST, LONGEST = 4e-3, 0.3
+"""Travels [rad] that a search considers: shorter is a gap, longer a wrong gear ratio."""
+SLIDING = 0.1
+"""Metres of a joint that slides which are looked at as a radian of one that turns."""
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class Hysteresis(MemoryEffect):
+    """The joint trails by ``amplitude`` once it has moved far one way; at first it does not."""
+
+    joint: str
+    amplitude: Value = 0.0
+    travel: Value = 0.03
+
+    name = 'hysteresis'
+    depends_on = 'direction'
+    of = 'joint'
+    stage = Stage.PLAY
+    common = False
+    by_motion = True
+    parameters = (
+        Parameter('amplitude', 'rad', typical=2e-4, lower=0.0, idealised=0.03),
+        Parameter('travel', 'rad', typical=0.03, lower=1e-5, linear=False, idealised=0.3),
+    )
+    needs = frozenset({'order'})
+
+    def _loop(self, q: Array, state: Any) -> tuple[Array, Array, Any]:
+        """Return z, the steps, and what to carry."""
+        before, z0 = (q[..., 0], np.zeros(q.shape[:-1])) if state is None else state
+        step = np.diff(q, axis=-1, prepend=np.asarray(before)[..., None])
+        z = bristle(step, self.number('travel'), 0.0, np.asarray(z0))
+        return z, step, (q[..., -1], z[..., -1])
+
+    def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
+        """Return minus amplitude times z on the joint, and where it and z were last."""
+        i = view.robot.index(self.joint)
+        z, _, state = self._loop(view.joint(i), state)
+        return {('q', i): -self.number('amplitude') * z}, state
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return d/d amplitude and d/d travel, by the recursion's own derivative."""
+        i = view.robot.index(self.joint)
+        z, step, _ = self._loop(view.joint(i), None)
+        travel = self.number('travel')
+        slope = bristle_tangent(step, travel, 0.0, z, -np.abs(step) / travel**2)
+        return [{('q', i): -z}, {('q', i): -self.number('amplitude') * slope}]
+
+    def push(self, view: View, tangent: Array) -> Array:
+        """Add how the loop follows the tangent's own steps."""
+        z, step, _ = self._loop(view.joint(view.robot.index(self.joint)), None)
+        travel = self.number('travel')
+        own = np.diff(tangent, axis=-1, prepend=tangent[..., :1])
+        change = np.where(step < 0.0, -own, own) / travel
+        return tangent - self.number('amplitude') * bristle_tangent(step, travel, 0.0, z, change)
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """
+        Return why the data cannot show it: at stations the loop has closed, and is backlash.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it would sit on.
+
+        """
+        if view.static:
+            return 'static stations only show which way a joint came, as backlash does'
+        return super().applicable(view, joint)
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """
+        Yield a short, a usual and a long loop.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it would sit on; None for the robot as a whole.
+        pull : array, shape (N,), optional
+            How strongly the residual would move the joint at every sample [rad or m, up to
+            scale].
+
+        """
+        unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
+        for travel in (0.01, 0.04, 0.16):
+            yield cls(str(joint), 0.0, travel * unit)
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return the loop of amplitude one."""
+        i = view.robot.index(self.joint)
+        return [{('q', i): -self._loop(view.joint(i), None)[0]}]
+
+    def from_atoms(self, coefficients: Array) -> Hysteresis:
+        """Return the loop whose amplitude is the coefficient, never negative."""
+        return Hysteresis(self.joint, max(float(coefficients[0]), 0.0), self.travel)
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
+        """Return loops of all travels: a start that is far off ends beside the best."""
+        if zoom:
+            return None
+        i = view.robot.index(self.joint)
+        unit = SLIDING if view.robot.prismatic[i] else 1.0
+        travels = unit * np.geomspace(SHORTEST, LONGEST, 10)
+        z = Hysteresis(self.joint, 1.0, travels)._loop(view.joint(i), None)[0]
+        return [Hysteresis(self.joint, 1.0, float(travel)) for travel in travels], -z

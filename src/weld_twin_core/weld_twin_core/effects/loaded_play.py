@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Loaded play: lost motion on the loaded flank, theta -> theta + width / 2 * tau / sqrt(tau^2 + T^2).
+
+A gear with play and a load on it lies on the flank that the load pulls it to, whichever way it
+moves; it changes over where the load changes sign, within the torque T that friction holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arm.channels import Shift
+from ..arm.robot import Robot
+from ..arrays import Array
+from ..errors import ModelError
+from .curve import load
+from .effect import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+SHARES = (0.03, 0.15)
+"""Torques at which the flank is certain that a search starts from, in the largest load seen."""
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class LoadedPlay(Effect):
+    """Play of full ``width`` whose side the load decides; ``torque`` [N m] is what friction holds."""
+
+    joint: str
+    width: Value = 0.0
+    torque: float = 1.0
+
+    name = 'loaded_play'
+    depends_on = 'load'
+    of = 'joint'
+    stage = Stage.LINK
+    common = False
+    by_motion = True
+    parameters = (Parameter('width', 'rad', typical=5e-4, lower=0.0),)
+    options = ('torque',)
+    needs = frozenset({'load'})
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a gear that friction does not hold at all: its flank would jump."""
+        super().check(robot)
+        if not float(self.torque) > 0.0:
+            raise ModelError(f'loaded_play: torque must be above zero, got {self.torque!r}')
+
+    def _side(self, view: View) -> Shift:
+        """Return the displacement for each radian of width."""
+        i = view.robot.index(self.joint)
+        pull = load(view, i)
+        return {('q', i): 0.5 * pull / np.hypot(pull, self.torque)}
+
+    def displace(self, view: View) -> Shift:
+        """Return half the width to the side that the load pulls to."""
+        return {channel: self.number('width') * side for channel, side in self._side(view).items()}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the side."""
+        return [self._side(view)]
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """
+        Yield play of a gear that slides easily, and of one that sticks.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it would sit on; None for the robot as a whole.
+        pull : array, shape (N,), optional
+            How strongly the residual would move the joint at every sample [rad or m, up to
+            scale].
+
+        """
+        torque = load(view, view.robot.index(str(joint)))
+        most = float(np.abs(torque).max(initial=0.0))
+        for share in SHARES:
+            # Where the load stays on one side, so does the flank, and that is an offset.
+            if (
+                most > 0.0
+                and torque.min() < -2.0 * share * most < 2.0 * share * most < torque.max()
+            ):
+                yield cls(str(joint), 0.0, share * most)

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Friction in a drive and hysteresis in a gear, contact by contact.
+
+friction
+    Bristles between the rubbing parts bend over `PRESLIDING` and break away into Coulomb friction,
+    a little higher at slow speed (Stribeck). A loop without integral action yields to the friction
+    with a lag of its own, and creep lets the bend go while the joint rests.
+hysteresis
+    Tooth contacts side by side (Iwan): each is a spring behind a dry slider, and they let go one
+    after the other, the last after twice the travel. A reversal has to bend each of them back, so
+    small swings make small closed loops.
+"""
+
+import numpy as np
+
+from .textbook_effects import Causes
+
+PRESLIDING = 3e-4
+"""Travel [rad] over which bristles bend."""
+STRIBECK, SLOW = 0.15, 0.02
+"""Share by which friction is higher at breakaway, and the speed [rad/s] at which that fades."""
+CREEP, STILL = 0.05, 1e-3
+"""Time [s] in which bristles at rest let go, and the speed [rad/s] that is none."""
+LOOP = 0.004
+"""Lag [s] of a loop that yields to friction."""
+CONTACTS = 10
+"""Tooth contacts; their shares are alike and their travels evenly spread."""
+
+
+def on_joints(causes: Causes, t: np.ndarray, q: np.ndarray, richness: float) -> np.ndarray:
+    """
+    Return the displacement of the links, shape (N, n) [rad or m].
+
+    Parameters
+    ----------
+    causes : Causes
+    t : array, shape (N,) [s]
+    q : array, shape (N, n)
+        Motor side; a sequence in time.
+    richness : float
+
+    """
+    out = np.zeros_like(q)
+    for item in causes.of('friction'):
+        i = causes.joint(item['joint'])
+        uneven = float(item.get('asymmetry', 0.0))
+        out[:, i] -= float(item['windup']) * _rubbing(t, q[:, i], uneven, richness)
+    for item in causes.of('hysteresis'):
+        i = causes.joint(item['joint'])
+        out[:, i] -= float(item['amplitude']) * _contacts(q[:, i], float(item['travel']))
+    return out
+
+
+def _rubbing(t: np.ndarray, q: np.ndarray, uneven: float, richness: float) -> np.ndarray:
+    """Return the friction that a loop has yielded to, over that of Coulomb, shape (N,)."""
+    dt = np.diff(t, prepend=t[0])
+    step = np.diff(q, prepend=q[0])
+    speed = np.abs(np.divide(step, dt, out=np.zeros_like(step), where=dt > 0.0))
+    way = np.sign(step)
+    fade = np.exp(-((speed / SLOW) ** 2))
+    target = way * (1.0 + uneven * way) * (1.0 + STRIBECK * richness * fade)
+    bend = np.exp(-np.abs(step) / PRESLIDING)
+    rest = np.exp(-dt / CREEP * np.exp(-((speed / STILL) ** 2)))
+    follow = -np.expm1(-dt / (LOOP * max(richness, 1e-3)))
+    force = yielded = 0.0
+    out = np.empty_like(q)
+    for k in range(len(q)):
+        force = (force * bend[k] + target[k] * (1.0 - bend[k])) * rest[k]
+        yielded += follow[k] * (force - yielded)
+        out[k] = yielded
+    return out
+
+
+def _contacts(q: np.ndarray, travel: float) -> np.ndarray:
+    """Return the mean of the contacts' forces over what they let go at, shape (N,)."""
+    gives = 2.0 * travel * (np.arange(CONTACTS) + 0.5) / CONTACTS
+    bent = np.zeros(CONTACTS)
+    out = np.empty_like(q)
+    for k, step in enumerate(np.diff(q, prepend=q[0])):
+        bent = np.clip(bent + step, -gives, gives)
+        out[k] = (bent / gives).mean()
+    return out

@@ -26,6 +26,10 @@ BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
 """Orders whose amplitudes are expected to be alike: up to a band's last order. Amplitudes fall off
 with the order, so bands widen with it; where they end is a judgement."""
 
+MANY_ORDERS, SPARSE = 8, 3
+"""Whole orders from which on their sum is worked out by powers of exp(i theta), and how many times as
+many powers as orders there may be: a sine takes as long as some five products."""
+
 
 @register
 @dataclass(frozen=True, eq=False)
@@ -81,8 +85,31 @@ class TransmissionRipple(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return the sum of sines on the joint."""
+        if self._dense():
+            return {('q', view.robot.index(self.joint)): self._all_orders(view)}
         total = _sum(a * np.sin(angle) for a, _, angle in self._terms(view))
         return {('q', view.robot.index(self.joint)): total}
+
+    def _dense(self) -> bool:
+        """Return whether there are so many whole orders that powers are quicker than sines."""
+        shapes = {np.shape(getattr(self, p.name)) for p in self.parameters}
+        orders = self.orders()
+        if len(shapes) > 1 or orders.size < MANY_ORDERS or orders.ndim != 1:
+            return False
+        whole = (orders == np.rint(orders)).all() and orders.min() > 0.0
+        return bool(whole and orders.max() <= SPARSE * orders.size)
+
+    def _all_orders(self, view: View) -> Array:
+        """Return the sum of sines as a polynomial in exp(i theta)."""
+        orders = self.orders().astype(int)
+        weights = np.zeros(int(orders.max()) + 1, complex)
+        np.add.at(weights, orders, self.amplitude * np.exp(1j * np.asarray(self.phase)))
+        turn = np.exp(1j * view.joint(view.robot.index(self.joint)))
+        total = np.zeros_like(turn)
+        for weight in weights[::-1]:
+            total *= turn
+            total += weight
+        return np.asarray(total.imag)
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return d/d amplitude of every order, None for the orders, d/d phase of every order."""
@@ -182,6 +209,13 @@ class TransmissionRipple(Effect):
         """Return sine and cosine of every order, so that amplitude and phase become linear."""
         channel = ('q', view.robot.index(self.joint))
         theta = view.joint(channel[1])
+        if self._dense():
+            turn, now, powers = np.exp(1j * theta), np.ones_like(theta, complex), {}
+            for n in range(1, int(self.orders().max()) + 1):
+                now = now * turn
+                powers[n] = now
+            waves = [powers[int(n)] for n in self.orders()]
+            return [{channel: part} for wave in waves for part in (wave.imag, wave.real)]
         return [{channel: f(n * theta)} for n in self.orders() for f in (np.sin, np.cos)]
 
     def from_atoms(self, coefficients: Array) -> TransmissionRipple:

@@ -130,10 +130,7 @@ def _closed_step(
     size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in free.names])
     span, _, _ = np.linalg.svd(free.vectors / size[:, None])
     closed = size[:, None] * span[:, free.vectors.shape[1] :]
-    allowed = np.zeros((columns.shape[0], closed.shape[1] + x.size))
-    allowed[:frames, : closed.shape[1]] = closed
-    allowed[frames:, closed.shape[1] :] = np.eye(x.size)
-    mixed = allowed.T @ columns
+    mixed = np.concatenate([closed.T @ columns[:frames], columns[frames:]])
     ridge = np.zeros(mixed.shape[0])
     pull = np.zeros(mixed.shape[0])
     held = precision if precision.size else np.zeros(coordinates(model).size)
@@ -143,4 +140,5 @@ def _closed_step(
     norm[norm == 0.0] = 1.0
     unit = mixed / norm[:, None]
     system = unit @ unit.T + np.diag(ridge / norm**2 + 1e-11)
-    return np.asarray(allowed @ (np.linalg.solve(system, (mixed @ residual - pull) / norm) / norm))
+    step = np.linalg.solve(system, (mixed @ residual - pull) / norm) / norm
+    return np.concatenate([closed @ step[: closed.shape[1]], step[closed.shape[1] :]])

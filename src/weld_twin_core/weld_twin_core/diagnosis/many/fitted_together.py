@@ -74,7 +74,7 @@ def fitted_together(
 def _many(found: Search, beliefs: Beliefs) -> bool:
     """Return whether many effects move the tool by much of what all of them leave."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    least = beliefs.member * unseen.rms(unseen.predict(range(len(unseen.parts))))
+    least = beliefs.member * unseen.rms(unseen.base(range(len(unseen.parts))).residual)
     sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
     return int((sizes > least).sum()) >= beliefs.many
 
@@ -99,5 +99,5 @@ def unseen_rms(found: Search) -> float:
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     everything = range(len(unseen.parts))
     parts = (unseen, unseen.by(posture_regions(found.problem)))
-    squares = [each.rms(each.predict(everything)) ** 2 for each in parts]
+    squares = [each.rms(each.base(everything).residual) ** 2 for each in parts]
     return float(np.sqrt(np.mean(squares)))

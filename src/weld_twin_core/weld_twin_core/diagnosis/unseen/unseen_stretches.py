@@ -303,7 +303,10 @@ class Base:
 def _sums(columns: Array, targets: Array, labels: Array) -> tuple[Array, Array]:
     """Return the normal equations of every part, and their right-hand sides."""
     spans = _rows_of(labels)
-    normals = np.array([columns[:, rows] @ columns[:, rows].T for rows in spans])
+    normals = np.empty((len(spans), columns.shape[0], columns.shape[0]))
+    for normal, rows in zip(normals, spans, strict=True):
+        part = columns[:, rows]
+        np.matmul(part, part.T, out=normal)
     return normals, np.array([columns[:, rows] @ targets[:, rows].T for rows in spans])
 
 

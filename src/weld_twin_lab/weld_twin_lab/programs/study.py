@@ -163,4 +163,5 @@ def _seam_row(entry: dict[str, Any]) -> tuple[str, ...]:
         for key in ('before', 'after', 'true_causes')
     ]
     ratio = worst['after'] / max(worst['true_causes'], 1e-9)
-    return (entry['language'], entry['robot'], causes, entry['status'], *columns, f'{ratio:.2f}')
+    verdict = f'{entry["status"]}, left as it was' if entry['left'] else entry['status']
+    return (entry['language'], entry['robot'], causes, verdict, *columns, f'{ratio:.2f}')

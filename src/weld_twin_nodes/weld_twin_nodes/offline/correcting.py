@@ -35,6 +35,10 @@ TOOL_LEFT = (
     'what was found of the tool was left out, for the program works with another tool than the '
     'one that was measured'
 )
+BASE_MOVED = (
+    'the robot was found to stand elsewhere than its file says, and points are moved by that too; '
+    'leave it out (diagnose with --align base) where the work frame was taught with this arm'
+)
 NOT_SURE = (
     'how sure the correction is is not known: the model has no posterior, only a diagnosis.json '
     'written by this version has'
@@ -162,6 +166,8 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
     named = any(effect.name == 'tool_pose' for effect in model.effects)
     if named and not all(model.same_tool(tool) for tool in tools):
         out.append(TOOL_LEFT)
+    if any(effect.name == 'base_pose' for effect in model.effects):
+        out.append(BASE_MOVED)
     left = [e.name for e in model.effects if e not in model.acting]
     if left:
         out.append(f'no program mends {", ".join(left)}')

@@ -117,6 +117,19 @@ def test_frames_of_a_taught_kuka_point_come_from_its_data():
     np.testing.assert_allclose(second.base.value[:3, 0], [0.0, 1.0, 0.0], atol=1e-12)
 
 
+def test_a_spline_move_of_kuka_brings_its_own_tool_base_and_speed():
+    point = 'DECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 0}\n'
+    data = 'DECL FDAT FP1={TOOL_NO 4,BASE_NO 2,IPO_FRAME #BASE}\n'
+    move = (
+        'SLIN XP1 WITH $VEL=SVEL_CP(0.25, , LCPDAT1), $TOOL=STOOL2(FP1), $BASE=SBASE(FP1.BASE_NO),'
+        '$IPO_MODE=SIPO_MODE(FP1.IPO_FRAME), $LOAD=SLOAD(FP1.TOOL_NO), $APO=SAPO(LCPDAT1) C_SPL\n'
+    )
+    text = 'DEF a()\n' + point + data + move + 'SLIN XP1 WITH $TOOL={X 1}\nEND\n'
+    step, other = read('krl', (text,), 'kuka_kr16_2').steps
+    assert (step.tool.name, step.base.name, step.speed, step.stop) == ('4', '2', 0.25, False)
+    assert other.end is None and 'tool or base' in other.why
+
+
 @pytest.mark.parametrize(
     'line',
     ['LIN_REL {X 5}', 'LIN {X 5,Y 1}', 'LIN XP1:XP2', 'SPL XP1', 'PTP HOME', 'CIRC XP1,XP2,CA 90'],

@@ -18,7 +18,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,15 +28,14 @@ from weld_twin_core.motion.programs.moves import Kind
 
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere
 from .context import Context
-from .controllers import Controller, Frame
+from .controllers import Frame
 from .notation import KUKA_POSE
+from .postures import turn_bits
 from .source import NUMBER, Number, Source, closing, masked, number_at, split_outside, stripped
 
 NAME = 'krl'
 KINDS: dict[str, Kind] = {'PTP': 'joint', 'LIN': 'linear', 'CIRC': 'circular'}
 POSE_KEYS, EXTERNAL = ('X', 'Y', 'Z', 'A', 'B', 'C'), ('E1', 'E2', 'E3', 'E4', 'E5', 'E6')
-SIGN_DOUBT = np.radians(0.5)
-"""An axis this near zero may have either sign in T, which was worked out from other digits."""
 SPEED = 0.1
 """m/s while the program has not said."""
 _COMMENTS = (r';[^\r\n]*', r'"[^"\r\n]*"')
@@ -55,6 +54,7 @@ _SET = re.compile(
 _BAS = re.compile(r'^[ \t]*BAS[ \t]*\([ \t]*#(\w+)[ \t]*,[ \t]*([^)\r\n]*)\)', re.I | re.M)
 _WAIT = re.compile(r'^[ \t]*WAIT[ \t]+SEC[ \t]+([^\s;]+)', re.I | re.M)
 _ROUTINE = re.compile(r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DEF|DEFFCT)\b', re.I | re.M)
+_WITH = re.compile(r'\bWITH\b', re.I)
 _AGGREGATE = re.compile(r'\{\s*(?:\w+\s*:)?')
 
 
@@ -234,7 +234,7 @@ class _Reader:
         elif what.startswith('$VEL_AXIS'):
             self.state.joint_speed = self._speed(start, end, 10.0) / 100.0
         elif what == 'FDAT_ACT':
-            self._frames_of(value)
+            self.state.tool, self.state.base = self._frames_of(value)
         elif what == 'LDAT_ACT' and value.lower() in self.data:
             speed = self.data[value.lower()].numbers.get('VEL')
             self.state.speed = self.state.speed if speed is None else max(speed.value, 1e-4)
@@ -251,19 +251,17 @@ class _Reader:
         elif what == 'VEL_PTP':
             self.state.joint_speed = self._speed(start, end, 10.0) / 100.0
 
-    def _frames_of(self, name: str) -> None:
-        """Take tool and base from the data of a taught point."""
+    def _frames_of(self, name: str) -> tuple[Frame, Frame]:
+        """Return tool and base of the data of a taught point."""
         content = self.data.get(name.lower())
         if content is None:
-            self.state.tool, self.state.base = Frame(name), Frame(name)
-            return
-        for what, key in (('TOOL', 'TOOL_NO'), ('BASE', 'BASE_NO')):
-            number = content.numbers.get(key)
-            frame = Frame(name) if number is None else self._numbered(what, f'{number.value:g}')
-            if what == 'TOOL':
-                self.state.tool = frame
-            else:
-                self.state.base = frame
+            return Frame(name), Frame(name)
+        numbers = [content.numbers.get(key) for key in ('TOOL_NO', 'BASE_NO')]
+        tool, base = (
+            Frame(name) if number is None else self._numbered(what, f'{number.value:g}')
+            for what, number in zip(('TOOL', 'BASE'), numbers, strict=True)
+        )
+        return tool, base
 
     def _numbered(self, what: str, text: str) -> Frame:
         """Return a frame by its number; number 0 is the robot's own."""
@@ -307,15 +305,21 @@ class _Reader:
         if found[2]:
             self.program.unknown(kind, where, f'{word}_REL counts from where the arm stands')
             return
-        parts = self._parts(found.end(), end)
-        tail = text[parts[-1][1] : end].upper() if parts else ''
-        if ' WITH ' in f'{tail} ' or len(parts) > (2 if kind == 'circular' else 1):
-            extra = 'an arc of its own angle' if kind == 'circular' else 'settings of its own'
-            if kind == 'circular' or re.search(r'\$(BASE|TOOL)', tail):
-                self.program.unknown(kind, where, f'{word} with {extra} is not understood')
-                return
-        refs = [self._ref(*part) for part in parts[: 2 if kind == 'circular' else 1]]
         wanted = 2 if kind == 'circular' else 1
+        with_ = _WITH.search(text, found.end(), end)
+        cut = end if with_ is None else with_.start()
+        parts = self._parts(found.end(), cut)
+        if len(parts) > wanted:
+            self.program.unknown(
+                kind, where, f'{word} with {len(parts)} arguments is not understood'
+            )
+            return
+        frames = self._own_frames(text[cut:end].upper())
+        if frames is None:
+            self.program.unknown(kind, where, f'{word} has a tool or base that is worked out')
+            return
+        tail = text[parts[-1][1] : end].upper() if parts else ''
+        refs = [self._ref(*part) for part in parts]
         if len(refs) < wanted or any(ref is None for ref in refs):
             what = source.text[found.end() : end].strip() or 'nothing'
             self.program.unknown(kind, where, f'{word} goes to {what!r}, which is not given here')
@@ -325,18 +329,31 @@ class _Reader:
         if joints and kind != 'joint':
             self.program.unknown(kind, where, f'{word} to axis positions is not understood')
             return
-        self.program.add(self._step(kind, where, ends, tail))
+        self.program.add(self._step(kind, where, ends, frames, tail))
 
-    def _step(self, kind: Kind, where: str, ends: Sequence[int], tail: str) -> Step:
+    def _own_frames(self, settings: str) -> tuple[Frame, Frame] | None:
+        """Return tool and base of a move, its own settings counted; None where they are open."""
+        frames = [self.state.tool, self.state.base]
+        for k, what in enumerate(('TOOL', 'BASE')):
+            if f'${what}' not in settings:
+                continue
+            named = re.search(rf'\${what}\s*=\s*S{what}2?\s*\(\s*(\w+)', settings)
+            if named is None:
+                return None
+            frames[k] = self._frames_of(named[1])[k]
+        return frames[0], frames[1]
+
+    def _step(
+        self, kind: Kind, where: str, ends: Sequence[int], frames: tuple[Frame, Frame], tail: str
+    ) -> Step:
         speed = self.state.joint_speed if kind == 'joint' else self.state.speed
-        own = re.search(rf'\$VEL\.CP\s*=\s*({NUMBER})', tail)
+        own = re.search(rf'\$VEL(?:\.CP)?\s*=\s*(?:SVEL_CP\s*\(\s*)?({NUMBER})', tail)
         return Step(
             kind,
             where,
             Ref(ends[-1]),
             Ref(ends[0]) if kind == 'circular' else None,
-            self.state.tool,
-            self.state.base,
+            *frames,
             speed if own is None else max(float(own[1].rstrip('.')), 1e-4),
             re.search(r'\bC_(DIS|PTP|VEL|ORI|SPL)\b', tail) is None,
             suits=self.suits.get(ends[-1]),
@@ -368,32 +385,6 @@ class _Reader:
             self.used[0].add(start)
             return self.names.get(name)
         return None
-
-
-def turn_bits(turn: int) -> Suits:
-    """
-    Return what takes the postures whose axes have the signs of T.
-
-    Parameters
-    ----------
-    turn : int
-        Bit k is set where axis k + 1 is below zero.
-
-    """
-
-    def suits(robot: object, controller: Controller) -> Any:
-        del robot
-        back = np.linalg.inv(controller.mix)
-
-        def of(q: Array) -> Array:
-            axes = q @ back.T
-            below = np.array([bool(turn >> k & 1) for k in range(axes.shape[1])])
-            fits = np.where(below, axes < SIGN_DOUBT, axes > -SIGN_DOUBT)
-            return np.asarray(fits.all(axis=1))
-
-        return of
-
-    return suits
 
 
 def _bare(text: str) -> str:

@@ -28,13 +28,12 @@ from weld_twin_core.motion.programs.moves import Kind
 
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere
 from .context import Context
-from .controllers import Controller, Frame
+from .controllers import Frame
 from .notation import ABB_POSE
+from .postures import quadrants
 from .source import Number, Source, closing, masked, number_at, split_outside, stripped
 
 NAME = 'rapid'
-QUADRANT_DOUBT = np.radians(0.5)
-"""An axis this near the edge of its quadrant may count to either."""
 NO_AXIS = 8.9e9
 """ABB writes 9E9 for an external axis that is not there."""
 SPEED = 0.1
@@ -363,31 +362,3 @@ class _Reader:
             # Of a joint move the speed is the tool's too; 1 m/s is near a tenth of full speed.
             value = float(np.clip(value / 10.0, 0.01, 1.0))
         return max(value, 1e-4), zone == 'fine'
-
-
-def quadrants(conf: Sequence[int]) -> Suits:
-    """
-    Return what takes the postures whose axes 1, 4 and 6 are in the quadrants of a confdata.
-
-    Parameters
-    ----------
-    conf : sequence of int
-        cf1, cf4, cf6 and cfx, which is left out: its meaning depends on the arm.
-
-    """
-
-    def suits(robot: object, controller: Controller) -> Any:
-        del robot, controller
-        places = np.array([0, 3, 5])
-
-        def of(q: Array) -> Array:
-            if q.shape[1] < 6:
-                return np.ones(len(q), dtype=bool)
-            low = np.array(conf[:3]) * 0.5 * np.pi
-            axes = q[:, places]
-            inside = (axes > low - QUADRANT_DOUBT) & (axes < low + 0.5 * np.pi + QUADRANT_DOUBT)
-            return np.asarray(inside.all(axis=1))
-
-        return of
-
-    return suits

@@ -26,8 +26,9 @@ from weld_twin_core.motion.programs.moves import Kind
 
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere
 from .context import Context
-from .controllers import Controller, Frame
+from .controllers import Frame
 from .notation import UR_POSE, Notation
+from .postures import nearest
 from .source import Number, Source, closing, masked, number_at, split_outside, stripped
 
 NAME = 'urscript'
@@ -228,7 +229,7 @@ class _Reader:
         first, last = parts[1]
         named = re.match(r'qnear\s*=\s*', self.text[first:last])
         near = self._constant_joints(first + (named.end() if named else 0), last)
-        return (Ref(point), None) if near is None else (Ref(point), _nearest(near))
+        return (Ref(point), None) if near is None else (Ref(point), nearest(near))
 
     def _constant(self, start: int, end: int) -> Array | None:
         """Return a pose that stands there, or of a variable that is set once."""
@@ -285,18 +286,3 @@ class _Reader:
         """Return a coordinate without its sign and exponent, to see whether it is worked out."""
         text = self.text[start:end].lstrip('+-')
         return re.sub(r'(?<=[\d.])[eE][-+]?\d+', '', text)
-
-
-def _nearest(near: Array) -> Suits:
-    """Return what takes the posture nearest given joint positions, as qnear does."""
-
-    def suits(robot: object, controller: Controller) -> object:
-        del robot, controller
-
-        def of(q: Array) -> Array:
-            away = np.abs(q - near).sum(axis=1)
-            return np.asarray(away == away.min())
-
-        return of
-
-    return suits  # type: ignore[return-value]

@@ -67,6 +67,10 @@ class JointCurve(Effect):
     def _site(self, view: View) -> tuple[str, int]:
         return self.channel, view.robot.index(self.joint)
 
+    def alike(self) -> list[tuple[str, ...]]:
+        """Return one label for each joint: every gear is as uneven as it was cut."""
+        return [(self.name, self.joint)] * self.coordinates().size
+
     def off_outside(self) -> float:
         """Return the RMS of a curve over the angle: no formula says how it goes on beyond."""
         if (self.over, self.channel) != ('angle', 'q'):

@@ -221,7 +221,9 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
 
 def carries_curves(diagnosis: Diagnosis) -> bool:
     """Return whether the twin carries curves in place of effects with a name."""
-    return any(e.name in ('joint_curve', 'frame_curve') for e in diagnosis.model.found)
+    # Beside many small errors a curve is one of them, and stands for no cause.
+    alone = not diagnosis.families
+    return alone and any(e.name in ('joint_curve', 'frame_curve') for e in diagnosis.model.found)
 
 
 def _placed(diagnosis: Diagnosis) -> tuple[str, str]:

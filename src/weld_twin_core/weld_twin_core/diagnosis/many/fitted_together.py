@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...effects.joint_curve import JointCurve
 from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
@@ -57,8 +58,8 @@ def fitted_together(
         return found
     progress('many small errors at once: fitting them together')
     steps = [_beyond(demand) for demand, least in enumerate(BEAR) if stations >= least]
-    if stations >= PLENTY:
-        steps = steps[-1:]
+    # First without curves: what a handful of stations bears is the geometry under load.
+    steps = steps[-1:] if stations >= PLENTY else [(*steps[0], JointCurve.name), *steps]
     best, left = found, np.inf
     for less in steps:
         trial = _together(found, (*exclude, *less), beliefs, progress)
@@ -68,7 +69,13 @@ def fitted_together(
     few = unseen_rms(found)
     if found.crowded or left < beliefs.better * few:
         return best
-    return best if left < CHOSEN * few and _many(best, beliefs) else found
+    many = _crowd(found) > beliefs.crowd or _many(best, beliefs)
+    return best if left < CHOSEN * few and many else found
+
+
+def _crowd(found: Search) -> int:
+    """Return how many separate causes were found one by one: too many are no answer."""
+    return sum(effect.causes() for effect in found.final.model.found)
 
 
 def _many(found: Search, beliefs: Beliefs) -> bool:

@@ -5,19 +5,22 @@ Dozens of small errors acting together, as in every arm once its one large fault
 
 All geometric errors, the gears' ripple of every order, and the errors of load, play and coupling
 are fitted at once, each family held to a size learned from the data (`shrinkage`); narrow ripple
-lines above the dense orders are then looked for one by one.
+lines above the dense orders are then looked for one by one. A joint that travels too little to
+tell waves from each other has a curve over its angle in their place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
 from ...arrays import Array
 from ...effects import REGISTRY
 from ...effects.effect import Effect, Stage, View
-from ...twin.features import joints_of
+from ...effects.joint_curve import JointCurve
+from ...twin.features import Features, joints_of
 from ..algebra.fit import Fit, robust_scale
 from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
@@ -26,6 +29,17 @@ from ..hypotheses.library import candidate_kinds
 from ..hypotheses.still_joints import hardly_moves
 from .shrinkage import shrunk_fit, shrunk_step
 from .wave_lines import with_lines
+
+KNOT = 0.1
+"""Least distance [rad] of the knots of a joint's curve: ripple of the orders up to ten or so bends
+within some tenths of a radian. A joint that travels less has no curve."""
+LEAST_KNOTS, MOST_KNOTS = 2, 8
+"""Fewest and most intervals of such a curve: one would be a line, more than eight are waves."""
+SEEN = 0.05
+"""Part of an error's effect on the tool that fitted frames must leave of it: formulas are a few
+per cent off real arms, so that less than this says nothing of the error."""
+ALIKE = 1e-9
+"""Strength of a direction of the frames, as a share of the strongest, below which it is rounding."""
 
 
 def many_small(
@@ -85,7 +99,49 @@ def _everything(
             if kind.applicable(view, joint) is None:
                 small = _small(kind, view, joint, most, beliefs, have)
                 out += [effect for effect in small if not hardly_moves(features, effect)]
+    if JointCurve.name not in exclude:
+        out += _curves(features, {effect.site for effect in out if effect.orders().size})
+    out = _apart_from_frames(problem, features, out)
     return (*out, *(e for e in model.found if e.dated))
+
+
+def _apart_from_frames(
+    problem: Problem, features: list[Features], effects: list[Effect]
+) -> list[Effect]:
+    """
+    Return the effects that fitted frames do not take the place of.
+
+    While a joint stands still, an error of its row looks like a turn of base or tool. What little
+    the frames leave of it would be read off the misfit of everything else, and be wrong by degrees
+    where the joint moves.
+    """
+    scale = problem.unit_scale()
+    frames = problem.whitened(problem.frame_columns(features)[0], scale)
+    if not frames.size:
+        return effects
+    _, strength, span = np.linalg.svd(frames, full_matrices=False)
+    span = span[strength > ALIKE * strength[0]]
+    out = []
+    for effect in effects:
+        own = problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
+        left = np.linalg.norm(own - (own @ span.T) @ span, axis=1)
+        if (left > SEEN * np.linalg.norm(own, axis=1)).any():
+            out.append(effect)
+    return out
+
+
+def _curves(features: list[Features], waved: AbstractSet[str | None]) -> list[Effect]:
+    """Return a curve over the angle of every joint that turns and has no waves of its own."""
+    robot = features[0].twin.robot
+    out: list[Effect] = []
+    for i, joint in enumerate(robot.joint_names):
+        angles = np.concatenate([maker.view.joint(i) for maker in features])
+        low, high = float(angles.min()), float(angles.max())
+        count = min(int((high - low) / KNOT), MOST_KNOTS)
+        if joint not in waved and not robot.prismatic[i] and count >= LEAST_KNOTS:
+            knots = tuple(np.linspace(low, high, count + 1).tolist())
+            out.append(JointCurve(joint, np.zeros(count + 1), knots))
+    return out
 
 
 def _small(

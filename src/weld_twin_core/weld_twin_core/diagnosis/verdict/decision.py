@@ -78,9 +78,9 @@ def _of_nothing(case: Weighed) -> Verdict:
     told, beliefs = case.evidence, case.beliefs
     if told.refused:
         return Verdict('unknown', beliefs.doubted, (), (_absurd(told),))
-    if case.left > beliefs.unexplained:
+    if case.left > beliefs.unexplained and case.above_noise:
         return Verdict('unknown', _unknown_confidence(case), (), (_depends(told),))
-    if not told.independent and told.after > beliefs.far_above * told.floor:
+    if case.wide:
         reason = (
             'what remains is far wider spread than noise, though it depends on nothing looked at'
         )
@@ -127,10 +127,14 @@ def _of_families(case: Weighed) -> Verdict:
 def _incomplete(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> Verdict:
     """Return 'unknown' with the effects that stand out beside what is left and apart from it."""
     told = case.evidence
+    # Of a rest that depends on nothing looked at, nobody knows what it touches.
     solid = tuple(
         chosen
         for chosen, part in zip(sets, told.parts, strict=True)
-        if len(chosen) == 1 and part > case.left and not _touched(chosen[0], told)
+        if case.above_noise
+        and len(chosen) == 1
+        and part > case.left
+        and not _touched(chosen[0], told)
     )
     return Verdict('unknown', _unknown_confidence(case), solid, (_depends(told),))
 

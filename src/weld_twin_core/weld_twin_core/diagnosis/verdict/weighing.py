@@ -37,6 +37,12 @@ class Weighed:
         return told.independent and told.after > self.beliefs.above * told.floor
 
     @property
+    def wide(self) -> bool:
+        """Return whether what remains is far wider than a floor that only the fit shows."""
+        told = self.evidence
+        return not told.independent and told.after > self.beliefs.far_above * told.floor
+
+    @property
     def above_noise(self) -> bool:
         """Return whether what remains is more than noise."""
         return self.structured or self.high
@@ -73,6 +79,9 @@ class Weighed:
         excess = max(told.gap**2 - told.floor**2, least, TINY)
         found = told.structure.gain * told.after**2 if self.structured else 0.0
         over = told.after**2 - told.floor**2 if self.high else 0.0
+        if self.wide:
+            # Such a floor may be too low by that factor; what is beyond is left all the same.
+            over = told.after**2 - (self.beliefs.far_above * told.floor) ** 2
         return float(np.clip(max(found, over) / excess, 0.0, 1.0))
 
     @property

@@ -64,15 +64,15 @@ def remaining(share, *slots, **changes):
 
 
 def structured(left, *slots, **changes):
-    """Return evidence of which a structure takes that share of the squared gap, floor aside."""
+    """Return evidence of which a structure takes that share of the squared gap above the floor."""
     return evidence(
         *slots,
         **{
-            'structure': left_over(left),
+            'structure': left_over(0.64 * left),
             'gap': 1e-3,
             'after': 1e-3,
             'fitted': 1e-3,
-            'floor': 1e-9,
+            'floor': 0.6e-3,
             'independent': False,
             **changes,
         },

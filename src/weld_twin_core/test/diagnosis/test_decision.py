@@ -41,6 +41,11 @@ def left_over(gain, sure=9.0, names=('time',)):
     return Structure(2e-5, gain, sure, names)
 
 
+def taking(left):
+    """Return a structure that takes that share of the evidence of `structured`."""
+    return left_over(left * (1.0 - 0.09) / 0.25)
+
+
 def evidence(*slots, **changes):
     """Return evidence of a large gap that is explained down to the floor."""
     usual = Evidence(
@@ -68,11 +73,11 @@ def structured(left, *slots, **changes):
     return evidence(
         *slots,
         **{
-            'structure': left_over(0.64 * left),
+            'structure': taking(left),
             'gap': 1e-3,
-            'after': 1e-3,
-            'fitted': 1e-3,
-            'floor': 0.6e-3,
+            'after': 0.5e-3,
+            'fitted': 0.5e-3,
+            'floor': 0.3e-3,
             'independent': False,
             **changes,
         },
@@ -298,7 +303,10 @@ def test_what_is_left_is_a_share_of_the_squared_gap_above_the_floor():
     sizes = {'after': 4.0, 'floor': 2.0, 'gap': 8.0}
     assert Weighed(evidence(**sizes), Beliefs()).left == pytest.approx(12.0 / 60.0)
     found = evidence(structure=left_over(0.1), **{**sizes, 'independent': False})
-    assert Weighed(found, Beliefs()).left == pytest.approx(1.6 / 60.0)
+    # A floor that only the fit shows may be too low by 1.7.
+    assert Weighed(found, Beliefs()).left == pytest.approx((16.0 - 3.4**2) / 60.0)
+    near = evidence(structure=left_over(0.1), **{**sizes, 'floor': 2.4, 'independent': False})
+    assert Weighed(near, Beliefs()).left == pytest.approx(1.6 / (64.0 - 2.4**2))
     both = evidence(structure=left_over(0.9), **sizes)
     assert Weighed(both, Beliefs()).left == pytest.approx(14.4 / 60.0)
     assert Weighed(evidence(after=9.0, floor=2.0, gap=8.0), Beliefs()).left == 1.0
@@ -317,15 +325,15 @@ def test_a_gap_within_the_floor_counts_as_a_twentieth_of_it():
 def test_without_gap_and_floor_a_nanometre_is_divided_by():
     told = evidence(after=0.5e-9, floor=0.0, gap=0.0, independent=False)
     assert Weighed(told, Beliefs()).share == pytest.approx(0.5)
-    found = replace(told, structure=left_over(0.2))
-    assert Weighed(found, Beliefs()).left == pytest.approx(0.05)
+    found = replace(told, structure=left_over(0.2), independent=True)
+    assert Weighed(found, Beliefs()).left == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize(('left', 'status'), [(0.049, 'identified'), (0.051, 'unknown')])
 def test_a_twentieth_may_stay_unexplained(left, status):
     assert decide(structured(left, SURE)).status == status
     # Without an effect the same holds, of what stands above a noise that is not far below it.
-    told = structured(left * 0.64, floor=0.6e-3)
+    told = structured(left)
     assert decide(told).status == ('none' if status == 'identified' else 'unknown')
 
 
@@ -394,9 +402,8 @@ def test_what_is_spread_far_wider_than_noise_is_unknown(times, status):
 # Many small errors ------------------------------------------------------------------------------
 
 
-def family(effect, fall, error=1e-12, size=1e-4, elsewhere=0.0):
-    sites = ((Site(effect, ELBOW), size),)
-    return WeighedFamily(effect, fall, error, 1e-10, sites, elsewhere)
+def family(effect, fall, size=1e-4, growths=(9.0,)):
+    return WeighedFamily(effect, fall, growths, ((Site(effect, ELBOW), size),))
 
 
 def of_families(*families, **changes):
@@ -404,30 +411,25 @@ def of_families(*families, **changes):
 
 
 @pytest.mark.parametrize(
-    ('fall', 'error', 'named'),
+    ('growths', 'named'),
     [
-        (1.1e-10, 1e-12, True),
-        (0.9e-10, 1e-12, False),
-        (1e-9, 0.49e-9, True),
-        (1e-9, 0.51e-9, False),
+        ((1.1,) * 8 + (0.0,) * 2, True),
+        ((1.1,) * 7 + (0.9,) * 3, False),
+        ((0.9,) * 10, False),
+        ((50.0,) * 7 + (0.0,) * 3, False),
+        ((), False),
     ],
 )
-def test_a_family_is_named_without_which_the_error_doubles_at_two_standard_errors(
-    fall, error, named
-):
-    verdict = of_families(family('link_length', fall, error))
+def test_a_family_is_named_without_which_the_error_doubles_in_four_parts_of_five(growths, named):
+    verdict = of_families(family('link_length', 1e-9, growths=growths))
     assert verdict.families[0].named is named
     assert verdict.sets == (((Site('link_length', ELBOW),),) if named else ())
 
 
-@pytest.mark.parametrize(('elsewhere', 'named'), [(1.1, True), (0.9, False)])
-def test_a_family_may_earn_its_name_on_postures_that_took_no_part(elsewhere, named):
-    verdict = of_families(family('link_length', 0.5e-10, elsewhere=elsewhere))
-    assert verdict.families[0].named is named
-
-
 def test_families_of_which_none_is_needed_leave_the_cause_unknown():
-    verdict = of_families(family('link_length', 1e-11), family('link_twist', 2e-11))
+    verdict = of_families(
+        *(family(n, 1e-11, growths=(0.1,)) for n in ('link_length', 'link_twist'))
+    )
     assert verdict.status == 'unknown' and not verdict.sets
     assert 'takes the place' in verdict.reasons[1]
 
@@ -454,7 +456,7 @@ def test_families_are_told_largest_first_and_what_they_account_for():
 
 @pytest.mark.parametrize(('left', 'status'), [(0.0395, 'identified'), (0.051, 'unknown')])
 def test_families_are_no_explanation_while_structure_remains(left, status):
-    verdict = of_families(family('link_length', 1e-9), structure=left_over(left))
+    verdict = of_families(family('link_length', 1e-9), structure=taking(left))
     assert verdict.status == status
     assert verdict.confidence == pytest.approx(0.75 / (1.0 + (left / 0.05) ** 3), rel=1e-6)
     assert 'only their sum is certain' in verdict.reasons[0]
@@ -462,7 +464,7 @@ def test_families_are_no_explanation_while_structure_remains(left, status):
 
 @pytest.mark.parametrize('left', [0.0398, 0.049])
 def test_families_more_likely_wrong_than_right_are_not_named(left):
-    verdict = of_families(family('link_length', 1e-9), structure=left_over(left))
+    verdict = of_families(family('link_length', 1e-9), structure=taking(left))
     assert verdict.status == 'unknown'
     assert verdict.sets == ()
     assert verdict.confidence == pytest.approx(0.75)

@@ -104,8 +104,7 @@ def _of_families(case: Weighed) -> Verdict:
     families = []
     for told in case.evidence.families or ():
         members = tuple(item for item in told.members if item[1] > beliefs.member_least_m)
-        worth = max(told.fall / max(told.full, TINY), told.elsewhere)
-        named = worth > beliefs.family_worth and told.fall > beliefs.family_sure * told.error
+        named = told.returns(beliefs.family_worth) >= beliefs.family_returns
         if members:
             families.append(Family(told.effect, named, told.rms_m, members))
     families.sort(key=lambda family: -family.rms_m)

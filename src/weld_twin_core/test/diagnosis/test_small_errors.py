@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Many small errors on stations that say little: what is fitted, and what is left alone."""
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.many.small_errors import many_small
+from weld_twin_core.effects import REGISTRY, LinkTwist, TransmissionRipple
+
+GEOMETRY = ('joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parallelism')
+MIDDLE = np.array([0.0, -1.2, 1.3, -1.2, -1.5, 0.0])
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return wt.load('ur5')
+
+
+def stations(robot, half, effects, seed=1, count=90):
+    """Return stations about a posture, each joint within its own half range [rad]."""
+    rng = np.random.default_rng(seed)
+    q = MIDDLE + rng.uniform(-1.0, 1.0, (count, 6)) * half
+    t = 5.0 * np.arange(count)
+    commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
+    poses = wt.Twin(robot, effects).poses(commanded, t)
+    noise = 2e-5 * rng.standard_normal(poses.position.shape)
+    return commanded.with_measured(wt.Measurements(t, poses.position + noise))
+
+
+def fitted(recording, robot, align, *kinds):
+    """Return the model of all errors of some kinds, fitted together."""
+    problem, start = aligned([recording], robot, align, ())
+    rest = [name for name in REGISTRY if name not in kinds]
+    return many_small(problem, start, rest, Beliefs(), lambda text: None)[0].model
+
+
+def off(model, recording):
+    """Return the mean distance of a model from a recording, [m]."""
+    poses = model.twin(0).poses(recording, recording.measured.t)
+    return float(np.linalg.norm(recording.measured.position - poses.position, axis=1).mean())
+
+
+def test_an_error_of_a_joint_that_stood_still_is_left_to_the_frames(robot):
+    """Read off the misfit of a slow gear, it would be wrong by degrees where the joint moves."""
+    errors = (
+        LinkTwist('elbow_joint', 1e-3),
+        TransmissionRipple('wrist_1_joint', 3e-4, 7.0, 0.3),
+    )
+    still = stations(robot, [0.01, 0.9, 0.9, 0.9, 0.9, 0.9], errors)
+    model = fitted(still, robot, 'base', *GEOMETRY)
+    first = [effect for effect in model.found if effect.site == 'shoulder_pan_joint']
+    assert not any(effect.name in ('link_twist', 'joint_offset') for effect in first)
+    assert any(effect.site == 'elbow_joint' for effect in model.found)
+    # Elsewhere the model is no worse for it: the twist that is there is found.
+    moving = stations(robot, [1.5, 0.9, 0.9, 0.9, 0.9, 0.9], errors, seed=2)
+    assert off(model, moving) < 0.5e-3
+
+
+def test_frames_that_are_known_take_no_place(robot):
+    """With base and tool known, the same error shows although the joint stands still."""
+    still = stations(
+        robot, [0.01, 0.9, 0.9, 0.9, 0.9, 0.9], (LinkTwist('shoulder_pan_joint', 1e-3),)
+    )
+    model = fitted(still, robot, '', *GEOMETRY)
+    (twist,) = (e for e in model.found if (e.name, e.site) == ('link_twist', 'shoulder_pan_joint'))
+    assert twist.dalpha == pytest.approx(1e-3, abs=1e-4)
+
+
+def test_a_gear_seen_over_little_travel_has_a_curve(robot):
+    """Waves cannot be told apart over 0.8 rad, but the bend they make is there, and predicted."""
+    rough = (TransmissionRipple('shoulder_lift_joint', 6e-4, 9.0, 0.4),)
+    half = [0.4, 0.4, 0.4, 0.4, 0.4, 0.4]
+    seen, other = (stations(robot, half, rough, seed) for seed in (3, 4))
+    plain = fitted(seen, robot, 'base', *GEOMETRY, 'transmission_ripple')
+    curved = fitted(seen, robot, 'base', *GEOMETRY, 'transmission_ripple', 'joint_curve')
+    assert not any(effect.orders().size for effect in curved.found)
+    assert off(curved, other) < 0.6 * off(plain, other)
+
+
+def test_a_joint_with_waves_has_no_curve_beside_them(robot):
+    """Over a whole turn waves say the same, and carry farther."""
+    seen = stations(robot, [1.5, 0.4, 0.4, 0.4, 0.4, 1.5], ())
+    model = fitted(seen, robot, 'base', 'transmission_ripple', 'joint_curve')
+    sites = {name: {e.site for e in model.found if e.name == name} for name in REGISTRY}
+    assert sites['transmission_ripple'] == {'shoulder_pan_joint', 'wrist_3_joint'}
+    assert sites['joint_curve'] == {
+        'shoulder_lift_joint',
+        'elbow_joint',
+        'wrist_1_joint',
+        'wrist_2_joint',
+    }

@@ -207,7 +207,7 @@ def _learned(
     x = coordinates(model)
     target = _target(normal, right, float(residual @ residual), x)
     precision, freedom = learned_precision(
-        *_projected(*target, frames), residual.size, labels, scales, effect_precision(model)
+        *_projected(*target, frames), residual.size, labels, scales, _believed(model)
     )
     ridge = np.concatenate([np.zeros(frames), precision])
     pull = ridge * np.concatenate([np.zeros(frames), x])
@@ -217,6 +217,16 @@ def _learned(
     if moved @ moved + precision @ x_moved**2 > residual @ residual + precision @ x**2:
         trial = fit(problem, model, scale, precision, iterations=2).model
     return trial, precision, freedom + frames
+
+
+def _believed(model: Model) -> Array:
+    """Return the prior precision of every coordinate; curves are as high as ripple usually is."""
+    parts = [effect_precision(model.with_found((effect,))) for effect in model.found]
+    for effect, part in zip(model.found, parts, strict=True):
+        if not (effect.cause or effect.of_setup):
+            unknown = part == 0.0
+            part[unknown] = effect.coordinate_scales()[unknown] ** -2.0
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def _target(normal: Array, right: Array, rss: float, x: Array) -> tuple[Array, Array, float]:

@@ -60,8 +60,8 @@ def held_out_shrink(
     rms = float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))
     if not holdout and found.problem.recordings[0].joints.static:
         other = by_posture(unseen)
-        ends = other.interval
-        interval = (min(interval[0], ends[0]), max(interval[1], ends[1]))
+        ends = [_of_others(ratio, interval), _of_others(other.ratio, other.interval)]
+        interval = (min(low for low, _ in ends), max(high for _, high in ends))
         if other.ratio > ratio:
             ratio, rms = other.ratio, other.rms
     return Shrink(
@@ -89,6 +89,18 @@ def left_on(found: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> fl
 
     """
     return float(np.sqrt(_on_bags(found, holdout, beliefs.other_setup)[1].mean()))
+
+
+def _of_others(ratio: float, interval: tuple[float, float]) -> tuple[float, float]:
+    """
+    Return the interval of what as many stations again will show.
+
+    They vary about the truth as much as these do, so that the variance counts twice.
+    """
+    if ratio <= 0.0:
+        return interval
+    low, high = (ratio * float((end / ratio) ** np.sqrt(2.0)) for end in interval)
+    return low, high
 
 
 class Judged(NamedTuple):

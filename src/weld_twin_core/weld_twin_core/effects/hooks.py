@@ -78,6 +78,10 @@ class Hooks(Parametric, ABC):
     """Set by an effect that is a sum of waves in its joint's angle; it also gives `orders` and
     `with_orders`."""
 
+    bends: ClassVar[bool] = False
+    """Whether it stands for waves of a joint that travels too little for them; then gives
+    `bend`."""
+
     @abstractmethod
     def gradient(self, view: View) -> list[Shift | None]:
         """Return d displacement / d component for every component; None where there is none."""
@@ -208,6 +212,20 @@ class Hooks(Parametric, ABC):
 
         """
         return list(cls.seeds(view, joint))[:2]
+
+    @classmethod
+    def bend(cls, joint: str, angles: Array) -> Any:
+        """
+        Return an instance of no size that bends a joint where it was, None over too short a way.
+
+        Parameters
+        ----------
+        joint : str
+        angles : array, shape (M,) [rad]
+            Where the joint was measured.
+
+        """
+        return None
 
     def alike(self) -> list[tuple[str, ...]]:
         """Return a label for every fit coordinate; those of one label are expected alike in size."""

@@ -18,6 +18,12 @@ from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
+KNOT = 0.1
+"""Least distance [rad] of the knots of a joint's curve: ripple of the orders up to ten or so bends
+within some tenths of a radian. A joint that travels less has no curve."""
+LEAST_KNOTS, MOST_KNOTS = 2, 8
+"""Fewest and most intervals of such a curve: one would be a line, more than eight are waves."""
+
 
 @register
 @dataclass(frozen=True, eq=False)
@@ -42,6 +48,7 @@ class JointCurve(Effect):
     of = 'joint'
     stage = Stage.LINK
     cause = False
+    bends = True
     parameters = (Parameter('values', 'rad', size=0, typical=2e-4),)
     options = ('knots', 'over', 'channel')
 
@@ -66,6 +73,15 @@ class JointCurve(Effect):
 
     def _site(self, view: View) -> tuple[str, int]:
         return self.channel, view.robot.index(self.joint)
+
+    @classmethod
+    def bend(cls, joint: str, angles: Array) -> JointCurve | None:
+        """Return a level curve over the angle, None where its knots would be too near."""
+        low, high = float(angles.min()), float(angles.max())
+        count = min(int((high - low) / KNOT), MOST_KNOTS)
+        if count < LEAST_KNOTS:
+            return None
+        return cls(joint, np.zeros(count + 1), tuple(np.linspace(low, high, count + 1).tolist()))
 
     def alike(self) -> list[tuple[str, ...]]:
         """Return one label for each joint: every gear is as uneven as it was cut."""

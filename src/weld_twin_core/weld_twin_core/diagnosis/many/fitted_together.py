@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...effects.joint_curve import JointCurve
 from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
@@ -59,7 +58,8 @@ def fitted_together(
     progress('many small errors at once: fitting them together')
     steps = [_beyond(demand) for demand, least in enumerate(BEAR) if stations >= least]
     # First without curves: what a handful of stations bears is the geometry under load.
-    steps = steps[-1:] if stations >= PLENTY else [(*steps[0], JointCurve.name), *steps]
+    curves = tuple(name for name, kind in REGISTRY.items() if kind.bends)
+    steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
     best, left = found, np.inf
     for less in steps:
         trial = _together(found, (*exclude, *less), beliefs, progress)

@@ -19,7 +19,6 @@ import numpy as np
 from ...arrays import Array
 from ...effects import REGISTRY
 from ...effects.effect import Effect, Stage, View
-from ...effects.joint_curve import JointCurve
 from ...twin.features import Features, joints_of
 from ..algebra.fit import Fit, robust_scale
 from ..algebra.gram import Gram
@@ -30,11 +29,6 @@ from ..hypotheses.still_joints import hardly_moves
 from .shrinkage import shrunk_fit, shrunk_step
 from .wave_lines import with_lines
 
-KNOT = 0.1
-"""Least distance [rad] of the knots of a joint's curve: ripple of the orders up to ten or so bends
-within some tenths of a radian. A joint that travels less has no curve."""
-LEAST_KNOTS, MOST_KNOTS = 2, 8
-"""Fewest and most intervals of such a curve: one would be a line, more than eight are waves."""
 SEEN = 0.05
 """Part of an error's effect on the tool that fitted frames must leave of it: formulas are a few
 per cent off real arms, so that less than this says nothing of the error."""
@@ -99,8 +93,7 @@ def _everything(
             if kind.applicable(view, joint) is None:
                 small = _small(kind, view, joint, most, beliefs, have)
                 out += [effect for effect in small if not hardly_moves(features, effect)]
-    if JointCurve.name not in exclude:
-        out += _curves(features, {effect.site for effect in out if effect.orders().size})
+    out += _bends(features, exclude, {effect.site for effect in out if effect.orders().size})
     out = _apart_from_frames(problem, features, out)
     return (*out, *(e for e in model.found if e.dated))
 
@@ -130,18 +123,18 @@ def _apart_from_frames(
     return out
 
 
-def _curves(features: list[Features], waved: AbstractSet[str | None]) -> list[Effect]:
-    """Return a curve over the angle of every joint that turns and has no waves of its own."""
+def _bends(
+    features: list[Features], exclude: Sequence[str], waved: AbstractSet[str | None]
+) -> list[Effect]:
+    """Return what bends the joints that turn and have no waves of their own."""
     robot = features[0].twin.robot
-    out: list[Effect] = []
+    kinds = [k for k in REGISTRY.values() if k.bends and k.name not in exclude]
+    out = []
     for i, joint in enumerate(robot.joint_names):
-        angles = np.concatenate([maker.view.joint(i) for maker in features])
-        low, high = float(angles.min()), float(angles.max())
-        count = min(int((high - low) / KNOT), MOST_KNOTS)
-        if joint not in waved and not robot.prismatic[i] and count >= LEAST_KNOTS:
-            knots = tuple(np.linspace(low, high, count + 1).tolist())
-            out.append(JointCurve(joint, np.zeros(count + 1), knots))
-    return out
+        if joint not in waved and not robot.prismatic[i]:
+            angles = np.concatenate([maker.view.joint(i) for maker in features])
+            out += [kind.bend(joint, angles) for kind in kinds]
+    return [effect for effect in out if effect is not None]
 
 
 def _small(

@@ -78,6 +78,8 @@ def learned_precision(
         wider, and what is fitted freely has it. Nothing is believed when left out.
 
     """
+    if not scales.size:
+        return np.zeros(0), 0.0
     # In units of the typical size, so that one variance serves a whole family.
     normal = normal * np.outer(scales, scales)
     right = right * scales

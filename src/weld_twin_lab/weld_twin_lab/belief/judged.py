@@ -82,7 +82,43 @@ def cases_of(rows: Sequence[Mapping[str, Any]]) -> list[Case]:
     return [_case(row) for row in rows if not row['error'] and row['signs']]
 
 
+def judged_row(row: Mapping[str, Any]) -> dict[str, Any]:
+    """
+    Return a row with what its answer was worth, so that no later library judges it otherwise.
+
+    Parameters
+    ----------
+    row : mapping
+        As `trial.tried` gives it.
+
+    """
+    if row['error'] or not row['signs']:
+        return dict(row)
+    case = _case(row)
+    truth = row['truth']
+    words = [[sorted(level.places), sorted(level.dependences)] for level in levels_of(truth)]
+    at_work = sorted(_at_work(truth), key=str)
+    return {
+        **row,
+        'right': case.right,
+        'honest': case.honest,
+        'truth': {**truth, 'levels': words, 'at_work': at_work},
+    }
+
+
+def _at_work(truth: Mapping[str, Any]) -> set[tuple[str, str | None]]:
+    """Return every site that may rightly be named."""
+    if 'at_work' in truth:
+        return {(str(effect), joint) for effect, joint in truth['at_work']}
+    return {site for answer in answers_of(truth) for site in answer}
+
+
 def _case(row: Mapping[str, Any]) -> Case:
+    if 'right' in row:
+        told = judge(
+            {**row['truth'], 'causes': ()}, {'verdict': {'effects': (), **row['verdict']}}
+        )
+        return Case(row, told, bool(row['right']), bool(row['honest']))
     truth = {**row['truth'], 'causes': (), 'alike': [*row['truth']['alike'], *_absorbed(row)]}
     told = judge(truth, {'verdict': {'effects': (), **row['verdict']}})
     right = told.right and _sets_hold(row)
@@ -109,7 +145,7 @@ def _absorbed(row: Mapping[str, Any]) -> list[list[tuple[str, str | None]]]:
 
 def _sets_hold(row: Mapping[str, Any]) -> bool:
     """Return whether each member of a set predicts as well as the right one."""
-    at_work = {site for answer in answers_of(row['truth']) for site in answer}
+    at_work = _at_work(row['truth'])
     floor = row['sealed']['floor']
     for group in row['sealed'].get('members', ()):
         left = {(item['effect'], item['joint']): item['left'] for item in group}
@@ -144,7 +180,7 @@ def _examples(case: Case) -> Iterator[Example]:
     if status == 'none':
         return
     truths = levels_of(row['truth'])
-    at_work = {site for answer in answers_of(row['truth']) for site in answer}
+    at_work = _at_work(row['truth'])
     for cause, more in zip(row['verdict']['causes'], row['cause_signs'], strict=True):
         both = {**signs, **more}
         if cause['place']:

@@ -57,9 +57,11 @@ def levels_of(truth: Mapping[str, Any]) -> list[Levels]:
     Parameters
     ----------
     truth : mapping
-        As `making.truth_of` gives it.
+        As `making.truth_of` gives it; words that were kept with it hold.
 
     """
+    if 'levels' in truth:
+        return [Levels(frozenset(at), frozenset(on)) for at, on in truth['levels']]
     out = [_levels(str(effect), joint, str(truth['robot'])) for effect, joint in truth['sites']]
     if truth['construction'] == LAGGING:
         out = [Levels(own.places | {'clock'}, own.dependences) for own in out]

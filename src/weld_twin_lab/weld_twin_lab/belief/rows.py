@@ -12,6 +12,8 @@ from typing import Any
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
 
+from .judged import judged_row
+
 DIGITS = 5
 """Significant digits that are kept."""
 TRUTH = (
@@ -27,6 +29,8 @@ TRUTH = (
     'richness',
     'align',
     'test',
+    'levels',
+    'at_work',
 )
 VERDICT = ('status', 'confidence', 'indistinguishable', 'causes')
 
@@ -43,8 +47,9 @@ def slim(row: Mapping[str, Any]) -> dict[str, Any]:
     """
     if row['error']:
         return {'name': row['name'], 'error': row['error']}
-    out = dict(row)
-    out['truth'] = {'name': row['name'], **{key: row['truth'][key] for key in TRUTH}}
+    out = judged_row(row)
+    truth = out['truth']
+    out['truth'] = {'name': row['name'], **{key: truth[key] for key in TRUTH if key in truth}}
     out['verdict'] = {key: row['verdict'][key] for key in VERDICT}
     return dict(_rounded(out))
 

@@ -82,6 +82,7 @@ TERMS: dict[str, dict[str, int]] = {
         'belief': 1,
         'gap': -1,
         'after': -1,
+        'rise': -1,
         'structure_gain': -1,
         'structure_sure': -1,
         'independent': 1,

@@ -95,6 +95,21 @@ def test_the_curve_has_the_shape_of_the_dent(dented):
     assert np.corrcoef(shape, wanted)[0, 1] > 0.9
 
 
+def test_friction_that_wanders_is_placed_though_nothing_predicts_it():
+    robot, commanded = wt.load('ur5'), motion(30.0, 5)
+    rng = np.random.default_rng(6)
+    size = np.interp(commanded.t, np.arange(0.0, 32.0, 2.0), rng.normal(scale=6e-4, size=16))
+    q = np.array(commanded.q)
+    q[:, ELBOW] += size * np.tanh(np.gradient(q[:, ELBOW], commanded.t) / 0.01)
+    real = wt.Twin(robot).poses(wt.Recording('rubs', wt.JointMotion(commanded.t, q)))
+    noise = rng.normal(scale=NOISE, size=real.position.shape)
+    measured = wt.Measurements(commanded.t, real.position + noise)
+    told = wt.diagnose(wt.Recording('rubs', commanded, measured=measured), robot)
+    assert told.status == 'unknown'
+    assert told.causes[0].place[0][0] == 'elbow_joint'
+    assert told.causes[0].dependence[0][0] in ('direction', 'time')
+
+
 def test_what_an_effect_explains_is_not_taken_from_it():
     robot = wt.load('ur5')
     spring = wt.effects.JointOffset('elbow_joint', offset=6e-4)

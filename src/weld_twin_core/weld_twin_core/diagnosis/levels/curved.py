@@ -69,18 +69,22 @@ def curved(found: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     alone = _beside(found, setup, beliefs)
     sure = {site for group in verdict.sets for site in group}
     named = [e for e in found.final.model.found if Site(e.name, e.site) in sure]
-    if verdict.status != 'unknown' or not named:
+    if verdict.status != 'unknown':
         return alone
-    beside = _beside(found, [*setup, *named], beliefs)
+    beside = _beside(found, [*setup, *named], beliefs) if named else None
     tried = [way for way in (beside, alone) if way is not None]
-    return min(tried, key=lambda way: way.rms_m, default=None)
+    if not tried:
+        return _beside(found, [*setup, *named], beliefs, wandering=True)
+    return min(tried, key=lambda way: way.rms_m)
 
 
-def _beside(found: Search, kept: Sequence[Effect], beliefs: Beliefs) -> Curved | None:
+def _beside(
+    found: Search, kept: Sequence[Effect], beliefs: Beliefs, *, wandering: bool = False
+) -> Curved | None:
     small = found.problem.thinned(ROWS)
     start = found.baseline.model.with_found(tuple(kept))
     bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
-    form = free_form(small, scale, bare, np.zeros(0), beliefs)
+    form = free_form(small, scale, bare, np.zeros(0), beliefs, wandering=wandering)
     if not form.parts:
         return None
     model = bare.model.with_found((*bare.model.found, *form.curves))

@@ -14,7 +14,7 @@ from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..unseen.regions import posture_regions
-from .groups import Group, all_groups
+from .groups import Group, all_groups, wandering_groups
 from .sparse_groups import choosing, chosen, rival_weights, worth
 
 
@@ -80,8 +80,21 @@ class FreeForm:
         return np.concatenate([np.zeros(0), *held])
 
 
+STRETCHES = 10
+"""Stretches of time that take turns in being unseen."""
+SHORT = 60
+"""Short stretches of which every tenth is left out together: what wanders is told from its
+neighbours in time, though not a minute later."""
+
+
 def free_form(
-    problem: Problem, scale: Scale, bare: Fit, precision: Array, beliefs: Beliefs
+    problem: Problem,
+    scale: Scale,
+    bare: Fit,
+    precision: Array,
+    beliefs: Beliefs,
+    *,
+    wandering: bool = False,
 ) -> FreeForm:
     """
     Return the few groups that explain what a fit leaves, each with its rivals.
@@ -95,6 +108,9 @@ def free_form(
     precision : array, shape (K,)
         Prior precision of those effects' coordinates.
     beliefs : Beliefs
+    wandering : bool
+        Look for what changes as the recording goes on, and ask no more of it than to predict
+        short stretches from their neighbours.
 
     """
     columns, _ = design(problem, bare.model, scale)
@@ -102,7 +118,11 @@ def free_form(
     if precision.size:
         held[-precision.size :] = precision
     groups = all_groups(problem, bare.model, scale)
-    work = choosing(problem, groups, columns, held, bare.residual, posture_regions(problem))
+    ways = [problem.block_labels(STRETCHES), posture_regions(problem)]
+    if wandering:
+        groups += wandering_groups(problem, bare.model, scale)
+        ways = [problem.block_labels(SHORT) % STRETCHES]
+    work = choosing(groups, columns, held, bare.residual, ways)
     members = chosen(work, beliefs)
     parts, total = [], worth(work, members)
     for k, member in enumerate(members):

@@ -30,6 +30,8 @@ is tried: twenty for each knot."""
 LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
 """Span below which a quantity did not vary: angle [rad], speed [rad/s], torque [N m],
 temperature [K]. Curves over less are straight lines, and told from nothing."""
+WANDERS = 16
+"""Times over a recording at which a lost motion may have another size: a few seconds apart."""
 LOOSE = 100.0
 """Carriers may be so many times their typical size: their group has been found by its columns."""
 OFF_AXIS = ('d', 'a', 'alpha', 'beta')
@@ -102,6 +104,33 @@ def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
     for at, on, blocks in _plain(problem, features, model):
         group = _group(problem, scale, at, on, (), blocks)
         out.append(replace(group, carriers=_late(features, model) if at == 'clock' else ()))
+    return [group for group in out if group.columns.size]
+
+
+def wandering_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
+    """
+    Return groups of what a joint loses by its direction, more and less as time goes on.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Model
+    scale : Scale
+
+    """
+    features = problem.features(model)
+    if features[0].run.view.static:
+        return []
+    out = []
+    for index, joint in enumerate(model.robot.joint_names):
+        parts = []
+        for k, maker in enumerate(features):
+            way = QUANTITIES['direction'](maker.view, index)
+            since = np.linspace(0.0, WANDERS - 1.0, way.size)
+            near = np.maximum(1.0 - np.abs(since - np.arange(WANDERS)[:, None]), 0.0)
+            column = maker.column(('q', index))[None, : problem.rows[k]]
+            parts.append(column * (near * way)[:, None, :])
+        out.append(_group(problem, scale, joint, 'direction', (), parts))
     return [group for group in out if group.columns.size]
 
 

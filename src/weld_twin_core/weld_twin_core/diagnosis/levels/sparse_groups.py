@@ -19,7 +19,6 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
 from ..algebra.gram import Index
-from ..algebra.problem import Problem
 from ..beliefs import Beliefs
 from .groups import Group
 
@@ -30,7 +29,6 @@ MOST = 6
 SHORTLIST = 12
 """Groups tried on unseen folds at every step, those that fit best in sample; the right one has
 not been seen below the fourth."""
-STRETCHES = 10
 """Stretches of time left out in turn: a tenth of the data is unseen each time."""
 
 
@@ -150,27 +148,25 @@ class Choosing:
 
 
 def choosing(
-    problem: Problem,
     groups: list[Group],
     fixed: Array,
     fixed_precision: Array,
     target: Array,
-    regions: Array,
+    ways: Sequence[Array],
 ) -> Choosing:
     """
     Return what groups are chosen on.
 
     Parameters
     ----------
-    problem : Problem
     groups : list of Group
     fixed : array, shape (F, rows)
         Whitened columns always fitted.
     fixed_precision : array, shape (F,)
     target : array, shape (rows,)
         What is to be explained: the whitened residual without any group.
-    regions : array of int, shape (rows,)
-        Region of posture of every row.
+    ways : sequence of array of int, shape (rows,)
+        Each way to divide the rows into folds: stretches of time, regions of posture.
 
     """
     size = np.sqrt(np.maximum((fixed**2).mean(axis=1), 1e-300))
@@ -179,11 +175,10 @@ def choosing(
     for group in groups:
         places.append(np.arange(at, at + group.columns.shape[0]))
         at += group.columns.shape[0]
-    stretches = problem.block_labels(STRETCHES)
-    ways = [Folds.of(columns, target, labels) for labels in (stretches, regions)]
+    folds = [Folds.of(columns, target, labels) for labels in ways]
     # Frames that the data hardly show move freely; a trace of ridge keeps the algebra whole.
     held = np.maximum(fixed_precision / size**2, 1e-6 * target.size)
-    return Choosing(groups, np.arange(fixed.shape[0]), held, places, tuple(ways))
+    return Choosing(groups, np.arange(fixed.shape[0]), held, places, tuple(folds))
 
 
 def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:

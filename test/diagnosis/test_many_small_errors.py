@@ -142,15 +142,17 @@ def judged(families, gain=0.0, sure=0.0):
     """Return the verdict on the two families, with a structure left beside them."""
     result, unseen = families[3:]
     loose = Structure(1e-4, gain, sure, ('the angle of elbow_joint',))
+    # Without a structure what is left is near the floor.
+    left = 1e-4 if gain else 5e-5
     weighed = weighed_families(SimpleNamespace(final=result), unseen)
     return decide(
         Evidence(
             slots=(),
             structure=loose,
             gap=4e-4,
-            after=5e-5,
+            after=left,
             floor=SIGMA * np.sqrt(3.0),
-            fitted=5e-5,
+            fitted=left,
             independent=False,
             parts=(),
             families=weighed,

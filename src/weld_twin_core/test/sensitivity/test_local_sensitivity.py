@@ -17,11 +17,12 @@ from weld_twin_core.sensitivity import (
     posture,
 )
 
+# A bearing's lean is nothing on a wrist that stands at a right angle, and has no slope to compare.
 POINTWISE = tuple(
     name
     for name, kind in REGISTRY.items()
     if kind.stage in (Stage.JOINT, Stage.ELASTIC, Stage.LINK, Stage.POSE)
-    and name not in ('quantization', 'joint_coupling', 'thermal_growth')
+    and name not in ('quantization', 'joint_coupling', 'thermal_growth', 'bearing_tilt')
     and not kind.needs
 )
 

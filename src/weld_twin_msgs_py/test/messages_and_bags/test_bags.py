@@ -287,7 +287,9 @@ def test_damaged_metadata_is_refused(tmp_path, robot, recording):
 def test_missing_joint_states_list_the_topics_there_are(tmp_path, robot):
     write_messages(tmp_path / 'bag', [('/other', m) for _, m in joint_states([SECOND])])
     with pytest.raises(
-        DataError, match=r"^the bag has no message on '/joint_states'; its topics are '/other'$"
+        DataError,
+        match=r"^the bag has no joint states on '/joint_states'; '/other' has that type, "
+        r'try --joint-topic /other$',
     ):
         read_recording(tmp_path / 'bag', robot)
 

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.bags import BagWriter, bag_info, write_recording
+from weld_twin_core.two_clocks import ONE_CLOCK
+from weld_twin_msgs_py.bags import BagWriter, bag_info, read_recording, write_recording
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import TopicNames
 
@@ -57,7 +59,10 @@ def test_a_bag_without_measurements_is_not_usable_and_says_why(tmp_path):
     write_joints(tmp_path / 'bag', [SECOND, 2 * SECOND])
     info = bag_info(tmp_path / 'bag')
     assert not info.usable
-    assert info.missing == ("no measurements on '/measured/tool_pose' or '/measured/tool_point'",)
+    assert info.missing == (
+        "no measurements on '/measured/tool_pose' or '/measured/tool_point'; its topics are "
+        "'/joint_states'",
+    )
 
 
 def test_a_topic_of_the_right_type_is_suggested(tmp_path):
@@ -77,7 +82,24 @@ def test_clocks_without_overlap_are_told(tmp_path):
         for k in range(5):
             bag.write('/joint_states', make.joint_state(SECOND + k, ['a'], np.zeros(1)), k + 1)
             bag.write('/measured/tool_point', make.point(90 * SECOND + k, np.zeros(3)), k + 1)
-    assert 'do not overlap in time' in bag_info(tmp_path / 'bag').missing[0]
+    (missing,) = bag_info(tmp_path / 'bag').missing
+    assert 'do not overlap in time' in missing and missing.endswith(ONE_CLOCK)
+
+
+@pytest.mark.parametrize('own', ['/twin/tool_pose', '/left/twin/tool_pose'])
+def test_what_info_and_a_diagnosis_say_of_lacking_measurements_is_the_same(tmp_path, own):
+    make, robot = bag_messages(), load('ur5')
+    with BagWriter(tmp_path / 'bag') as bag:
+        for k in range(1, 6):
+            joints = make.joint_state(k * SECOND, robot.joint_names, np.zeros(6))
+            bag.write('/joint_states', joints, k * SECOND)
+            pose = make.pose(k * SECOND, np.zeros(3), np.eye(3))
+            bag.write(own, pose, k * SECOND)
+    (missing,) = bag_info(tmp_path / 'bag').missing
+    assert 'try' not in missing, 'what the twin says was not measured'
+    with pytest.raises(DataError) as error:
+        read_recording(tmp_path / 'bag', robot, needs_measurements=True)
+    assert str(error.value).endswith(missing)
 
 
 def test_an_empty_bag_is_described_not_refused(tmp_path):

@@ -19,6 +19,7 @@ from weld_twin_core.recording import (
     Signal,
     backward_rates,
 )
+from weld_twin_core.two_clocks import ONE_CLOCK, apart
 
 from .intake import Role, rotations
 from .station_stamps import looks_static
@@ -146,12 +147,10 @@ def _matched_sigma(ns: np.ndarray, given: Samples, sigma: Array) -> Array:
 
 def _refuse_apart(motion: JointMotion, measured: Measurements) -> None:
     """Two clocks with nothing in common would silently pair everything with one joint state."""
-    gap = max(measured.t[0] - motion.t[-1], motion.t[0] - measured.t[-1])
-    if gap > 0.0:
-        raise DataError(
-            f'measurements and joint states do not overlap in time, they are {gap:.3f} s '
-            'apart: their stamps come from different clocks'
-        )
+    spans = [(float(t[0]), float(t[-1])) for t in (motion.t, measured.t)]
+    sentence = apart(*spans)
+    if sentence is not None:
+        raise DataError(f'{sentence}. {ONE_CLOCK}')
 
 
 def _unloaded_before(

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.two_clocks import ONE_CLOCK, apart
+
 from ..messages.topics import (
     BY_NAME,
     CONTACT,
@@ -22,7 +24,7 @@ from ..messages.topics import (
     TopicNames,
 )
 from .ends import GAP, Ends, never_recorded, uneven_ends
-from .from_bag import POSE_TYPES
+from .needed import POSE_TYPES, no_joints, no_measurements
 from .reader import BagReader
 
 
@@ -215,21 +217,16 @@ def _judge(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return what is missing for a diagnosis and what it will do without."""
     missing, notes = [], []
-    others = {t.type: t.name for t in found if not t.use and t.count}
+    present = {t.name: (t.type, t.count) for t in found}
     if 'joints' not in used:
-        missing.append(
-            f"no joint states on '{names.joints}'" + _hint(others, JOINT_STATES.type, 'joint')
-        )
+        missing.append(no_joints(names, present))
     measured = used.get('contact') or used.get('pose') or used.get('point')
     if measured is None:
-        hints = _hint(others, POSE_TYPES[0], 'pose') or _hint(others, MEASURED_POINT.type, 'point')
-        missing.append(f"no measurements on '{names.pose}' or '{names.point}'" + hints)
+        missing.append(no_measurements(names, present))
     joints = used.get('joints')
-    if joints and measured and not _overlap(joints, measured):
-        missing.append(
-            f"'{joints.name}' and '{measured.name}' do not overlap in time: their stamps come "
-            'from different clocks'
-        )
+    if joints and measured:
+        sentence = apart(_span(joints), _span(measured))
+        missing += [] if sentence is None else [f'{sentence}. {ONE_CLOCK}']
     if measured is not None and measured.use == 'point':
         notes.append('positions only: errors that turn the tool in place stay invisible')
     for use, effects in (('wrench', 'tool loads'), ('temperature', 'thermal growth')):
@@ -247,14 +244,7 @@ def _judge(
     return tuple(missing), tuple(notes)
 
 
-def _hint(others: dict[str, str], kind: str, option: str) -> str:
-    if kind not in others:
-        return ''
-    return f"; '{others[kind]}' has that type, try --{option}-topic {others[kind]}"
-
-
-def _overlap(first: TopicInfo, second: TopicInfo) -> bool:
-    if first.start_ns is None or second.start_ns is None:
-        return False
-    assert first.end_ns is not None and second.end_ns is not None
-    return first.start_ns <= second.end_ns and second.start_ns <= first.end_ns
+def _span(topic: TopicInfo) -> tuple[float, float]:
+    """Return first and last stamp [s]."""
+    assert topic.start_ns is not None and topic.end_ns is not None
+    return topic.start_ns * 1e-9, topic.end_ns * 1e-9

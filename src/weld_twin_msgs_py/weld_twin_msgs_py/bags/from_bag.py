@@ -16,11 +16,10 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 
 from ..assembly import Intake, Role, Samples, assembled
-from ..assembly.foreign_types import JOINTS, POSES, plain_messages, split_topic
+from ..assembly.foreign_types import JOINTS, plain_messages, split_topic
 from ..messages.topics import (
     JOINT_STATES,
     MEASURED_POINT,
-    MEASURED_POSE,
     MEASURED_SIGMA,
     TEMPERATURE,
     TOOL_WRENCH,
@@ -29,9 +28,9 @@ from ..messages.topics import (
 from .columns import LEFT_OUT, Stream
 from .contacts import marks, touching
 from .ends import Ends, never_recorded, uneven_ends
+from .needed import POSE_TYPES, no_joints, no_measurements
 from .reader import BagReader
 
-POSE_TYPES = (MEASURED_POSE.type, 'geometry_msgs/msg/PoseWithCovarianceStamped', *POSES)
 TYPES = {
     Role.JOINTS: (JOINT_STATES.type, *JOINTS),
     Role.POSE: POSE_TYPES,
@@ -49,6 +48,7 @@ def read_recording(
     topics: TopicNames | None = None,
     *,
     one_clock: bool = True,
+    needs_measurements: bool = False,
 ) -> Recording:
     """
     Read a bag in one pass.
@@ -69,6 +69,8 @@ def read_recording(
         What the topics are called in this bag.
     one_clock : bool
         Refuse measurements that have no time in common with the joint states.
+    needs_measurements : bool
+        Refuse a bag in which nothing was measured.
 
     Raises
     ------
@@ -86,6 +88,9 @@ def read_recording(
         points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
         made = bag.provenance
         touched = marks(bag, names)
+        measured = touched or {Role.POSE, Role.POINT} & set(roles.values())
+        if needs_measurements and not measured:
+            raise DataError(f"bag '{path}': {no_measurements(names, bag.topics)}")
     if streams[Role.JOINTS].messages == intake.joints.others:
         raise DataError(
             f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
@@ -136,8 +141,10 @@ def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[st
     defaults = {*vars(TopicNames()).values(), *vars(TopicNames.within(space)).values()}
     for topic, role in list(roles.items()):
         kind, count = present.get(topic, ('', 0))
+        if role is Role.JOINTS and (count == 0 or kind not in TYPES[role]):
+            raise DataError(f'the bag has {no_joints(names, present)}')
         if count == 0:
-            if role is Role.JOINTS or topic not in defaults:
+            if topic not in defaults:
                 listed = ', '.join(f"'{t}'" for t, (_, c) in sorted(present.items()) if c)
                 raise DataError(
                     f"the bag has no message on '{topic}'; its topics are {listed or 'all empty'}"

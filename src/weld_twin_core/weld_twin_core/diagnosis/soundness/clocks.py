@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...recording import Recording
+from ...two_clocks import ONE_CLOCK
 from .evidence import Case, Finding, Mistake
 from .lag import Lag
 from .limits import LATE, RATE
@@ -40,7 +41,6 @@ def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:
             f'measurements are {_late(start)} at the start and {_late(end)} at the end.'
         )
         wrong = abs(lag.rate) > RATE
-        remedy = 'Stamp both streams with one clock, or synchronise the two (PTP, NTP)'
     elif abs(lag.late) > FEW * step:
         cause = ', or commanded joints were recorded and the arm lags behind'
         sentence = (
@@ -48,11 +48,10 @@ def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:
             f' the clocks are not synchronised{cause if lag.late > 0.0 else ""}.'
         )
         wrong = abs(lag.late) > LATE
-        remedy = 'Synchronise the two clocks (PTP, NTP), or stamp both streams on one computer'
     else:
         return
     if wrong:
-        yield Finding.of(Mistake('clock', ('clock',), sentence, remedy, mend, of_all=False))
+        yield Finding.of(Mistake('clock', ('clock',), sentence, ONE_CLOCK, mend, of_all=False))
     else:
         yield Finding('note', sentence)
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...recording import Recording
+from ...two_clocks import ONE_CLOCK
 from .evidence import Mistake, listed
 from .limits import LIKE_LENGTH, MOVED, STILL_SPEED
 from .mending import Given, measured, stamps_as, velocities_left_out
@@ -76,7 +77,7 @@ def _apart(recording: Recording, k: int) -> Iterator[Mistake]:
         f'No measurement of {recording.name} lies inside its joint stream '
         f'({t[0]:.3f} to {t[-1]:.3f} s against {seen[0]:.3f} to {seen[-1]:.3f} s): the stamps are '
         'of two clocks.',
-        'Stamp both streams with one clock, or synchronise the two (PTP, NTP)',
+        ONE_CLOCK,
         mend,
         of_all=False,
     )

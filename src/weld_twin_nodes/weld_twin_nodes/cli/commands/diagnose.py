@@ -126,7 +126,9 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
         for path in (*args.bags, *args.holdout):
             tell(f'reading {path}')
             # Two clocks are for the checks of the data to name.
-            recordings.append(read_recording(path, twin.robot, topics, one_clock=False))
+            recordings.append(
+                read_recording(path, twin.robot, topics, one_clock=False, needs_measurements=True)
+            )
         count = len(args.bags)
         return diagnose(
             _bounded(recordings[:count]),

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis needs and a bag has not, and how to mend it; told alike wherever it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..assembly.foreign_types import POSES, split_topic
+from ..messages.topics import BY_NAME, JOINT_STATES, MEASURED_POINT, MEASURED_POSE, TopicNames
+
+_PLAIN_POSES = (MEASURED_POSE.type, 'geometry_msgs/msg/PoseWithCovarianceStamped')
+POSE_TYPES = (*_PLAIN_POSES, *POSES)
+"""Message types from which measured poses are read."""
+Present = Mapping[str, tuple[str, int]]
+"""Type and number of messages of every topic of a bag."""
+_INPUTS = frozenset(vars(TopicNames()).values())
+_RESULTS = tuple(name for name in BY_NAME if name not in _INPUTS)
+"""What the nodes make themselves: never to be diagnosed as if it were measured."""
+
+
+def no_joints(names: TopicNames, present: Present) -> str:
+    """Return that there are no joint states, and which topic may be meant."""
+    return f"no joint states on '{names.joints}'" + _meant(
+        present, ((JOINT_STATES.type, 'joint'),), (names.joints,)
+    )
+
+
+def no_measurements(names: TopicNames, present: Present) -> str:
+    """Return that nothing was measured, and which topic may be meant."""
+    kinds = (*((kind, 'pose') for kind in _PLAIN_POSES), (MEASURED_POINT.type, 'point'))
+    return f"no measurements on '{names.pose}' or '{names.point}'" + _meant(
+        present, kinds, (names.pose, names.point)
+    )
+
+
+def _meant(present: Present, kinds: tuple[tuple[str, str], ...], asked: tuple[str, ...]) -> str:
+    asked = tuple(split_topic(name)[0] for name in asked)
+    full = {name: kind for name, (kind, count) in sorted(present.items()) if count}
+    for kind, option in kinds:
+        for name, own in full.items():
+            if own == kind and name not in asked and not name.endswith(_RESULTS):
+                return f"; '{name}' has that type, try --{option}-topic {name}"
+    wrong = [f"'{name}' is a {full[name]}" for name in asked if name in full]
+    if wrong:
+        return f'; {" and ".join(wrong)}, this needs {" or ".join(kind for kind, _ in kinds)}'
+    return f'; its topics are {", ".join(map(repr, full)) or "all empty"}'

@@ -52,6 +52,22 @@ Arms mastered on wrong marks were up to 7 degrees off (see `effects.plausible`);
 to hundredths of a millimetre, and those of sibling arms differ by 5 to 30 mm. Links count together,
 by the root of the sum of their squares: a sibling differs in several of them.
 """
+SIBLING = 4e-3
+"""
+RMS motion [m] of the tool by wrong lengths of links, from which they are those of another arm.
+
+The two arms of docs/real_robots.md are off by 2 to 3 mm in all, most of it by their zeros; arms of
+one family differ by 5 to 30 mm.
+"""
+LINKS_EXPLAIN = 2.0
+"""
+Factor by which other lengths must bring down the gap that all other errors of an arm leave.
+
+Whatever else is at work stays (play, ripple, loads: up to 2 mm), so it is less than `EXPLAINED`;
+lengths of sound arms never did better than 1.3 where a millimetre was left.
+"""
+LINKS_APART = LINK_SPREAD, 0.02
+"""Spreads [m] of lengths that are tried in turn: within a family, and of an arm of another size."""
 SOFT = 2e-4, 4e-4
 """Noise [m, rad] that trial fits assume at least, so that the spreads above have weight."""
 

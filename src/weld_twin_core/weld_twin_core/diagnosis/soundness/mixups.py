@@ -25,11 +25,13 @@ from .limits import (
     LARGE,
     MOST,
     SHORTLIST,
+    SIBLING,
     TURNED,
     UNEXPLAINED,
     WORTH,
 )
 from .mending import base_turned, frames_fitted
+from .other_links import GIVE_ITS_MODEL, other_links
 from .snapshot import Arm, Snapshot, gap
 from .suspicions import Suspicion, doubles, suspicions
 
@@ -41,7 +43,7 @@ def mixups(case: Case) -> Sequence[Finding]:
     shot = case.snapshot
     arm = shot.arm()
     if arm.off < 1.0:
-        return _frames(case, gap(shot.problem, shot.model))
+        return _frames(case, gap(shot.problem, shot.model)) or _links(case, shot)
     found, rest = _unravelled(shot, arm, case.problem.align)
     if found:
         return [Finding.of(_mistake(each, arm.gap, rest.gap)) for each in found]
@@ -221,8 +223,19 @@ def _half_turn(given: Array, fitted: Array) -> Array | None:
 # Nothing known ---------------------------------------------------------------------------------
 
 
+def _links(case: Case, shot: Snapshot) -> Sequence[Finding]:
+    """Return that free frames and a bent arm took up what are the links of another one."""
+    if case.gap < SIBLING:
+        return ()
+    found = other_links(shot, case.problem.align)
+    return () if found is None else [Finding.of(found)]
+
+
 def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """No mix-up explains it: another robot, a zero that is far off, or something else."""
+    links = _links(case, shot)
+    if links:
+        return links
     if arm.gap > UNEXPLAINED:
         words = (
             f'No base and tool frame and no plausible arm brings the gap below '
@@ -253,5 +266,4 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
         f'The links are those of another robot than {case.model.robot.name!r}: {what} of '
         f'{joint!r} differs by {size}, which no arm is off by.'
     )
-    remedy = 'Give the model of the arm that was measured; its siblings differ by as much'
-    return [Finding.of(Mistake('other_robot', ('robot',), words, remedy, None))]
+    return [Finding.of(Mistake('other_robot', ('robot',), words, GIVE_ITS_MODEL, None))]

@@ -32,7 +32,7 @@ from .limits import (
 )
 from .mending import Given, Mend, measured
 
-__all__ = ['Arm', 'Snapshot', 'gap', 'measured', 'snapshot']
+__all__ = ['FRAMES', 'Arm', 'Snapshot', 'gap', 'measured', 'snapshot']
 
 SAMPLES = 60
 """Samples of a snapshot in all: enough for every error of an arm, few enough for fits at once."""
@@ -115,12 +115,14 @@ class Snapshot:
         trial = self.framed().with_found(tuple(errors))
         precision = np.array(spread) ** -2.0
         for _ in range(3):
-            scale = robust_scale(self.problem, self.problem.residuals(trial), self._soft())
+            scale = robust_scale(self.problem, self.problem.residuals(trial), self.soft)
             trial = fit(self.problem, trial, scale, precision, iterations=6).model
         strain = np.abs([float(e.vector()[0]) for e in trial.found]) / np.array(most)
         return Arm(trial, gap(self.problem, trial), strain)
 
-    def _soft(self) -> Scale:
+    @property
+    def soft(self) -> Scale:
+        """Return the least noise that trial fits assume."""
         return Scale(*SOFT, self.problem.unit_scale().weights)
 
 

@@ -68,11 +68,11 @@ def test_one_miss_in_ten_or_one_complaint_fails_the_proof():
         ]
 
     quiet, loud = [{'right': True}], [{'right': False}]
-    assert result(trials(10), quiet, 1)['passed']
-    missed = result(trials(9), quiet, 1)
+    assert result([*trials(10), *quiet], 1)['passed']
+    missed = result([*trials(9), *quiet], 1)
     assert not missed['passed'], 'to stand among the alike is not to be named'
     assert missed['named']['sign']['only_alike'] == 1
-    assert not result(trials(10), loud, 1)['passed']
+    assert not result([*trials(10), *loud], 1)['passed']
 
 
 @pytest.mark.slow

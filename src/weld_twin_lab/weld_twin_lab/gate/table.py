@@ -15,20 +15,29 @@ GOAL_NAMED = 0.95
 """Least share of the mistakes of every kind that must be named."""
 
 
-HEADS = ('mistake', 'bags', 'tables', 'named first', 'only among the alike')
+HEADS = ('named first', 'only among the alike')
+NUMBERS = frozenset({'trials', 'named', 'only_alike'})
 
 
-def result(
-    mistakes: Sequence[Mapping[str, Any]], sound: Sequence[Mapping[str, Any]], seed: int
-) -> dict[str, Any]:
+def result(trials: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]:
     """
     Return shares named by kind, complaints, what went wrong, and whether the goals are met.
 
     What stands only among the alike of another mistake is counted beside, and not as named.
+
+    Parameters
+    ----------
+    trials : sequence of mapping
+        Those without a ``kind`` are of sound recordings.
+    seed : int
+
     """
-    named = {kind: _share([m for m in mistakes if m['kind'] == kind]) for kind in KINDS}
+    mistakes = [t for t in trials if 'kind' in t]
+    sound = [t for t in trials if 'kind' not in t]
+    tried = {t['kind'] for t in mistakes}
+    named = {k: _share([m for m in mistakes if m['kind'] == k]) for k in KINDS if k in tried}
     complaints = [s for s in sound if not s['right']]
-    goals = [n['named'] >= GOAL_NAMED * n['trials'] for n in named.values() if n['trials']]
+    goals = [n['named'] >= GOAL_NAMED * n['trials'] for n in named.values()]
     return {
         'seed': seed,
         'named': named,
@@ -53,17 +62,18 @@ def _share(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def table(content: Mapping[str, Any]) -> str:
     """Return the result as a Markdown table."""
+    ways = sorted({w for found in content['named'].values() for w in found} - NUMBERS)
     rows = [
         [
             kind,
-            *(_cell(found.get(way)) for way in ('bag', 'table')),
+            *(_cell(found.get(way)) for way in ways),
             _cell(found),
             found['only_alike'] or '-',
         ]
         for kind, found in content['named'].items()
     ]
     sound = content['sound']
-    made = markdown.table(HEADS, *rows)
+    made = markdown.table(('mistake', *ways, *HEADS), *rows)
     return f'{made}\nsound recordings: {sound["complaints"]} complaints on {sound["trials"]}\n'
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -36,8 +37,7 @@ def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> di
     drawn = [seed, list(KINDS).index(kind), list(WAYS).index(way), number]
     rng = np.random.default_rng(drawn)
     sound, (robot, recording, said) = _made(kind, way, rng)
-    found = _looked(recording, robot, sound.align, way)
-    right = kind in (*found['kinds'], *found['dated'])
+    found = looked(recording, robot, sound.align, way)
     return {
         'kind': kind,
         'way': way,
@@ -45,9 +45,14 @@ def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> di
         'what': said,
         **_plain(sound),
         **found,
-        'right': right,
-        'only_alike': not right and kind in found['alike'],
+        **judged(kind, found),
     }
+
+
+def judged(kind: str, found: Mapping[str, Any]) -> dict[str, bool]:
+    """Return whether a mistake is named, and whether it only stands among those alike."""
+    right = kind in (*found['kinds'], *found['dated'])
+    return {'right': right, 'only_alike': not right and kind in found['alike']}
 
 
 def _made(kind: str, way: str, rng: np.random.Generator) -> tuple[Sound, Made]:
@@ -71,7 +76,7 @@ def complaint(seed: int, number: int, engine: str = '') -> dict[str, Any]:
     sound = draw(rng)
     static = sound.recording.joints.static
     way = 'table' if static and rng.random() < 0.5 else 'bag'
-    found = _looked(sound.recording, sound.robot, sound.align, way)
+    found = looked(sound.recording, sound.robot, sound.align, way)
     return {'number': number, 'way': way, **_plain(sound), **found, 'right': not found['kinds']}
 
 
@@ -81,9 +86,8 @@ def _plain(sound: Sound) -> dict[str, Any]:
     return {**sound.told, 'align': list(sound.align), 'causes': [dict(c) for c in causes]}
 
 
-def _looked(
-    recording: Recording, robot: Robot, align: tuple[str, ...], way: str
-) -> dict[str, Any]:
+def looked(recording: Recording, robot: Robot, align: tuple[str, ...], way: str) -> dict[str, Any]:
+    """Return what the gate says of a recording after it was a bag or a table."""
     begin = time.perf_counter()
     with TemporaryDirectory() as folder:
         try:

@@ -33,7 +33,7 @@ from .limits import (
 from .mending import base_turned, frames_fitted
 from .other_links import GIVE_ITS_MODEL, other_links
 from .snapshot import Arm, Snapshot, gap
-from .suspicions import Suspicion, doubles, suspicions
+from .suspicions import Suspicion, doubles, robots, suspicions
 
 
 def mixups(case: Case) -> Sequence[Finding]:
@@ -43,7 +43,7 @@ def mixups(case: Case) -> Sequence[Finding]:
     shot = case.snapshot
     arm = shot.arm()
     if arm.off < 1.0:
-        return _frames(case, gap(shot.problem, shot.model)) or _links(case, shot)
+        return _frames(case, gap(shot.problem, shot.model)) or _links(case, shot, arm)
     found, rest = _unravelled(shot, arm, case.problem.align)
     if found:
         return [Finding.of(_mistake(each, arm.gap, rest.gap)) for each in found]
@@ -223,17 +223,22 @@ def _half_turn(given: Array, fitted: Array) -> Array | None:
 # Nothing known ---------------------------------------------------------------------------------
 
 
-def _links(case: Case, shot: Snapshot) -> Sequence[Finding]:
+def _links(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """Return that free frames and a bent arm took up what are the links of another one."""
-    if case.gap < SIBLING:
+    align = case.problem.align
+    found = other_links(shot, align) if case.gap >= SIBLING else None
+    if found is None:
         return ()
-    found = other_links(shot, case.problem.align)
-    return () if found is None else [Finding.of(found)]
+    mistake, left = found
+    bundled, undone, rest = _best(shot, arm, robots(shot.robot), align)
+    if bundled is not None and rest.off < 1.0 and other_links(undone, align) is None:
+        mistake = _mistake(bundled, left, rest.gap)
+    return [Finding.of(mistake)]
 
 
 def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """No mix-up explains it: another robot, a zero that is far off, or something else."""
-    links = _links(case, shot)
+    links = _links(case, shot, arm)
     if links:
         return links
     if arm.gap > UNEXPLAINED:

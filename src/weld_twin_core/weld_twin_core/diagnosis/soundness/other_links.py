@@ -33,9 +33,11 @@ LENGTHS = {'link_length': 'a', 'link_offset': 'd'}
 """The lengths of a link, and what a robot file calls them."""
 
 
-def other_links(shot: Snapshot, align: frozenset[str]) -> Mistake | None:
+def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Mistake, float] | None:
     """
-    Return that the lengths of the links are those of another arm; None where they are not.
+    Return that the lengths of the links are those of another arm, and the gap [m] with these.
+
+    None where they are not.
 
     Frames that are not aligned stay within what they can be off by, as all errors do.
 
@@ -62,7 +64,7 @@ def other_links(shot: Snapshot, align: frozenset[str]) -> Mistake | None:
         arm = fitted(errors, spread)
         if LINKS_EXPLAIN * gap(problem, arm) < left:
             far = _moved(problem, arm) > SIBLING
-            return _mistake(arm, left, gap(problem, arm)) if far else None
+            return (_mistake(arm, left, gap(problem, arm)), left) if far else None
     return None
 
 

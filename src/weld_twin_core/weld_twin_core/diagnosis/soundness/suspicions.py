@@ -58,7 +58,7 @@ def suspicions(robot: Robot) -> Iterator[Suspicion]:
     yield from _one_apart(robot)
     yield from _signs(robot)
     yield from _orders(robot)
-    yield from _robots(robot)
+    yield from robots(robot)
     yield from _zeros(robot)
     yield from _couplings(robot)
     yield from _mirror()
@@ -104,10 +104,14 @@ def _units(robot: Robot) -> Iterator[Suspicion]:
     ):
         yield _positions('units', words, 'Record or import positions in metres', [factor] * 3)
     for k, axis in enumerate(AXES):
-        for factor, words in ((1e-3, 'millimetres'), (1e3, 'kilometres'), (INCH, 'inches')):
+        for factor, unit in (
+            (1e-3, 'millimetres among metres'),
+            (1e3, 'metres among millimetres'),
+            (INCH, 'inches among metres'),
+        ):
             scale = np.ones(3)
             scale[k] = factor
-            words = f'{axis} of the measured positions is in {words} where metres belong'
+            words = f'{axis} of the measured positions is in {unit}'
             yield _positions('units', words, f'Give {axis} in the unit of the others', scale)
 
 
@@ -165,7 +169,8 @@ def _orders(robot: Robot) -> Iterator[Suspicion]:
     yield _ordered(names, 'joints are shifted by one place', straight[-1:] + straight[:-1])
 
 
-def _robots(robot: Robot) -> Iterator[Suspicion]:
+def robots(robot: Robot) -> Iterator[Suspicion]:
+    """Yield every other bundled robot of as many joints."""
     for name in catalog.names():
         other = catalog.load(name)
         if other.n == robot.n and name != robot.name:

@@ -4,13 +4,18 @@
 
 Recordings come from the plant, as bags and as tables; each mistake is drawn anew. Sound ones have
 causes of all families in plausible size, on rich and poor motions, with and without alignment.
+With --real, stations of two measured arms and a servo axis are tried besides (docs/transfer.md says
+where the data come from): poor parts of them as they are, and the same mistakes put into them. A
+run that was interrupted goes on where it stopped.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ..blind_jobs.job_options import add_pool, runner_of
 
@@ -32,20 +37,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--kinds', default='', metavar='LIST', help='only these mistakes, comma-separated'
     )
+    parser.add_argument(
+        '--real',
+        nargs=3,
+        metavar=('UR5', 'UR10', 'EMPS'),
+        help='directories of real recordings, tried besides',
+    )
+    parser.add_argument(
+        '--real-draws', type=int, default=30, metavar='N', help='of stations of either real arm'
+    )
     add_pool(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run what is not done yet, write the result, print the table."""
     from weld_twin_core.errors import DataError
-    from weld_twin_msgs_py.files.whole_files import write_text
-    from weld_twin_nodes.offline.task_pool import Task
 
     from ...blind.diagnosing import engine_digest
     from ...blind.simulator import require_simulator
-    from ...gate.mistakes import KINDS, MOVING_ONLY
+    from ...gate.mistakes import KINDS
     from ...gate.table import result, table
-    from ...gate.trials import WAYS, complaint, mistake
+    from ...gate.tasks import drawn, real
 
     require_simulator()
     kinds = [k for k in args.kinds.split(',') if k] or list(KINDS)
@@ -53,21 +65,25 @@ def run(args: argparse.Namespace) -> int:
         if kind not in KINDS:
             raise DataError(f'there is no mistake {kind!r}; there are ' + ', '.join(KINDS))
     engine = engine_digest()
-    wrong = [
-        Task(mistake, (args.seed, kind, way, number, engine), f'{kind} {way}')
-        for kind in kinds
-        for way in WAYS
-        for number in range(args.draws)
-        if not (way == 'table' and kind in MOVING_ONLY)
-    ]
-    sound = [Task(complaint, (args.seed, n, engine), 'sound') for n in range(args.sound)]
+    tasks = drawn(args.seed, kinds, args.draws, args.sound, engine)
+    more = real(args.real, kinds, args.draws, args.real_draws, engine) if args.real else []
     out = Path(args.out)
     with runner_of(args, out / 'done', 'trying the gate') as runner:
-        found = runner.run([*wrong, *sound])
-    content = result(found[: len(wrong)], found[len(wrong) :], args.seed)
+        found = runner.run([*tasks, *more])
+    content = result(found[: len(tasks)], args.seed)
+    told = table(content)
+    if more:
+        content['real'] = result(found[len(tasks) :], args.seed)
+        content['passed'] = content['passed'] and content['real']['passed']
+        told += f'\nThe same with stations of real arms:\n\n{table(content["real"])}'
+    return _written(out, content, told)
+
+
+def _written(out: Path, content: Mapping[str, Any], told: str) -> int:
+    from weld_twin_msgs_py.files.whole_files import write_text
+
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / RESULT, json.dumps(content, indent=1) + '\n', overwrite=True)
-    told = table(content)
     write_text(out / TABLE, told, overwrite=True)
     print(told)
     print(f'gate: {"passed" if content["passed"] else "FAILED"}, {out / RESULT}')

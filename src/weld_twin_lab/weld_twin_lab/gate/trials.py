@@ -101,9 +101,11 @@ def looked(recording: Recording, robot: Robot, align: tuple[str, ...], way: str)
                 'sentences': [str(error)],
                 'seconds': 0.0,
             }
+    alike = [pair for item in examined.unsound for pair in item.alike]
+    alike += [pair for slip in examined.slips for pair in slip.alike]
     return {
         'kinds': sorted({item.kind for item in examined.unsound}),
-        'alike': sorted({kind for item in examined.unsound for kind, _ in item.alike}),
+        'alike': sorted({kind for kind, _ in alike}),
         'dated': sorted({slip.kind for slip in examined.slips}),
         'sentences': [
             *(item.sentence for item in examined.unsound),

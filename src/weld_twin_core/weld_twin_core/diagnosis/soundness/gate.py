@@ -187,10 +187,11 @@ def _checked(
 
 def _told(slip: Slip, given: Given) -> Unsound:
     recording = given.recordings[slip.recording]
-    return Unsound(slip.kind, slip.at, slip.sentence(recording), slip.remedy, applied=True)
+    sentence = slip.sentence(recording)
+    return Unsound(slip.kind, slip.at, sentence, slip.remedy, applied=True, alike=slip.alike)
 
 
 def _undated(slip: Slip, problem: Problem) -> Mistake:
     """Return what gave way in one of several recordings: their effects count one time for all."""
     sentence = slip.sentence(problem.recordings[slip.recording])
-    return Mistake(slip.kind, slip.at, sentence, slip.remedy, None)
+    return Mistake(slip.kind, slip.at, sentence, slip.remedy, None, alike=slip.alike)

@@ -35,9 +35,9 @@ LENGTHS = {'link_length': 'a', 'link_offset': 'd'}
 
 def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Mistake, float] | None:
     """
-    Return that the lengths of the links are those of another arm, and the gap [m] with these.
+    Return that the lengths of the links are those of another arm; None where they are not.
 
-    None where they are not.
+    With it comes the median gap [m] that every other error of an arm leaves.
 
     Frames that are not aligned stay within what they can be off by, as all errors do.
 

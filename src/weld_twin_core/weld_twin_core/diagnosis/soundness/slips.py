@@ -11,7 +11,7 @@ only where it explains much more than any smooth change of the same thing or of 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -31,6 +31,11 @@ from .mending import measured
 from .smooth_shapes import smooth_shapes
 
 KNOCKED, JUMPED, SLIPPED = 'instrument_knocked', 'reflector_jumped', 'joint_slipped'
+_OTHERWISE = {
+    KNOCKED: 'A knock at instrument or base',
+    JUMPED: 'A jump of the reflector or the tool',
+    SLIPPED: 'A slip of joint {!r}',
+}
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,8 @@ class Slip:
         RMS motion of the measured points.
     nats : float
         Evidence for it.
+    alike : tuple of (str, tuple of str)
+        Kinds and places of what would explain the same step nearly as well.
 
     """
 
@@ -59,6 +66,7 @@ class Slip:
     time: float
     size: float
     nats: float
+    alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def sentence(self, recording: Recording) -> str:
         """Return what happened, in words."""
@@ -68,7 +76,9 @@ class Slip:
             JUMPED: 'The reflector jumped in its nest, or the tool in its holder',
             SLIPPED: f'Joint {self.joint!r} slipped',
         }[self.kind]
-        return f'{what} at {at} of {recording.name}: the tool is {length(self.size)} off then.'
+        out = f'{what} at {at} of {recording.name}: the tool is {length(self.size)} off then.'
+        others = dict.fromkeys(_OTHERWISE[kind].format(*at) for kind, at in self.alike)
+        return f'{out} {" or ".join(others)} would look the same.' if others else out
 
     @property
     def remedy(self) -> str:
@@ -223,7 +233,11 @@ def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
     if not enough:  # nothing to explain, so no number explains it
         return None
     fewest = min(trial.changed.columns.shape[2] for trial in enough)
-    return max((t for t in enough if t.changed.columns.shape[2] == fewest), key=_nats)
+    best = max((t for t in enough if t.changed.columns.shape[2] == fewest), key=_nats)
+    if best.slip is None:
+        return best
+    alike = tuple((t.slip.kind, t.slip.at) for t in enough if t is not best and t.slip is not None)
+    return best._replace(slip=replace(best.slip, alike=alike))
 
 
 def _nats(trial: _Trial) -> float:

@@ -145,6 +145,30 @@ def test_what_gave_way_is_dated_and_named_as_a_cause(ur5, rng, kind):
     assert found.shrink.rms_after_m < 0.2 * found.shrink.rms_before_m
 
 
+def test_where_the_tool_never_turns_a_knock_and_a_jump_are_told_as_alike(ur5, rng):
+    q = np.array(stations(ur5, rng).q)
+    q[:, [0, 4, 5]] = [0.3, -1.5, 0.2]
+    q[:, 3] = -1.0 - q[:, 1] - q[:, 2]
+    run = recorded(ur5, JointMotion(np.arange(float(len(q))), q, static=True), rng, points=True)
+    step = np.where(run.measured.t[:, None] > 60.0, [2e-3, -1e-3, 1e-3], 0.0)
+    (slip,) = seen(ur5, remeasured(run, position=run.measured.position + step), ()).slips
+    assert slip.time == 60.5
+    kinds = {slip.kind, *(kind for kind, _ in slip.alike)}
+    assert {'instrument_knocked', 'reflector_jumped'} <= kinds
+    assert 'would look the same' in slip.sentence(run)
+
+
+def test_links_of_a_sibling_are_told_from_frames_that_are_off(ur5, rng):
+    """Six millimetres either way: of an arm's length, and of where it stands."""
+    run = recorded(ur5, stations(ur5, rng), rng, points=True)
+    told = replace(ur5, a=ur5.a * [1, 1.014, 1.0, 1, 1, 1], name='sibling')
+    (item,) = seen(told, run, ()).unsound
+    assert item.kind == 'other_robot'
+    base = np.array(ur5.T_world_base)
+    base[:3, 3] += [6e-3, 0.0, 0.0]
+    assert not seen(ur5.with_frames(base=base), run, ()).unsound
+
+
 def test_sound_recordings_have_nothing_that_gave_way(ur5, cell, run):
     for recording, align in ((cell, ('base', 'tool')), (run, ())):
         found = seen(ur5, recording, align)

@@ -87,8 +87,8 @@ def test_the_command_names_mistakes_and_spares_the_sound(tmp_path, capsys):
         'trials': 2,
         'named': 2,
         'only_alike': 0,
-        'bag': {'trials': 1, 'named': 1, 'only_alike': 0},
-        'table': {'trials': 1, 'named': 1, 'only_alike': 0},
+        'bag': {'trials': 1, 'named': 1},
+        'table': {'trials': 1, 'named': 1},
     }
     assert content['sound'] == {'trials': 2, 'complaints': 0}
     assert 'base_turned' in capsys.readouterr().out

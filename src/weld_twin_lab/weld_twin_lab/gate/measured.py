@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arm import catalog
+from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 
@@ -66,7 +67,9 @@ def found_out(folder: str, arm: str, kind: str, number: int, engine: str = '') -
     robot = catalog.load(arm)
     for _ in range(TRIES):
         count = int(rng.choice([n for n in COUNTS if n >= FEWEST]))
-        sound = Sound(robot, _drawn(folder, arm, count, rng), ALIGN, {'robot': arm})
+        drawn = _drawn(folder, arm, count, rng)
+        real = aligned((drawn,), robot, frozenset(ALIGN), ())[1].robot
+        sound = Sound(robot, drawn, ALIGN, real, {'robot': arm})
         try:
             told, recording, said = KINDS[kind](sound, rng)
         except Hidden:

@@ -199,7 +199,7 @@ def reflector_jumped(sound: Sound, rng: np.random.Generator) -> Made:
     way = _direction(rng) * size
     seen = _seen(sound.recording)
     q = sound.recording.joints.at(seen.t)[0]
-    turns = forward(sound.robot, q)[:, :3, :3] @ sound.robot.T_flange_tool[:3, :3]
+    turns = forward(sound.real, q)[:, :3, :3] @ sound.real.T_flange_tool[:3, :3]
     turns = _frame_of(sound, seen, q) @ turns
     position = seen.position + np.where(after[:, None], turns @ way, 0.0)
     made = sound.recording.with_measured(replace(seen, position=position))
@@ -208,7 +208,7 @@ def reflector_jumped(sound: Sound, rng: np.random.Generator) -> Made:
 
 def _frame_of(sound: Sound, seen: Measurements, q: Array) -> Array:
     """Return how the measuring frame is turned against the base, (3, 3)."""
-    there = forward(sound.robot, q)[:, :3, 3]
+    there = _tip(sound.real, q)
     u, _, vt = np.linalg.svd(
         (seen.position - seen.position.mean(axis=0)).T @ (there - there.mean(axis=0))
     )
@@ -218,7 +218,7 @@ def _frame_of(sound: Sound, seen: Measurements, q: Array) -> Array:
 def joint_slipped(sound: Sound, rng: np.random.Generator) -> Made:
     """Have a joint slip, so that the tool is off by 0.5 to 5 mm from some instant on."""
     i, after = _inner(sound, rng), _middle(sound, rng)
-    seen, robot = _seen(sound.recording), sound.robot
+    seen, robot = _seen(sound.recording), sound.real
     q = sound.recording.joints.at(seen.t)[0]
     slip = np.zeros(robot.n)
     slip[i] = 1e-3
@@ -239,7 +239,7 @@ def joint_slipped(sound: Sound, rng: np.random.Generator) -> Made:
         rotation = np.where(after[:, None, None], rotated, rotation)
     made = replace(seen, position=seen.position + moved, rotation=rotation)
     said = f'{robot.joint_names[i]} {slip[i] * 1e3:+.2f} mrad'
-    return robot, sound.recording.with_measured(made), said
+    return sound.robot, sound.recording.with_measured(made), said
 
 
 def _tip(robot: Robot, q: Array) -> Array:

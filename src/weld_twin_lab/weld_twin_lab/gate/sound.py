@@ -40,6 +40,8 @@ class Sound:
         The nominal arm with its tool as it is told to the diagnosis.
     recording : Recording
     align : tuple of str
+    real : Robot
+        The same arm with its tool as it is; the base as it was told.
     told : dict
         Robot, motion, causes, how the motion was made poor.
 
@@ -48,6 +50,7 @@ class Sound:
     robot: Robot
     recording: Recording
     align: tuple[str, ...]
+    real: Robot
     told: dict[str, object]
 
 
@@ -97,7 +100,7 @@ def _drawn(rng: np.random.Generator, rich: bool) -> Sound:
         'align': align,
         'causes': causes,
     }
-    return Sound(robot, recording, align, told)
+    return Sound(robot, recording, align, cell.robot, told)
 
 
 def _as_told(

@@ -77,5 +77,33 @@ def table(content: Mapping[str, Any]) -> str:
     return f'{made}\nsound recordings: {sound["complaints"]} complaints on {sound["trials"]}\n'
 
 
+def page(content: Mapping[str, Any]) -> str:
+    """Return tables and misses as a page."""
+    out = [
+        '# The gate, measured',
+        '[What is found and how](../../unsound.md). Every kind of mistake was made in recordings '
+        'that a simulator drew, then written as a bag or as a table and read again. Sound ones '
+        'have causes of all families, big ones among them, on rich and poor motions.',
+        table(content),
+    ]
+    parts = [content]
+    if 'real' in content:
+        parts.append(content['real'])
+        out += [
+            '## Stations of real arms',
+            'The same mistakes put into stations of a measured UR5 and UR10. Sound ones are poor '
+            'parts of both, and a servo axis in motion.',
+            table(content['real']),
+        ]
+    missed = [m for part in parts for m in part['missed']]
+    if missed:
+        rows = [
+            [m['kind'], m['way'], m['what'], ', '.join((*m['kinds'], *m['dated'])) or 'nothing']
+            for m in missed
+        ]
+        out += ['## Missed', markdown.table(('mistake', 'in', 'what was done', 'named'), *rows)]
+    return '\n\n'.join(part.rstrip() for part in out) + '\n'
+
+
 def _cell(found: Mapping[str, Any] | None) -> str:
     return '-' if not found else f'{found["named"]} of {found["trials"]}'

@@ -5,7 +5,8 @@ What a base frame that changes with time would explain, beyond everything that d
 
 Residuals of an arm follow its pose, and poses follow time, so any motion looks a little like a
 change of the frame. Constant frames and a first-order model of the whole arm (geometry, springs,
-play, lag of every joint) are therefore projected out before a change in time is tried.
+play, lag of every joint) and of the instrument's scale are therefore projected out before a change
+in time is tried.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
+from ...effects.measurement_scale import MeasurementScale
 from ...twin.features import Features
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
@@ -32,6 +34,8 @@ DEAD = 1e-18
 """Share of the largest squared column below which a column is rounding."""
 LOOSE = (3e-3, 1e-2)
 """Prior spread of the arm's own errors [m, rad]."""
+UNIT_OFF = 1e-3
+"""Prior spread of the instrument's unit of length: half of what is plausible at all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +74,11 @@ class BaseChange:
     def recording(self) -> NDArray[np.int_]:
         """Return the recording of every sample, shape (M,)."""
         return np.repeat(np.arange(len(self.samples)), self.samples)
+
+    @property
+    def far(self) -> float:
+        """Return the sum of squares of positions that is left; turns may be nothing but noise."""
+        return float((self.residual[:, :3] ** 2).sum())
 
     @cached_property
     def share(self) -> float:
@@ -187,7 +196,7 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
     frames = [_moved(maker, 'base', 6, c) for maker, c in pairs]
     tools = [_moved(maker, 'tool', 6, c) for maker, c in pairs]
     joints = [_moved(maker, 'q', model.robot.n, c) for maker, c in pairs]
-    arms = [_arm(maker, c) for maker, c in pairs]
+    arms = [np.concatenate([_arm(maker, c), _scaled(maker, c)]) for maker, c in pairs]
     left, base, tool, joint, arm = (
         _stacked([_white(part, scale, k) for k, part in enumerate(each)])
         for each in ([part[None] for part in parts], frames, tools, joints, arms)
@@ -276,6 +285,11 @@ def _arm(maker: Features, rows: int) -> Array:
             if spread > 1e-9:
                 out.append(joint * (signal / spread))
     return np.stack(out)
+
+
+def _scaled(maker: Features, rows: int) -> Array:
+    """Return the column of an instrument that reads too long, shape (1, rows, M)."""
+    return UNIT_OFF * maker.columns(MeasurementScale(), atoms=False)[:, :rows]
 
 
 def _white(part: Array, scale: Scale, k: int) -> Array:

@@ -18,7 +18,7 @@ from ..frames.alignment import refined
 from .base_change import BaseChange, base_change, thinned
 from .lag import Lag, lag
 from .lengths import length
-from .limits import LATE_LEFT
+from .limits import LATE_LEFT, RATE_MOST
 from .mending import Mend
 from .slips import Slip, slips
 from .snapshot import Snapshot, measured, snapshot
@@ -107,6 +107,7 @@ class Case:
             new
             if old is not None
             and new is not None
+            and abs(new.rate) < RATE_MOST
             and new.after < min(EXPLAINED * old.before, LATE_LEFT)
             else None
             for old, new in zip(late, again, strict=True)

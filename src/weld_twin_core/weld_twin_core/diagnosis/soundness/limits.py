@@ -98,6 +98,9 @@ Rate at which two clocks may run apart.
 A cheap quartz is within 100 ppm; more is stamps made by something else than a clock.
 """
 
+RATE_MOST = 0.1
+"""Rate beyond which it is no clock: rows that do not belong together look like that."""
+
 STILL_SPEED = 1e-12
 """Velocity [rad/s, m/s] below which a stream says zero; sensors at rest show noise, not zero."""
 MOVED = 0.02
@@ -127,6 +130,13 @@ MARGIN = 10.0
 """Nats by which a step must beat every smooth change of anything."""
 NEARLY = 0.9
 """Share of what a step of more numbers explains that one of fewer must explain to be taken."""
+LEFT_ALIKE = 2.0
+"""
+What it may leave, in squares, as a multiple of what the one of more numbers leaves.
+
+Where play or springs are at work both leave much the same; a wrong place leaves ten times as much
+and more.
+"""
 DATED_SIZE = 2.5
 """
 A step this many times as large as the largest gaps did not happen: one frame that is fitted takes

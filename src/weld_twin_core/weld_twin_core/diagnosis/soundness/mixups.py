@@ -81,7 +81,8 @@ def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list
             found.append(best)
             trial, arm, look = undone, rest, suspicions
         factor = EXPLAINED if shot.possible or not trial.possible else EXPLAINED_IMPOSSIBLE
-        if found and (arm.off < start.off / factor or _as_given(shot, trial, start, align)):
+        off = arm.off * trial.shrunk(shot)
+        if found and (off < start.off / factor or _as_given(shot, trial, start, align)):
             return found, arm
     return [], start
 
@@ -92,7 +93,7 @@ def _as_given(shot: Snapshot, trial: Snapshot, start: Arm, align: frozenset[str]
 
     On short motions free frames and a bent arm take up much of any mistake.
     """
-    left = trial.gap_with(align)
+    left = trial.gap_with(align) * trial.shrunk(shot)
     return left < WORTH * start.gap and left < shot.gap_with(align) / EXPLAINED
 
 
@@ -111,15 +112,15 @@ def _best(
     fitted: list[tuple[Suspicion, Snapshot, Arm]] = []
     # Without orientations a quick fit may end beside the tool vector: then from many starts.
     for thorough in (False,) if shot.turned else (False, True):
-        rough = [trial.rough_gap(thorough=thorough) for _, trial in tried]
+        rough = [trial.rough_gap(thorough=thorough) * trial.shrunk(shot) for _, trial in tried]
         for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
             fitted.append((*tried[k], tried[k][1].arm()))
-        least = min(arm.off for _, _, arm in fitted)
+        least = min(arm.off * trial.shrunk(shot) for _, trial, arm in fitted)
         if least < before.off / EXPLAINED:
             break
     if least > WORTH * before.off:
         return None, shot, before
-    alike = [each for each in fitted if WORTH * each[2].off <= least]
+    alike = [each for each in fitted if WORTH * each[2].off * each[1].shrunk(shot) <= least]
     gaps = [each[1].gap_with(align) for each in alike] if len(alike) > 1 else [0.0]
     first = int(np.argmin(gaps))
     others = [

@@ -26,7 +26,17 @@ from ...recording import Recording
 from ..algebra.problem import Problem
 from .base_change import BaseChange
 from .lengths import length
-from .limits import DATED, DATED_MOVING, DATED_SHARE, DATED_SIZE, ENDS, MARGIN, MOST_SLIPS, NEARLY
+from .limits import (
+    DATED,
+    DATED_MOVING,
+    DATED_SHARE,
+    DATED_SIZE,
+    ENDS,
+    LEFT_ALIKE,
+    MARGIN,
+    MOST_SLIPS,
+    NEARLY,
+)
 from .mending import measured
 from .smooth_shapes import smooth_shapes
 
@@ -125,15 +135,15 @@ def slips(
     """
     out: list[Slip] = []
     taken: list[tuple[int, int]] = []
-    whole = float((change.residual**2).sum())
+    whole = change.far
     for _ in range(MOST_SLIPS):
         best = _Seen(problem, change, joints, taken).best()
         if best is None:
             break
-        change = change.past(best.changed, best.shape)
+        before, change = change.far, change.past(best.changed, best.shape)
         if best.slip is not None:
             taken.append((best.slip.recording, best.at))
-            if best.slip.size < DATED_SIZE * largest and best.gain > DATED_SHARE * whole:
+            if best.slip.size < DATED_SIZE * largest and before - change.far > DATED_SHARE * whole:
                 out.append(best.slip)
     return out
 
@@ -168,9 +178,10 @@ class _Seen:
         for k, recording in enumerate(self.problem.recordings):
             sure = DATED if recording.joints.static else DATED_MOVING
             smooth = max(self._smooth(k), key=_nats)
-            step = _simplest(list(self._steps(k)))
-            if step is not None and step.nats > max(sure, MARGIN + smooth.nats):
-                trials.append(step)
+            steps = list(self._steps(k))
+            step, surest = _simplest(steps), max((t.nats for t in steps), default=0.0)
+            if step is not None and surest > max(sure, MARGIN + smooth.nats):
+                trials.append(step._replace(nats=surest))
             elif smooth.nats > sure:
                 trials.append(smooth)
         return max(trials, key=_nats, default=None)
@@ -224,12 +235,15 @@ def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
     """
     Return the step with most evidence, or one of fewer numbers that explains nearly as much.
 
-    What a model leaves for other reasons lets six numbers explain a little more than one, always.
+    What a model leaves for other reasons lets six numbers explain a little more than one, always;
+    where hardly anything is left for other reasons, that little counts.
     """
     if not trials:
         return None
     most = max(trial.gain for trial in trials)
-    enough = [trial for trial in trials if trial.gain > NEARLY * most]
+    whole = float((trials[0].changed.residual ** 2).sum())
+    least = max(NEARLY * most, whole - LEFT_ALIKE * (whole - most))
+    enough = [trial for trial in trials if trial.gain >= least > 0.0]
     if not enough:  # nothing to explain, so no number explains it
         return None
     fewest = min(trial.changed.columns.shape[2] for trial in enough)

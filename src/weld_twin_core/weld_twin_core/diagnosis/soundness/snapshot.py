@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -67,6 +68,22 @@ class Snapshot:
         pairs = zip(self.recordings, turns, strict=True)
         out = [r.with_measured(replace(measured(r), rotation=turn)) for r, turn in pairs]
         return replace(self, recordings=tuple(out))
+
+    @cached_property
+    def spread(self) -> float:
+        """Return how far the measured positions spread, RMS [m]."""
+        parts = [
+            seen - seen.mean(axis=0) for seen in (measured(r).position for r in self.recordings)
+        ]
+        return float(np.sqrt((np.concatenate(parts) ** 2).sum(axis=1).mean()))
+
+    def shrunk(self, before: Snapshot) -> float:
+        """
+        Return by what factor the measurements spread less than before, at least 1.
+
+        Whatever is shrunk to a point leaves no gap; gaps count in the size that they came from.
+        """
+        return max(1.0, before.spread / max(self.spread, 1e-12))
 
     @property
     def turned(self) -> bool:

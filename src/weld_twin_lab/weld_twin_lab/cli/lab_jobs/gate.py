@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from ...blind.diagnosing import engine_digest
     from ...blind.simulator import require_simulator
     from ...gate.mistakes import KINDS
-    from ...gate.table import result, table
+    from ...gate.table import result
     from ...gate.tasks import drawn, real
 
     require_simulator()
@@ -71,17 +71,18 @@ def run(args: argparse.Namespace) -> int:
     with runner_of(args, out / 'done', 'trying the gate') as runner:
         found = runner.run([*tasks, *more])
     content = result(found[: len(tasks)], args.seed)
-    told = table(content)
     if more:
         content['real'] = result(found[len(tasks) :], args.seed)
         content['passed'] = content['passed'] and content['real']['passed']
-        told += f'\nThe same with stations of real arms:\n\n{table(content["real"])}'
-    return _written(out, content, told)
+    return _written(out, content)
 
 
-def _written(out: Path, content: Mapping[str, Any], told: str) -> int:
+def _written(out: Path, content: Mapping[str, Any]) -> int:
     from weld_twin_msgs_py.files.whole_files import write_text
 
+    from ...gate.table import page
+
+    told = page(content)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / RESULT, json.dumps(content, indent=1) + '\n', overwrite=True)
     write_text(out / TABLE, told, overwrite=True)

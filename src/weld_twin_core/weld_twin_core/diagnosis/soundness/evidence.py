@@ -18,7 +18,7 @@ from ..frames.alignment import refined
 from .base_change import BaseChange, base_change, thinned
 from .lag import Lag, lag
 from .lengths import length
-from .limits import LATE_LEFT, RATE_MOST
+from .limits import LATE_LEFT, RATE_MOST, UNEXPLAINED
 from .mending import Mend
 from .slips import Slip, slips
 from .snapshot import Snapshot, measured, snapshot
@@ -97,12 +97,20 @@ class Case:
 
         Frames fitted at a wrong lag hide it, so they are fitted again with the lag undone.
         """
-        first = self._lags(self.model)
+        found = self._explained(self._lags(self.model))
+        if any(found) or self.gap < UNEXPLAINED:
+            return found
+        # Nothing near explains what nobody could use: the clocks may be far apart.
+        return self._explained(self._lags(self.model, wide=True), wide=True)
+
+    def _explained(self, first: Sequence[Lag | None], *, wide: bool = False) -> list[Lag | None]:
         late = [f if f is not None and f.after < HINT * f.before else None for f in first]
         if not any(late):
             return [None] * len(late)
         shot = snapshot(self.problem, self.model, self._motions(late))
-        again = self._lags(refined(replace(shot.problem, align=self.problem.align), shot.model))
+        again = self._lags(
+            refined(replace(shot.problem, align=self.problem.align), shot.model), wide=wide
+        )
         return [
             new
             if old is not None
@@ -113,7 +121,7 @@ class Case:
             for old, new in zip(late, again, strict=True)
         ]
 
-    def _lags(self, model: Model) -> list[Lag | None]:
+    def _lags(self, model: Model, *, wide: bool = False) -> list[Lag | None]:
         out: list[Lag | None] = []
         for k, recording in enumerate(self.recordings):
             t, seen = recording.joints.t, measured(recording)
@@ -121,7 +129,7 @@ class Case:
                 out.append(None)
                 continue
             path = model.twin(k).poses(recording, t).position
-            out.append(lag(t, path, seen.t, seen.position))
+            out.append(lag(t, path, seen.t, seen.position, wide=wide))
         return out
 
     def _motions(self, lags: Sequence[Lag | None]) -> list[Array]:

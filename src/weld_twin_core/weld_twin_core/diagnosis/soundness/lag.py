@@ -13,6 +13,8 @@ from ..frames.alignment import nearest_rotation
 
 MOST_LAG = 2.0
 """Lags up to this [s] are looked at, and up to a tenth of the recording."""
+WIDEST = 0.4
+"""Share of the recording up to which lags are looked at where nothing else can be wrong."""
 COARSE, STEP = 0.02, 0.01
 """Spacing of the lags tried first, and of the differences that give velocities [s]."""
 SAMPLES = 300
@@ -43,7 +45,9 @@ class Lag(NamedTuple):
         return self.late + self.rate * (t - self.middle)
 
 
-def lag(joints: Array, path: Array, t: Array, position: Array) -> Lag | None:
+def lag(
+    joints: Array, path: Array, t: Array, position: Array, *, wide: bool = False
+) -> Lag | None:
     """
     Return how late measurements are against a path; None when too few to tell.
 
@@ -53,16 +57,20 @@ def lag(joints: Array, path: Array, t: Array, position: Array) -> Lag | None:
     ----------
     joints, path : array, shape (N,) [s] and (N, 3) [m]
     t, position : array, shape (M,) [s] and (M, 3) [m]
+    wide : bool
+        Look at lags up to `WIDEST` of the recording.
 
     """
-    most = min(MOST_LAG, 0.1 * float(np.ptp(t)))
+    span = float(np.ptp(t))
+    most = WIDEST * span if wide else min(MOST_LAG, 0.1 * span)
     index = np.flatnonzero((t > joints[0] + most) & (t < joints[-1] - most))
     if index.size < 20:
         return None
     index = index[np.linspace(0, index.size - 1, min(SAMPLES, index.size)).round().astype(int)]
     stamps, seen = t[index], position[index]
     middle = float(stamps.mean())
-    grid = np.arange(-most, most + COARSE, COARSE)
+    coarse = max(COARSE, most / 300.0) if wide else COARSE
+    grid = np.arange(-most, most + coarse, coarse)
     costs = [_misfit(seen, _along(path, joints, stamps - late)) for late in grid]
     start = Lag(_nearest(grid, np.array(costs)), 0.0, middle)
     constant = _polished(start, joints, path, stamps, seen, free=1)

@@ -32,6 +32,12 @@ WORTH = 0.7
 """A further mistake must bring what is wrong below this share of what it was."""
 MOST = 3
 """So many mistakes at once are looked for; more never came together by accident."""
+UNLIKE = 6.0
+"""
+Factor by which measured positions may spread less than the flange of the arm moves.
+
+A long tool makes a small motion large, or takes part of it back; units differ by 25 and more.
+"""
 SHORTLIST = 5
 """So many of the roughly best mistakes are fitted in full; the right one was always among two."""
 UNEXPLAINED = 0.01

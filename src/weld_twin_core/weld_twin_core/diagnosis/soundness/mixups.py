@@ -81,8 +81,10 @@ def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list
             found.append(best)
             trial, arm, look = undone, rest, suspicions
         factor = EXPLAINED if shot.possible or not trial.possible else EXPLAINED_IMPOSSIBLE
-        off = arm.off * trial.shrunk(shot)
-        if found and (off < start.off / factor or _as_given(shot, trial, start, align)):
+        told = arm.off < start.off / factor or _as_given(shot, trial, start, align)
+        # What is shrunk leaves less of everything; it must leave less for its size as well.
+        size = trial.shrunk(shot)
+        if found and told and (size == 1.0 or arm.gap * size < start.gap / factor):
             return found, arm
     return [], start
 
@@ -93,7 +95,7 @@ def _as_given(shot: Snapshot, trial: Snapshot, start: Arm, align: frozenset[str]
 
     On short motions free frames and a bent arm take up much of any mistake.
     """
-    left = trial.gap_with(align) * trial.shrunk(shot)
+    left = trial.gap_with(align)
     return left < WORTH * start.gap and left < shot.gap_with(align) / EXPLAINED
 
 
@@ -112,15 +114,15 @@ def _best(
     fitted: list[tuple[Suspicion, Snapshot, Arm]] = []
     # Without orientations a quick fit may end beside the tool vector: then from many starts.
     for thorough in (False,) if shot.turned else (False, True):
-        rough = [trial.rough_gap(thorough=thorough) * trial.shrunk(shot) for _, trial in tried]
+        rough = [trial.rough_gap(thorough=thorough) * trial.collapsed for _, trial in tried]
         for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
             fitted.append((*tried[k], tried[k][1].arm()))
-        least = min(arm.off * trial.shrunk(shot) for _, trial, arm in fitted)
+        least = min(arm.off * trial.collapsed for _, trial, arm in fitted)
         if least < before.off / EXPLAINED:
             break
     if least > WORTH * before.off:
         return None, shot, before
-    alike = [each for each in fitted if WORTH * each[2].off * each[1].shrunk(shot) <= least]
+    alike = [each for each in fitted if WORTH * each[2].off * each[1].collapsed <= least]
     gaps = [each[1].gap_with(align) for each in alike] if len(alike) > 1 else [0.0]
     first = int(np.argmin(gaps))
     others = [

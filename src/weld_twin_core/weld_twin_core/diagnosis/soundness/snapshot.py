@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -30,6 +31,7 @@ from .limits import (
     SOFT,
     TWIST_MOST,
     TWIST_SPREAD,
+    UNLIKE,
 )
 from .mending import Given, Mend, measured
 
@@ -72,17 +74,23 @@ class Snapshot:
     @cached_property
     def spread(self) -> float:
         """Return how far the measured positions spread, RMS [m]."""
-        parts = [
-            seen - seen.mean(axis=0) for seen in (measured(r).position for r in self.recordings)
+        return _spread([measured(recording).position for recording in self.recordings])
+
+    @cached_property
+    def collapsed(self) -> float:
+        """
+        Return by what factor the measurements spread less than any such motion lets them, or 1.
+
+        Whatever is shrunk to a point leaves no gap: that explains nothing.
+        """
+        twins = [
+            self.model.twin(k).poses(recording, measured(recording).t).position
+            for k, recording in enumerate(self.recordings)
         ]
-        return float(np.sqrt((np.concatenate(parts) ** 2).sum(axis=1).mean()))
+        return max(1.0, _spread(twins) / (UNLIKE * max(self.spread, 1e-12)))
 
     def shrunk(self, before: Snapshot) -> float:
-        """
-        Return by what factor the measurements spread less than before, at least 1.
-
-        Whatever is shrunk to a point leaves no gap; gaps count in the size that they came from.
-        """
+        """Return by what factor the measurements spread less than before, or 1."""
         return max(1.0, before.spread / max(self.spread, 1e-12))
 
     @property
@@ -201,3 +209,8 @@ def gap(problem: Problem, model: Model) -> float:
     """Return the median distance between measured and twin [m]."""
     parts = problem.residuals(model)
     return float(np.median(np.concatenate([np.linalg.norm(p[:3], axis=0) for p in parts])))
+
+
+def _spread(parts: Sequence[Array]) -> float:
+    centred = np.concatenate([part - part.mean(axis=0) for part in parts])
+    return float(np.sqrt((centred**2).sum(axis=1).mean()))

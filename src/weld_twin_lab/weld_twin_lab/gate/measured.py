@@ -33,6 +33,7 @@ NOT_HERE = ('zero_velocities', 'clock', 'base_turned')
 SPLITS = 20
 """Of every arm; see `transfer.splits.splits`."""
 TRIES = 20
+"""Draws of stations in which a mistake may show; then none will."""
 
 
 def spared(folder: str, arm: str, number: int, engine: str = '') -> dict[str, Any]:

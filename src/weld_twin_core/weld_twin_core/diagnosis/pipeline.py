@@ -17,6 +17,7 @@ from .answer.refusal import refusal
 from .beliefs import Beliefs
 from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
+from .frames.places import not_told
 from .hypotheses.search import Search, search
 from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.carried import carried
@@ -133,6 +134,7 @@ def _explained(
 ) -> Diagnosis:
     """Return the diagnosis of recordings that were found sound."""
     assert examined.posed is not None
+    exclude = (*exclude, *not_told(examined.posed[0]))
     found = search(*examined.posed, exclude, beliefs, progress)
     found = fitted_together(found, exclude, beliefs, progress)
     found = settled_between(found, examined.given.may_change, beliefs)

@@ -19,6 +19,7 @@ from ...arm.rotation import transform
 from ...arrays import Array
 from ...contacts import places
 from ...effects.effect import Effect
+from ...effects.registry import REGISTRY
 from ...errors import DataError
 from ...recording import Measurements, Recording
 from ..algebra.problem import Anchor, Model, Problem
@@ -29,6 +30,8 @@ ROUNDS = 20
 """Times that the tool vector is found anew with less weight for what is off; it settles sooner."""
 FLOOR = 1e-5
 """Distance [m] below which a contact gains no more weight."""
+NO_CONTACT = ('time', 'place', 'direction', 'speed', 'acceleration', 'temperature')
+"""What effects may depend on that no contact tells of."""
 FEWEST = 2
 """Postures that one contact needs at the least: of a single one its unknown place takes everything."""
 
@@ -65,6 +68,22 @@ def posed(
     anchor = Anchor(bases, model.robot.T_flange_tool)
     problem = Problem(tuple(filled), align & {'tool'}, anchor)
     return problem.touching(model), model
+
+
+def not_told(problem: Problem) -> tuple[str, ...]:
+    """
+    Return the kinds of effect that no contact tells of; none where an instrument measured.
+
+    A place may be anywhere, so nothing that moves all of the cell shows; a contact has no approach
+    and no time that counts; there is no instrument.
+    """
+    if not problem.touched:
+        return ()
+    return tuple(
+        name
+        for name, kind in REGISTRY.items()
+        if kind.fitted_with == 'base' or kind.depends_on in NO_CONTACT
+    )
 
 
 def by_place(recording: Recording) -> list[Recording]:

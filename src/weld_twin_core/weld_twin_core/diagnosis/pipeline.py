@@ -122,6 +122,7 @@ def diagnose(
     progress('data checked')
     if examined.posed is None:
         return refusal(examined)
+    exclude = (*exclude, *not_told(examined.posed[0]))
     return _explained(examined, exclude, holdout, beliefs, progress)
 
 
@@ -134,7 +135,6 @@ def _explained(
 ) -> Diagnosis:
     """Return the diagnosis of recordings that were found sound."""
     assert examined.posed is not None
-    exclude = (*exclude, *not_told(examined.posed[0]))
     found = search(*examined.posed, exclude, beliefs, progress)
     found = fitted_together(found, exclude, beliefs, progress)
     found = settled_between(found, examined.given.may_change, beliefs)

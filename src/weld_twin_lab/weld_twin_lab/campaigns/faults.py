@@ -111,7 +111,7 @@ def table(result: dict[str, Any]) -> str:
     ]
     refused = sum(row['refused'] for row in result['parameters'])
     return markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows) + (
-        f'\nAbsurd parameter values refused in a sentence: {refused} of '
-        f'{len(result["parameters"])}. Messages in the bag of the whole campaign, all of which '
-        f'read: {result["bag"]["messages"]:,}.\n'
+        f'\n{refused} of {len(result["parameters"])} absurd parameter values were refused in a '
+        f'sentence. The bag of the whole campaign has {result["bag"]["messages"]:,} messages; all '
+        'of them can be read.\n'
     )

@@ -99,6 +99,14 @@ def test_tests_of_a_package_import_it_and_those_below_alone(package):
         assert named & set(PACKAGES) <= allowed, file
 
 
+@pytest.mark.parametrize('package', PACKAGES)
+def test_tests_of_a_package_have_names_of_their_own(package):
+    """As colcon runs them, each is imported by its bare name."""
+    names = [file.name for file in (ROOT / 'src' / package / 'test').rglob('*.py')]
+    twice = {name for name in names if names.count(name) > 1}
+    assert twice - {'conftest.py'} == set()
+
+
 def test_no_files_import_each_other_in_a_circle(graph):
     assert circles(graph) == []
 

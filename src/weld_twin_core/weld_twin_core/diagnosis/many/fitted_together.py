@@ -63,8 +63,6 @@ def fitted_together(
     steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
     if found.problem.touched:
         steps = [_but_scales(step) for step in steps]
-    if stations >= PLENTY:
-        steps = steps[-1:]
     best, left = found, np.inf
     for less in steps:
         trial = _together(found, (*exclude, *less), beliefs, progress)

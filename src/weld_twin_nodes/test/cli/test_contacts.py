@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From a table of touches to a corrected URDF, as a user without a tracker goes."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.arm.chain import forward, jacobian
+from weld_twin_msgs_py.robots import load_robot, write_urdf
+
+PLACES = {
+    'low a': [0.45, 0.1, 0.2],
+    'low b': [0.45, 0.15, 0.2],
+    'high a': [-0.1, 0.5, 0.4],
+    'high b': [-0.05, 0.5, 0.4],
+}
+EACH = 12
+
+
+@pytest.fixture(scope='module')
+def cell(tmp_path_factory):
+    """Return a directory with a URDF, and touches of an arm whose elbow stands 2 mrad off."""
+    folder, rng = tmp_path_factory.mktemp('cell'), np.random.default_rng(5)
+    tool = np.eye(4)
+    tool[:3, 3] = [0.02, 0.03, 0.12]
+    robot = wt.load('ur5').with_frames(tool=tool)
+    write_urdf(folder / 'cell.urdf', robot)
+    real = replace(robot, theta=robot.theta + 0.002 * (np.arange(6) == 2))
+    rows = [','.join((*robot.joint_names, 'contact'))]
+    for label, place in PLACES.items():
+        for q in postures(real, np.array(place), rng)[:EACH]:
+            rows.append(','.join((*(f'{v:.7f}' for v in q + rng.normal(0.0, 3e-5, 6)), label)))
+    (folder / 'touches.csv').write_text('\n'.join(rows) + '\n')
+    (folder / 'artefact.yaml').write_text(
+        'contacts: {low a: point, low b: point, high a: point, high b: point}\n'
+        'distances:\n  - {between: [low a, low b], value: 0.05, sigma: 0.0001}\n'
+        '  - {between: [high a, high b], value: 0.05, sigma: 0.0001}\n'
+    )
+    return folder
+
+
+def postures(robot, place, rng):
+    """Return postures in which the tool point rests at a place."""
+    q = rng.uniform(-2.0, 2.0, (400, 6))
+    for _ in range(60):
+        turn = jacobian(robot, q)[:, :3]
+        inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + 1e-6 * np.eye(3))
+        off = place - forward(robot, q)[:, :3, 3]
+        q = q + np.clip(np.einsum('mji,mjk,mk->mi', turn, inverse, off), -0.2, 0.2)
+    good = np.linalg.norm(place - forward(robot, q)[:, :3, 3], axis=1) < 1e-9
+    return q[good & (np.abs(q) < 3.0).all(axis=1)]
+
+
+def test_touches_become_a_corrected_urdf(cell, weld_twin):
+    urdf = ('--robot', str(cell / 'cell.urdf'))
+    artefact = ('--contacts', str(cell / 'artefact.yaml'))
+    bag, out = str(cell / 'bag'), cell / 'out'
+    weld_twin('import', str(cell / 'touches.csv'), *artefact, *urdf, '--out', bag)
+    weld_twin('diagnose', bag, *urdf, '--out', str(out))
+
+    found = json.loads((out / 'diagnosis.json').read_text())
+    named = [(item['effect'], item['joint']) for item in found['verdict']['effects']]
+    assert named == [('joint_offset', 'elbow_joint')]
+    contacts = found['contacts']
+    assert contacts['spread_before_m'] > 5 * contacts['held_out_spread_m']
+    assert contacts['held_out_spread_m'] < 1e-4
+    assert [item['between'] for item in contacts['distances']] == [
+        ['low a', 'low b'],
+        ['high a', 'high b'],
+    ]
+    assert 'where the base stands' in contacts['not_seen']
+    assert 'joint offset of shoulder_pan_joint' in '; '.join(contacts['not_seen'])
+    corrected = load_robot(out / 'robot.urdf')
+    assert corrected.theta[2] - load_robot(cell / 'cell.urdf').theta[2] == pytest.approx(
+        0.002, abs=1e-4
+    )
+    assert 'id="contacts"' in (out / 'report.html').read_text()

@@ -93,3 +93,16 @@ def test_a_joint_with_waves_has_no_curve_beside_them(robot):
         'wrist_1_joint',
         'wrist_2_joint',
     }
+
+
+@pytest.mark.parametrize(
+    'name', [n for n, kind in sorted(REGISTRY.items()) if kind.of == 'joint' and kind.cause]
+)
+def test_a_search_never_makes_an_effect_outside_its_bounds(robot, name):
+    """Noise asks for play below nothing as often as for play."""
+    recording = stations(robot, [0.5] * 6, (), count=12)
+    view = wt.Twin(robot).evaluate(recording, recording.joints.t).view
+    for seed in REGISTRY[name].seeds(view, 'elbow_joint'):
+        count = len(seed.coordinates())
+        for sign in (1.0, -1.0):
+            seed.from_atoms(sign * 1e-4 * np.ones(count)).check(robot)

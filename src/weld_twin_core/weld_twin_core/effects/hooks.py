@@ -171,8 +171,9 @@ class Hooks(Parametric, ABC):
         return [shift for shift in self.gradient(view) if shift is not None]
 
     def from_atoms(self: H, coefficients: Array) -> H:
-        """Return the instance that a combination of `atoms` stands for."""
-        return self.with_vector(np.asarray(coefficients, dtype=np.float64))
+        """Return the instance that a combination of `atoms` stands for, inside its bounds."""
+        low, high = np.array([(p.lower, p.upper) for p, _ in self.components()]).T
+        return self.with_vector(np.clip(np.asarray(coefficients, dtype=np.float64), low, high))
 
     def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
         """

@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What people wait for: whole commands, started cold, beside the same commands of another version."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.markdown import table
+
+from . import waiting_data as data
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """
+    Something that a person waits for.
+
+    Attributes
+    ----------
+    name : str
+    words : tuple of str
+        What the interpreter is started with; '{out}' is a place that does not exist yet.
+    needs : str
+        Which data must be there, as `waiting_data.MAKERS` names them; '{data}' in the words.
+    divided_by : int
+        Pieces of work that one run does.
+    once : bool
+        Takes so long that it is run once.
+
+    """
+
+    name: str
+    words: tuple[str, ...]
+    needs: str = ''
+    divided_by: int = 1
+    once: bool = False
+
+
+_CLI = ('-m', 'weld_twin_nodes')
+_READ = """
+import sys
+from weld_twin_core.arm.catalog import load
+from weld_twin_msgs_py.bags import read_recording
+read_recording(sys.argv[1], load('ur5'))
+"""
+CASES = 4
+JOBS = (
+    Job('`weld-twin --help`', (*_CLI, '--help')),
+    Job('`import weld_twin_core`', ('-c', 'import weld_twin_core')),
+    Job('`import weld_twin_core.diagnosis`', ('-c', 'import weld_twin_core.diagnosis')),
+    Job(
+        'diagnose 60 s of motion, page included',
+        (*_CLI, 'diagnose', '{data}', '--robot', 'ur5', '--out', '{out}'),
+        'motion',
+    ),
+    Job(
+        'diagnose 2,772 stations, six-dimensional, ripple of all orders',
+        (*_CLI, 'diagnose', '{data}', '--robot', 'ur10', '--align', 'base', '--out', '{out}'),
+        'stations',
+        once=True,
+    ),
+    Job('read ten minutes of bag (111,000 messages)', ('-c', _READ, '{data}'), 'minutes'),
+    Job(
+        'import a table of 100,000 rows',
+        (*_CLI, 'import', '{data}', '--robot', 'ur5', '--out', '{out}'),
+        'table',
+    ),
+    Job(
+        'sensitivity study with page',
+        (*_CLI, 'sensitivity', '--robot', 'ur5', '--workers', '1', '--out', '{out}'),
+        once=True,
+    ),
+    Job(
+        'a sealed blind case: made, diagnosed, scored',
+        (
+            *_CLI,
+            *('blind', 'run', '--cases', str(CASES), '--seed', '99', '--workers', '1'),
+            *('--kinds', 'single', '--out', '{out}'),
+        ),
+        divided_by=CASES,
+        once=True,
+    ),
+)
+
+
+class Cost(NamedTuple):
+    """Seconds on the clock, seconds of processor time, and the largest process [bytes]."""
+
+    wall: float
+    cpu: float
+    peak: float
+
+
+def measured(base: Path | None, out: Path, runs: int, only: Sequence[str], tell: Tell) -> Any:
+    """
+    Return what every job costs, here and in another checkout, in turn.
+
+    Parameters
+    ----------
+    base : Path or None
+        A checkout with an environment of its own in ``.venv``.
+    out : Path
+        Gets the data and, for a moment, what the commands write.
+    runs : int
+        Pairs of runs after one to warm up; jobs that take long are run once.
+    only : sequence of str
+        Parts of the names of jobs; empty for all.
+    tell : callable
+        Told what has been done.
+
+    Raises
+    ------
+    DataError
+        There is no environment in ``base``, or no job has such a name, or a command fails here.
+
+    """
+    pythons = {'here': sys.executable}
+    if base is not None:
+        other = base / '.venv' / 'bin' / 'python'
+        if not other.exists():
+            raise DataError(f"there is no '{other}'; run make setup in '{base}' first")
+        pythons['base'] = str(other.absolute())
+    wanted = [job for job in JOBS if not only or any(part in job.name for part in only)]
+    if not wanted:
+        raise DataError(f'no job is called {", ".join(only)}; leave --only out to see all')
+    out.mkdir(parents=True, exist_ok=True)
+    entries = []
+    for job in wanted:
+        entries.append(_entry(job, pythons, out, runs))
+        tell(f'{job.name}: {entries[-1]}')
+    return entries
+
+
+def _entry(job: Job, pythons: dict[str, str], out: Path, runs: int) -> dict[str, Any]:
+    place = data.made(job.needs, out) if job.needs else Path()
+    costs: dict[str, list[Cost]] = {name: [] for name in pythons}
+    for turn in range(1 if job.once else runs + 1):
+        for name, python in pythons.items():
+            cost = _run([python, *job.words], place, out / 'written')
+            if cost is None and name == 'here':
+                raise DataError(f'the command of {job.name!r} fails; run it by hand to see why')
+            if cost is not None and (turn or job.once):
+                costs[name].append(cost)
+    entry: dict[str, Any] = {'job': job.name, 'runs': len(costs['here'])}
+    for name, own in costs.items():
+        if own:
+            wall, cpu, peak = np.median(np.array(own), axis=0)
+            shares = (float(wall) / job.divided_by, float(cpu) / job.divided_by, float(peak))
+            entry[name] = dict(zip(Cost._fields, shares, strict=True))
+    if costs.get('base'):
+        pairs = np.array(costs['here']) / np.array(costs['base'])
+        ratio = [float(v) for v in np.median(pairs, axis=0)]
+        entry['ratio'] = dict(zip(Cost._fields, ratio, strict=True))
+    return entry
+
+
+def _run(words: Sequence[str], place: Path, written: Path) -> Cost | None:
+    """Return what one command costs; None where it fails. An empty or unsound verdict is fine."""
+    shutil.rmtree(written, ignore_errors=True)
+    filled = [word.replace('{data}', str(place)).replace('{out}', str(written)) for word in words]
+    quiet = {key: value for key, value in os.environ.items() if key != 'PYTHONPATH'}
+    start = time.perf_counter()
+    process = subprocess.Popen(
+        filled, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=quiet
+    )
+    _, status, used = os.wait4(process.pid, 0)
+    wall = time.perf_counter() - start
+    process.returncode = os.waitstatus_to_exitcode(status)
+    shutil.rmtree(written, ignore_errors=True)
+    if process.returncode not in (0, 1):
+        return None
+    return Cost(wall, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024.0)
+
+
+def summary(entries: Sequence[dict[str, Any]]) -> str:
+    """Return the table in Markdown."""
+    rows: list[Sequence[object]] = [
+        ('job', 'wall [s]', 'processor [s]', 'memory [MB]', 'before: wall, processor, memory')
+        + ('times as fast: wall, processor', 'share of the memory')
+    ]
+    for entry in entries:
+        now, before, ratio = entry['here'], entry.get('base'), entry.get('ratio')
+        rows.append(
+            (
+                entry['job'],
+                f'{now["wall"]:.3g}',
+                f'{now["cpu"]:.3g}',
+                f'{now["peak"] / 1e6:.0f}',
+                '' if before is None else _told(before),
+                '' if ratio is None else f'{1 / ratio["wall"]:.2f}, {1 / ratio["cpu"]:.2f}',
+                '' if ratio is None else f'{ratio["peak"]:.2f}',
+            )
+        )
+    return table(*rows)
+
+
+def _told(cost: dict[str, float]) -> str:
+    return f'{cost["wall"]:.3g}, {cost["cpu"]:.3g}, {cost["peak"] / 1e6:.0f}'

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The recordings and tables that waits are measured on, made once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arrays import Array
+from weld_twin_core.effects import Backlash, JointOffset, LinkLength, TransmissionRipple
+from weld_twin_core.effects.effect import Effect
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.bags import write_recording
+
+from .arms import smooth_motion
+
+JOINT_RATE, POSE_RATE = 125.0, 60.0
+"""Hz: those of a UR controller and of a camera system."""
+NOISE, TURN_NOISE = 2e-5, 5e-5
+"""Of a laser tracker with a probe [m, rad]."""
+STATIONS, ROWS = 2772, 100_000
+
+
+def made(name: str, folder: Path) -> Path:
+    """
+    Return where data are, made where they are not there yet.
+
+    Parameters
+    ----------
+    name : str
+        'motion', 'minutes', 'stations' or 'table'.
+    folder : Path
+
+    """
+    place = folder / ('table.csv' if name == 'table' else name)
+    if not place.exists():
+        MAKERS[name](place)
+    return place
+
+
+def _moving(seconds: float) -> Recording:
+    robot = load('ur5')
+    t = np.arange(round(seconds * JOINT_RATE) + 1) / JOINT_RATE
+    at = 0.003 + np.arange(round(seconds * POSE_RATE)) / POSE_RATE
+    at = at[at < t[-1]]
+    way = smooth_motion(robot, 2)[0] + 0.3 * np.sin(t[:, None] * np.arange(1.0, 7.0) / 5.0)
+    commanded = Recording('motion', JointMotion(t, way))
+    play = Backlash('elbow_joint', width=5e-4)
+    return _seen(commanded, 'ur5', [play], at)
+
+
+def _seen(commanded: Recording, robot: str, effects: list[Effect], at: Array) -> Recording:
+    """Return a recording with what a twin with effects and noise would measure."""
+    rng = np.random.default_rng(7)
+    poses = Twin(load(robot), effects).poses(commanded, at)
+    position = poses.position + rng.normal(scale=NOISE, size=poses.position.shape)
+    tilt = rng.normal(scale=TURN_NOISE, size=(at.size, 3))
+    skew = np.cross(np.eye(3), tilt[:, None, :])
+    turned, _ = np.linalg.qr(poses.rotation @ (np.eye(3) + skew))
+    sign = np.sign((turned * poses.rotation).sum(axis=1, keepdims=True))
+    return commanded.with_measured(Measurements(at, position, turned * sign))
+
+
+def _motion(place: Path) -> None:
+    write_recording(place, _moving(60.0), load('ur5'))
+
+
+def _minutes(place: Path) -> None:
+    write_recording(place, _moving(600.0), load('ur5'))
+
+
+def _stations(place: Path) -> None:
+    robot, rng = load('ur10'), np.random.default_rng(11)
+    t = np.arange(float(STATIONS))
+    q = rng.uniform(-2.5, 2.5, (STATIONS, robot.n))
+    orders = np.array([1.0, 2.0, 3.0, 5.0, 8.0, 13.0])
+    effects: list[Effect] = [
+        LinkLength('shoulder_lift_joint', da=2e-4),
+        *(JointOffset(name, offset=rng.normal(scale=3e-4)) for name in robot.joint_names),
+        *(
+            TransmissionRipple(name, 1e-4 / np.sqrt(orders), orders, rng.uniform(0.0, 6.0, 6))
+            for name in robot.joint_names
+        ),
+    ]
+    commanded = Recording('stations', JointMotion(t, q, static=True))
+    write_recording(place, _seen(commanded, 'ur10', effects, t), robot)
+
+
+def _table(place: Path) -> None:
+    robot, rng = load('ur5'), np.random.default_rng(13)
+    q = rng.uniform(-2.5, 2.5, (ROWS, robot.n))
+    commanded = Recording('table', JointMotion(np.arange(float(ROWS)), q, static=True))
+    position = Twin(robot).poses(commanded).position * 1e3
+    head = ','.join([*robot.joint_names, 'x_mm', 'y_mm', 'z_mm'])
+    rows = np.column_stack([np.degrees(q), position])
+    np.savetxt(place, rows, delimiter=',', header=head, comments='', fmt='%.6f')
+
+
+MAKERS = {'motion': _motion, 'minutes': _minutes, 'stations': _stations, 'table': _table}

@@ -24,7 +24,7 @@ ZERO = {'effect': 'joint_offset', 'joint': 'elbow_joint'}
 def stations(count=60, sigma=36.0, cost=15.0):
     return {
         'kind': 'stations',
-        'sentence': 'Measure stations.',
+        'sentence': f'Measure {count} stations at rest.',
         'reason': 'They would part.',
         'cost': cost,
         'expected_separation_sigma': sigma,
@@ -58,6 +58,7 @@ def test_an_experiment_has_no_more_stations_than_its_decision_needs():
     assert few['stations'] == 12 and few['minutes'] == pytest.approx(3.0)
     assert few['expected_sigma'] == pytest.approx(36.0 * (12 / 60) ** 0.5)
     assert len(few['motion']['t']) == len(few['motion']['q']) == 12
+    assert few['sentence'] == 'Measure 12 stations at rest.' and 'adds 16' in few['reason']
     # 12 sigma: (9 / 12)^2 of 60 is 34 stations.
     assert shortened(stations(sigma=12.0))['stations'] == 34
     assert shortened(stations(sigma=3.0))['stations'] == 60

@@ -11,6 +11,7 @@ when the recording has come in.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -223,14 +224,20 @@ def shortened(wanted: Mapping[str, Any]) -> dict[str, Any]:
     whole, part = ((float(motion['t'][k - 1]) + stays) / 60.0 for k in (count, keep))
     # What the experiment costs beyond its motion, such as another tool, stays.
     minutes = max(float(wanted['cost']) - whole, 0.0) + part
+    reached = None if sigma is None else float(sigma) * (keep / count) ** 0.5
+    sentence, reason = str(wanted['sentence']), str(wanted['reason'])
+    if keep < count and reached is not None:
+        told = keep // GROUP.get(wanted['kind'], 1)
+        sentence = re.sub(r'\b\d+ stations', f'{told} stations', sentence, count=1)
+        reason += f' With {told} stations it adds {reached:.0f}, which is enough.'
     return {
         'kind': wanted['kind'],
-        'sentence': wanted['sentence'],
-        'reason': wanted['reason'],
+        'sentence': sentence,
+        'reason': reason,
         'minutes': round(minutes, 2),
         'robot_minutes': round(part, 2),
         'stations': keep if motion['static'] else None,
-        'expected_sigma': None if sigma is None else float(sigma) * (keep / count) ** 0.5,
+        'expected_sigma': reached,
         'between': wanted.get('between'),
         'motion': {**motion, 't': motion['t'][:keep], 'q': motion['q'][:keep]},
         'decided': None,

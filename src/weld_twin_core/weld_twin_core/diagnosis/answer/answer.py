@@ -10,6 +10,7 @@ from typing import Any
 from ...twin.posterior import Posterior
 from ..advice import actions
 from ..advice.next_step import next_step
+from ..frames.places import NOT_TOLD, not_told
 from ..hypotheses.search import Search
 from ..levels.causes import causes
 from ..levels.curved import Curved
@@ -78,7 +79,7 @@ def answer(
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         model=found.final.model,
         traces=traces(found),
-        absent=found.library.absent,
+        absent=found.library.absent | dict.fromkeys(not_told(found.problem), NOT_TOLD),
         recordings=found.problem.recordings,
         families=verdict.families,
         evidence=evidence,

@@ -32,6 +32,8 @@ FLOOR = 1e-5
 """Distance [m] below which a contact gains no more weight."""
 NO_CONTACT = ('time', 'place', 'direction', 'speed', 'acceleration', 'temperature')
 """What effects may depend on that no contact tells of."""
+NOT_TOLD = 'contacts do not tell of it'
+"""Why such an effect is not considered."""
 FEWEST = 2
 """Postures that one contact needs at the least: of a single one its unknown place takes everything."""
 

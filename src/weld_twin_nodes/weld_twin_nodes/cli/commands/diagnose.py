@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -66,6 +67,11 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_causes(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        '--contacts',
+        metavar='ARTEFACT.yaml',
+        help='describes what the contacts of the bags touched, where they were not imported with it',
+    )
     parser.add_argument(
         '--effects-known',
         default='',
@@ -126,9 +132,10 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
         for path in (*args.bags, *args.holdout):
             tell(f'reading {path}')
             # Two clocks are for the checks of the data to name.
-            recordings.append(
-                read_recording(path, twin.robot, topics, one_clock=False, needs_measurements=True)
+            recording = read_recording(
+                path, twin.robot, topics, one_clock=False, needs_measurements=True
             )
+            recordings.append(_described(recording, args.contacts))
         count = len(args.bags)
         return diagnose(
             _bounded(recordings[:count]),
@@ -141,6 +148,18 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             may_change=changing,
             progress=tell,
         )
+
+
+def _described(recording: Recording, artefact: str | None) -> Recording:
+    """Return the recording with its contacts as an artefact file describes them."""
+    from weld_twin_core.contacts import Contacts
+    from weld_twin_msgs_py.files.artefact_file import read_artefact
+
+    contacts = recording.contacts
+    if artefact is None or contacts is None:
+        return recording
+    told = Contacts(read_artefact(artefact), contacts.labels, contacts.value, contacts.sigma)
+    return replace(recording, contacts=told)
 
 
 def _bounded(recordings: Sequence[Recording]) -> list[Recording]:

@@ -29,21 +29,26 @@ def misfit(robot: Robot, q: Array, position: Array) -> Array:
     """
     T = forward(robot, q)
     flange, turn = T[:, :3, 3], T[:, :3, :3]
+    seen, count = position - position.mean(axis=0), len(q)
+    # All that the rounds need are sums over the rows, so a long table is read once.
+    turns, flanges = turn.sum(axis=0), flange.sum(axis=0)
+    seen_turn = (seen.T @ turn.reshape(count, 9)).reshape(3, 3, 3)
+    seen_flange = seen.T @ flange
+    turned_flange = np.einsum('mbc,mb->c', turn, flange)
     tool = np.zeros(3)
     for _ in range(_ROUNDS):
-        tip = flange + turn @ tool
-        centre, there = tip.mean(axis=0), position.mean(axis=0)
-        R = _best_turn(position - there, tip - centre)
-        design = np.concatenate([R @ turn, np.tile(np.eye(3), (len(q), 1, 1))], axis=2)
-        target = position - flange @ R.T
-        solution = np.linalg.lstsq(design.reshape(-1, 6), target.reshape(-1), rcond=None)[0]
+        R = _best_turn(seen_flange + seen_turn @ tool)
+        cross, own = R @ turns, count * np.eye(3)
+        normal = np.block([[own, cross.T], [cross, own]])
+        right = [np.einsum('ab,abc->c', R, seen_turn) - turned_flange, -R @ flanges]
+        solution = np.linalg.lstsq(normal, np.concatenate(right), rcond=None)[0]
         tool = solution[:3]
-        rest = target - (design @ solution)
+    rest = seen - (flange + turn @ tool) @ R.T - solution[3:]
     return np.asarray(np.linalg.norm(rest, axis=1))
 
 
-def _best_turn(to: Array, origin: Array) -> Array:
-    """Return the rotation (3, 3) that turns centred points (M, 3) closest to others (Kabsch)."""
-    u, _, vt = np.linalg.svd(to.T @ origin)
+def _best_turn(products: Array) -> Array:
+    """Return the rotation (3, 3) that turns points closest to others (Kabsch), by their products."""
+    u, _, vt = np.linalg.svd(products)
     sign = np.sign(np.linalg.det(u @ vt))
     return np.asarray(u @ np.diag([1.0, 1.0, sign]) @ vt)

@@ -175,6 +175,20 @@ def test_abb_targets_under_a_displacement_are_not_touched():
     assert 'displaces' in displaced.why and plain.end is not None
 
 
+@pytest.mark.parametrize(
+    ('line', 'held'), [('PR[1]=P[2]', {'P[2]'}), ('L P[R[3]] 5mm/sec FINE', {'P[1]', 'P[2]'})]
+)
+def test_fanuc_points_that_something_else_uses_are_left(line, held):
+    points = ''.join(
+        f"P[{k}]{{\n GP1:\n UF : 0, UT : 1, CONFIG : 'N U T, 0, 0, 0',\n X = 900 mm, Y = 0 mm, "
+        'Z = 300 mm,\n W = 180 deg, P = 0 deg, R = 0 deg\n};\n'
+        for k in (1, 2)
+    )
+    text = f'/PROG A\n/MN\n 1:J P[1] 5% FINE ;\n 2:  !P[1] ;\n 3:{line} ;\n/POS\n{points}/END\n'
+    program = read('fanuc-ls', (text,), 'fanuc_m10ia')
+    assert {program.points[k].name for k in program.held} == held
+
+
 def test_a_point_that_is_declared_twice_is_refused_with_its_line():
     text = 'MODULE M\n' + 2 * (
         'CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'

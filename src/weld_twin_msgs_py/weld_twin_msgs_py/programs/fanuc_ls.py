@@ -154,6 +154,7 @@ class _Reader:
         if wait is not None:
             self.program.dwell(max(float(wait[1]), 0.0))
         move = _MOVE.match(text)
+        self._hold_used(text, where, move is not None)
         if move is None:
             return
         kind, via = _KINDS.get(move[1], 'linear'), None
@@ -172,6 +173,17 @@ class _Reader:
             self.program.unknown(kind, where, why)
             return
         self._add(kind, where, via, point, tail)
+
+    def _hold_used(self, text: str, where: str, moves: bool) -> None:
+        """Hold points that a register chooses, or that something else than a move uses."""
+        if re.search(r'(?<![A-Z])P\[\s*(?:A?R)\[', text):
+            for point in self.points.values():
+                self.program.hold(point, f'a register chooses the point at {where}')
+        elif not moves and not text.startswith(('!', '//')):
+            for found in re.finditer(r'(?<![A-Z])P\[\s*(\d+)', text):
+                point = self.points.get(int(found[1]), -1)
+                if point >= 0:
+                    self.program.hold(point, f'P[{found[1]}] is used at {where} by no move')
 
     def _add(self, kind: Kind, where: str, via: int | None, point: int | None, tail: str) -> None:
         assert point is not None

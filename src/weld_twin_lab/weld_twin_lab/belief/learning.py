@@ -12,6 +12,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.trust.model import AS_LOGIT, SCHEMA, Trust, taken, trust_from
 
+from ..blind.statistics import calibration_error
 from .bound import Bound, bounded
 from .judged import Example
 from .logistic import Weights, fitted, log_loss
@@ -71,17 +72,21 @@ def learned(examples: Sequence[Example], card: Mapping[str, Any]) -> dict[str, A
 
     """
     levels: dict[str, Level] = {}
-    parts: dict[str, list[tuple[Array, Array]]] = {}
+    parts: dict[str, list[tuple[Array, Array, Array]]] = {}
     for name in TERMS:
         own = [e for e in examples if e.level == name]
         if len(own) >= FEWEST:
             levels[name] = _level(own, name)
-            pair = (levels[name].unseen, np.array([e.right for e in own]))
-            parts.setdefault(name.split()[0], []).append(pair)
+            told, right = (np.array([getattr(e, key) for e in own]) for key in ('told', 'right'))
+            parts.setdefault(name.split()[0], []).append((levels[name].unseen, right, told))
     bounds = {level: _bound(pairs) for level, pairs in parts.items()}
     return {
         'schema': SCHEMA,
-        'card': {**card, 'bounds': {level: _told(b) for level, b in bounds.items()}},
+        'card': {
+            **card,
+            'bounds': {level: _told(b) for level, b in bounds.items()},
+            'unseen': {level: _unseen_worth(parts[level], b) for level, b in bounds.items()},
+        },
         'sure_from': {level: b.sure_from for level, b in bounds.items()},
         'told_unsure': TOLD_UNSURE,
         'levels': {name: level.content for name, level in levels.items()},
@@ -93,9 +98,25 @@ def trust_of(examples: Sequence[Example]) -> Trust:
     return trust_from(learned(examples, {}))
 
 
-def _bound(pairs: Sequence[tuple[Array, Array]]) -> Bound:
-    probability, right = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
+def _bound(parts: Sequence[tuple[Array, Array, Array]]) -> Bound:
+    probability, right = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     return bounded(probability, right, RISK)
+
+
+def _unseen_worth(parts: Sequence[tuple[Array, Array, Array]], bound: Bound) -> dict[str, Any]:
+    """Return what beliefs are worth, each by weights that had not seen its case."""
+    learned, right, before = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    told = np.where(learned >= bound.sure_from, learned, np.minimum(learned, TOLD_UNSURE))
+    return {
+        name: {
+            'ece': round(
+                float(calibration_error(list(p), list(map(bool, right))).value or 0.0), 4
+            ),
+            'sure_and_wrong': round(float(((p > TOLD_UNSURE) & ~right).mean()), 4),
+            'sure': round(float((p > TOLD_UNSURE).mean()), 4),
+        }
+        for name, p in (('by hand', before), ('learned', learned), ('told', told))
+    }
 
 
 def _told(bound: Bound) -> dict[str, Any]:

@@ -53,6 +53,12 @@ def page(result: Mapping[str, Any]) -> str:
             'Answers as a whole:',
             '',
             markdown.table(HEAD, *(_row(name, row) for name, row in groups)),
+            'The cases learned from, each judged by weights that had not seen it:',
+            '',
+            markdown.table(
+                ('statements on', 'belief', 'calibration error', 'sure and wrong', 'sure'),
+                *_unseen(taught['unseen']),
+            ),
             'Beside the goals:',
             '',
             markdown.table(
@@ -62,6 +68,20 @@ def page(result: Mapping[str, Any]) -> str:
             *_failures(result['wrong_and_sure']),
         ]
     )
+
+
+def _unseen(levels: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    return [
+        (
+            level,
+            name,
+            f'{worth["ece"]:.3f}',
+            _percent(worth['sure_and_wrong']),
+            _percent(worth['sure']),
+        )
+        for level, beliefs in levels.items()
+        for name, worth in beliefs.items()
+    ]
 
 
 def _bound(bound: Mapping[str, Any]) -> str:

@@ -14,8 +14,13 @@ CELLS = 'cells'
 
 
 def pytest_collection_modifyitems(items):
-    """Put the tests that start nodes first: they wait more than they work."""
-    items.sort(key=lambda item: item.get_closest_marker(CELLS) is None)
+    """
+    Put the tests that start nodes first, which wait more than they work; then files with slow ones.
+
+    So that nothing that takes long is begun last.
+    """
+    slow = {item.path for item in items if item.get_closest_marker('slow')}
+    items.sort(key=lambda item: (item.get_closest_marker(CELLS) is None, item.path not in slow))
 
 
 @pytest.hookimpl(optionalhook=True)

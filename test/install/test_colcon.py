@@ -118,6 +118,7 @@ def test_the_command_line_runs_as_installed(workspace, sourced):
     assert 'franka_panda' in out.stdout
 
 
+@pytest.mark.slow
 def test_packages_bring_all_that_their_tests_need(tmp_path):
     for name in ('weld_twin_core', 'weld_twin_msgs_py'):
         source = tmp_path / 'src' / name

@@ -8,8 +8,8 @@ frame UF (0 is the robot's own) and its tool frame UT. FANUC writes thousandths.
 
 References
 ----------
-.. [1] FANUC Robotics, "SYSTEM R-30iA, R-30iB Handling Tool Operator's Manual", B-83284EN: motion
-   instruction, position data.
+.. [1] TP programs in public backups of cells (repositories JuniorNatalin/VASC and
+   Creearc/welding_project); "Common robot data formats", docs.transfertech.cn: W P R.
 
 """
 

@@ -8,8 +8,8 @@ are mm, angles degrees, ``$VEL.CP`` m/s. The bits of T are the signs of the axes
 
 References
 ----------
-.. [1] KUKA, "KUKA System Software 8.x, Operating and Programming Instructions for System
-   Integrators": motion programming, $BASE, $TOOL, E6POS, Status and Turn.
+.. [1] KUKA's expert programming manual as quoted at robot-forum.com, thread 7173 (Status, Turn);
+   "Status and Turn in LIN motions", industrialmonitordirect.com: linear moves do not use them.
 
 """
 

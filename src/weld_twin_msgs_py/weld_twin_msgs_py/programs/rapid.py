@@ -8,8 +8,8 @@ Lengths are mm, angles degrees, orientations quaternions with the scalar first, 
 
 References
 ----------
-.. [1] ABB, "Technical reference manual, RAPID Instructions, Functions and Data types",
-   3HAC050917: robtarget, confdata, speeddata, zonedata, tooldata, wobjdata.
+.. [1] ABB, "RAPID Reference Manual": confdata; abb_rapid_msgs/RobTarget, docs.ros.org; the types
+   of the package abb-motion-program-exec, whose words are those of 3HAC16581-1.
 
 """
 

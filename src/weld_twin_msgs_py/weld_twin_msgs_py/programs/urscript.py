@@ -8,7 +8,8 @@ rad/s. A blend radius of 0 is a stop.
 
 References
 ----------
-.. [1] Universal Robots, "The URScript Programming Language", module motion.
+.. [1] "URScript Quick Reference" of the daemon urd, and the wrapper of the URScript manual 1.8:
+   arguments of movej, movel and movec, poses in m with rotation vectors.
 
 """
 

@@ -185,9 +185,19 @@ class Hooks(Parametric, ABC):
         """
         return None
 
+    @property
+    def searched(self) -> bool:
+        """Return whether a fit of it has to search for its start among its `starts`."""
+        return type(self).starts is not Hooks.starts
+
     def joined(self: H, other: H) -> H | None:
         """Return this effect and another of its kind and joint as one; None where one has to do."""
         return None
+
+    @property
+    def ideal(self) -> float:
+        """Return by how much its formula errs on real arms, as a share of what is usual."""
+        return 1.0
 
     # The fit ------------------------------------------------------------------------------------
 

@@ -122,8 +122,10 @@ def effective_rows(
     """
     share = effective_share(found.residual, problem.rows, problem.samples) ** trust
     count = share * found.residual.size
+    # What entered first explains most, and so does what its formula misses.
+    misfit = beliefs.misfit * (found.model.found[0].ideal if found.model.found else 1.0)
     explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
-    return float(count / (1.0 + beliefs.misfit**2 * explained / beliefs.misfit_directions))
+    return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
 
 
 def search(

@@ -67,7 +67,7 @@ def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Eff
 
 def searched(effect: Effect) -> bool:
     """Return whether an effect's kind needs a search for its start."""
-    return type(effect).starts is not Effect.starts
+    return effect.searched
 
 
 def profile(

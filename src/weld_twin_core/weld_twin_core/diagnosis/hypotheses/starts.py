@@ -17,6 +17,8 @@ from ..algebra.fit import design
 from ..algebra.problem import Model, Problem, Scale
 
 MEMORY = (Stage.SERVO, Stage.PLAY)
+LEAST = 1e-9
+"""Size, as a share of the typical one, that is taken for less: zero has no logarithm."""
 USUAL = 0.8
 """Spread of the logarithm of a frequency or a damping about the typical one."""
 
@@ -108,7 +110,9 @@ def _prior(effects: list[Effect]) -> Array:
     bent = [k for k, p in sizes if not p.linear and p.lower >= 0.0]
     typical = np.array([effects[0].parameters[k].typical for k in bent])
     values = np.array([effect.vector()[bent] for effect in effects])
-    return np.asarray(-0.5 * ((np.log(values / typical) / USUAL) ** 2).sum(axis=1))
+    return np.asarray(
+        -0.5 * ((np.log(np.maximum(values / typical, LEAST)) / USUAL) ** 2).sum(axis=1)
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,7 @@ include_patterns = [
     'docs/results/sensitivity/README.md',
     'docs/results/transfer/after.md',
     'docs/results/transfer/before.md',
+    'docs/results/waits/waits.md',
     'examples/*.ipynb',
     'bags/README.md',
     'CHANGELOG.md',

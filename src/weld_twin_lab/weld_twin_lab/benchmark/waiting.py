@@ -186,6 +186,16 @@ def _run(words: Sequence[str], place: Path, written: Path) -> Cost | None:
     return Cost(wall, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024.0)
 
 
+def page(entries: Sequence[dict[str, Any]]) -> str:
+    """Return the table with what a reader must know of it, in Markdown."""
+    return (
+        '# What people wait for\n\n'
+        'Whole commands, started cold, by `weld-twin lab waits`. Ratios are medians of pairs of runs; '
+        'the cases, robots and effects of an earlier version are fewer, so its blind cases are '
+        'not the same.\n\n' + summary(entries)
+    )
+
+
 def summary(entries: Sequence[dict[str, Any]]) -> str:
     """Return the table in Markdown."""
     rows: list[Sequence[object]] = [

@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
 
     from weld_twin_msgs_py.files.whole_files import write_text
 
-    from ...benchmark.waiting import measured, summary
+    from ...benchmark.waiting import measured, page, summary
 
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
@@ -45,6 +45,6 @@ def run(args: argparse.Namespace) -> int:
     with TemporaryDirectory() as folder:
         entries = measured(base, Path(folder), max(args.runs, 1), args.only, tell)
     write_text(out / 'waits.json', json.dumps(entries, indent=1) + '\n')
-    write_text(out / 'waits.md', summary(entries))
+    write_text(out / 'waits.md', page(entries))
     print(summary(entries))
     return 0

@@ -58,6 +58,7 @@ from weld_twin_msgs_py.bags import read_recording
 read_recording(sys.argv[1], load('ur5'))
 """
 CASES = 4
+"""Sealed cases that are diagnosed; the time is told for one."""
 JOBS = (
     Job('`weld-twin --help`', (*_CLI, '--help')),
     Job('`import weld_twin_core`', ('-c', 'import weld_twin_core')),

@@ -23,6 +23,7 @@ JOINT_RATE, POSE_RATE = 125.0, 60.0
 NOISE, TURN_NOISE = 2e-5, 5e-5
 """Of a laser tracker with a probe [m, rad]."""
 STATIONS, ROWS = 2772, 100_000
+"""Stations of a long calibration, and rows of a long table."""
 
 
 def made(name: str, folder: Path) -> Path:

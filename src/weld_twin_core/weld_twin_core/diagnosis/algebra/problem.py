@@ -24,9 +24,9 @@ from ...twin.twin import Twin
 from .row_layout import by_sample
 
 FRAMES = ('base', 'tool')
-PLACES = 2
-"""Places of contacts from which on each is left out as a whole. What fits a place carries over to
-another one less than to its other postures, and another one is what a user wants."""
+PLACES = 3
+"""Places of contacts from which on each is left out as a whole. Of two, one alone would have to tell
+of the other what only both together show."""
 
 
 def frames_named(align: str | Iterable[str], what: str = 'align') -> frozenset[str]:

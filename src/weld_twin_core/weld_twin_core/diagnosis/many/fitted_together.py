@@ -17,6 +17,7 @@ import numpy as np
 
 from ...effects.effect import Effect, Stage
 from ...effects.registry import REGISTRY
+from ..algebra.problem import PLACES
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.regions import posture_regions
@@ -63,6 +64,8 @@ def fitted_together(
     steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
     if found.problem.touched:
         steps = [_but_scales(step) for step in steps]
+        # What carries over to another place only a place left out can tell; two are too few.
+        steps = steps[:1] if len(found.problem.touched) < PLACES else steps
     best, left = found, np.inf
     for less in steps:
         trial = _together(found, (*exclude, *less), beliefs, progress)
@@ -127,7 +130,7 @@ def unseen_rms(found: Search) -> float:
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     everything = range(len(unseen.parts))
     parts = [unseen]
-    if not found.problem.touched:  # regions would have every place on both sides
+    if len(found.problem.touched) < PLACES:  # else regions would have places on both sides
         parts.append(unseen.by(posture_regions(found.problem)))
     squares = [each.rms(each.base(everything).residual) ** 2 for each in parts]
     return float(np.sqrt(np.mean(squares)))

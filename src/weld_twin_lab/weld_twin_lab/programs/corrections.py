@@ -3,11 +3,10 @@
 """
 Does a corrected program help? Out, in by another reader, run by another arm.
 
-The plant records an arm with sealed causes, in free motion and once along the seam, and that is
-diagnosed. The seam is written as a program, corrected with what was found, and with the true causes
-beside it. A reader that shares nothing with the product takes each program in, a plain controller
-that knows no error interpolates it, and the plant runs it. The path is judged against the seam as the
-program meant it.
+The plant records an arm with sealed causes; the recording is diagnosed; a seam is written as a program,
+corrected with what was found, and with the true causes beside it. A reader that shares nothing with
+the product takes each program in, a plain controller that knows no error interpolates it, and the
+plant runs it. The path is judged against the seam as the program meant it.
 """
 
 from __future__ import annotations
@@ -65,13 +64,12 @@ def correction(language: str, seed: int = 0) -> dict[str, Any]:
     plain = robot_of(language)
     robot = plain.with_frames(tool=context.controller.flange @ along(2, TORCH))
     causes = _causes(robot, rng)
+    found = _diagnosed(robot, causes, rng)
     context = context._replace(
         robot=robot, controller=replace(context.controller, own_tool=np.array(robot.T_flange_tool))
     )
     made, text, _ = export('arc', context, language, 'seam', Speeds(), 1)
     start = made.moves[0].q
-    joints, wanted = _driven(robot, language, text, start)
-    found = _diagnosed(robot, causes, joints, rng)
     true = ProgramModel(robot, tuple(effects_from_list(causes, robot)))
     left = ''
     try:
@@ -83,6 +81,7 @@ def correction(language: str, seed: int = 0) -> dict[str, Any]:
         'after': after,
         'true_causes': _corrected(language, text, context, true),
     }
+    wanted = _driven(robot, language, text, start)[1]
     errors = {
         name: _errors(robot, causes, _driven(robot, language, one, start)[0], wanted)
         for name, one in texts.items()
@@ -108,15 +107,11 @@ def _causes(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
     ]
 
 
-def _diagnosed(
-    robot: Robot, causes: Sequence[Any], joints: np.ndarray, rng: np.random.Generator
-) -> Diagnosis:
-    """Return the diagnosis of a free motion and of one run of the seam itself."""
+def _diagnosed(robot: Robot, causes: Sequence[Any], rng: np.random.Generator) -> Diagnosis:
     moved = motion('free', robot, RECORDED, rng)
     tracker = Tracker(rate=60.0, sigma=NOISE)
-    commands = [Command(moved.t, moved.q), _run_of(joints)]
-    made = [run(robot.to_mapping(), causes, command, tracker, rng) for command in commands]
-    return diagnose([as_recording(f'sealed {k}', one) for k, one in enumerate(made)], robot)
+    made = run(robot.to_mapping(), causes, Command(moved.t, moved.q), tracker, rng)
+    return diagnose([as_recording('sealed', made)], robot)
 
 
 def _model(found: Diagnosis) -> ProgramModel:
@@ -161,22 +156,16 @@ def _errors(
     robot: Robot, causes: Sequence[Any], joints: np.ndarray, wanted: np.ndarray
 ) -> np.ndarray:
     """Return how far the plant's tool is from the line of the seam at every sample [m]."""
-    command = _run_of(joints)
-    made = run(robot.to_mapping(), causes, command, Tracker(), np.random.default_rng(0))
-    stay = int(REST * RATE)
-    real = made.position[stay : len(made.position) - stay]
-    starts, ways = wanted[:-1], np.diff(wanted, axis=0)
-    size = np.maximum((ways**2).sum(axis=1), 1e-18)
-    share = np.clip(((real[:, None] - starts) * ways).sum(axis=2) / size, 0.0, 1.0)
-    gap = real[:, None] - (starts + share[..., None] * ways)
-    return np.asarray(np.linalg.norm(gap, axis=2).min(axis=1))
-
-
-def _run_of(joints: np.ndarray) -> Command:
-    """Return the command of a seam from rest to rest at a steady speed."""
     clock = STEP / SPEED * np.arange(len(joints))
     stay = int(REST * RATE)
     t = np.arange(int(clock[-1] * RATE) + 1) / RATE
     moving = np.stack([np.interp(t, clock, column) for column in joints.T], axis=1)
     q = np.concatenate([np.tile(moving[0], (stay, 1)), moving, np.tile(moving[-1], (stay, 1))])
-    return Command(np.arange(len(q)) / RATE, q)
+    command = Command(np.arange(len(q)) / RATE, q)
+    made = run(robot.to_mapping(), causes, command, Tracker(), np.random.default_rng(0))
+    real = made.position[stay : stay + len(moving)]
+    starts, ways = wanted[:-1], np.diff(wanted, axis=0)
+    size = np.maximum((ways**2).sum(axis=1), 1e-18)
+    share = np.clip(((real[:, None] - starts) * ways).sum(axis=2) / size, 0.0, 1.0)
+    gap = real[:, None] - (starts + share[..., None] * ways)
+    return np.asarray(np.linalg.norm(gap, axis=2).min(axis=1))

@@ -201,6 +201,7 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
         _stacked([_white(part, scale, k) for k, part in enumerate(each)])
         for each in ([part[None] for part in parts], frames, tools, joints, arms)
     )
+    arm = arm[..., np.abs(arm).max(axis=(0, 1)) > 0.0]
     bases = [base]
     if 'base' in problem.align:
         number = np.repeat(np.arange(len(parts)), problem.samples)
@@ -278,12 +279,11 @@ def _arm(maker: Features, rows: int) -> Array:
         ]
         signals = [np.sin(view.q[:, i]), np.cos(view.q[:, i]), view.q[:, i]]
         signals += [view.shift[('tau', i)], view.qd[:, i], np.sign(view.qd[:, i])]
-        if view.static:
-            signals.append(np.sign(np.gradient(view.q[:, i])))
-        for signal in signals:
+        side = np.sign(np.gradient(view.q[:, i])) if view.static else 0.0 * view.q[:, i]
+        for signal in (*signals, side):
+            # A joint that rests in one recording and moves in another has the same columns in both.
             spread = float(np.abs(signal).max())
-            if spread > 1e-9:
-                out.append(joint * (signal / spread))
+            out.append(joint * (signal / spread if spread > 1e-9 else 0.0 * signal))
     return np.stack(out)
 
 

@@ -95,6 +95,12 @@ class Directions:
             out += [f'curve of joint {joint + 1} at {place:.3f}' for place in knots]
         return out
 
+    def fitted(self) -> Array:
+        """Return the coordinates of the fitted model; those of frames and curves are zero."""
+        curves = sum(k.size for k in self.knots)
+        own = [effect.coordinates() for effect in self.effects]
+        return np.concatenate([np.zeros(self.frame_count), *own, np.zeros(curves)])
+
     def columns(self, features: Features, setup: int) -> Array:
         """
         Return d pose / d coordinate, shape (P, 6, M), linear part first [m, rad].
@@ -201,6 +207,8 @@ class Posterior:
     recorded_m, anywhere_m : float
         Standard deviation of position in its worst direction [m], in the middle of the postures
         that were recorded and of those that the joints' limits allow.
+    prior_std : array, shape (P,), optional
+        Standard deviation of every coordinate before the data.
 
     """
 
@@ -212,6 +220,7 @@ class Posterior:
     left_open: tuple[str, ...] = ()
     recorded_m: float = 0.0
     anywhere_m: float = 0.0
+    prior_std: Array | None = None
 
     def __post_init__(self) -> None:
         count = self.directions.count
@@ -343,15 +352,21 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
     """Return plain numbers, lists and strings: the entry ``posterior`` of diagnosis.json."""
     what, rest = posterior.directions, posterior.discrepancy
     deviation = np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0))
+    coordinates = [
+        {'name': name, 'std': float(std), 'mean': float(mean), 'value': float(at + mean)}
+        for name, std, mean, at in zip(
+            what.names(), deviation, posterior.mean, what.fitted(), strict=True
+        )
+    ]
+    if posterior.prior_std is not None:
+        for entry, width in zip(coordinates, posterior.prior_std, strict=True):
+            entry['prior_std'] = float(width)
     return {
         'frames': list(what.frames),
         'setups': what.setups,
         'effects': [effect.to_mapping() for effect in what.effects],
         'knots': [knots.tolist() for knots in what.knots],
-        'coordinates': [
-            {'name': name, 'std': float(std), 'mean': float(mean)}
-            for name, std, mean in zip(what.names(), deviation, posterior.mean, strict=True)
-        ],
+        'coordinates': coordinates,
         'covariance': [
             [float(v) for v in row[: k + 1]] for k, row in enumerate(posterior.covariance)
         ],

@@ -126,6 +126,7 @@ def allowed(
         plausible_arm.discrepancy(model.robot, left, width[ends], model.found),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
+        prior_std=width,
     )
     return _with_usual_sigma(posterior, model, problem)
 

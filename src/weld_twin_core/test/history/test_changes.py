@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Changes between diagnoses, against years of simulated weekly recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weld_twin_core.errors import DataError
+from weld_twin_core.history import Observation, changes, reaches
+from weld_twin_core.history.observation import series_of
+
+COUNT = 20
+NAMES = tuple(f'joint_offset joint_{k} 0' for k in range(COUNT))
+
+
+def year(seed, drift=None, weeks=52, same=()):
+    """Return the weekly posteriors of an arm whose coordinates do what ``drift(week)`` adds."""
+    rng = np.random.default_rng(seed)
+    arm = 0.5 * rng.normal(size=COUNT)
+    motion = rng.normal(size=(60, COUNT)) @ np.diag(rng.uniform(0.3, 3.0, COUNT))
+    out = []
+    for week in range(weeks):
+        rows = motion + 0.3 * rng.normal(size=motion.shape)
+        for one, other in same:
+            rows[:, one] = rows[:, other]
+        moved = arm + (0.0 if drift is None else drift(week))
+        covariance = np.linalg.inv(rows.T @ rows + np.eye(COUNT))
+        seen = rows @ moved + rng.normal(size=len(rows))
+        value = covariance @ (rows.T @ seen)
+        out.append(Observation(7.0 * week, NAMES, value, covariance, np.ones(COUNT)))
+    return out
+
+
+def only(place, size, begin):
+    return lambda week: size * (np.arange(COUNT) == place) * (week >= begin)
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_nothing_is_told_of_a_year_without_a_change(seed):
+    assert changes(year(seed)) == ()
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_a_step_of_four_standard_errors_is_found_within_three_recordings(seed):
+    place = seed % COUNT
+    error = np.sqrt(year(seed)[30].covariance[place, place])
+    found = changes(year(seed, only(place, 4.0 * error, 30), weeks=33))
+    assert [(each.name, each.kind) for each in found] == [(NAMES[place], 'step')]
+    assert abs(found[0].size - 4.0 * error) < 4.0 * found[0].std
+    assert found[0].between[0] <= 7.0 * 30 <= found[0].between[1] + 7.0
+    assert found[0].std < error
+
+
+def test_a_trend_is_no_step_and_has_its_rate():
+    found = changes(year(3, lambda week: 0.1 * (np.arange(COUNT) == 5) * max(week - 20, 0)))
+    assert [(each.name, each.kind) for each in found] == [(NAMES[5], 'trend')]
+    assert found[0].size == pytest.approx(0.1 / 7.0, rel=0.1)
+    assert found[0].day == pytest.approx(7.0 * 20, abs=21.0)
+
+
+def test_a_season_is_neither():
+    def swing(week):
+        return 0.6 * (np.arange(COUNT) == 2) * np.sin(2.0 * np.pi * week * 7.0 / 365.25 + 0.4)
+
+    found = changes(year(4, swing))
+    assert [(each.name, each.kind) for each in found] == [(NAMES[2], 'season')]
+    assert found[0].size == pytest.approx(0.6, rel=0.15)
+
+
+def test_two_changes_are_both_found():
+    found = changes(year(6, lambda w: only(1, 1.0, 10)(w) + only(7, -1.2, 33)(w)))
+    assert {(each.name, each.kind) for each in found} == {(NAMES[1], 'step'), (NAMES[7], 'step')}
+
+
+def test_what_recordings_cannot_tell_apart_comes_as_a_set():
+    """Every motion shows the sum of two coordinates only."""
+    months = year(9, only(0, 1.5, 12), weeks=24, same=[(1, 0)])
+    found = changes(months)
+    assert {NAMES[0], NAMES[1]} <= {found[0].name, *found[0].alike}
+    assert changes(months, named={NAMES[1]})[0].name == NAMES[1]
+
+
+def test_the_prior_is_taken_out_of_what_the_data_say():
+    rng = np.random.default_rng(5)
+    rows, width = rng.normal(size=(9, 4)), np.array([0.1, 1.0, 3.0, 0.5])
+    truth = rng.normal(size=4)
+    covariance = np.linalg.inv(rows.T @ rows + np.diag(width**-2))
+    seen = Observation(0.0, NAMES[:4], covariance @ rows.T @ rows @ truth, covariance, width)
+    precision, told = seen.information()
+    np.testing.assert_allclose(precision, rows.T @ rows, atol=1e-9)
+    np.testing.assert_allclose(told, rows.T @ rows @ truth, atol=1e-9)
+
+
+def test_an_effect_that_is_not_named_is_taken_to_be_small():
+    weeks = year(2, weeks=3)
+    bare = replace(
+        weeks[0],
+        names=NAMES[1:],
+        value=weeks[0].value[1:],
+        covariance=weeks[0].covariance[1:, 1:],
+        prior_std=weeks[0].prior_std[1:],
+    )
+    series = series_of([bare, *weeks[1:]])
+    k = series.names.index(NAMES[0])
+    error = np.median([np.sqrt(each.covariance[0, 0]) for each in weeks[1:]])
+    assert series.precision[0, k, k] == pytest.approx(1.0 / (3.0 * error) ** 2)
+    assert series.told[0, k] == 0.0
+
+
+def test_diagnoses_of_one_instant_and_none_are_refused():
+    with pytest.raises(DataError, match='of the same instant'):
+        changes([year(0, weeks=1)[0]] * 2)
+    with pytest.raises(DataError, match='no diagnosis yet'):
+        changes([])
+
+
+def test_a_limit_is_reached_when_the_line_meets_it():
+    low, middle, high = reaches(2.0, 1.0, 0.0, 0.1, 0.01)
+    assert middle == pytest.approx(10.0, rel=0.02)
+    # 90 % of the rates lie within 1.645 standard errors
+    assert low == pytest.approx(1.0 / (0.1 + 0.01645), rel=0.02)
+    assert high == pytest.approx(1.0 / (0.1 - 0.01645), rel=0.02)
+    assert reaches(0.5, 1.0, 0.0, 0.1, 0.01) == (0.0, 0.0, 0.0)
+    assert reaches(2.0, 1.0, 0.0, -0.1, 0.01)[1] == pytest.approx(30.0, rel=0.02)
+    assert reaches(2.0, 1.0, 0.0, 0.0, 0.0)[1] == float('inf')

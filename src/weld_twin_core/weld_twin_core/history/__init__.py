@@ -1,0 +1,9 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What changed on one arm from diagnosis to diagnosis, and where it leads."""
+
+from .changes import Change, changes
+from .forecast import reaches
+from .observation import Observation
+
+__all__ = ['Change', 'Observation', 'changes', 'reaches']

@@ -1,0 +1,323 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What changed between diagnoses: steps, trends and seasons of single coordinates.
+
+All diagnoses are one linear model: the arm as it was at first, plus a few shapes in time, each on
+one coordinate. The shape that explains most is taken in, as long as it explains more than chance
+would in all the shapes that were tried; then the next is looked for beside it. Coordinates that the
+recordings tell apart badly explain a change equally well, so they come as a set. This is the
+generalised likelihood ratio test of a change point [1]_ with nuisance parameters.
+
+References
+----------
+.. [1] M. Basseville, I. V. Nikiforov, "Detection of Abrupt Changes", Prentice Hall 1993, section 2.4.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import chdtri
+
+from ..arrays import Array
+from .observation import Observation, Series, series_of
+
+YEAR = 365.25
+"""Days of a season."""
+MOST = 8
+"""Changes looked for; an arm with more of them was rebuilt."""
+ALIKE = 6.0
+"""Fall of the sum of squares by which another coordinate may explain less and still be told as alike:
+three nats, odds of twenty to one."""
+DATED = 3.84
+"""Fall within which another instant is as likely: 95 % of chi-square with one degree of freedom."""
+SEASON_SPAN = 0.75
+"""Share of a year that must be covered before a season is looked for: a shorter piece of a sine
+is a trend."""
+NAMED = 3.0
+"""Nats by which a coordinate that a diagnosis has named goes before one that none has: twenty to one."""
+ALARMS = 1.0 / 52.0
+"""False alarms allowed in one look: one in a year of weekly looks."""
+
+
+class Shape(NamedTuple):
+    """A kind of change, its instant (the first diagnosis after it) and its columns (W, m)."""
+
+    kind: str
+    begin: int
+    columns: Array
+
+
+@dataclass(frozen=True)
+class Change:
+    """
+    A change of one coordinate.
+
+    Attributes
+    ----------
+    name : str
+        The coordinate.
+    kind : str
+        'step', 'trend' or 'season'.
+    day : float
+        Of the first diagnosis that shows a step; where a trend begins.
+    between : tuple of float
+        Earliest and latest day that explain it as well (95 %); of a step, the last day before.
+    size, std : float
+        Height of a step, rise of a trend in a day, half the swing of a season; SI units.
+    nats : float
+        By how much it is more likely than no change.
+    alike : tuple of str
+        Other coordinates whose change would explain the same.
+
+    """
+
+    name: str
+    kind: str
+    day: float
+    between: tuple[float, float]
+    size: float
+    std: float
+    nats: float
+    alike: tuple[str, ...] = ()
+
+
+class Found(NamedTuple):
+    """A shape on a coordinate that was taken in."""
+
+    shape: Shape
+    place: int
+
+
+def changes(
+    observations: Sequence[Observation],
+    *,
+    named: Collection[str] = (),
+    alarms: float = ALARMS,
+) -> tuple[Change, ...]:
+    """
+    Return what changed, the surest first.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+    named : collection of str
+        Coordinates that a diagnosis has named as causes: of those that explain a change equally
+        well, they come first.
+    alarms : float
+        False alarms allowed in this look.
+
+    Raises
+    ------
+    DataError
+        There is no observation, or two are of the same instant.
+
+    """
+    series = series_of(observations)
+    if series.days.size < 2:
+        return ()
+    shapes = _shapes(series.days)
+    tests = len(shapes) * len(series.names)
+    found: list[Found] = []
+    out: list[Change] = []
+    for _ in range(MOST):
+        system = _System(series, found)
+        gain = np.array([system.gains(shape) for shape in shapes]) / system.scatter
+        # The last few diagnoses hardly tell a step from a trend; a step is the simpler.
+        bar = np.array(
+            [
+                chdtri(shape.columns.shape[1], alarms / tests) + ALIKE * (shape.kind == 'trend')
+                for shape in shapes
+            ]
+        )
+        row, column = np.unravel_index(int(np.argmax(gain - bar[:, None])), gain.shape)
+        best = int(row), int(column)
+        if gain[best] <= bar[best[0]]:
+            break
+        one, told = _told(series, system, shapes, gain, best, frozenset(named))
+        found.append(one)
+        out.append(told)
+    return tuple(out)
+
+
+def _shapes(days: Array) -> list[Shape]:
+    """Return the steps before every diagnosis but the first, the trends from each, and a season."""
+    count = days.size
+    shapes = [
+        Shape('step', k, (np.arange(count) >= k).astype(float)[:, None]) for k in range(1, count)
+    ]
+    shapes += [
+        Shape('trend', k, np.maximum(days - days[k], 0.0)[:, None]) for k in range(count - 2)
+    ]
+    if days[-1] - days[0] > SEASON_SPAN * YEAR:
+        phase = 2.0 * np.pi * days / YEAR
+        shapes.append(Shape('season', 0, np.column_stack([np.cos(phase), np.sin(phase)])))
+    return shapes
+
+
+class _System:
+    """
+    The arm as it was at first and the changes found so far, fitted together.
+
+    Parameters
+    ----------
+    series : Series
+    found : sequence of Found
+
+    """
+
+    def __init__(self, series: Series, found: Sequence[Found]) -> None:
+        self._series, self._found = series, tuple(found)
+        first = series.precision.sum(axis=0)
+        self._first = first
+        blocks = [[first + np.diag(series.prior)]]
+        right = [series.told.sum(axis=0)]
+        for each in found:
+            cross, _, told = self._against(each.shape)
+            blocks.append([cross[..., each.place], *self._among(each)])
+            right.append(told[:, each.place])
+        self._matrix = _symmetric(blocks)
+        self._right = np.concatenate([np.atleast_1d(r) for r in right])
+        self._inverse = np.linalg.inv(self._matrix)
+        self.solution = self._inverse @ self._right
+
+    @property
+    def scatter(self) -> float:
+        """
+        Return by how much diagnoses scatter more than they say, at least 1.
+
+        The median over the diagnoses, so that one that is off does not hide a change.
+        """
+        series, count = self._series, len(self._series.names)
+        ratios = []
+        for w in range(series.days.size):
+            state = self.solution[:count].copy()
+            at = count
+            for each in self._found:
+                width = each.shape.columns.shape[1]
+                state[each.place] += each.shape.columns[w] @ self.solution[at : at + width]
+                at += width
+            precision = series.precision[w]
+            values, axes = np.linalg.eigh(
+                precision / np.sqrt(np.outer(series.prior, series.prior))
+            )
+            live = values > 1.0
+            if not live.any():
+                continue
+            unit = axes[:, live] / np.sqrt(values[live])
+            gap = unit.T @ ((series.told[w] - precision @ state) / np.sqrt(series.prior))
+            ratios.append(float(gap @ gap) / live.sum())
+        return max(1.0, float(np.median(ratios))) if ratios else 1.0
+
+    def _against(self, shape: Shape) -> tuple[Array, Array, Array]:
+        """Return a shape on every coordinate: against the first state, itself, and the data."""
+        x, series = shape.columns, self._series
+        cross = np.einsum('wm,wij->mij', x, series.precision)
+        own = np.einsum('wm,wn,wjj->jmn', x, x, series.precision)
+        return cross, own, np.einsum('wm,wj->mj', x, series.told)
+
+    def _among(self, one: Found) -> list[Array]:
+        """Return the products of a change found with those found before it, and with itself."""
+        series, out = self._series, []
+        for other in self._found:
+            between = series.precision[:, one.place, other.place]
+            out.append(np.einsum('wm,wn,w->mn', one.shape.columns, other.shape.columns, between))
+            if other is one:
+                break
+        return out
+
+    def gains(self, shape: Shape) -> Array:
+        """Return by how much the sum of squares falls with a shape on each coordinate, (P,)."""
+        mean, information = self.sizes(shape)
+        return np.asarray(np.einsum('jm,jmn,jn->j', mean, information, mean))
+
+    def sizes(self, shape: Shape) -> tuple[Array, Array]:
+        """Return the size of a shape on each coordinate, (P, m), and its information, (P, m, m)."""
+        cross, own, told = self._against(shape)
+        series = self._series
+        rows = [np.moveaxis(cross, 0, -1)]  # (P first, P, m)
+        for each in self._found:
+            between = series.precision[:, each.place, :]
+            rows.append(np.einsum('wa,wm,wj->ajm', each.shape.columns, shape.columns, between))
+        stacked = np.concatenate(rows, axis=0)  # (P + found, P, m)
+        solved = np.tensordot(self._inverse, stacked, axes=1)
+        information = own - np.einsum('ajm,ajn->jmn', stacked, solved)
+        right = told.T - np.einsum('a,ajm->jm', self.solution, stacked)
+        # A coordinate that nobody has seen carries no information; its size is zero.
+        eye = np.eye(own.shape[1])
+        floor = 1e-9 * np.maximum(np.trace(own, axis1=1, axis2=2), 1e-300)
+        safe = information + floor[:, None, None] * eye
+        return np.linalg.solve(safe, right[..., None])[..., 0], information
+
+
+def _symmetric(blocks: list[list[Array]]) -> Array:
+    """Return a symmetric matrix of its blocks below the diagonal."""
+    sizes = [np.atleast_2d(row[-1]).shape[0] for row in blocks]
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    out = np.zeros((starts[-1], starts[-1]))
+    for i, row in enumerate(blocks):
+        for j, block in enumerate(row):
+            here = np.ix_(range(starts[i], starts[i + 1]), range(starts[j], starts[j + 1]))
+            out[here] = np.reshape(block, (sizes[i], sizes[j]))
+    return np.asarray(np.tril(out) + np.tril(out, -1).T)
+
+
+def _told(
+    series: Series,
+    system: _System,
+    shapes: Sequence[Shape],
+    gain: Array,
+    best: tuple[int, int],
+    named: frozenset[str],
+) -> tuple[Found, Change]:
+    """
+    Return the simplest change that explains as much as the best, and what else would.
+
+    Of coordinates that explain equally much, the one that need not do what it hardly ever does:
+    the size is weighed by what was believed of the coordinate before the data.
+    """
+    kind, top = shapes[best[0]].kind, gain[best]
+    same = [k for k, each in enumerate(shapes) if each.kind == kind]
+    most = gain[same].max(axis=0)
+    alike = np.flatnonzero(most > top - ALIKE)
+    at = {int(j): same[int(np.argmax(gain[same][:, j]))] for j in alike}
+    odds = {
+        j: _odds(series, system, shapes[k], j) + NAMED * (series.names[j] in named)
+        for j, k in at.items()
+    }
+    place = max(odds, key=lambda j: odds[j])
+    shape = shapes[at[place]]
+    mean, information = system.sizes(shape)
+    near = [shapes[k].begin for k in same if gain[k, place] > most[place] - DATED]
+    ranked = sorted(odds, key=lambda j: -odds[j])
+    others = [j for j in ranked if j != place and odds[j] > odds[place] - 0.5 * ALIKE]
+    season = kind == 'season'
+    return Found(shape, place), Change(
+        series.names[place],
+        kind,
+        float(series.days[shape.begin]),
+        (
+            float(series.days[max(min(near) - (kind == 'step'), 0)]),
+            float(series.days[max(near)]),
+        ),
+        float(np.hypot(*mean[place])) if season else float(mean[place, 0]),
+        float(np.sqrt(system.scatter / np.linalg.eigvalsh(information[place])[0])),
+        0.5 * float(most[place]),
+        tuple(series.names[k] for k in others),
+    )
+
+
+def _odds(series: Series, system: _System, shape: Shape, place: int) -> float:
+    """Return the logarithm of the odds of a shape on a coordinate against none, its prior in."""
+    mean, information = system.sizes(shape)
+    known = information[place] / system.scatter
+    # What was believed of a value holds for how far it moves over the recordings.
+    prior = series.prior[place] * np.diag(np.ptp(shape.columns, axis=0) ** 2)
+    told = known @ mean[place]
+    fall = told @ np.linalg.solve(known + prior, told)
+    return 0.5 * float(fall + np.linalg.slogdet(prior)[1] - np.linalg.slogdet(known + prior)[1])

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What one diagnosis says of an arm, as numbers that can be added to those of the next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array, readonly
+from ..errors import DataError
+
+SHOWN = 1e-6
+"""Share of the variance before the data that they must take away to have shown anything: less is
+the rounding of a file."""
+ABSENT = 3.0
+"""Standard errors of the diagnoses that name an effect, within which it is taken to be zero in those
+that do not name it: it would have been named beyond."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """
+    One diagnosis: values of coordinates, and how sure they are.
+
+    Attributes
+    ----------
+    day : float
+        When it was recorded [days]; the zero is the same for all.
+    names : tuple of str
+        Of the coordinates, such as 'joint_offset elbow_joint 0'; unique.
+    value : array, shape (P,)
+        SI units, counted from the model that was given.
+    covariance : array, shape (P, P)
+    prior_std : array, shape (P,)
+        What was believed of each before the data, about zero.
+
+    Raises
+    ------
+    DataError
+        The shapes do not agree, a name comes twice, or a number is not finite.
+
+    """
+
+    day: float
+    names: tuple[str, ...]
+    value: Array
+    covariance: Array
+    prior_std: Array
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        if len(set(self.names)) != count:
+            raise DataError('a coordinate comes twice in one diagnosis')
+        for name, shape in (
+            ('value', (count,)),
+            ('covariance', (count,) * 2),
+            ('prior_std', (count,)),
+        ):
+            object.__setattr__(self, name, readonly(getattr(self, name), shape, name))
+
+    def information(self) -> tuple[Array, Array]:
+        """
+        Return what the data alone say: precision, shape (P, P), and precision times value, (P,).
+
+        The prior is taken out again, else every diagnosis would repeat it.
+        """
+        width = self.prior_std
+        # At unit prior the posterior variance along a direction is 1 less what the data showed.
+        scaled = self.covariance / np.outer(width, width)
+        variance, axes = np.linalg.eigh(0.5 * (scaled + scaled.T))
+        variance = np.clip(variance, 1e-300, 1.0)
+        shown = np.where(variance < 1.0 - SHOWN, 1.0 / variance - 1.0, 0.0)
+        # value = variance * (precision of the data) * (what the data say), along each axis
+        along = axes.T @ (self.value / width)
+        told = np.where(shown > 0.0, along / variance, 0.0)
+        precision = (axes * shown) @ axes.T / np.outer(width, width)
+        return precision, (axes @ told) / width
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """
+    Observations over the same coordinates, in the order of time.
+
+    Attributes
+    ----------
+    days : array, shape (W,)
+    names : tuple of str, length P
+    precision : array, shape (W, P, P)
+    told : array, shape (W, P)
+        Precision times value.
+    prior : array, shape (P,)
+        Precision of what was believed before any of them.
+
+    """
+
+    days: Array
+    names: tuple[str, ...]
+    precision: Array
+    told: Array
+    prior: Array
+
+
+def series_of(observations: Sequence[Observation]) -> Series:
+    """
+    Return observations over all their coordinates.
+
+    An effect that only some diagnoses name is taken to be zero in the others, as surely as three
+    standard errors of those that name it.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+
+    Raises
+    ------
+    DataError
+        There are none, or two are of the same instant.
+
+    """
+    if not observations:
+        raise DataError('there is no diagnosis yet; add some first')
+    ordered = sorted(observations, key=lambda each: each.day)
+    days = np.array([each.day for each in ordered])
+    if (np.diff(days) <= 0.0).any():
+        raise DataError('two diagnoses are of the same instant; give each its own date')
+    names = tuple(dict.fromkeys(name for each in ordered for name in each.names))
+    place = {name: k for k, name in enumerate(names)}
+    width = np.zeros(len(names))
+    error: list[list[float]] = [[] for _ in names]
+    precision = np.zeros((days.size, len(names), len(names)))
+    told = np.zeros((days.size, len(names)))
+    for w, each in enumerate(ordered):
+        at = np.array([place[name] for name in each.names], int)
+        precision[w][np.ix_(at, at)], told[w, at] = each.information()
+        width[at] = np.maximum(width[at], each.prior_std)
+        for k, std in zip(at, np.sqrt(np.diag(each.covariance)), strict=True):
+            error[k].append(float(std))
+    for k, name in enumerate(names):
+        for w, each in enumerate(ordered):
+            if name not in each.names:
+                precision[w, k, k] += 1.0 / (ABSENT * float(np.median(error[k]))) ** 2
+    return Series(days, names, precision, told, 1.0 / width**2)

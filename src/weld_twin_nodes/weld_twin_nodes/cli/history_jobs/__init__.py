@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The jobs of `weld-twin history`, one file each."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from weld_twin_nodes.history import Database
+
+DATABASE = 'weld_twin_history.db'
+
+
+def add_database(parser: argparse.ArgumentParser) -> None:
+    """Add the option that names the database."""
+    parser.add_argument(
+        '--db',
+        default=DATABASE,
+        metavar='URL',
+        help='database: an SQLite file, or a URL such as postgresql+psycopg://user@host/name '
+        f'(default: {DATABASE})',
+    )
+
+
+@contextmanager
+def opened(args: argparse.Namespace) -> Iterator[Database]:
+    """Yield the database of the options."""
+    from weld_twin_nodes.history import Database
+
+    database = Database(args.db)
+    try:
+        yield database
+    finally:
+        database.close()
+
+
+def date_of(text: str) -> datetime:
+    """
+    Return the instant that a text names, UTC where it does not say.
+
+    Raises
+    ------
+    DataError
+        It is no date.
+
+    """
+    from weld_twin_core.errors import DataError
+
+    try:
+        at = datetime.fromisoformat(text)
+    except ValueError:
+        raise DataError(f"'{text}' is no date; write 2026-03-31 or 2026-03-31T14:05") from None
+    return at if at.tzinfo else at.replace(tzinfo=timezone.utc)

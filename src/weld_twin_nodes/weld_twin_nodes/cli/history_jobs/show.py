@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Show the diagnoses of a cell in the order of time, or which cells there are."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from . import add_database, opened
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from weld_twin_nodes.history import Entry
+
+WIDTH = 100
+"""Columns of the table, whatever the terminal has."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('--cell', metavar='NAME', help='left out: list the cells')
+    add_database(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a table."""
+    from rich.console import Console
+
+    with opened(args) as database:
+        if not args.cell:
+            print('\n'.join(database.cells()) or 'no cell yet')
+            return 0
+        entries = database.entries(args.cell)
+    Console(highlight=False, width=WIDTH).print(_table(entries))
+    return 0
+
+
+def _table(entries: list[Entry]) -> Table:
+    from rich.table import Table
+
+    from weld_twin_nodes.report.quantities import millimetres, odds
+    from weld_twin_nodes.report.words import cause
+
+    table = Table('recorded', 'status', 'sure', 'gap', 'left', 'causes', box=None)
+    for entry in entries:
+        causes = [cause(each['effect'], each.get('joint')) for each in entry.effects]
+        table.add_row(
+            entry.at.date().isoformat(),
+            entry.status,
+            '' if entry.confidence is None else odds(entry.confidence),
+            millimetres(entry.gap_m),
+            millimetres(entry.unexplained_m),
+            ', '.join(causes),
+        )
+    return table

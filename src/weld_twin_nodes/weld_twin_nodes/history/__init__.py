@@ -1,0 +1,9 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The history of cells: verdicts and values in a database, and what changed between them."""
+
+from .database import Database
+from .entry import Entry, entry_of
+from .tracking import observations
+
+__all__ = ['Database', 'Entry', 'entry_of', 'observations']

@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One diagnosis as it stands in the history."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
+
+NANOSECONDS = 1_000_000_000
+FIRST_YEAR = 2000
+"""Stamps before it are counted from the start of a machine, not from a date."""
+PASSING = ('base ', 'curve of ')
+"""Coordinates that are of one set-up or one motion only: where the instrument stood, and curves on
+the angles that were visited."""
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """
+    One diagnosis.
+
+    Attributes
+    ----------
+    at : datetime
+        When it was recorded, UTC.
+    robot, kinematics : str
+        Name and fingerprint of the robot's model.
+    recording : str
+        SHA-256 of what was diagnosed.
+    status : str
+    confidence, gap_m, floor_m, unexplained_m : float or None
+    effects : list of mappings
+        What was named, as in ``verdict.effects``.
+    names : tuple of str
+        Coordinates that say something of the arm; none where the data were unsound.
+    value, prior_std : array, shape (P,)
+    covariance : array, shape (P, P)
+    tool : array, shape (4, 4)
+        The fitted tool frame.
+
+    """
+
+    at: datetime
+    robot: str
+    kinematics: str
+    recording: str
+    status: str
+    confidence: float | None
+    gap_m: float | None
+    floor_m: float | None
+    unexplained_m: float | None
+    effects: list[Any]
+    names: tuple[str, ...]
+    value: Array
+    prior_std: Array
+    covariance: Array
+    tool: Array
+
+
+def entry_of(path: Path | str, at: datetime | None = None) -> Entry:
+    """
+    Return the entry of a diagnosis.
+
+    Parameters
+    ----------
+    path : Path or str
+        A ``diagnosis.json``, or the directory that holds it.
+    at : datetime, optional
+        When it was recorded; left out, the stamps of the recording tell.
+
+    Raises
+    ------
+    ModelError
+        It is no diagnosis.
+    DataError
+        It lacks what a history needs; the sentence says what.
+
+    """
+    file = Path(path)
+    file = file / 'diagnosis.json' if file.is_dir() else file
+    data = read_diagnosis(file)
+    try:
+        return _entry(data, file, at)
+    except (KeyError, TypeError, IndexError, AttributeError) as error:
+        raise ModelError(f"diagnosis '{file}' lacks {error}; make it again") from None
+
+
+def _entry(data: Mapping[str, Any], file: Path, at: datetime | None) -> Entry:
+    model, verdict, gap = data.get('model'), data['verdict'], data.get('gap') or {}
+    recordings = [each['sha256'] for each in data['inputs'] if each['use'] == 'recording']
+    if not recordings:
+        raise DataError(f"diagnosis '{file}' does not say which recording it is of; make it again")
+    if model is None:
+        raise DataError(
+            f"the data of '{file}' were unsound, so it says nothing of the arm; mend them first"
+        )
+    names, value, prior, covariance = _coordinates(data.get('posterior'), file)
+    return Entry(
+        at or _date(model['epochs_ns'][0], file),
+        str(model['robot']),
+        str(model['kinematics']),
+        '+'.join(recordings),
+        str(verdict['status']),
+        verdict['confidence'],
+        gap.get('rms_m'),
+        gap.get('noise_floor_m'),
+        (data.get('unexplained') or {}).get('rms_m'),
+        list(verdict['effects']),
+        names,
+        value,
+        prior,
+        covariance,
+        np.asarray(model['tool'], dtype=float),
+    )
+
+
+def _date(epoch_ns: int, file: Path) -> datetime:
+    at = datetime.fromtimestamp(epoch_ns // NANOSECONDS, timezone.utc)
+    if at.year < FIRST_YEAR:
+        raise DataError(
+            f"the stamps of '{file}' are no dates ({at.date()}); say when it was recorded: --at DATE"
+        )
+    return at
+
+
+def _coordinates(
+    posterior: Mapping[str, Any] | None, file: Path
+) -> tuple[tuple[str, ...], Array, Array, Array]:
+    """Return names, values, widths before the data and covariance of what is the arm's own."""
+    told = [] if posterior is None else posterior['coordinates']
+    if not told or 'prior_std' not in told[0]:
+        raise DataError(
+            f"diagnosis '{file}' does not say what was believed before the data: an older version "
+            'wrote it; diagnose the recording again'
+        )
+    assert posterior is not None
+    keep = [k for k, each in enumerate(told) if not each['name'].startswith(PASSING)]
+    whole = np.zeros((len(told), len(told)))
+    for k, row in enumerate(posterior['covariance']):
+        whole[k, : k + 1] = row
+        whole[: k + 1, k] = row
+    return (
+        tuple(told[k]['name'] for k in keep),
+        np.array([float(told[k]['value']) for k in keep]),
+        np.array([float(told[k]['prior_std']) for k in keep]),
+        whole[np.ix_(keep, keep)],
+    )

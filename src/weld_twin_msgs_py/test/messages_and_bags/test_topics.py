@@ -21,6 +21,7 @@ def test_names_and_types_are_those_of_the_public_interface():
         '/diagnosis': 'diagnostic_msgs/DiagnosticArray',
         '/tool_wrench': 'geometry_msgs/WrenchStamped',
         '/temperature': 'sensor_msgs/Temperature',
+        '/contact': 'sensor_msgs/Range',
     }
 
 

@@ -232,6 +232,13 @@ def test_every_subcommand_has_help(weld_twin):
         assert weld_twin(name, '--help').code == 0
 
 
+def simulated_with(weld_twin, folder, effect):
+    """Return what the command says of a short motion with one effect."""
+    (folder / 'e.yaml').write_text(f'- {effect}\n')
+    words = ('--effects', folder / 'e.yaml', '--rate', 20, '--out', folder / 'bag')
+    return weld_twin('simulate', '--robot', 'ur5', *words)
+
+
 @pytest.mark.parametrize(
     ('effect', 'said'),
     [
@@ -243,35 +250,13 @@ def test_every_subcommand_has_help(weld_twin):
     ],
 )
 def test_a_value_that_no_machine_has_is_doubted_in_a_sentence(weld_twin, tmp_path, effect, said):
-    (tmp_path / 'e.yaml').write_text(f'- {effect}\n')
-    result = weld_twin(
-        'simulate',
-        '--robot',
-        'ur5',
-        '--effects',
-        tmp_path / 'e.yaml',
-        '--rate',
-        20,
-        '--out',
-        tmp_path / 'bag',
-    )
+    result = simulated_with(weld_twin, tmp_path, effect)
     assert result.code == 0
     assert said in result.err
 
 
 def test_a_delay_beyond_the_motion_leaves_a_sentence_and_no_bag(weld_twin, tmp_path):
-    (tmp_path / 'e.yaml').write_text('- {effect: time_delay, delay: 200}\n')
-    result = weld_twin(
-        'simulate',
-        '--robot',
-        'ur5',
-        '--effects',
-        tmp_path / 'e.yaml',
-        '--rate',
-        20,
-        '--out',
-        tmp_path / 'bag',
-    )
+    result = simulated_with(weld_twin, tmp_path, '{effect: time_delay, delay: 200}')
     assert result.code == 2
     assert 'no measurement meets a pose of the twin' in result.err
     assert not (tmp_path / 'bag').exists()

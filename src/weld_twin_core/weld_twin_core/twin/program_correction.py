@@ -214,7 +214,19 @@ class _Work(NamedTuple):
         return ''
 
     def moved_by(self, moved: MoveProgram, use: Use, tool: Array) -> tuple[float, float]:
-        """Return how far a place moved [m, rad]."""
+        """
+        Return how far a place moved [m, rad].
+
+        Parameters
+        ----------
+        moved : MoveProgram
+            The corrected program.
+        use : Use
+            Where the place is used.
+        tool : array, shape (4, 4)
+            The tool frame there.
+
+        """
         old, new = self.program.place(use), moved.place(use)
         if old.ndim == 1:
             arm = self.model.arm(tool)

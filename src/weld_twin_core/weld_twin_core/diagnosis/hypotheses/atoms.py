@@ -99,7 +99,19 @@ class MovedJoint:
     def of(
         cls, problem: Problem, features: Sequence[Features], scale: Scale, joint: int
     ) -> MovedJoint:
-        """Take the column of a joint at the features' model."""
+        """
+        Take the column of a joint at the features' model.
+
+        Parameters
+        ----------
+        problem : Problem
+        features : sequence of Features
+            Of every recording, at the model.
+        scale : Scale
+            What the rows are divided by.
+        joint : int
+
+        """
         parts = [
             maker.column(('q', joint))[:c] for maker, c in zip(features, problem.rows, strict=True)
         ]
@@ -169,7 +181,18 @@ def moved_joint(shifts: Sequence[Sequence[Shift]]) -> int | None:
 
 
 def amounts(shifts: Sequence[Sequence[Shift]], joint: int, samples: Sequence[int]) -> Array:
-    """Return by how much every feature moves a joint, over all recordings, shape (K, samples)."""
+    """
+    Return by how much every feature moves a joint, over all recordings, shape (K, samples).
+
+    Parameters
+    ----------
+    shifts : sequence of sequence of Shift
+        Of every recording, K features each.
+    joint : int
+    samples : sequence of int
+        Of every recording.
+
+    """
     channel = ('q', joint)
     parts = [
         np.stack([np.broadcast_to(shift.get(channel, 0.0), (m,)) for shift in part])

@@ -76,8 +76,11 @@ SIM = {'use_sim_time': True, 'reliable_inputs': True, 'wait_for_subscribers': 1}
 def test_every_node_does_the_same_from_a_played_bag_as_it_did_live(cell, recorded):
     taps = {topic: cell.collect(topic) for topic in READ}
     cell.start('deviation_analyzer', use_sim_time=True, reliable_inputs=True)
-    cell.start('forward_kinematics_twin', **SIM)
+    cell.start('forward_kinematics_twin', **{**SIM, 'wait_for_subscribers': 2})
     cell.start('error_injector', effects=EFFECTS, seed=7, **{**SIM, 'wait_for_subscribers': 0})
+    # The bag is over in a second: the analyzer must be known before it begins.
+    both = ('/twin/tool_pose', '/measured/tool_pose')
+    cell.wait(lambda: all(cell.node.count_subscribers(t) == 2 for t in both), 'the analyzer')
     cell.meet()
     player(cell, '/joint_states', options=('--subscribers', '2'))
     count = len(recorded['/deviation'])

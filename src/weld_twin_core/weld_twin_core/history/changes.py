@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -173,8 +174,8 @@ class _System:
 
     def __init__(self, series: Series, found: Sequence[Found]) -> None:
         self._series, self._found = series, tuple(found)
+        self._sizes: dict[tuple[str, int], tuple[Array, Array]] = {}
         first = series.precision.sum(axis=0)
-        self._first = first
         blocks = [[first + np.diag(series.prior)]]
         right = [series.told.sum(axis=0)]
         for each in found:
@@ -186,7 +187,7 @@ class _System:
         self._inverse = np.linalg.inv(self._matrix)
         self.solution = self._inverse @ self._right
 
-    @property
+    @cached_property
     def scatter(self) -> float:
         """
         Return by how much diagnoses scatter more than they say, at least 1.
@@ -238,6 +239,12 @@ class _System:
 
     def sizes(self, shape: Shape) -> tuple[Array, Array]:
         """Return the size of a shape on each coordinate, (P, m), and its information, (P, m, m)."""
+        key = shape.kind, shape.begin
+        if key not in self._sizes:
+            self._sizes[key] = self._fitted(shape)
+        return self._sizes[key]
+
+    def _fitted(self, shape: Shape) -> tuple[Array, Array]:
         cross, own, told = self._against(shape)
         series = self._series
         rows = [np.moveaxis(cross, 0, -1)]  # (P first, P, m)

@@ -106,9 +106,9 @@ def split_topic(name: str) -> tuple[str, str]:
     return topic, part.strip('/')
 
 
-def plain_messages(kind: str, message: Any, part: str = '') -> Iterator[Any]:
+def plain_messages(kind: str, message: Any, part: str = '') -> tuple[Any, ...]:
     """
-    Yield the plain messages that a message stands for, itself where it is one.
+    Return the plain messages that a message stands for, itself where it is one.
 
     Parameters
     ----------
@@ -125,7 +125,4 @@ def plain_messages(kind: str, message: Any, part: str = '') -> Iterator[Any]:
 
     """
     turn = FOREIGN.get(kind)
-    if turn is None:
-        yield message
-        return
-    yield from turn(message, part)
+    return (message,) if turn is None else tuple(turn(message, part))

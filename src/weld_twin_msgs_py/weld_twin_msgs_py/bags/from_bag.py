@@ -178,7 +178,7 @@ def _fill(
     for topic, kind, _, message in bag.messages(roles):
         stream = streams[roles[topic]]
         try:
-            plain = tuple(plain_messages(kind, message, parts[topic]))
+            plain = plain_messages(kind, message, parts[topic])
         except DataError as error:
             raise DataError(f"message {stream.messages} of '{topic}': {error}") from None
         for each in plain:

@@ -15,8 +15,8 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
+from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
-NANOSECONDS = 1_000_000_000
 FIRST_YEAR = 2000
 """Stamps before it are counted from the start of a machine, not from a date."""
 PASSING = ('base ', 'curve of ')

@@ -58,7 +58,9 @@ class Database:
         self._sql = sqlalchemy
         self.url = url if '://' in url else f'sqlite:///{Path(url).absolute()}'
         with self._clear():
-            self._engine: Engine = sqlalchemy.create_engine(self.url)
+            address = sqlalchemy.make_url(self.url)
+            self.url = address.render_as_string(hide_password=True)
+            self._engine: Engine = sqlalchemy.create_engine(address)
             self._tables = _schema()
             self._tables.create_all(self._engine)
             self._check_version()
@@ -161,7 +163,12 @@ class Database:
         """Turn errors of the database into one sentence."""
         try:
             yield
-        except (self._sql.exc.SQLAlchemyError, ModuleNotFoundError) as error:
+        except ModuleNotFoundError as error:
+            raise DataError(
+                f"the history '{self.url}' needs {error.name}; for PostgreSQL install it with: "
+                "pip install 'weld-twin[postgresql]'"
+            ) from None
+        except self._sql.exc.SQLAlchemyError as error:
             said = str(getattr(error, 'orig', None) or error).splitlines()[0]
             raise DataError(f"the history '{self.url}' cannot be used: {said}") from None
 

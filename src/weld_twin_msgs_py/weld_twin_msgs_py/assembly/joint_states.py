@@ -78,6 +78,11 @@ class JointStates:
         self.others = self.parts = 0
         self.remark = ''
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the robot's joints as the messages name them."""
+        return self._names
+
     def take(self, message: Any) -> JointSample | None:
         """
         Return the sample that a message completes, None if it completes none.

@@ -30,6 +30,7 @@ from .contacts import marks, touching
 from .ends import Ends, never_recorded, uneven_ends
 from .needed import POSE_TYPES, no_joints, no_measurements
 from .reader import BagReader
+from .regular import fill_regular
 
 TYPES = {
     Role.JOINTS: (JOINT_STATES.type, *JOINTS),
@@ -80,11 +81,9 @@ def read_recording(
 
     """
     names = TopicNames() if topics is None else topics
-    intake = Intake(robot, limits=False)
     with BagReader(path) as bag:
         roles = _roles(names, bag.topics)
-        streams = {role: Stream(topic, Intake.width(role, robot)) for topic, role in roles.items()}
-        _fill(bag, names, roles, streams, intake)
+        streams, intake = _read(bag, names, roles, robot)
         points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
         made = bag.provenance
         touched = marks(bag, names)
@@ -164,6 +163,23 @@ def _topic(names: TopicNames, role: Role) -> str:
     """Return the topic of a role, without the part of its messages that is meant."""
     name: str = getattr(names, role.value)
     return split_topic(name)[0]
+
+
+def _read(
+    bag: BagReader, names: TopicNames, roles: Mapping[str, Role], robot: Robot
+) -> tuple[dict[Role, Stream], Intake]:
+    """Return the columns of a bag: read by the thousand where all is as usual, else one by one."""
+    streams, intake = _empty(roles, robot)
+    whole = not any(split_topic(getattr(names, role.value))[1] for role in roles.values())
+    if not (whole and fill_regular(bag, roles, streams, intake)):
+        streams, intake = _empty(roles, robot)
+        _fill(bag, names, roles, streams, intake)
+    return streams, intake
+
+
+def _empty(roles: Mapping[str, Role], robot: Robot) -> tuple[dict[Role, Stream], Intake]:
+    streams = {role: Stream(topic, Intake.width(role, robot)) for topic, role in roles.items()}
+    return streams, Intake(robot, limits=False)
 
 
 def _fill(

@@ -5,14 +5,18 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import replace
 from inspect import getdoc
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.messages.topics import TopicNames
+    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
 
 PARTS = {
     'joint': 'JointState, DynamicJointState or JointTrajectoryControllerState (TOPIC:feedback)',
@@ -39,6 +43,27 @@ def robot_of(args: argparse.Namespace) -> Robot:
     from weld_twin_msgs_py.robots import load_robot
 
     return load_robot(args.robot, args.base_link, args.tip_link)
+
+
+def given_urdf(args: argparse.Namespace) -> GivenUrdf | None:
+    """Return the URDF that the robot was read from, None for another robot file."""
+    from weld_twin_msgs_py.robots.load import URDF_SUFFIXES
+    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
+
+    path = Path(args.robot)
+    if path.suffix.lower() not in URDF_SUFFIXES:
+        return None
+    return GivenUrdf(path, args.base_link, args.tip_link)
+
+
+def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
+    """Return the robot with the effects of a file; say which values no machine has."""
+    from ..offline.told_twin import build_twin, doubts
+
+    twin = build_twin(robot, path, implausible=implausible)
+    for doubt in doubts(twin):
+        print(f'weld-twin: {path}: {doubt}', file=sys.stderr)
+    return twin
 
 
 def add_topics(parser: argparse.ArgumentParser) -> None:

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import replace
-from inspect import getdoc
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -81,6 +79,8 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
     """Return the names of the topics."""
+    from dataclasses import replace
+
     from weld_twin_msgs_py.messages.topics import TopicNames
 
     given = {name: getattr(args, f'{name}_topic') for name in TOPIC_OPTIONS}
@@ -110,7 +110,7 @@ def add_command(subparsers: Any, name: str, module: ModuleType) -> argparse.Argu
         With ``add_arguments(parser)``; the first line of its docstring is the short help.
 
     """
-    text = getdoc(module) or ''
+    text = (module.__doc__ or '').strip()
     parser: argparse.ArgumentParser = subparsers.add_parser(
         name,
         help=text.partition('\n')[0].replace('%', '%%'),

@@ -54,6 +54,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default='add',
         help='whether measured is target plus or minus difference',
     )
+    group.add_argument(
+        '--joint-signs',
+        metavar='1,-1,...',
+        type=_floats,
+        help='of every joint, where the controller counts it the other way than the model',
+    )
+    group.add_argument(
+        '--joint-offsets',
+        metavar='DEG,DEG,...',
+        type=_floats,
+        help='added to every joint [deg, mm for a slide], such as 0,-90,90,0,0,0',
+    )
+    group.add_argument(
+        '--coupled',
+        metavar='3+2',
+        help="the model's joint 3 is that of the table plus joint 2; 3-2 takes it off",
+    )
     group.add_argument('--positions-only', action='store_true', help='do not read orientations')
     group.add_argument(
         '--skip-rows',
@@ -141,6 +158,10 @@ def _write_deviations(args: argparse.Namespace, recording: Recording, off: Array
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(','))
+
+
+def _floats(text: str) -> tuple[float, ...]:
+    return tuple(float(part) for part in text.split(','))
 
 
 def _numbers(text: str) -> tuple[int, ...]:

@@ -35,6 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--table', metavar='CSV', help='also write every deviation from the twin')
     parser.add_argument('--picture', metavar='PNG', help='also draw the deviations')
+    _add_reading(parser)
+
+
+def _add_reading(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('how to read the table')
     for name in LISTS:
         group.add_argument(f'--{name}-columns', metavar='A,B,C', type=_names)
@@ -54,6 +58,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default='add',
         help='whether measured is target plus or minus difference',
     )
+    group.add_argument('--positions-only', action='store_true', help='do not read orientations')
+    group.add_argument(
+        '--skip-rows',
+        metavar='N,N',
+        type=_numbers,
+        default=(),
+        help='rows to leave out; the first row under the header is 1',
+    )
+    group.add_argument('--delimiter', help='comma, semicolon or tab')
+    group.add_argument('--decimal', choices=('.', ','))
+    _add_counting(parser)
+
+
+def _add_counting(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group('how the controller counts its joints')
     group.add_argument(
         '--joint-signs',
         metavar='1,-1,...',
@@ -71,16 +90,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='3+2',
         help="the model's joint 3 is that of the table plus joint 2; 3-2 takes it off",
     )
-    group.add_argument('--positions-only', action='store_true', help='do not read orientations')
-    group.add_argument(
-        '--skip-rows',
-        metavar='N,N',
-        type=_numbers,
-        default=(),
-        help='rows to leave out; the first row under the header is 1',
-    )
-    group.add_argument('--delimiter', help='comma, semicolon or tab')
-    group.add_argument('--decimal', choices=('.', ','))
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Many serialised messages of one layout to columns of numbers, without decoding each.
+Many serialised messages of one layout to columns of numbers and back, none decoded by itself.
 
 A robot that moves sends the same message again and again: frame, names and counts stay, stamp and
 numbers change. Where the first message has been decoded, the others are numbers at known places,
@@ -15,7 +15,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,6 +87,32 @@ class Layout:
             for at, count in self.doubles
         ]
         return ns, runs
+
+    def filled(self, data: bytes, ns: np.ndarray, runs: Sequence[Array]) -> np.ndarray:
+        """
+        Return messages like one of this layout, with other stamps and numbers.
+
+        Parameters
+        ----------
+        data : bytes, length size
+            The message to repeat.
+        ns : array of int, shape (N,) [ns]
+        runs : sequence of arrays, shapes (N, count)
+            One for each run of doubles.
+
+        Returns
+        -------
+        array of uint8, shape (N, size)
+
+        """
+        out = np.tile(np.frombuffer(data, np.uint8), (ns.size, 1))
+        seconds, rest = np.divmod(ns, NANOSECONDS)
+        out[:, _STAMP] = np.column_stack([seconds, rest]).astype('<u4').view(np.uint8)
+        for (at, count), run in zip(self.doubles, runs, strict=True):
+            if count:
+                values = np.ascontiguousarray(run, dtype='<f8').reshape(ns.size, count)
+                out[:, at : at + 8 * count] = values.view(np.uint8)
+        return out
 
 
 class _Walk:

@@ -13,8 +13,6 @@ from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.messages.topics import (
     DIAGNOSIS,
     JOINT_STATES,
-    MEASURED_POINT,
-    MEASURED_POSE,
     MEASURED_SIGMA,
     TEMPERATURE,
     TOOL_WRENCH,
@@ -25,9 +23,11 @@ from .cell_frames import placed_twin
 from .cell_node import CellNode
 from .diagnosis_window import Window
 from .diagnosis_worker import Finding, Job, Worker
+from .input_settings import JOINT_SETTINGS, MEASURED_SETTINGS
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run
 from .settings import Setting
+from .tf_frames import MeasuredInputs
 
 LOOK_EVERY = 0.2
 """Seconds between two looks at whether the worker has finished."""
@@ -37,8 +37,6 @@ INPUTS = {
     TOOL_WRENCH: Role.WRENCH,
     TEMPERATURE: Role.TEMPERATURE,
     MEASURED_SIGMA: Role.SIGMA,
-    MEASURED_POSE: Role.POSE,
-    MEASURED_POINT: Role.POINT,
     JOINT_STATES: Role.JOINTS,
 }
 
@@ -53,6 +51,8 @@ class LiveDiagnosis(CellNode):
 
     settings: ClassVar[tuple[Setting, ...]] = (
         *ROBOT_SETTINGS,
+        *JOINT_SETTINGS,
+        *MEASURED_SETTINGS,
         Setting('model', '', 'what the twin knows: an effects file or diagnosis.json'),
         Setting('align', '', 'frames fitted along: base, tool, or base,tool'),
         Setting('window', 60.0, 'length of the window [s]', 1.0, 600.0),
@@ -65,7 +65,10 @@ class LiveDiagnosis(CellNode):
         self._twin = placed_twin(self, build_twin(robot_of(self), self.setting('model')))
         self._align = frames_named(self.setting('align'))
         self._window = Window(
-            self._twin.robot, self.setting('window'), self.setting('measuring_frame')
+            self._twin.robot,
+            self.setting('window'),
+            self.setting('measuring_frame'),
+            self.joint_names,
         )
         self._worker = Worker()
         self._begun = -float('inf')
@@ -75,6 +78,9 @@ class LiveDiagnosis(CellNode):
         for topic, role in INPUTS.items():
             required = role is Role.JOINTS
             self.listen(topic, partial(self._take, role), required=required)
+        self._measured = MeasuredInputs(
+            self, partial(self._take, Role.POSE), partial(self._take, Role.POINT)
+        )
         self.every(LOOK_EVERY, self._look)
 
     def destroy_node(self) -> None:
@@ -89,6 +95,7 @@ class LiveDiagnosis(CellNode):
 
     def time_went_back(self) -> None:
         """Forget the window."""
+        self._measured.clear()
         self._window.reset()
         self._seen = None
 

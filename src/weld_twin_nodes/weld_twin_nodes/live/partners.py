@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.node import Node
@@ -12,7 +13,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from weld_twin_msgs_py.messages.topics import Qos
 
 
-def unheard_publishers(node: Node, topic: str, kind: str, wanted: Qos) -> list[str]:
+def unheard_publishers(
+    node: Node, topic: str, kind: str, wanted: Qos, understood: Sequence[str] = ()
+) -> list[str]:
     """
     Return a sentence for every publisher of a topic of which nothing arrives.
 
@@ -25,12 +28,16 @@ def unheard_publishers(node: Node, topic: str, kind: str, wanted: Qos) -> list[s
         Message type that is asked for.
     wanted : Qos
         Quality of service that is asked for.
+    understood : sequence of str
+        Types that could be taken instead, if nobody published the one that is.
 
     """
     out = []
     for info in node.get_publishers_info_by_topic(topic):
-        if info.topic_type != kind:
-            reason = f'sends {info.topic_type}, this node needs {kind}'
+        if info.topic_type != kind and info.topic_type in understood:
+            reason = f'sends {info.topic_type} where another sends {kind}, which is taken'
+        elif info.topic_type != kind:
+            reason = f'sends {info.topic_type}, this node needs {" or ".join(understood) or kind}'
         else:
             reason = _gap(info.qos_profile, wanted.to_rclpy())
         if reason:

@@ -7,16 +7,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from rclpy.executors import SingleThreadedExecutor
-
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import ModelError
 from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
+from .awaiting import spin_until
 from .cell_frames import FRAME_SETTINGS, placed
 from .cell_node import CellNode
+from .input_settings import joint_names
 from .settings import Setting
 
 ROBOT_SETTINGS = (
@@ -30,8 +29,6 @@ ROBOT_SETTINGS = (
     Setting('tip_link', '', 'last link of the chain in a URDF; empty: its only leaf'),
     *FRAME_SETTINGS,
 )
-LOOK = 0.1
-"""Seconds of one turn of the loop that waits for a description."""
 
 
 def robot_of(node: CellNode) -> Robot:
@@ -51,8 +48,10 @@ def robot_of(node: CellNode) -> Robot:
         robot = parse_urdf(_described(node, topic), topic, base, tip)
     else:
         robot = load_robot(name, base, tip)
-    node.take_robot_name(robot.name)
-    return placed(node, robot)
+    robot = placed(node, robot)
+    given = node.has_parameter('joint_map')
+    node.take_robot(robot, joint_names(node, robot) if given else None)
+    return robot
 
 
 def told_by_topic(name: str) -> bool:
@@ -76,18 +75,6 @@ def _described(node: CellNode, topic: str) -> str:
         ROBOT_DESCRIPTION.requested.to_rclpy(),
         raw=True,
     )
-    node.get_logger().info(f'waiting for the robot on {topic}')
-    node.health.lasting['robot'] = f'waiting for the robot on {topic}'
-    runner = SingleThreadedExecutor(context=node.context)
-    runner.add_node(node)
-    try:
-        while not texts:
-            if not node.context.ok():
-                raise ModelError(f'stopped before a robot was told on {topic}')
-            runner.spin_once(timeout_sec=LOOK)
-    finally:
-        runner.remove_node(node)
-        runner.shutdown()
+    spin_until(node, lambda: bool(texts), f'the robot on {topic}')
     node.destroy_subscription(subscription)
-    del node.health.lasting['robot']
     return texts[-1]

@@ -39,6 +39,13 @@ ROS = {
     'rcl_interfaces',
     'rclpy',
     'rosgraph_msgs',
+    'rosidl_adapter',
+    'rosidl_generator_c',
+    'rosidl_generator_py',
+    'rosidl_generator_type_description',
+    'rosidl_typesupport_c',
+    'rosidl_typesupport_fastrtps_c',
+    'rosidl_typesupport_introspection_c',
     'sensor_msgs',
     'std_srvs',
 }

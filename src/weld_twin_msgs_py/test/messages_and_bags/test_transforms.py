@@ -72,7 +72,7 @@ def test_what_is_not_told_yet_or_was_too_long_ago_is_no_place(tree):
     with pytest.raises(NoTransform, match=r'is 0.5 s newer'):
         tree.between('world', 'tool0', S // 2)
     tree.take(told('base_link', 'tool0', at=3.5))
-    with pytest.raises(NoTransform, match='have a hole of 1.5 s around'):
+    with pytest.raises(NoTransform, match=r'have a hole of 1.5 s around'):
         tree.between('world', 'tool0', 3 * S)
     for k in range(4, 20):
         tree.take(told('base_link', 'tool0', at=float(k)))

@@ -30,7 +30,7 @@ from ..messages.from_messages import NANOSECONDS
 KEPT = 10.0
 """Seconds of a moving frame that are kept, as tf2 keeps them."""
 GAP = 1.0
-"""Longest step [s] between two places that is interpolated: what went on in a longer one, nobody knows."""
+"""Longest step [s] between two places that is interpolated; in a longer one anything may go on."""
 
 
 class NoTransform(DataError):

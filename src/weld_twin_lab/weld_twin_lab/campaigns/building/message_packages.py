@@ -17,7 +17,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from importlib.util import find_spec
 from io import StringIO
@@ -140,11 +140,37 @@ def _generate(package: str, source: Path, made: Path, site: Path) -> None:
     import rosidl_typesupport_introspection_c
     from rosidl_adapter.msg import convert_msg_to_idl
 
-    names = sorted(DEFINITIONS[package])
-    for name in names:
+    for name in DEFINITIONS[package]:
         convert_msg_to_idl(source, package, Path('msg', f'{name}.msg'), source / 'msg')
-    share = PREFIX / 'share'
-    common: dict[str, Any] = {
+    common = _arguments(package, source, made)
+    joint = made / 'rosidl_typesupport_c'
+    describe = rosidl_generator_type_description.generate_type_hash
+    fast = rosidl_typesupport_fastrtps_c.generate_typesupport_fastrtps_c
+    introspect = rosidl_typesupport_introspection_c.generate_c
+    for generator, action, out, more in (
+        ('rosidl_generator_type_description', describe, made, ()),
+        ('rosidl_generator_c', rosidl_generator_c.generate_c, made, ()),
+        (SUPPORTS[0], fast, made / SUPPORTS[0], ()),
+        (SUPPORTS[1], introspect, made / SUPPORTS[1], ()),
+        ('rosidl_typesupport_c', rosidl_typesupport_c.generate_c, joint, (list(SUPPORTS),)),
+        (
+            'rosidl_generator_py',
+            rosidl_generator_py.generate_py,
+            site,
+            (['rosidl_typesupport_c'],),
+        ),
+    ):
+        file, resource = source / f'{generator}.json', PREFIX / 'share' / generator / 'resource'
+        given = {**common, 'output_dir': str(out), 'template_dir': str(resource)}
+        file.write_text(json.dumps(given))
+        action(str(file), *more)
+        _write_visibility(package, resource, out)
+
+
+def _arguments(package: str, source: Path, made: Path) -> dict[str, Any]:
+    """Return what all generators are told."""
+    names, share = sorted(DEFINITIONS[package]), PREFIX / 'share'
+    return {
         'package_name': package,
         'idl_tuples': [f'{source}:msg/{name}.idl' for name in names],
         'ros_interface_dependencies': [
@@ -158,26 +184,13 @@ def _generate(package: str, source: Path, made: Path, site: Path) -> None:
         'target_dependencies': [],
     }
 
-    def run(generator: str, action: Callable[..., Any], out: Path, *more: Any) -> None:
-        file = source / f'{generator}.json'
-        resource = share / generator / 'resource'
-        arguments = {**common, 'output_dir': str(out), 'template_dir': str(resource)}
-        file.write_text(json.dumps(arguments))
-        action(str(file), *more)
-        for template in resource.glob('*visibility_control.h.in'):
-            text = template.read_text().replace('@PROJECT_NAME_UPPER@', package.upper())
-            header = out / 'msg' / template.name.removesuffix('.in')
-            header.write_text(text.replace('@PROJECT_NAME@', package))
 
-    describe = rosidl_generator_type_description.generate_type_hash
-    run('rosidl_generator_type_description', describe, made)
-    run('rosidl_generator_c', rosidl_generator_c.generate_c, made)
-    fast = rosidl_typesupport_fastrtps_c.generate_typesupport_fastrtps_c
-    run(SUPPORTS[0], fast, made / SUPPORTS[0])
-    run(SUPPORTS[1], rosidl_typesupport_introspection_c.generate_c, made / SUPPORTS[1])
-    joint = made / 'rosidl_typesupport_c'
-    run('rosidl_typesupport_c', rosidl_typesupport_c.generate_c, joint, list(SUPPORTS))
-    run('rosidl_generator_py', rosidl_generator_py.generate_py, site, ['rosidl_typesupport_c'])
+def _write_visibility(package: str, resource: Path, out: Path) -> None:
+    """Write the header that says which symbols a library shows."""
+    for template in resource.glob('*visibility_control.h.in'):
+        text = template.read_text().replace('@PROJECT_NAME_UPPER@', package.upper())
+        header = out / 'msg' / template.name.removesuffix('.in')
+        header.write_text(text.replace('@PROJECT_NAME@', package))
 
 
 def _compile(package: str, folder: Path, made: Path, site: Path) -> None:

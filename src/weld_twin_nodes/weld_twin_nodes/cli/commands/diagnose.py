@@ -10,6 +10,8 @@ diagnosis.json then say what, and no model is written.
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from weld_twin_core.recording import Recording
     from weld_twin_msgs_py.files.input_files import InputFile
 
+LINES = 'WELD_TWIN_PROGRESS'
+"""Variable of the environment: 'lines' has every step told as a line on stderr."""
 UNSOUND = 3
 """Exit code where data or set-up are wrong."""
 MEASUREMENTS = 40_000
@@ -204,10 +208,17 @@ def _inputs(args: argparse.Namespace) -> list[InputFile]:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str], None]]:
-    """Yield where to tell progress; it shows on a terminal and leaves other streams alone."""
+    """
+    Yield where to tell progress; it shows on a terminal and leaves other streams alone.
+
+    A program that shows it elsewhere asks for lines.
+    """
     from rich.console import Console
     from rich.markup import escape
 
+    if os.environ.get(LINES) == 'lines':
+        yield lambda text: print(text, file=sys.stderr, flush=True)
+        return
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda text: None

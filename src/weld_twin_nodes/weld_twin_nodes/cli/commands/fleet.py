@@ -9,7 +9,7 @@ from importlib import import_module
 
 from ..options import add_command
 
-JOBS = ('run',)
+JOBS = ('run', 'page')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -227,12 +227,20 @@ class CellNode(Node):
             except Exception:
                 self._raise_unless_over()
 
-        subscribe = partial(self._subscribe_to, topic, kinds, guarded)
+        subscribe = partial(self._subscribe_to, topic, kinds, guarded, required=required)
         if at_once:
             subscribe()
         else:
             self.when_ready(subscribe)
         return state
+
+    def stop_listening(self) -> None:
+        """Take no input any more, until somebody listens again."""
+        for source in self._sources:
+            source.close()
+        self._sources.clear()
+        self.health.inputs.clear()
+        self.frames = None
 
     def _plain(self, topic: Topic) -> Callable[[str, Any], Iterable[Any]]:
         """Return what turns messages of other types into those that the topic usually has."""
@@ -251,7 +259,12 @@ class CellNode(Node):
         return turn
 
     def _subscribe_to(
-        self, topic: Topic, kinds: Sequence[str], take: Callable[[str, bytes], None]
+        self,
+        topic: Topic,
+        kinds: Sequence[str],
+        take: Callable[[str, bytes], None],
+        *,
+        required: bool,
     ) -> None:
         wanted = topic.requested
         if self.setting('reliable_inputs'):
@@ -262,12 +275,12 @@ class CellNode(Node):
             kinds,
             wanted,
             take,
+            required=required,
             remark=self.remark,
             lack=self._lack,
             unmatched=self._unmatched_event,
         )
         self._sources.append(source)
-        self._partners.append(source.unheard)
 
     def refuse(self, source: str, reason: str) -> None:
         """Count a sample that cannot be used, and say why, now and then."""
@@ -292,6 +305,12 @@ class CellNode(Node):
         if now - self._warned.get(source, -WARN_EVERY) >= WARN_EVERY:
             self._warned[source] = now
             self.get_logger().warning(sentence)
+
+    def _tell_once(self, sentence: str) -> None:
+        """Tell something in the log and in the next health message, if there is something."""
+        if sentence:
+            self.get_logger().warning(sentence)
+            self.health.say(sentence)
 
     def time_went_back(self) -> None:
         """Forget what was heard: the clock begins anew, as when a bag is played in a loop."""
@@ -357,6 +376,7 @@ class CellNode(Node):
     def _tell_health(self) -> None:
         for source in self._sources:
             source.adapt()
+            self._tell_once(source.switched())
         for name, state in self.health.inputs.items():
             state.publishers = self.count_publishers(name)
         self._look_at_partners()
@@ -378,7 +398,8 @@ class CellNode(Node):
         for key in [key for key in self.health.lasting if key.startswith('/')]:
             if not self.count_publishers(key) * self.count_subscribers(key):
                 del self.health.lasting[key]
-        unmatched = [sentence for look in self._partners for sentence in look()]
+        looks = (*self._partners, *(source.unheard for source in self._sources))
+        unmatched = [sentence for look in looks for sentence in look()]
         for sentence in unmatched:
             if sentence not in self._unmatched:
                 self.get_logger().warning(sentence)

@@ -20,10 +20,10 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.told_twin import build_twin
 from .cell_frames import placed_twin
-from .cell_node import CellNode
 from .diagnosis_window import Window
 from .diagnosis_worker import Finding, Job, Worker
 from .input_settings import JOINT_SETTINGS, MEASURED_SETTINGS
+from .managed_node import ManagedNode
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run
 from .settings import Setting
@@ -41,7 +41,7 @@ INPUTS = {
 }
 
 
-class LiveDiagnosis(CellNode):
+class LiveDiagnosis(ManagedNode):
     """
     Diagnoses a sliding window again and again, in another process.
 
@@ -50,6 +50,7 @@ class LiveDiagnosis(CellNode):
     """
 
     settings: ClassVar[tuple[Setting, ...]] = (
+        *ManagedNode.settings,
         *ROBOT_SETTINGS,
         *JOINT_SETTINGS,
         *MEASURED_SETTINGS,
@@ -75,13 +76,32 @@ class LiveDiagnosis(CellNode):
         self._seen: int | None = None
         self._speaking = False
         self._verdict = self.offer(DIAGNOSIS)
+        self._measured: MeasuredInputs | None = None
+        self._looking: Any = None
+        self.start()
+
+    def prepare(self) -> None:
+        """Nothing is left to look at: robot and model were read when the node started."""
+
+    def begin(self) -> None:
+        """Listen, and diagnose from time to time."""
         for topic, role in INPUTS.items():
             required = role is Role.JOINTS
             self.listen(topic, partial(self._take, role), required=required)
         self._measured = MeasuredInputs(
             self, partial(self._take, Role.POSE), partial(self._take, Role.POINT)
         )
-        self.every(LOOK_EVERY, self._look)
+        self._looking = self.every(LOOK_EVERY, self._look)
+
+    def finish(self) -> None:
+        """Listen no more; forget the window and the diagnosis under way."""
+        self.stop_listening()
+        if self._looking is not None:
+            self.destroy_timer(self._looking)
+        self._worker.stop()
+        self._worker = Worker()
+        self.time_went_back()
+        self._begun = -float('inf')
 
     def destroy_node(self) -> None:
         """End the diagnosis under way."""
@@ -95,7 +115,8 @@ class LiveDiagnosis(CellNode):
 
     def time_went_back(self) -> None:
         """Forget the window."""
-        self._measured.clear()
+        if self._measured is not None:
+            self._measured.clear()
         self._window.reset()
         self._seen = None
 

@@ -141,6 +141,11 @@ class RecordedTopic:
                 count += 1
         return count
 
+    def close(self) -> None:
+        """Take nothing more."""
+        self._node.destroy_subscription(self._subscription)
+        self._node.health.inputs.pop(self.name, None)
+
     def _subscribe(self) -> Any:
         return self._node.create_subscription(
             self._class,

@@ -16,7 +16,7 @@ from weld_twin_msgs_py.messages.topics import JOINT_STATES, Qos, Topic
 
 from . import qos_events
 from .message_classes import message_class
-from .partners import unheard_publishers
+from .partners import Senders, elsewhere, unheard_publishers
 
 
 class TypedInput:
@@ -32,6 +32,8 @@ class TypedInput:
     wanted : Qos
     take : callable
         Takes the type and the bytes of a message.
+    required : bool
+        Whether the node can do nothing without it.
     remark, lack, unmatched : callable
         Take a sentence: on the type that is taken, on one that is not installed, and on a partner
         whose quality of service does not match.
@@ -51,6 +53,7 @@ class TypedInput:
         wanted: Qos,
         take: Callable[[str, bytes], None],
         *,
+        required: bool,
         remark: Callable[[str], None],
         lack: Callable[[str], None],
         unmatched: Callable[[str], None],
@@ -58,6 +61,7 @@ class TypedInput:
         self._node, self._topic, self._kinds = node, topic, tuple(kinds)
         self._name = node.resolve_topic_name(topic.relative)
         self._wanted, self._take = wanted, take
+        self._required, self._senders = required, Senders()
         self._remark, self._lack, self._unmatched = remark, lack, unmatched
         self.kind = self._kinds[0]
         self._missing: set[str] = set()
@@ -74,8 +78,19 @@ class TypedInput:
             self._subscribe(kind)
 
     def unheard(self) -> list[str]:
-        """Return a sentence for every publisher of which nothing arrives."""
+        """Return a sentence for every publisher of which nothing arrives, or where one may be."""
+        if self._required and not self._node.count_publishers(self._name):
+            lost = elsewhere(self._node, self._name, self._topic.name, self._kinds)
+            return [lost] if lost else []
         return unheard_publishers(self._node, self._name, self.kind, self._wanted, self._kinds)
+
+    def switched(self) -> str:
+        """Return in a sentence that somebody else publishes it now, empty where that is not so."""
+        return self._senders.changed(self._node, self._name)
+
+    def close(self) -> None:
+        """Take nothing more."""
+        self._node.destroy_subscription(self._subscription)
 
     def _subscribe(self, kind: str) -> None:
         """Take one type; go on with the one before where it is not installed."""

@@ -28,7 +28,7 @@ from .run_node import run
 from .settings import Setting
 from .tf_frames import MeasuredInputs
 
-LOOK_EVERY = 1.0
+LOOK_EVERY = 0.5
 """Seconds between two looks at the clocks."""
 BASE_EVERY = 0.1
 """Seconds between two looks at whether the base is told, until it is known."""

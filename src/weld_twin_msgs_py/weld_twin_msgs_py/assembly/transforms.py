@@ -12,6 +12,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterator
+from math import hypot, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +30,8 @@ from ..messages.from_messages import NANOSECONDS
 
 KEPT = 10.0
 """Seconds of a moving frame that are kept, as tf2 keeps them."""
+UNIT = 0.009
+"""By how much the length of a quaternion may differ from one and be taken unasked."""
 GAP = 1.0
 """Longest step [s] between two places that is interpolated; in a longer one anything may go on."""
 
@@ -42,10 +45,28 @@ class NotYet(NoTransform):
 
 
 class Placed(NamedTuple):
-    """Where a frame is in its parent, shape (4, 4), at a stamp [ns]."""
+    """
+    Where a frame is in its parent.
+
+    Most are never asked for, so that the numbers stay as they came.
+
+    Attributes
+    ----------
+    stamp : int [ns]
+    position : tuple of float [m]
+    quaternion : tuple of float
+        x y z w.
+
+    """
 
     stamp: int
-    T_parent_child: Array
+    position: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+
+    @property
+    def T_parent_child(self) -> Array:
+        """Return it as a matrix, shape (4, 4)."""
+        return transform(matrix_from_quaternion(self.quaternion), np.array(self.position))
 
 
 class Branch:
@@ -109,11 +130,13 @@ def _placed(each: Any) -> Placed:
     """Return where a TransformStamped has its frame."""
     p, q, stamp = each.transform.translation, each.transform.rotation, each.header.stamp
     child = each.child_frame_id
-    if not np.isfinite([p.x, p.y, p.z]).all():
+    if not isfinite(p.x + p.y + p.z):
         raise DataError(f'the transform of {child!r} is not finite')
-    turn = matrix_from_quaternion([q.x, q.y, q.z, q.w], f'rotation of {child!r}')
+    quaternion = q.x, q.y, q.z, q.w
+    if not abs(hypot(*quaternion) - 1.0) < UNIT:
+        matrix_from_quaternion(quaternion, f'rotation of {child!r}')  # has the sentence, the bound
     ns = int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
-    return Placed(ns, transform(turn, np.array([p.x, p.y, p.z])))
+    return Placed(ns, (p.x, p.y, p.z), quaternion)
 
 
 class TransformTree:

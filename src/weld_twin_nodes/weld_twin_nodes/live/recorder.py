@@ -107,7 +107,7 @@ class Recorder(ManagedNode):
     def _tell(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Answer with the messages written by topic, and those dropped."""
         counts = {} if self._run is None else self._run.counts()
-        response.success = not counts.get('dropped', 0)
+        response.success = not counts.get('dropped')
         response.message = json.dumps(counts)
         return response
 

@@ -140,7 +140,7 @@ class MeasuredInputs:
         except NoTransform as error:
             raise NoTransform(
                 f'the measurement is given in {frame!r}, but measuring_frame is '
-                f'{self._wanted!r}, and {error}'
+                f'{self._wanted!r}, and {error}; publish it in that frame, or the way on /tf'
             ) from None
         moves = ', which moves' if self._tree.moves(self._wanted, frame) else ''
         self._node.remark(

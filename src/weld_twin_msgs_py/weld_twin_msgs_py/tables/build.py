@@ -64,8 +64,13 @@ def read_table(path: Path | str, robot: Robot, options: TableOptions | None = No
 
     """
     options = options or TableOptions()
-    cells = read_cells(path, options.delimiter, options.decimal)
-    said = list(cells.said)
+    cells = read_cells(path, options.delimiter, options.decimal, options.marker)
+    return table_of(cells, robot, options, list(cells.said))
+
+
+def table_of(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) -> Table:
+    """Return what the cells of a table mean; the same errors as `read_table`."""
+    path = cells.path
     try:
         return _read(cells, robot, options, said)
     except DataError as error:

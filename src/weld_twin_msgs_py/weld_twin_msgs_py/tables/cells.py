@@ -15,6 +15,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
+from .formats import Format, read, recognised
 from .words import UNITS
 
 DELIMITERS = (';', '\t', ',')
@@ -103,9 +104,19 @@ class Cells:
         return np.stack([self.numbers(name) for name in names], axis=1)
 
 
-def read_cells(path: Path | str, delimiter: str | None, decimal: str | None) -> Cells:
+def read_cells(
+    path: Path | str, delimiter: str | None, decimal: str | None, marker: str | None = None
+) -> Cells:
     """
-    Read a delimited text file with a header line.
+    Read a delimited text file with a header line, or a log or export in a form that is known.
+
+    Parameters
+    ----------
+    path : Path or str
+    delimiter, decimal : str, optional
+        Left out, they are found.
+    marker : str, optional
+        What is meant, where an export holds several things that were tracked.
 
     Raises
     ------
@@ -119,7 +130,11 @@ def read_cells(path: Path | str, delimiter: str | None, decimal: str | None) -> 
         text = path.read_bytes()
     except OSError as error:
         raise DataError(f"table '{path}' cannot be read: {error.strerror or error}") from None
-    lines = _without_comments(_decoded(path, text).splitlines())
+    decoded = _decoded(path, text)
+    known = None if delimiter else recognised(decoded)
+    if known is not None:
+        return _of_known(path, known, decoded, marker)
+    lines = _without_comments(decoded.splitlines())
     if sum(1 for line in lines if line.strip()) < 2:
         raise DataError(f"table '{path}' needs a header line and at least one row")
     if delimiter is None:
@@ -133,6 +148,17 @@ def read_cells(path: Path | str, delimiter: str | None, decimal: str | None) -> 
         if decimal == ',':
             said.append('the decimal sign is a comma')
     return Cells(path, header, rows, numbers, decimal, said)
+
+
+def _of_known(path: Path, known: Format, text: str, marker: str | None) -> Cells:
+    try:
+        header, rows, lines, said = read(known, text, marker)
+    except DataError as error:
+        raise DataError(f"table '{path}': {error}") from None
+    if not rows:
+        raise DataError(f"table '{path}' has a header of {known.name} and no row under it")
+    comma = any(_COMMA_NUMBER.match(cell) for row in rows[:_LOOK] for cell in row)
+    return Cells(path, header, rows, lines, ',' if comma else '.', said)
 
 
 def _without_comments(lines: list[str]) -> list[str]:

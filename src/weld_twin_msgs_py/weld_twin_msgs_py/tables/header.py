@@ -90,7 +90,8 @@ def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> 
     left = [part for part in parts if part.name not in out.joints]
     names = [part.name for part in left]
     out.temperature = options.temperature_column or _first(names, TEMPERATURE)
-    out.date, out.time = _times(names, options)
+    given = options.time_column
+    out.date, out.time = (None, given) if given else time_columns(names)
     _positions(left, options, out)
     if not options.positions_only:
         out.rotation = options.rotation_columns or _rotation(left)
@@ -120,7 +121,9 @@ def _taken_apart(name: str) -> Named:
     for k, word in enumerate(words):
         kind, axis = _axis(word, words)
         if kind:
-            return Named(name, tuple(words[:k] + words[k + 1 :]), axis, kind, unit)
+            said = {'quaternion': QUATERNION, 'angle': TURNS}.get(kind, set())
+            stem = [w for w in words[:k] + words[k + 1 :] if w not in said]
+            return Named(name, tuple(stem), axis, kind, unit)
     return Named(name, tuple(words), unit=unit)
 
 
@@ -261,13 +264,16 @@ def _one_group(
     return tuple(whole[named[0]][axis] for axis in axes) if named else ()
 
 
-def _times(header: Sequence[str], options: TableOptions) -> tuple[str | None, str | None]:
+def time_columns(header: Sequence[str]) -> tuple[str | None, str | None]:
     """Return the columns of the date, where it has one of its own, and of the time."""
-    if options.time_column:
-        return None, options.time_column
     date = _first(header, DATE)
     clock = _first([name for name in header if name != date], CLOCK)
     return (date, clock) if date and clock else (None, clock or date)
+
+
+def unit_of(name: str) -> str | None:
+    """Return the unit that a header cell names, None for none."""
+    return _taken_apart(name).unit
 
 
 def _first(header: Sequence[str], pattern: re.Pattern[str]) -> str | None:

@@ -61,6 +61,8 @@ class TableOptions:
     coupled : str, optional
         '3+2': the model's joint 3 is the column of joint 3 plus that of joint 2, where a
         pendant counts joint 3 against the ground; '3-2' takes it off.
+    marker : str, optional
+        Of an export that holds several things that were tracked.
     positions_only : bool
         Leave measured orientation out.
     skip_rows : tuple of int
@@ -86,6 +88,7 @@ class TableOptions:
     joint_signs: tuple[float, ...] | None = None
     joint_offsets: tuple[float, ...] | None = None
     coupled: str | None = None
+    marker: str | None = None
     positions_only: bool = False
     skip_rows: tuple[int, ...] = ()
 

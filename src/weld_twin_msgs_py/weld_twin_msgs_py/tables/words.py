@@ -56,7 +56,8 @@ KUKA = {'a': 'z', 'b': 'y', 'c': 'x'}
 FANUC = {'w': 'x', 'p': 'y', 'r': 'z'}
 """Positions of FANUC: R about z, P about y, W about x."""
 UNITS = {
-    'm': 'm', 'meter': 'm', 'meters': 'm', 'mm': 'mm', 'millimeter': 'mm', 'millimeters': 'mm',
+    'm': 'm', 'meter': 'm', 'meters': 'm', 'mm': 'mm', 'cm': 'cm',
+    'millimeter': 'mm', 'millimeters': 'mm',
     'rad': 'rad', 'radian': 'rad', 'radians': 'rad',
     'deg': 'deg', 'degree': 'deg', 'degrees': 'deg', '\N{DEGREE SIGN}': 'deg', 'grad': 'deg',
     's': 's', 'sec': 's', 'seconds': 's', 'sekunden': 's', 'ms': 'ms', 'us': 'us', 'ns': 'ns',

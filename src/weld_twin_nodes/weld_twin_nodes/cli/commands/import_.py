@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arrays import Array
     from weld_twin_core.recording import Recording
-    from weld_twin_msgs_py.tables import TableOptions
+    from weld_twin_msgs_py.tables import Table, TableOptions
 
 LISTS = ('joint', 'position', 'target', 'difference', 'rotation', 'sigma')
 """Options that take several columns."""
@@ -32,6 +32,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--contacts',
         metavar='ARTEFACT.yaml',
         help='the table holds joint angles and what was touched; this file describes it',
+    )
+    parser.add_argument(
+        '--measured',
+        metavar='FILE',
+        help='FILE.csv has the joints alone; this one has what the instrument measured',
+    )
+    parser.add_argument(
+        '--clock-offset',
+        type=float,
+        default=0.0,
+        metavar='S',
+        help='added to the stamps of --measured',
     )
     parser.add_argument('--table', metavar='CSV', help='also write every deviation from the twin')
     parser.add_argument('--picture', metavar='PNG', help='also draw the deviations')
@@ -66,6 +78,9 @@ def _add_reading(parser: argparse.ArgumentParser) -> None:
         default=(),
         help='rows to leave out; the first row under the header is 1',
     )
+    group.add_argument(
+        '--marker', metavar='NAME', help='what is meant, where an export has several markers'
+    )
     group.add_argument('--delimiter', help='comma, semicolon or tab')
     group.add_argument('--decimal', choices=('.', ','))
     _add_counting(parser)
@@ -99,13 +114,13 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_core.metrics.deviation import deviation_metrics
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.bags import write_recording
-    from weld_twin_msgs_py.tables import TableOptions, read_table
+    from weld_twin_msgs_py.tables import TableOptions
 
     robot = robot_of(args)
     options = TableOptions(**{f.name: getattr(args, f.name) for f in fields(TableOptions)})
     if args.contacts is not None:
         return _touched(args, robot, options)
-    recording, said = read_table(args.file, robot, options)
+    recording, said = _read(args, robot, options)
     measured = recording.measured
     assert measured is not None
     expected = Twin(robot).poses(recording, measured.t)
@@ -123,12 +138,22 @@ def run(args: argparse.Namespace) -> int:
         print(sentence)
     if args.table or args.picture:
         _write_deviations(args, recording, off)
+    kind = 'stations' if recording.joints.static else 'measurements along a motion'
     found = deviation_metrics(measured.position, expected.position)
     print(
-        f'{args.out}: {found.samples} stations; from the nominal twin, base and tool frame not '
+        f'{args.out}: {found.samples} {kind}; from the nominal twin, base and tool frame not '
         f'fitted: RMS {found.rms_m * 1e3:.3f} mm, max {found.max_m * 1e3:.3f} mm'
     )
     return 0
+
+
+def _read(args: argparse.Namespace, robot: Robot, options: TableOptions) -> Table:
+    """Return the recording of one file, or of a log and what was measured beside it."""
+    from weld_twin_msgs_py.tables import read_table, read_two_tables
+
+    if args.measured is None:
+        return read_table(args.file, robot, options)
+    return read_two_tables(args.file, args.measured, robot, options, args.clock_offset)
 
 
 def _touched(args: argparse.Namespace, robot: Robot, options: TableOptions) -> int:

@@ -11,7 +11,6 @@ demo: setup
 
 test: lint
 	@$(RUN) python -m pytest -n auto --dist loadscope --no-loadscope-reorder
-	@tools/browser why
 
 docs: setup-docs
 	@$(RUN) python -m sphinx -q -W --keep-going -c docs . build/site
@@ -31,7 +30,6 @@ setup-docs: .venv/ready-docs
 
 .venv/ready-test: .venv/ready
 	@tools/setup test bench
-	@tools/browser
 
 .venv/ready-docs: .venv/ready
 	@tools/setup docs

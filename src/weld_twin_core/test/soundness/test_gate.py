@@ -115,6 +115,16 @@ def test_readings_that_stand_still_while_the_tool_moves(ur5, rng, which, kind):
     assert item.at == (('wrist_1_joint',) if len(which) == 1 else ())
 
 
+def test_a_reading_that_stands_still_in_a_third_of_the_stations_pulls_no_frame_along(ur5, rng):
+    real = ur5.with_frames(base=anywhere(rng, 2.0), tool=anywhere(rng, 0.1))
+    narrow = stations(ur5, rng)
+    q = np.array(narrow.q[:60])
+    held = recorded(real, JointMotion(narrow.t[:60], q, None, True), rng)
+    q[20:38, 3] = q[20, 3]
+    (item,) = seen(ur5, rejointed(held, q)).unsound
+    assert (item.kind, item.at) == ('joints_stuck', ('wrist_1_joint',))
+
+
 def test_a_joint_that_rests_is_not_stuck(ur5, rng):
     motion = moving(ur5, rng)
     q = np.insert(motion.q, 900, np.tile(motion.q[900], (400, 1)), axis=0)

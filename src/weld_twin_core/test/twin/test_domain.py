@@ -55,6 +55,13 @@ def test_a_hole_in_the_range_is_outside_and_a_full_turn_is_not():
     assert away[1].max() == 0.0
 
 
+def test_from_few_stations_a_joint_may_go_as_far_again_as_it_went():
+    q = np.linspace(0.0, 0.3, 15)[:, None] * np.ones(6)
+    domain = Domain.of([recorded(q, static=True)], UR5)
+    assert not domain.outside(np.full((1, 6), 0.55))
+    assert len(domain.outside(np.full((1, 6), 0.65))) == 6
+
+
 def test_further_stations_of_the_same_kind_are_rarely_outside():
     rng = np.random.default_rng(4)
     for count in (15, 30, 120):

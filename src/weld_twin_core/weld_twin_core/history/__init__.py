@@ -3,7 +3,7 @@
 """What changed on one arm from diagnosis to diagnosis, and where it leads."""
 
 from .changes import Change, changes
-from .forecast import Outlook, outlook, reaches
+from .forecast import reaches
 from .observation import Observation
 
-__all__ = ['Change', 'Observation', 'Outlook', 'changes', 'outlook', 'reaches']
+__all__ = ['Change', 'Observation', 'changes', 'reaches']

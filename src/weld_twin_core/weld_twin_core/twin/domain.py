@@ -24,6 +24,9 @@ LEFT_OUT = 0.95
 WIDER = 1.5
 """The margin in units of what that takes: with six joints and few stations the next one lies
 outside more often than the last one did."""
+AS_FAR_AGAIN = 1.0
+"""From fewer than 19 measurements no distance can be read that holds 95 of 100: a joint then counts
+as recorded as far beyond as it moved, in units of its range."""
 SPACINGS = 3.0
 """At least so many mean distances between neighbours: of stations drawn evenly a further one lies
 nearer than that to one of them, joint by joint, in 95 of 100 cases."""
@@ -268,6 +271,8 @@ def _gaps(q: Array) -> Array:
     worst = np.sort((np.where(np.isfinite(apart), apart, 0.0) / span).max(axis=1))
     at = min(int(np.ceil(LEFT_OUT * (worst.size + 1))), worst.size) - 1
     share = max(WIDER * worst[at], SPACINGS / max(worst.size - 1, 1))
+    if np.ceil(LEFT_OUT * (worst.size + 1)) > worst.size:
+        share = max(share, AS_FAR_AGAIN)
     return np.asarray(np.maximum(LEAST_MARGIN, share * span))
 
 

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from weld_twin_core.arm.chain import forward
 from weld_twin_core.diagnosis.result import MISTAKES
 from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.gate import sound
@@ -46,6 +47,25 @@ def test_a_mistake_opens_a_gap_that_the_sound_recording_has_not(recording, kind)
     other = Twin(robot).poses(made, made.measured.t).position
     same = Twin(recording.robot).poses(made, made.measured.t).position
     assert changed or not np.allclose(other, same)
+
+
+def test_a_joint_that_slips_takes_position_and_turn_along(recording):
+    made = said = None
+    for seed in range(40):
+        try:
+            _, made, said = KINDS['joint_slipped'](recording, np.random.default_rng(seed))
+            break
+        except Hidden:
+            continue
+    assert made is not None and said is not None
+    name, size, _ = said.split()
+    slip = np.zeros(recording.real.n)
+    slip[recording.real.index(name)] = 1e-3 * float(size)
+    q = recording.recording.joints.at(made.measured.t)[0]
+    way = forward(recording.real, q + slip)[:, :3, 3] - forward(recording.real, q)[:, :3, 3]
+    moved = np.linalg.norm(made.measured.position - recording.recording.measured.position, axis=1)
+    after = moved > 0.0
+    np.testing.assert_allclose(moved[after], np.linalg.norm(way[after], axis=1), rtol=0.01)
 
 
 def test_the_same_draw_is_the_same_recording():

@@ -10,7 +10,7 @@ import pytest
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_lab.transfer.goals import measures
 from weld_twin_lab.transfer.judging import paired
-from weld_twin_lab.transfer.splits import LEAST, halves, kept_back, splits
+from weld_twin_lab.transfer.splits import LEAST, among, halves, kept_back, splits
 
 
 @pytest.fixture(scope='module')
@@ -120,3 +120,10 @@ def test_goals_are_reached_by_what_is_good_and_missed_by_what_is_not():
         assert any(words in what for what in missed), words
     assert any('nothing named' in what for what in missed)
     assert any('tracebacks' in what for what in missed)
+
+
+def test_what_was_measured_plane_by_plane_is_elsewhere_afterwards():
+    plane = np.stack(np.meshgrid(0.0, np.arange(6) * 0.1, np.arange(6) * 0.1), axis=-1)
+    first = plane.reshape(-1, 3)
+    later = np.concatenate([first + [0.05, 0.02, 0.0], first + [0.3, 0.0, 0.0]])
+    np.testing.assert_array_equal(among(first, later), np.arange(72) < 36)

@@ -23,6 +23,15 @@ VISIBLE = 0.05
 """Range [rad, m] from which a joint's reading is worth swapping or turning round."""
 LARGEST_SLIP = 0.03
 """Slip [rad, m] of a joint beyond which it is a crash and not a slip."""
+UNLIKE_SIBLINGS = 0.05
+"""Difference of a length [m] beyond which an arm is no sibling: those differ by 5 to 30 mm."""
+ZERO_OFF, NUDGE = 0.01, 1e-6
+"""What a mastering leaves of a zero, and the step of its derivative [rad, m]."""
+SEEN_AT_ALL = 1e-3
+"""Distance [m] below which nobody tells a wrong link from a wrong zero."""
+ONE_PLACE = np.radians(20.0)
+"""Mean turn [rad] of the tool below which a knock and a jump of the reflector move it alike: to a
+tenth of their squares."""
 MOVING_ONLY = frozenset({'zero_velocities', 'clock'})
 """Kinds that stations in a table cannot have."""
 
@@ -155,28 +164,34 @@ def other_robot(sound: Sound, rng: np.random.Generator) -> Made:
     off = rng.standard_normal((2, robot.n)) * (np.stack([robot.a, robot.d]) != 0.0)
     for _ in range(20):
         told = replace(robot, a=robot.a + off[0], d=robot.d + off[1], name='sibling')
-        size = _unaligned(sound, forward(robot, q), forward(told, q))
+        size = _untaken(sound.robot, q, forward(told, q))
         if abs(size - wanted) < 0.02 * wanted:
             return told, sound.recording, f'{size * 1e3:.1f} mm'
         off = off * wanted / max(size, 1e-9)
-        if np.abs(off).max() > 0.2:
-            raise Hidden('the frames take up every difference')
+        if np.abs(off).max() > UNLIKE_SIBLINGS:
+            raise Hidden('frames and zeros take up every difference')
     raise Hidden('no sibling differs by as much')
 
 
-def _unaligned(sound: Sound, real: Array, told: Array) -> float:
-    """Return the RMS distance of poses (M, 4, 4) once the fitted frames have done their part."""
+def _untaken(robot: Robot, q: Array, told: Array) -> float:
+    """
+    Return the RMS distance of poses (M, 4, 4) from those of a robot that nothing else takes up.
+
+    Frames that were given wrong, and zeros within what a mastering leaves, are causes of their own.
+    """
+    real = forward(robot, q)
     left = told[:, :3, 3] - real[:, :3, 3]
-    columns = []
-    if 'base' in sound.align:
-        columns += list(np.eye(3)[:, None] * np.ones((len(left), 1)))
-        columns += [np.cross(axis, real[:, :3, 3]) for axis in np.eye(3)]
-    if 'tool' in sound.align:
-        columns += [real[:, :3, k] for k in range(3)]
-    if columns:
-        design = np.stack([column.ravel() for column in columns], axis=1)
-        left = left.ravel() - design @ np.linalg.lstsq(design, left.ravel(), rcond=None)[0]
-        left = left.reshape(-1, 3)
+    columns = [*(np.eye(3)[:, None] * np.ones((len(left), 1)))]
+    columns += [np.cross(axis, real[:, :3, 3]) for axis in np.eye(3)]
+    columns += [real[:, :3, k] for k in range(3)]
+    for turn in NUDGE * np.eye(robot.n):
+        columns.append(ZERO_OFF / NUDGE * (forward(robot, q + turn) - real)[:, :3, 3])
+    design = np.stack([column.ravel() for column in columns], axis=1)
+    # Zeros by a prior in units of what is seen at all; frames are free.
+    held = np.diag(np.r_[np.zeros(9), np.full(robot.n, SEEN_AT_ALL)])
+    system, wanted = np.vstack([design, held]), np.r_[left.ravel(), np.zeros(len(held))]
+    taken = design @ np.linalg.lstsq(system, wanted, rcond=None)[0]
+    left = left - taken.reshape(-1, 3)
     return float(np.sqrt((left**2).sum(axis=1).mean()))
 
 
@@ -199,8 +214,7 @@ def reflector_jumped(sound: Sound, rng: np.random.Generator) -> Made:
     way = _direction(rng) * size
     seen = _seen(sound.recording)
     q = sound.recording.joints.at(seen.t)[0]
-    turns = forward(sound.real, q)[:, :3, :3] @ sound.real.T_flange_tool[:3, :3]
-    turns = _frame_of(sound, seen, q) @ turns
+    turns = _frame_of(sound, seen, q) @ forward(sound.real, q)[:, :3, :3]
     position = seen.position + np.where(after[:, None], turns @ way, 0.0)
     made = sound.recording.with_measured(replace(seen, position=position))
     return sound.robot, made, f'{size * 1e3:.2f} mm'
@@ -243,7 +257,7 @@ def joint_slipped(sound: Sound, rng: np.random.Generator) -> Made:
 
 
 def _tip(robot: Robot, q: Array) -> Array:
-    return np.asarray((forward(robot, q) @ robot.T_flange_tool)[:, :3, 3])
+    return np.asarray(forward(robot, q)[:, :3, 3])
 
 
 def instrument_knocked(sound: Sound, rng: np.random.Generator) -> Made:
@@ -251,6 +265,8 @@ def instrument_knocked(sound: Sound, rng: np.random.Generator) -> Made:
     after, size = _middle(sound, rng), float(rng.uniform(5e-4, 5e-3))
     way, turn = _direction(rng) * size, _direction(rng) * float(rng.uniform(0.0, 1e-3))
     seen = _seen(sound.recording)
+    if seen.rotation is None and _turning(sound) < ONE_PLACE:
+        raise Hidden('while the tool hardly turns a knock is a jump of the reflector')
     R = Rotation.from_rotvec(turn).as_matrix()
     centre = seen.position.mean(axis=0)
     moved = (seen.position - centre) @ R.T + centre + way
@@ -260,6 +276,12 @@ def instrument_knocked(sound: Sound, rng: np.random.Generator) -> Made:
         rotation = np.where(after[:, None, None], R @ rotation, rotation)
     made = replace(seen, position=position, rotation=rotation)
     return sound.robot, sound.recording.with_measured(made), f'{size * 1e3:.2f} mm'
+
+
+def _turning(sound: Sound) -> float:
+    """Return the mean angle of the tool from its middle [rad]."""
+    turns = Rotation.from_matrix(forward(sound.real, sound.recording.joints.q)[:, :3, :3])
+    return float((turns.mean().inv() * turns).magnitude().mean())
 
 
 def joints_stuck(sound: Sound, rng: np.random.Generator) -> Made:
@@ -303,15 +325,18 @@ def clock(sound: Sound, rng: np.random.Generator) -> Made:
 
 
 def other(sound: Sound, rng: np.random.Generator) -> Made:
-    """Pair measurements with the wrong rows, or write quaternions in another order."""
+    """Pair measurements with the wrong rows or motion, or write quaternions in another order."""
     seen = _seen(sound.recording)
     if seen.rotation is not None and rng.random() < 0.5:
         made = replace(seen, rotation=np.swapaxes(seen.rotation, 1, 2))
         return sound.robot, sound.recording.with_measured(made), 'orientations inverted'
-    shift = int(seen.t.size * rng.uniform(0.2, 0.8))
-    position = np.roll(seen.position, shift, axis=0)
+    if sound.recording.joints.static:
+        shift = int(seen.t.size * rng.uniform(0.2, 0.8))
+        position, said = np.roll(seen.position, shift, axis=0), f'rows shifted by {shift}'
+    else:  # shifted in time it would be another clock
+        position, said = seen.position[::-1], 'measured on the way back'
     made = replace(seen, position=position, rotation=None)
-    return sound.robot, sound.recording.with_measured(made), f'rows shifted by {shift}'
+    return sound.robot, sound.recording.with_measured(made), said
 
 
 def _direction(rng: np.random.Generator) -> Array:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from weld_twin_nodes.offline.task_pool import Task
 
-from .measured import ARMS, NOT_HERE, SPLITS, axis_spared, found_out, spared
+from .measured import ARMS, NOT_HERE, ONE_PLACE, SPLITS, axis_spared, found_out, spared
 from .mistakes import MOVING_ONLY
 from .trials import WAYS, complaint, mistake
 
@@ -49,7 +49,7 @@ def real(
         for kind in kinds
         for folder, arm in arms
         for number in range(draws)
-        if kind not in NOT_HERE
+        if kind not in NOT_HERE and (kind, arm) not in ONE_PLACE
     ]
     poor = [
         Task(spared, (folder, arm, number, engine), arm)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion, Recording
@@ -87,7 +88,10 @@ def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:
             fitted, back = kept_back(chosen)
             yield _split(robot, kind, table, fitted, back, np.setdiff1d(rows, chosen))
     cut = int(FIRST * rows.size)
-    yield _split(robot, 'first_fifth', table, rows[:cut], rows[cut:], None)
+    near = among(table.measured.position[rows[:cut]], table.measured.position[rows[cut:]])
+    near &= near.sum() >= LEAST  # on a handful nothing can be judged
+    far = None if near.all() else rows[cut:][~near]
+    yield _split(robot, 'first_fifth', table, rows[:cut], rows[cut:][near], far)
     yield _split(robot, 'odd', table, rows[1::2], rows[0::2], None)
     yield _split(robot, 'even', table, rows[0::2], rows[1::2], None)
 
@@ -113,6 +117,24 @@ def densest(q: Array, half: float) -> NDArray[np.bool_]:
     near = [(np.abs(q - centre).max(axis=1) <= half) for centre in q]
     best: NDArray[np.bool_] = near[int(np.argmax([mask.sum() for mask in near]))]
     return best
+
+
+def among(fitted: Array, others: Array) -> NDArray[np.bool_]:
+    """
+    Return which places lie among those fitted: as near to one as the loneliest to its neighbour.
+
+    An arm that visits a grid plane by plane has been nowhere near most of it after a fifth of the
+    time; one that visits places at random has been everywhere.
+
+    Parameters
+    ----------
+    fitted, others : array, shape (M, 3) and (K, 3) [m]
+        Measured positions of the tool.
+
+    """
+    tree = cKDTree(fitted)
+    own = tree.query(fitted, k=2)[0][:, 1]
+    return np.asarray(tree.query(others)[0] <= own.max())
 
 
 def kept_back(rows: Rows) -> tuple[Rows, Rows]:

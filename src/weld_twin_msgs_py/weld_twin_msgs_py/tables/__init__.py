@@ -5,6 +5,5 @@
 from .build import Table, read_table
 from .contacts import read_contacts
 from .table_options import TableOptions
-from .two_tables import read_two_tables
 
-__all__ = ['Table', 'TableOptions', 'read_contacts', 'read_table', 'read_two_tables']
+__all__ = ['Table', 'TableOptions', 'read_contacts', 'read_table']

@@ -9,7 +9,7 @@ from datetime import datetime, timezone
 from math import isfinite
 from typing import Any
 
-from weld_twin_core.history import Change, Observation, outlook, reaches
+from weld_twin_core.history import Change, Observation, reaches
 
 from ..report.quantities import uncertain
 from .coordinate_words import coordinate
@@ -48,10 +48,7 @@ def sentence(change: Change) -> str:
 
 
 def forecast(
-    change: Change,
-    seen: Sequence[Observation],
-    found: Sequence[Change],
-    limits: Mapping[str, float],
+    change: Change, latest: Observation, limits: Mapping[str, float]
 ) -> dict[str, Any] | None:
     """
     Return when a trend reaches its limit; None where there is no trend or no limit.
@@ -59,21 +56,23 @@ def forecast(
     Parameters
     ----------
     change : Change
-    seen : sequence of Observation
-        All diagnoses of the cell.
-    found : sequence of Change
-        All that changed.
+    latest : Observation
+        The last diagnosis.
     limits : mapping of str to float
         Largest value allowed of an effect, SI units.
 
     """
     what = coordinate(change.name)
-    if change.kind != 'trend' or what.effect not in limits:
+    if change.kind != 'trend' or what.effect not in limits or change.name not in latest.names:
         return None
-    now = outlook(seen, found, change.name)
-    if now is None:
-        return None
-    days = reaches(limits[what.effect], now)
+    at = latest.names.index(change.name)
+    days = reaches(
+        limits[what.effect],
+        float(latest.value[at]),
+        float(latest.covariance[at, at]) ** 0.5,
+        change.size,
+        change.std,
+    )
     weeks = [each / WEEK if isfinite(each) else None for each in days]
     return {
         'limit': limits[what.effect],

@@ -17,10 +17,6 @@ STEP = 0.5
 not given a processor, has not listened meanwhile."""
 
 
-AT_START = 'at the start'
-"""Where messages are missing that were sent before the recorder was there."""
-
-
 class SentBook:
     """Keeps what every node last told of the messages it sent; each start counts by itself."""
 
@@ -108,7 +104,7 @@ def shortfall(sent: Sent | None, recorded: Sent) -> Shortfall | None:
         early = recorded.last < sent.last  # type: ignore[operator]
     where = {
         (True, True): 'at both ends',
-        (True, False): AT_START,
+        (True, False): 'at the start',
         (False, True): 'at the end',
         (False, False): 'in between',
     }[late, early]

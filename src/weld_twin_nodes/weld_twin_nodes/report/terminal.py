@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from rich.console import Console
 from rich.markup import escape
 from rich.padding import Padding
@@ -29,8 +27,6 @@ _COLOURS = {
 }
 _MOST = 8
 """Rows of a table; the files have all."""
-_BETWEEN = '  '
-"""Between the columns of a table."""
 
 
 def print_summary(diagnosis: Diagnosis, console: Console) -> None:
@@ -46,11 +42,11 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     if diagnosis.families:
         _print_families(diagnosis, console)
     elif diagnosis.effects:
-        _print_effects(diagnosis, console)
+        console.print(_effects(diagnosis))
     if diagnosis.status == 'unknown' and diagnosis.causes:
-        _print_levels(diagnosis, console)
+        console.print(_levels(diagnosis))
     elif len(diagnosis.candidates) > 1:
-        _print_candidates(diagnosis, console)
+        console.print(_candidates(diagnosis))
     _print_sets(diagnosis, console)
     _print_changed(diagnosis, console)
     for check in diagnosis.checks:
@@ -72,7 +68,12 @@ def _print_changed(diagnosis: Diagnosis, console: Console) -> None:
         console.print(escape(nothing_changed(diagnosis)))
         return
     title = f'changed since {diagnosis.recordings[0].name}'
-    _print_table(console, title, CHANGED_HEADS, changed_rows(diagnosis))
+    table = Table(box=None, title=escape(title), title_justify='left', pad_edge=False)
+    for head in CHANGED_HEADS:
+        table.add_column(head, header_style='dim', overflow='fold')
+    for row in changed_rows(diagnosis):
+        table.add_row(*(escape(cell) for cell in row))
+    console.print(table)
 
 
 def _print_holds(diagnosis: Diagnosis, console: Console) -> None:
@@ -92,59 +93,49 @@ def _print_families(diagnosis: Diagnosis, console: Console) -> None:
     ]
     for title, heads, rows in parts:
         if rows:
-            _print_table(console, title, [head.lower() for head in heads], rows)
+            table = Table(box=None, title=title, title_justify='left', pad_edge=False)
+            for head in heads:
+                table.add_column(head.lower(), header_style='dim', overflow='fold')
+            for row in rows:
+                table.add_row(*(escape(cell) for cell in row))
+            console.print(table)
 
 
-def _print_effects(diagnosis: Diagnosis, console: Console) -> None:
-    rows = []
+def _effects(diagnosis: Diagnosis) -> Table:
+    table = Table(box=None, title='effects found', title_justify='left', pad_edge=False)
+    for head in ('effect', 'parameter', 'value ± standard error'):
+        table.add_column(head, header_style='dim', overflow='fold')
     for found in diagnosis.effects[:_MOST]:
         for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
-            rows.append([found_name(found) if k == 0 else '', name, value])
-    _print_table(console, 'effects found', ('effect', 'parameter', 'value ± standard error'), rows)
+            table.add_row(escape(found_name(found)) if k == 0 else '', name, value)
     more = len(diagnosis.effects) - _MOST
     if more > 0:
-        console.print(f'and {more} more in effects.yaml')
+        table.add_row(f'and {more} more in effects.yaml')
+    return table
 
 
-def _print_levels(diagnosis: Diagnosis, console: Console) -> None:
-    """Print what is certain of each cause although it has no name."""
-    rows = [level_row(cause) for cause in diagnosis.causes[:_MOST]]
-    _print_table(console, 'what is certain', [head.lower() for head in LEVEL_HEADS], rows)
+def _levels(diagnosis: Diagnosis) -> Table:
+    """Return what is certain of each cause although it has no name."""
+    table = Table(box=None, title='what is certain', title_justify='left', pad_edge=False)
+    for head in LEVEL_HEADS:
+        table.add_column(head.lower(), header_style='dim', overflow='fold')
+    for cause in diagnosis.causes[:_MOST]:
+        table.add_row(*(escape(cell) for cell in level_row(cause)))
+    return table
 
 
-def _print_candidates(diagnosis: Diagnosis, console: Console) -> None:
-    rows = [
-        [
-            site_name(item.site),
+def _candidates(diagnosis: Diagnosis) -> Table:
+    table = Table(box=None, title='candidates', title_justify='left', pad_edge=False)
+    for head in ('effect', 'probability', 'gap left', 'change'):
+        table.add_column(head, header_style='dim', overflow='fold')
+    for item in diagnosis.candidates[:_MOST]:
+        table.add_row(
+            escape(site_name(item.site)),
             odds(item.probability),
             millimetres(item.rms_after_m),
             change(item.shrink),
-        ]
-        for item in diagnosis.candidates[:_MOST]
-    ]
-    _print_table(console, 'candidates', ('effect', 'probability', 'gap left', 'change'), rows)
-
-
-def _print_table(
-    console: Console, title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]
-) -> None:
-    """Print a table; where its longest words do not fit side by side, a paragraph for each row."""
-    columns = list(zip(heads, *rows, strict=True))
-    longest = [max(len(word) for cell in column for word in cell.split()) for column in columns]
-    if sum(longest) + len(_BETWEEN) * (len(heads) - 1) <= console.width:
-        table = Table(box=None, title=escape(title), title_justify='left', pad_edge=False)
-        for head, width in zip(heads, longest, strict=True):
-            table.add_column(head, header_style='dim', min_width=width)
-        for row in rows:
-            table.add_row(*(escape(cell) for cell in row))
-        console.print(table)
-        return
-    console.print(f'[italic]{escape(title)}[/]')
-    for first, *rest in rows:
-        if first:
-            console.print(escape(first))
-        for head, cell in zip(heads[1:], rest, strict=True):
-            console.print(Padding(f'[dim]{escape(head)}:[/] {escape(cell)}', (0, 0, 0, 2)))
+        )
+    return table
 
 
 def _print_sets(diagnosis: Diagnosis, console: Console) -> None:

@@ -20,7 +20,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,50 +29,17 @@ from ...arrays import Array
 from ...errors import DataError
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem
+from .in_turn import in_turn
+from .track import FLOOR, LEVER, TIE, Track, chord, nearest_rotation
 
 NEAR = 0.02
 """Median gap [m] from which a least-squares fit finds its own way."""
-LEVER = 0.1
-"""Metres that a radian counts as, where turns and positions are weighed together."""
-FLOOR = 1e-5
-"""Gap [m] below which a sample gains no more weight."""
-TIE = 1e-6
-"""Pull towards the given frames, relative; decides only what the data leave open."""
 MOST_ROWS = 3000
 """Rows that the frames are found on: far more than their numbers need, few enough to be quick."""
 ROUNDS = 15
 """Steps of each refinement; there is no test of convergence."""
 REACHES = (0.1, 0.4)
 """Lengths [m] of the tool vectors tried where only positions were measured."""
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """
-    One recording for alignment.
-
-    ``position`` (M, 3) and ``rotation`` (M, 3, 3) or None were measured, ``point`` and ``turn``
-    are those of the flange in the base frame.
-    """
-
-    position: Array
-    rotation: Array | None
-    point: Array
-    turn: Array
-
-    def gap(self, base: Array, tool: Array) -> Array:
-        """Return how far each sample is off, position and turn together, shape (M,) [m]."""
-        turn = base[:3, :3] @ self.turn
-        reached = self.point @ base[:3, :3].T + base[:3, 3] + turn @ tool[:3, 3]
-        off: Array = np.linalg.norm(self.position - reached, axis=1)
-        if self.rotation is None:
-            return off
-        return off + LEVER * chord(self.rotation, turn @ tool[:3, :3])
-
-    @property
-    def turns(self) -> Array:
-        """Return measured rotations, none where only points were measured."""
-        return np.zeros((0, 3, 3)) if self.rotation is None else self.rotation
 
 
 def initial_frames(problem: Problem, model: Model) -> Model:
@@ -229,13 +196,12 @@ def _base_and_tool(
 ) -> Model:
     tool = model.robot.T_flange_tool
     if all(track.rotation is not None for track in tracks):
-        starts = [transform(_tool_rotation(tracks, tool[:3, :3]), tool[:3, 3])]
+        turn, vectors = _tool_rotation(tracks, tool[:3, :3]), tool[None, :3, 3]
     else:
         ways = np.concatenate([np.eye(3), -np.eye(3)])
-        vectors = [tool[:3, 3], *(reach * way for reach in reaches for way in ways)]
-        starts = [transform(tool[:3, :3], vector) for vector in vectors]
-    trials = [_in_turn(tracks, model.bases, start) for start in starts]
-    bases, tool = min(trials, key=lambda trial: _median_gap(tracks, *trial))
+        tried = [tool[:3, 3], *(reach * way for reach in reaches for way in ways)]
+        turn, vectors = tool[:3, :3], np.array(tried)
+    bases, tool = in_turn(tracks, model.bases, turn, vectors)
     return replace(model, bases=bases, robot=model.robot.with_frames(tool=tool))
 
 
@@ -273,29 +239,7 @@ def _turn_weight(track: Track, tool: Array) -> Array:
     return weight
 
 
-def _in_turn(
-    tracks: list[Track], bases: tuple[Array, ...], tool: Array
-) -> tuple[tuple[Array, ...], Array]:
-    """Return base frames and tool found alternately, the tool's turn as it is."""
-    for _ in range(ROUNDS):
-        bases = _bases(tracks, tool, bases, rounds=3)
-        vector = _tool_vector(tracks, bases, _weights(tracks, bases, tool), tool[:3, 3], True)
-        tool = transform(tool[:3, :3], vector)
-    return _bases(tracks, tool, bases, ROUNDS), tool
-
-
 def _weights(tracks: list[Track], bases: tuple[Array, ...], tool: Array) -> list[Array]:
     """Return the weights that turn least squares into least absolute deviations."""
     pairs = zip(tracks, bases, strict=True)
     return [1.0 / np.maximum(track.gap(base, tool), FLOOR) for track, base in pairs]
-
-
-def nearest_rotation(matrix: Array) -> Array:
-    """Return the rotation R that makes trace(R' matrix) largest."""
-    u, _, vt = np.linalg.svd(matrix)
-    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
-
-
-def chord(first: Array, second: Array) -> Array:
-    """Return 2 sin(angle / 2) of the turns between rotations, shape (M,): small ones' angle."""
-    return np.asarray(np.linalg.norm(first - second, axis=(1, 2)) / np.sqrt(2.0))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ..frames.alignment import nearest_rotation
+from ..frames.track import nearest_rotation
 
 MOST_LAG = 2.0
 """Lags up to this [s] are looked at, and up to a tenth of the recording."""

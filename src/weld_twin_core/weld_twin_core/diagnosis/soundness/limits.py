@@ -24,6 +24,13 @@ Factor by which undoing a mistake must bring down what is wrong.
 Undoing a real one brings centimetres to the noise (factors of 100 and more); undoing one that is
 not there by chance never did better than 2 on sound recordings.
 """
+UNDONE = 4e-3
+"""
+Median gap [m] that a plausible arm may leave once a mistake is undone.
+
+Play, ripple, lag and springs leave up to 2 mm; of rows that do not belong together any turn of a
+joint may by chance leave a fifth, and still centimetres.
+"""
 EXPLAINED_IMPOSSIBLE = 2.0
 """The same factor where undoing it also brings joints back into their range."""
 BEYOND = 1.0

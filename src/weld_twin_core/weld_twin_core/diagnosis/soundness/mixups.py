@@ -27,6 +27,7 @@ from .limits import (
     SHORTLIST,
     SIBLING,
     TURNED,
+    UNDONE,
     UNEXPLAINED,
     WORTH,
 )
@@ -84,6 +85,7 @@ def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list
         told = arm.off < start.off / factor or _as_given(shot, trial, start, align)
         # What is shrunk leaves less of everything; it must leave less for its size as well.
         size = trial.shrunk(shot)
+        told = told and arm.gap < UNDONE
         if found and told and (size == 1.0 or arm.gap * size < start.gap / factor):
             return found, arm
     return [], start
@@ -150,7 +152,7 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
         problem = replace(shot.problem, align=given | more)
         model = refined(problem, initial_frames(problem, shot.model))
         left = gap(problem, model)
-        if left < max(UNEXPLAINED, before / EXPLAINED):
+        if left < UNEXPLAINED:
             if _plausible(shot.robot, model):
                 return ()
             framed = _framed(shot, model, frozenset(more - given), before, left)
@@ -161,7 +163,7 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
 
 def _within(shot: Snapshot, before: float, left: float, align: frozenset[str]) -> Mistake | None:
     """Return the mix-up that explains as much with no more frames fitted than were to be."""
-    most = max(LARGE, 2.0 * left)
+    most = min(max(LARGE, 2.0 * left), UNDONE)
     for suspicion in suspicions(shot.robot):
         undone = shot.mended(suspicion.mend).gap_with(align)
         if undone < min(most, before / EXPLAINED):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...recording import JointMotion, Recording
 from ..algebra.problem import Model
+from ..frames.alignment import refined
 from .evidence import Case, Finding, Mistake, distance, length
 from .limits import STUCK_AFTER, STUCK_EXPLAINED, STUCK_FAR, STUCK_LEAST, STUCK_STATIONS
 from .snapshot import measured
@@ -21,6 +22,12 @@ ROUNDS = 12
 """Newton steps that find where a joint really stood; it may have gone on by a radian."""
 STEP = 1e-5
 """Step [rad, m] of the derivative by a joint's position."""
+REFITS = 3
+"""Standing stretches, the longest, that frames are fitted without: arms that rest have dozens."""
+FIT_ROWS = 2000
+"""Rows of such a fit, which has twelve numbers to find."""
+ENOUGH = 12
+"""Measurements that must remain for it."""
 LONGEST_STEP = 0.3
 """Longest Newton step [rad, m]: farther, the derivative means nothing."""
 
@@ -60,24 +67,59 @@ REMEDY = 'See to the driver that publishes the joint states, and measure again'
 
 def _joints(case: Case, k: int) -> Iterator[tuple[float, Mistake]]:
     """Yield joints whose own motion would explain the gap while their reading stands still."""
-    recording, off = case.recordings[k], distance(case.residuals[k])
-    for i, name in enumerate(case.model.robot.joint_names):
-        for start, end in _runs(recording.joints.q[:, i : i + 1], recording.joints):
-            inside = _inside(recording, start, end)
-            if inside.sum() < 2 or inside.all():
-                continue
-            gap, rest = float(np.median(off[inside])), float(np.median(off[~inside]))
-            if gap < max(STUCK_FAR, STUCK_EXPLAINED * rest):
-                continue
-            left = _freed(case.model, recording, k, i, inside)
-            if left > gap / STUCK_EXPLAINED:
-                continue
-            sentence = (
-                f'The reading of joint {name!r} of {recording.name} stands still '
-                f'{_when(recording, start, end)} while the joint moves: the gap there is '
-                f'{length(gap)}, and {length(left)} with the joint set free.'
-            )
-            yield gap / left, Mistake('joints_stuck', (name,), sentence, REMEDY, None)
+    recording, refits = case.recordings[k], 0
+    for start, end, i in _longest(case, k):
+        inside = _inside(recording, start, end)
+        if inside.sum() < 2 or inside.all():
+            continue
+        model, off = case.model, distance(case.residuals[k])
+        if np.median(off[inside]) > max(STUCK_FAR, float(np.median(off[~inside]))):
+            # Frames that were fitted to the stretch as well leave some of its gap elsewhere.
+            if case.problem.align and refits < REFITS and (~inside).sum() > ENOUGH:
+                refits += 1
+                model, off = _unfitted(case, k, inside)
+            found = _freed_there(model, recording, k, i, (start, end), off)
+            if found is not None:
+                yield found
+
+
+def _longest(case: Case, k: int) -> list[tuple[int, int, int]]:
+    """Return first sample, last sample and joint of every standing stretch, long ones first."""
+    joints = case.recordings[k].joints
+    found = [
+        (start, end, i)
+        for i in range(joints.q.shape[1])
+        for start, end in _runs(joints.q[:, i : i + 1], joints)
+    ]
+    return sorted(found, key=lambda run: run[0] - run[1])
+
+
+def _unfitted(case: Case, k: int, inside: NDArray[np.bool_]) -> tuple[Model, Array]:
+    """Return the model with its frames fitted to all but a stretch, and the gaps it leaves."""
+    recordings = list(case.recordings)
+    recordings[k] = recordings[k].with_measured(measured(recordings[k]).take(~inside))
+    problem = replace(case.problem, recordings=tuple(recordings)).thinned(FIT_ROWS)
+    model = refined(problem, case.model)
+    return model, distance(case.problem.residuals(model)[k])
+
+
+def _freed_there(
+    model: Model, recording: Recording, k: int, i: int, run: tuple[int, int], off: Array
+) -> tuple[float, Mistake] | None:
+    """Return that a joint went on while its reading stood still, and how much that explains."""
+    inside, name = _inside(recording, *run), model.robot.joint_names[i]
+    gap, rest = float(np.median(off[inside])), float(np.median(off[~inside]))
+    if gap < max(STUCK_FAR, STUCK_EXPLAINED * rest):
+        return None
+    left = _freed(model, recording, k, i, inside)
+    if left > gap / STUCK_EXPLAINED:
+        return None
+    sentence = (
+        f'The reading of joint {name!r} of {recording.name} stands still '
+        f'{_when(recording, *run)} while the joint moves: the gap there is '
+        f'{length(gap)}, and {length(left)} with the joint set free.'
+    )
+    return gap / left, Mistake('joints_stuck', (name,), sentence, REMEDY, None)
 
 
 def _runs(q: Array, joints: JointMotion) -> list[tuple[int, int]]:

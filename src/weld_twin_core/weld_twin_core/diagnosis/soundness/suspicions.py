@@ -162,8 +162,9 @@ def _orders(robot: Robot) -> Iterator[Suspicion]:
         yield _ordered((names[i], names[j]), words, order)
     # The k-th column of an alphabetical table belongs to the k-th name of the sorted list.
     alphabet = [sorted(names).index(name) for name in names]
-    words = 'joints are in alphabetical order, not in that of the chain'
-    yield _ordered(names, words, alphabet)
+    if alphabet != straight:
+        words = 'joints are in alphabetical order, not in that of the chain'
+        yield _ordered(names, words, alphabet)
     yield _ordered(names, 'joints are in reverse order', straight[::-1])
     yield _ordered(names, 'joints are shifted by one place', straight[1:] + straight[:1])
     yield _ordered(names, 'joints are shifted by one place', straight[-1:] + straight[:-1])

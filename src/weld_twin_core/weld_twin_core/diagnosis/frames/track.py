@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A recording as alignment sees it: measured poses or points beside those of the flange."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array
+
+LEVER = 0.1
+"""Metres that a radian counts as, where turns and positions are weighed together."""
+FLOOR = 1e-5
+"""Gap [m] below which a sample gains no more weight."""
+TIE = 1e-6
+"""Pull towards the given frames, relative; decides only what the data leave open."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """
+    One recording for alignment.
+
+    ``position`` (M, 3) and ``rotation`` (M, 3, 3) or None were measured, ``point`` and ``turn``
+    are those of the flange in the base frame.
+    """
+
+    position: Array
+    rotation: Array | None
+    point: Array
+    turn: Array
+
+    def gap(self, base: Array, tool: Array) -> Array:
+        """Return how far each sample is off, position and turn together, shape (M,) [m]."""
+        turn = base[:3, :3] @ self.turn
+        reached = self.point @ base[:3, :3].T + base[:3, 3] + turn @ tool[:3, 3]
+        off: Array = np.linalg.norm(self.position - reached, axis=1)
+        if self.rotation is None:
+            return off
+        return off + LEVER * chord(self.rotation, turn @ tool[:3, :3])
+
+    @property
+    def turns(self) -> Array:
+        """Return measured rotations, none where only points were measured."""
+        return np.zeros((0, 3, 3)) if self.rotation is None else self.rotation
+
+
+def nearest_rotation(matrix: Array) -> Array:
+    """Return the rotations R that make trace(R' matrix) largest, shape (..., 3, 3)."""
+    u, _, vt = np.linalg.svd(matrix)
+    u[..., 2] *= np.linalg.det(u @ vt)[..., None]
+    return np.asarray(u @ vt)
+
+
+def chord(first: Array, second: Array) -> Array:
+    """Return 2 sin(angle / 2) of the turns between rotations, shape (M,): small ones' angle."""
+    return np.asarray(np.linalg.norm(first - second, axis=(1, 2)) / np.sqrt(2.0))

@@ -31,8 +31,8 @@ from .tolerance import Tolerance, with_draws
 CHUNK = 30_000
 """Runs times path points worked on at once; a few of such arrays fit the processor's cache."""
 Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
-_BLOCK = 8192
-"""Runs whose play and lag are worked out together."""
+_BLOCK = 1024
+"""Runs whose play and lag are worked out together; larger arrays than these cost page faults."""
 _RANK = 1e-6
 """Shapes weaker than this part of the strongest are left out."""
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..effects import REGISTRY, Effect, Stage
-from ..twin.memory import run_all
+from ..twin.memory import in_series, run_all
 from ..twin.resampling import Picker
 from ..twin.twin import Twin
 from .seam_study import Study
@@ -66,7 +66,8 @@ class Remembered:
     def rest(self, study: Study, draws: Array) -> Rest:
         """Return what the slope leaves of the displacements by draws, shape (D, P)."""
         own, row = _different(draws[:, self.columns])
-        left = displacement(study, self.joint, self.tolerances, own) - own @ self.slope
+        left = displacement(study, self.joint, self.tolerances, own)
+        left -= own @ self.slope
         return Rest(left, row)
 
 
@@ -128,10 +129,15 @@ def displacement(study: Study, joint: int, tolerances: Sequence[Tolerance], draw
 
 
 def _displaced(study: Study, joint: int, effects: Sequence[Effect]) -> Array:
-    motion = study.recording.joints
-    moved, _ = run_all(effects, Twin(study.robot).joint_view(study.recording), False)
-    if moved is None:
+    view = Twin(study.robot).joint_view(study.recording)
+    alone = in_series(effects)
+    if not alone:
         return np.zeros((1, 1))
+    if len(alone) == 1:  # the other joints stay: all of them, for every draw, would be copied
+        shift, _ = alone[0][1].run(view)
+        moved = shift['q', joint][..., None]
+    else:
+        moved = np.asarray(run_all(effects, view, False)[0])[..., joint : joint + 1]
     if study.at is not None:
-        moved = Picker(motion, study.at).take(moved)
-    return np.atleast_2d(moved[..., joint])
+        moved = Picker(study.recording.joints, study.at).take(moved)
+    return np.atleast_2d(moved[..., 0])

@@ -196,3 +196,35 @@ def test_a_single_touch_is_refused():
     recording = touching(two_links(), np.zeros((2, 2)), ['a', 'b'])
     with pytest.raises(DataError, match="contact 'a' of touches has 1 postures; touch it in at"):
         aligned(replace(recording), two_links(), '', ())
+
+
+def test_touches_told_to_be_rough_hardly_count():
+    robot = two_links()
+    postures, labels = elbow_up_and_down(0.004)
+    rough = np.arange(len(postures)) % 3 == 0
+    postures[rough, 1] += np.where(np.arange(len(postures)) % 2 == 0, 0.02, 0.016)[rough]
+    sigma = np.where(rough, 1e-2, 1e-4)
+    offset = wt.effects.JointOffset('elbow', offset=0.0)
+
+    found = {}
+    for name, told in (('told', sigma), ('not told', None)):
+        recording = touching(robot, postures, labels)
+        contacts = replace(recording.contacts, sigma=told)
+        problem, model = aligned(replace(recording, contacts=contacts), robot, '', ())
+        scale = problem.unit_scale()
+        found[name] = fit(problem, model.with_found((offset,)), scale).coordinates[0]
+
+    assert found['told'] == pytest.approx(0.004, abs=2e-5)
+    assert abs(found['not told'] - 0.004) > 1e-3
+
+
+def elbow_up_and_down(offset):
+    """Return postures of one pin with the elbow up and down, as an arm reads that is short."""
+    postures, labels = [], []
+    for bend in (0.8, 1.2, 1.6):
+        reach = np.sqrt(0.5**2 + 0.4**2 + 2 * 0.5 * 0.4 * np.cos(bend))
+        inner = np.arccos((0.5**2 + reach**2 - 0.4**2) / (2 * 0.5 * reach))
+        for sign in (1.0, -1.0, 1.0, -1.0):
+            postures.append([0.3 - sign * inner, sign * bend - offset])
+            labels.append(f'pin {bend}')
+    return np.array(postures), labels

@@ -49,6 +49,8 @@ class Contacts:
             given = getattr(self, name)
             if given is not None:
                 object.__setattr__(self, name, readonly(given, count, f'{name} of the contacts'))
+        if self.sigma is not None and not (self.sigma > 0.0).all():
+            raise DataError('sigma of the contacts must be positive [m]')
         lengths = [self.artefact.named(label).kind == 'length' for label in self.labels]
         if any(lengths) and (self.value is None or (self.value[lengths] <= 0.0).any()):
             raise DataError(

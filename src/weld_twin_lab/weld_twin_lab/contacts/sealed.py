@@ -5,23 +5,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward, jacobian
+from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, spreads
+from weld_twin_core.contacts import Tie, spreads
 from weld_twin_core.diagnosis import Diagnosis, diagnose
-from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.whole_files import write_text
 
 from ..blind.cause_sizes import draw, scaled, site
 from ..blind.simulator import require_simulator
+from .touching import postures_at, touching
 
 ARMS = ('ur5', 'ur10', 'kuka_iiwa14', 'franka_panda')
 """Arms of which link masses are known, so that every cause can act."""
@@ -54,8 +55,8 @@ LARGEST = 10.0
 """Factor on a drawn cause beyond which it is larger than machines have it."""
 SURE = 0.9
 """Confidence from which a wrong answer counts as sure."""
-ROUNDS = 4
-"""Newton steps in which the plant is made to touch: each leaves a hundredth of what was off."""
+TIES = tuple(Tie((f'{k}/0', f'{k}/1'), 0.05, 2e-5) for k in range(len(SOCKETS)))
+"""The sockets of a place are 50 mm apart."""
 
 
 def case(seed: int) -> dict[str, Any]:
@@ -75,12 +76,12 @@ def case(seed: int) -> dict[str, Any]:
     cause = draw(str(rng.choice(FAMILIES)), robot, 1.0, rng)
     slack, size = float(rng.uniform(*SLACK)), float(rng.uniform(*SIZE))
     start, labels, places = _starts(robot, rng)
-    recording = _touching(robot, cause, start, labels, places, rng)
+    recording = touching(robot, [cause], start, labels, places, TIES, rng)
     shown = _shown(robot, recording)
     factor = min(size * slack / max(shown, 1e-12), LARGEST)
     cause = scaled(cause, factor)
     loose = places + rng.normal(0.0, slack, places.shape)
-    recording = _touching(robot, cause, start, labels, loose, rng)
+    recording = touching(robot, [cause], start, labels, loose, TIES, rng)
     return {'seed': seed, 'robot': robot.name} | _opened(
         diagnose(recording, robot), site(cause), shown * factor / slack
     )
@@ -111,53 +112,11 @@ def _starts(robot: Robot, rng: np.random.Generator) -> tuple[Array, list[str], A
     for k, middle in enumerate(SOCKETS):
         for socket in (0, 1):
             place = middle + socket * APART
-            found = _at(robot, place, rng)
+            found = postures_at(robot, place, EACH, rng)
             q.append(found)
             labels += [f'{k}/{socket}'] * len(found)
             places.append(np.tile(place, (len(found), 1)))
     return np.concatenate(q), labels, np.concatenate(places)
-
-
-def _at(robot: Robot, place: Array, rng: np.random.Generator) -> Array:
-    """Return nominal postures in which the tool point is at a place, within the limits."""
-    low, high = np.maximum(robot.lower, -2.5), np.minimum(robot.upper, 2.5)
-    q = rng.uniform(low, high, (60 * EACH, robot.n))
-    for _ in range(80):
-        q = q + np.clip(_step(robot, q, place - forward(robot, q)[:, :3, 3]), -0.2, 0.2)
-    near = np.linalg.norm(place - forward(robot, q)[:, :3, 3], axis=1) < 1e-9
-    within = (q > low).all(axis=1) & (q < high).all(axis=1)
-    return np.asarray(q[near & within][:EACH])
-
-
-def _step(robot: Robot, q: Array, off: Array) -> Array:
-    """Return the least joint step, (M, n), that moves the tool point by ``off``, (M, 3)."""
-    turn = jacobian(robot, q)[:, :3]
-    inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + 1e-6 * np.eye(3))
-    return np.asarray(np.einsum('mji,mjk,mk->mi', turn, inverse, off))
-
-
-def _touching(
-    robot: Robot,
-    cause: Mapping[str, Any],
-    q: Array,
-    labels: list[str],
-    places: Array,
-    rng: np.random.Generator,
-) -> Recording:
-    """Return the joint readings at which the plant's own tool point touches."""
-    from ..plant.plant import run
-    from ..plant.plant_recording import Command
-    from ..plant.tracker import Tracker
-
-    t = 1.0 + np.arange(float(len(q)))
-    for _ in range(ROUNDS):
-        real = run(robot.to_mapping(), [cause], Command(t, q, static=True), Tracker(), rng)
-        q = q + _step(robot, q, places - real.position)
-    names = dict.fromkeys(labels)
-    ties = [Tie((f'{k}/0', f'{k}/1'), 0.05, 2e-5) for k in range(len(SOCKETS))]
-    artefact = Artefact(tuple(Contact(name) for name in names), tuple(ties))
-    motion = JointMotion(t, q, static=True)
-    return Recording('sealed', motion, contacts=Contacts(artefact, tuple(labels)))
 
 
 def _shown(robot: Robot, recording: Recording) -> float:

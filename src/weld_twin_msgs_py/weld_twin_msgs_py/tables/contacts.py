@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from weld_twin_core.contacts import Artefact, Contact, Contacts
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 
+from ..files.whole_files import write_text
 from .build import Table, joint_angles, own_epoch
 from .cells import Cells, read_cells
 from .header import joint_columns
@@ -44,6 +47,28 @@ KINDS = {
 """German words for the kinds of contact."""
 ARM = 5.0
 """Length [m] beyond which a value is taken for millimetres: no bar of a cell is longer."""
+
+
+def write_touches(path: Path, motion: Mapping[str, Any]) -> None:
+    """
+    Write postures and what each touches, as `read_contacts` reads them.
+
+    Parameters
+    ----------
+    path : Path
+    motion : mapping
+        'joint_names', 'q' [rad, m] and 'contact', one label per posture.
+
+    """
+    lines = [','.join((*motion['joint_names'], 'contact'))]
+    for q, label in zip(motion['q'], motion['contact'], strict=True):
+        lines.append(','.join((*(f'{value:.7f}' for value in q), quoted(label))))
+    write_text(path, '\n'.join(lines) + '\n', overwrite=True)
+
+
+def quoted(label: str) -> str:
+    """Return a label as a cell of a table has it."""
+    return '"' + label.replace('"', '""') + '"' if set(label) & set(',"') else label
 
 
 def read_contacts(

@@ -13,6 +13,7 @@ from std_srvs.srv import Trigger
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import CONTACT, JOINT_STATES
+from weld_twin_msgs_py.tables import quoted
 
 from .cell_node import CellNode
 from .run_node import run
@@ -101,13 +102,9 @@ class ContactMarker(CellNode):
             with path.open('a', encoding='utf-8') as file:
                 if new:
                     file.write(','.join((*names, 'contact')) + '\n')
-                file.write(','.join((*(repr(float(v)) for v in q), _quoted(label))) + '\n')
+                file.write(','.join((*(repr(float(v)) for v in q), quoted(label))) + '\n')
         except OSError as error:
             raise DataError(f"table '{path}' cannot be written: {error.strerror}") from None
-
-
-def _quoted(label: str) -> str:
-    return '"' + label.replace('"', '""') + '"' if set(label) & set(',"') else label
 
 
 def main(args: list[str] | None = None) -> int:

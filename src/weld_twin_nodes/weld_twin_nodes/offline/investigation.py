@@ -174,7 +174,8 @@ def question(
     if status in ('identified', 'none', 'unsound'):
         return _ended(status)
     wanted = found.get('next_experiment')
-    if not wanted or wanted.get('motion') is None:
+    by_hand = wanted and 'contact' in (wanted.get('motion') or {})
+    if not wanted or wanted.get('motion') is None or by_hand:
         told = '' if not wanted else f': {wanted["sentence"]}'
         return 'nothing would part them', f'no motion decides between what is left{told}'
     sigma = wanted['expected_separation_sigma']

@@ -19,6 +19,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
+from weld_twin_msgs_py.tables import write_touches
 
 from ..offline.exports import write_all
 from ..offline.where_it_holds import where_it_holds
@@ -28,6 +29,9 @@ RESULT = 'diagnosis.json'
 PAGE = 'report.html'
 NEXT = 'next_experiment.yaml'
 """The motion to measure next, where one decides; the trajectory generator runs it."""
+TOUCHES = 'next_touches.csv'
+"""Postures to touch in next: a table to guide the arm by, and no motion, which would tear the ball
+from one posture to the next while it rests in its socket."""
 
 
 def write_results(
@@ -53,8 +57,12 @@ def write_results(
     """
     wanted = diagnosis.next_experiment
     if wanted is not None and wanted.get('motion') is not None:
-        write_joint_motion(directory / NEXT, wanted['motion'], wanted['sentence'])
-        diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': NEXT})
+        file = NEXT if 'contact' not in wanted['motion'] else TOUCHES
+        if file == NEXT:
+            write_joint_motion(directory / file, wanted['motion'], wanted['sentence'])
+        else:
+            write_touches(directory / file, wanted['motion'])
+        diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': file})
     write_text(directory / PAGE, report_page(diagnosis, inputs))
     if diagnosis.status != 'unsound':
         posterior = diagnosis.posterior

@@ -178,7 +178,18 @@ def _with_sides(problem: Problem, joints: JointMotion) -> Recording:
     return Recording(NAME, joints, wrench=wrench, wrench_frame=load[0][1], temperature=heat)
 
 
-def _range(problem: Problem, robot: Robot) -> tuple[Array, Array]:
+def widened(problem: Problem, robot: Robot) -> tuple[Array, Array]:
+    """
+    Return the least and the most of every joint that a proposal uses, shape (n,) each.
+
+    The recorded range, a little wider, within the limits.
+
+    Parameters
+    ----------
+    problem : Problem
+    robot : Robot
+
+    """
     q = np.concatenate([r.joints.q for r in problem.recordings])
     middle = 0.5 * (q.min(axis=0) + q.max(axis=0))
     half = np.maximum(REACH * 0.5 * np.ptp(q, axis=0), LEAST)
@@ -190,7 +201,7 @@ def _range(problem: Problem, robot: Robot) -> tuple[Array, Array]:
 
 def _spread(problem: Problem, robot: Robot, count: int) -> Array:
     """Return stations that fill the range evenly, shape (count, n)."""
-    low, high = _range(problem, robot)
+    low, high = widened(problem, robot)
     unit = halton(robot.n, count)
     return np.asarray(low + unit * (high - low))
 
@@ -203,7 +214,7 @@ def _both_sides(stations: Array) -> Array:
 
 def sweep(problem: Problem, robot: Robot) -> JointMotion:
     """Return one path forth and back at three speeds, from rest to rest."""
-    low, high = _range(problem, robot)
+    low, high = widened(problem, robot)
     turn = np.linspace(0.0, 1.0, 7)
     joint = np.arange(robot.n)
     phase = turn[:, None] * (1 + joint % 3) + joint / 7.0

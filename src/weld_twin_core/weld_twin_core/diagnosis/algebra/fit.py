@@ -267,6 +267,8 @@ def robust_scale(
         Coordinates that the residuals' own data determined; they took their share of the noise.
 
     """
+    told = problem.told_weights
+    residuals = [part * np.sqrt(own) for part, own in zip(residuals, told, strict=True)]
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
     position = np.concatenate([measured_axes(r[:3]).ravel() for r in residuals])
     turn = np.concatenate([r[3:].ravel() for r in residuals])
@@ -277,11 +279,11 @@ def robust_scale(
     sigma = max(sigma, 1e-9)
     sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
     weights = []
-    for part in residuals:
+    for part, own in zip(residuals, told, strict=True):
         off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma
         if part.shape[0] > 3:
             off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)
-        weights.append(np.minimum(1.0, (HUBER / np.maximum(off, 1e-12)) ** 2))
+        weights.append(own * np.minimum(1.0, (HUBER / np.maximum(off, 1e-12)) ** 2))
     return Scale(sigma, sigma_turn, tuple(weights))
 
 

@@ -248,6 +248,18 @@ class Problem:
         """Return the number of measurements of each recording."""
         return tuple(_measured(r).t.size for r in self.recordings)
 
+    @cached_property
+    def told_weights(self) -> list[Array]:
+        """
+        Return the weight of every sample that was told with the data, shape (M,) per recording.
+
+        Of contacts whose uncertainty is known, in shares of the surest; one for all others.
+        """
+        told = [None if r.contacts is None else r.contacts.sigma for r in self.recordings]
+        least = min((float(sigma.min()) for sigma in told if sigma is not None), default=0.0)
+        pairs = zip(told, self.samples, strict=True)
+        return [np.ones(m) if sigma is None else (least / sigma) ** 2 for sigma, m in pairs]
+
     @property
     def size(self) -> int:
         """Return the number of scalar rows."""
@@ -400,7 +412,7 @@ class Problem:
 
     def unit_scale(self) -> Scale:
         """Return a scale before anything is known of the noise."""
-        return Scale(1e-4, 2e-4, tuple(np.ones(m) for m in self.samples))
+        return Scale(1e-4, 2e-4, tuple(self.told_weights))
 
 
 def usable(recording: Recording) -> Recording:

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...arrays import Array
 from ...contacts import Length, lengths, spreads
-from ...effects import REGISTRY
 from ...effects.plausible import spreads as spreads_of
 from ..algebra.problem import Model, Problem
+from ..hypotheses.plain_causes import plain_causes
 from ..hypotheses.search import Search
 from ..result import ContactResult, KnownLength, Touched
 from ..unseen.unseen_stretches import Unseen
@@ -63,20 +63,12 @@ def not_seen(found: Search) -> tuple[str, ...]:
     frames = problem.whitened(problem.frame_columns(features)[0], scale)
     basis = np.linalg.qr(frames.T)[0] if frames.shape[0] else np.zeros((frames.shape[1], 0))
     hidden: dict[str, list[str]] = {}
-    for kind in REGISTRY.values():
-        if kind.of not in ('joint', 'link') or not kind.cause or kind.dated:
-            continue
-        for joint in model.robot.joint_names:
-            if kind.applicable(features[0].view, joint) is not None:
-                continue
-            for effect in kind.small(features[0].view, joint, 1):
-                if effect.on != 'constant':
-                    continue
-                rows = problem.whitened(problem.effect_columns(features, effect), scale)
-                rows = rows - (rows @ basis) @ basis.T
-                size = np.linalg.norm(rows, axis=1) * spreads_of(model.robot, effect)
-                if size.max(initial=0.0) < 1.0:
-                    hidden.setdefault(effect.name.replace('_', ' '), []).append(str(effect.site))
+    for effect in plain_causes(model.robot, features[0].view, ('constant',)):
+        rows = problem.whitened(problem.effect_columns(features, effect), scale)
+        rows = rows - (rows @ basis) @ basis.T
+        size = np.linalg.norm(rows, axis=1) * spreads_of(model.robot, effect)
+        if size.max(initial=0.0) < 1.0:
+            hidden.setdefault(effect.name.replace('_', ' '), []).append(str(effect.site))
     listed = [f'{name} of {", ".join(sites)}' for name, sites in hidden.items()]
     return ('where the base stands', *listed)
 

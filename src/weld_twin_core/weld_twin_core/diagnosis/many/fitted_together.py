@@ -32,6 +32,9 @@ could not tell.
 """
 PLENTY = 600
 """Stations from which on only the richest is fitted: they bear all of it, and time is saved."""
+ONCE = 1
+"""Order of the waves that two places of contacts bear: once a turn, as an eccentric scale or gear
+makes."""
 CHOSEN = 1.2
 """Effects chosen one by one were chosen on the stations left out as well: what they leave there
 counts a fifth more where the many are many. From draws of 15 to 60 stations of two real arms."""
@@ -74,10 +77,33 @@ def fitted_together(
             best, left, dropped = trial, remains, less
     best, left = _without_creep(found, best, left, (*exclude, *dropped), beliefs, progress)
     few = unseen_rms(found)
-    if found.crowded or left < beliefs.better * few:
-        return best
-    many = _crowd(found) > beliefs.crowd or _many(best, beliefs)
-    return best if left < CHOSEN * few and many else found
+    better = found.crowded or left < beliefs.better * few
+    if not better:
+        many = _crowd(found) > beliefs.crowd or _many(best, beliefs)
+        better = left < CHOSEN * few and many
+    if better and len(found.problem.touched) == PLACES - 1:
+        return _carrying(found, exclude, steps[0], beliefs, progress)
+    return best if better else found
+
+
+def _carrying(
+    found: Search,
+    exclude: Sequence[str],
+    less: Sequence[str],
+    beliefs: Beliefs,
+    progress: Callable[[str], None],
+) -> Search:
+    """
+    Return the fit of all families that carries over from two places of contacts to a third.
+
+    Two places hardly show some kinds, and sizes learned there would say that there are none of
+    them; so all are as large as machines have them. Of 14 pairs of places of three arms, each
+    judged on the others, this left 0.31 mm instead of 0.33 mm in the mean, and 0.49 mm instead of
+    0.84 mm at the worst place of the three with the largest rest.
+    """
+    waves = {name for name, kind in REGISTRY.items() if kind.waves is not None}
+    less = tuple(name for name in less if name not in waves)
+    return _together(found, (*exclude, *less), beliefs, progress, orders=ONCE)
 
 
 def _without_creep(
@@ -120,12 +146,16 @@ def _many(found: Search, beliefs: Beliefs) -> bool:
 
 
 def _together(
-    found: Search, exclude: Sequence[str], beliefs: Beliefs, progress: Callable[[str], None]
+    found: Search,
+    exclude: Sequence[str],
+    beliefs: Beliefs,
+    progress: Callable[[str], None],
+    orders: int | None = None,
 ) -> Search:
     """Return the fit of all families but some."""
     model = found.small.model
     kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
-    final, scale, precision = many_small(found.problem, kept, exclude, beliefs, progress)
+    final, scale, precision = many_small(found.problem, kept, exclude, beliefs, progress, orders)
     return replace(found, scale=scale, final=final, precision=precision, slots=(), dense=True)
 
 

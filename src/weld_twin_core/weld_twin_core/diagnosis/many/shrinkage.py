@@ -61,6 +61,8 @@ def learned_precision(
     labels: Array,
     scales: Array,
     believed: Array | None = None,
+    *,
+    learn: bool = True,
 ) -> tuple[Array, float]:
     """
     Return the prior precision that maximises the evidence, shape (K,), and the freedom it leaves.
@@ -76,6 +78,8 @@ def learned_precision(
     believed : array, shape (K,), optional
         Precision of machines at large: the spread learned of this one starts there and is never
         wider, and what is fitted freely has it. Nothing is believed when left out.
+    learn : bool
+        Else what is believed of machines stays as it is, and only the noise is learned.
 
     """
     if not scales.size:
@@ -86,6 +90,7 @@ def learned_precision(
     tied = labels >= 0
     usual = _usual(scales, believed)
     variance, most = _first_variances(labels, usual)
+    learned_of = np.flatnonzero(learn | ~np.isfinite(most))
     noise = 1.0
     for _ in range(ROUNDS):
         precision = _precision(tied, variance, labels, usual)
@@ -96,7 +101,7 @@ def learned_precision(
         determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
         left = rss - 2.0 * right @ mean + mean @ normal @ mean
         noise = max(left / max(rows - determined.sum(), 1.0), 1e-6)
-        for k in range(variance.size):
+        for k in learned_of:
             mine = labels == k
             if mine.any():
                 share = max(float(determined[mine].sum()), 1e-3)
@@ -151,7 +156,7 @@ def _precision(tied: NDArray[np.bool_], variance: Array, labels: Array, usual: A
 
 
 def shrunk_step(
-    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs, *, learn: bool = True
 ) -> tuple[Model, Scale]:
     """
     Return the model after one linear step with learned priors, and the noise it leaves.
@@ -166,14 +171,16 @@ def shrunk_step(
         The noise that residuals are measured in, and the weight of every sample.
     beliefs : Beliefs
         The numbers that decide.
+    learn : bool
+        Whether sizes are learned; see `learned_precision`.
 
     """
-    model, _, freedom = _learned(problem, model, scale, beliefs)
+    model, _, freedom = _learned(problem, model, scale, beliefs, learn=learn)
     return model, robust_scale(problem, problem.residuals(model), freedom=freedom)
 
 
 def shrunk_fit(
-    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs, *, learn: bool = True
 ) -> tuple[Fit, Array]:
     """
     Return the fit with learned priors, and their precision, shape (K,).
@@ -188,14 +195,16 @@ def shrunk_fit(
         The noise that residuals are measured in, and the weight of every sample.
     beliefs : Beliefs
         The numbers that decide.
+    learn : bool
+        Whether sizes are learned; see `learned_precision`.
 
     """
-    model, precision, _ = _learned(problem, model, scale, beliefs)
+    model, precision, _ = _learned(problem, model, scale, beliefs, learn=learn)
     return fit(problem, model, scale, precision, iterations=1), precision
 
 
 def _learned(
-    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs, *, learn: bool
 ) -> tuple[Model, Array, float]:
     """Return the model after one linear step, the prior precision learned, and its freedom."""
     residual = problem.whitened(problem.residuals(model), scale)
@@ -209,7 +218,12 @@ def _learned(
     x = coordinates(model)
     target = _target(normal, right, float(residual @ residual), x)
     precision, freedom = learned_precision(
-        *_projected(*target, frames), residual.size, labels, scales, _believed(model)
+        *_projected(*target, frames),
+        residual.size,
+        labels,
+        scales,
+        _believed(model),
+        learn=learn,
     )
     ridge = np.concatenate([np.zeros(frames), precision])
     pull = ridge * np.concatenate([np.zeros(frames), x])

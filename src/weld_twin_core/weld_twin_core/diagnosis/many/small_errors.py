@@ -42,6 +42,7 @@ def many_small(
     exclude: Sequence[str],
     beliefs: Beliefs,
     progress: Callable[[str], None],
+    orders: int | None = None,
 ) -> tuple[Fit, Scale, Array]:
     """
     Return the fit of all families together, its noise and its prior precision.
@@ -58,25 +59,34 @@ def many_small(
         The numbers that decide.
     progress : callable
         Told in a few words what has been done.
+    orders : int, optional
+        The most orders of waves, where the measurements are too few to learn any size from; all
+        that they tell when left out, and sizes are learned.
 
     """
-    everything = model.with_found(_everything(problem, model, exclude, beliefs))
+    learn = orders is None
+    everything = model.with_found(_everything(problem, model, exclude, beliefs, orders))
     scale = robust_scale(problem, problem.residuals(model))
-    model, scale = shrunk_step(problem, everything, scale, beliefs)
+    model, scale = shrunk_step(problem, everything, scale, beliefs, learn=learn)
     model = model.with_found(tuple(effect.turned() for effect in model.found))
     progress('families fitted together')
-    model = with_lines(problem, model, scale, beliefs)
-    progress('lines of high order looked for')
+    if learn:
+        model = with_lines(problem, model, scale, beliefs)
+        progress('lines of high order looked for')
     if 'base' in problem.align:
         model = with_setup(problem, model, scale, beliefs)
         progress('motion of the set-up looked for')
-    model, scale = shrunk_step(problem, model, scale, beliefs)
-    result, precision = shrunk_fit(problem, model, scale, beliefs)
+    model, scale = shrunk_step(problem, model, scale, beliefs, learn=learn)
+    result, precision = shrunk_fit(problem, model, scale, beliefs, learn=learn)
     return result, scale, precision
 
 
 def _everything(
-    problem: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs
+    problem: Problem,
+    model: Model,
+    exclude: Sequence[str],
+    beliefs: Beliefs,
+    orders: int | None,
 ) -> tuple[Effect, ...]:
     """Return every effect that fits linearly, at zero unless the search has found its value."""
     features = problem.features(model)
@@ -90,9 +100,13 @@ def _everything(
             out += [e for e in model.found if e.name == kind.name]
             continue
         for joint in joints_of(kind, model.robot.joint_names):
-            if kind.applicable(view, joint) is None:
+            if kind.applicable(view, joint) is not None:
+                continue
+            if kind.waves is not None and orders is not None:
+                small: Sequence[Effect] = kind.small(view, joint, orders)
+            else:
                 small = _small(kind, view, joint, most, beliefs, have)
-                out += [effect for effect in small if not hardly_moves(features, effect)]
+            out += [effect for effect in small if not hardly_moves(features, effect)]
     out += _bends(features, exclude, {effect.site for effect in out if effect.orders().size})
     out = _apart_from_frames(problem, features, out)
     return (*out, *(e for e in model.found if e.dated))

@@ -19,12 +19,11 @@ import numpy as np
 
 from ...arrays import Array
 from ...contacts import Artefact, Contact, Contacts
-from ...effects import REGISTRY, Effect
 from ...recording import Recording
-from ...twin.features import joints_of
 from ..algebra.fit import robust_fit, robust_scale
 from ..algebra.problem import Model, Problem
 from ..frames.places import FEWEST, posed
+from ..hypotheses.plain_causes import plain_causes
 from ..result import Unsound
 from .evidence import Mistake
 
@@ -85,15 +84,8 @@ def touches(problem: Problem, model: Model) -> Touched:
 def _plain_fit(problem: Problem, model: Model) -> Model:
     """Return the model with all constant errors and springs fitted, outliers with little weight."""
     view = problem.features(model)[0].view
-    every: list[Effect] = []
-    for kind in REGISTRY.values():
-        if kind.of not in ('joint', 'link') or not kind.cause or kind.dated:
-            continue
-        for joint in joints_of(kind, model.robot.joint_names):
-            if kind.applicable(view, joint) is None:
-                small = kind.small(view, joint, 1)
-                every += [effect for effect in small if effect.on in ('constant', 'load')]
-    start = model.with_found((*model.found, *{e.key: e for e in every}.values()))
+    every = plain_causes(model.robot, view, ('constant', 'load'))
+    start = model.with_found((*model.found, *every))
     scale = robust_scale(problem, problem.residuals(model))
     return robust_fit(problem, start, scale)[0].model
 

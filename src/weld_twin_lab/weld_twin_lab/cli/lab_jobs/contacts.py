@@ -26,6 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='N',
         help='also make and open N cases of the plant',
     )
+    parser.add_argument(
+        '--postures',
+        type=int,
+        default=0,
+        metavar='N',
+        help='also ask on N arms of the plant how many postures a place needs',
+    )
     parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
 
 
@@ -61,4 +68,10 @@ def run(args: argparse.Namespace) -> int:
         score = sealed(args.sealed, out / 'sealed', tell)
         write_text(out / 'sealed.json', json.dumps(score, indent=1) + '\n', overwrite=True)
         print(', '.join(f'{key} {value}' for key, value in score.items()))
+    if args.postures:
+        from ...contacts.postures import postures
+
+        needed = postures(args.postures, out / 'postures', tell)
+        write_text(out / 'postures.json', json.dumps(needed, indent=1) + '\n', overwrite=True)
+        print(json.dumps(needed))
     return 0

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Postures in which the tool point is at given points, from postures to start with."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array
+from .chain import forward, jacobian
+from .robot import Robot
+
+ROUNDS = 80
+"""Newton steps at the most: from a start at random they reach a point within some thirty."""
+STRIDE = 0.2
+"""Longest step of a joint [rad, m]: longer ones jump to and fro near the edge of the reach."""
+DAMPING = 1e-6
+"""Added to the squares [m^2/rad^2]: an arm that is stretched has no step that leads outwards."""
+REACHED = 1e-9
+"""Distance [m] from which on the point counts as reached."""
+
+
+def least_step(robot: Robot, q: Array, off: Array) -> Array:
+    """
+    Return the least joint step that moves the tool point, shape (M, n).
+
+    Parameters
+    ----------
+    robot : Robot
+    q : array, shape (M, n) [rad or m]
+    off : array, shape (M, 3) [m]
+        The way that the tool point has to go.
+
+    """
+    turn = jacobian(robot, q)[:, :3]
+    inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + DAMPING * np.eye(3))
+    return np.asarray(np.einsum('mji,mjk,mk->mi', turn, inverse, off))
+
+
+def reaching(robot: Robot, points: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """
+    Return postures near their starts with the tool point at points, and which of them reach it.
+
+    Limits of the joints are not looked at.
+
+    Parameters
+    ----------
+    robot : Robot
+    points : array, shape (M, 3) [m]
+    start : array, shape (M, n) [rad or m]
+
+    Returns
+    -------
+    postures : array, shape (M, n) [rad or m]
+    reached : array, shape (M,)
+
+    """
+    q = np.array(start)
+    for _ in range(ROUNDS):
+        off = points - forward(robot, q)[:, :3, 3]
+        if np.abs(off).max(initial=0.0) < REACHED:
+            break
+        q = q + np.clip(least_step(robot, q, off), -STRIDE, STRIDE)
+    off = points - forward(robot, q)[:, :3, 3]
+    return q, np.linalg.norm(off, axis=1) < REACHED

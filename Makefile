@@ -11,6 +11,7 @@ demo: setup
 
 test: lint
 	@$(RUN) python -m pytest -n auto --dist loadscope --no-loadscope-reorder
+	@tools/browser why
 
 docs: setup-docs
 	@$(RUN) python -m sphinx -q -W --keep-going -c docs . build/site
@@ -30,6 +31,7 @@ setup-docs: .venv/ready-docs
 
 .venv/ready-test: .venv/ready
 	@tools/setup test bench
+	@tools/browser
 
 .venv/ready-docs: .venv/ready
 	@tools/setup docs

@@ -3,6 +3,7 @@
 """What holds for the tests of every package, and which of them run side by side."""
 
 import os
+import shutil
 from functools import cache
 
 import pytest
@@ -48,3 +49,60 @@ def pytest_xdist_make_scheduler(config, log):
             return CELLS if f'mark.{CELLS}' in text else file
 
     return ByFile(config, log)
+
+
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
+
+
+@pytest.fixture(scope='session')
+def chromium():
+    """Return a headless Chromium, one for the whole process; the tests open pages in it."""
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip('no Chromium is installed: apt-get install chromium')
+    api = pytest.importorskip(
+        'playwright.sync_api', reason='Playwright is missing: tools/setup test'
+    )
+    with api.sync_playwright() as playwright:
+        made = playwright.chromium.launch(executable_path=program, args=['--no-sandbox'])
+        yield made
+        made.close()
+
+
+class Browser:
+    """Opens pages given as text, and notes what they say on the console."""
+
+    def __init__(self, chromium, folder):
+        self.chromium, self.folder, self.console = chromium, folder, []
+        self.contexts = []
+
+    def open(self, text, *, width=1100, height=900, **how):
+        """Return the open page; ``how`` is for the context, such as ``color_scheme='dark'``."""
+        place = self.folder / f'page{len(self.contexts)}.html'
+        place.write_text(text, encoding='utf-8')
+        context = self.chromium.new_context(viewport={'width': width, 'height': height}, **how)
+        self.contexts.append(context)
+        page = context.new_page()
+        self.console = []
+        page.on('console', lambda message: self.console.append(message.text))
+        page.on('pageerror', lambda error: self.console.append(str(error)))
+        page.on('request', lambda request: self._only_files(request.url))
+        page.goto(place.as_uri())
+        return page
+
+    def _only_files(self, url):
+        if not url.startswith(('file:', 'data:')):
+            self.console.append(f'fetched {url}')
+
+    def close(self):
+        """Close all pages."""
+        for context in self.contexts:
+            context.close()
+
+
+@pytest.fixture
+def browser(chromium, tmp_path):
+    """Return a browser that opens pages given as text."""
+    made = Browser(chromium, tmp_path)
+    yield made
+    made.close()

@@ -16,6 +16,7 @@ from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.deviation_markers import DeviationMarkers
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+from weld_twin_nodes.live.graph_table import COMMON, SPOKEN, Spoken
 from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
 from weld_twin_nodes.live.recorder import Recorder
 from weld_twin_nodes.live.settings import Setting
@@ -38,7 +39,10 @@ class Nodes(Directive):
 
     def run(self) -> list[nodes.Node]:
         """Return the sections."""
-        out = [_section(name, node.__doc__ or '', node.settings) for name, node in NODES.items()]
+        out = [
+            _section(name, node.__doc__ or '', node.settings, SPOKEN[name])
+            for name, node in NODES.items()
+        ]
         return [*out, _section('Every node', 'Parameters that all of them have.', SHARED)]
 
 
@@ -58,10 +62,22 @@ def _quality(qos: Qos) -> str:
     return f'{qos.reliability.replace("_", " ")}, last {qos.depth}{latched}'
 
 
-def _section(name: str, text: str, settings: tuple[Setting, ...]) -> nodes.section:
+def _section(
+    name: str, text: str, settings: tuple[Setting, ...], spoken: Spoken | None = None
+) -> nodes.section:
     section = nodes.section(ids=[f'node-{name.replace(" ", "-").lower()}'], names=[name])
     section += nodes.title(text=name)
     section += nodes.paragraph(text=text.strip().partition('\n\n')[0])
+    if spoken is not None:
+        for words, names in (
+            ('publishes', spoken.publishes),
+            ('hears', spoken.hears),
+            ('answers', spoken.answers),
+            ('asks', spoken.asks),
+        ):
+            own = [n for n in names if n not in COMMON]
+            if own:
+                section += nodes.paragraph(text=f'{words}: {", ".join(own)}')
     section += page_table(
         ('parameter', 'meaning', 'default', 'range', 'while running'),
         [

@@ -20,13 +20,4 @@ setup(
     maintainer_email='maintainers@example.org',
     description='Proof of the welding robot digital twin: blind check, plant, benchmarks, campaigns.',
     license='Apache-2.0',
-    entry_points={
-        'weld_twin.commands': [
-            'benchmark = weld_twin_lab.cli.benchmark',
-            'blind = weld_twin_lab.cli.blind',
-            'campaign = weld_twin_lab.cli.campaign',
-            'lab = weld_twin_lab.cli.lab',
-            'real-robots = weld_twin_lab.cli.real_robots',
-        ]
-    },
 )

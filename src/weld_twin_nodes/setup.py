@@ -10,7 +10,9 @@ setup(
     name=NAME,
     version='0.1.0',
     packages=find_packages(),
-    package_data={NAME: ['py.typed', '**/*.yaml', '**/*.csv', '**/*.css', '**/*.js']},
+    package_data={
+        NAME: ['py.typed', '**/*.yaml', '**/*.csv', '**/*.css', '**/*.js', '**/LICENSE']
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),

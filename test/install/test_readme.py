@@ -14,6 +14,8 @@ import pytest
 import weld_twin_core as wt
 from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.files.effects_file import read_effects
+from weld_twin_msgs_py.robots import load_robot
 from weld_twin_nodes.cli import main
 
 ROOT = Path(__file__).parents[2]
@@ -111,3 +113,27 @@ def test_the_reference_has_every_public_name():
         if not re.search(rf'weld_twin_core\.(\w+\.)*{rooms.get(name, name)}$', pages, re.M)
     ]
     assert missing == []
+
+
+def test_the_chain_of_the_readme_leads_to_the_robot_as_it_is(tmp_path, monkeypatch):
+    """Simulate, diagnose and predict as written; the corrected twin moves as the one simulated."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'bags').symlink_to(ROOT / 'bags')
+    chain = ('simulate', 'diagnose', 'predict')
+    for command in [c for name in chain for c in COMMANDS if c.split()[1] == name]:
+        assert main(shlex.split(command)[1:]) == 0
+    robot = catalog.load('ur5')
+    found = read_recording(tmp_path / 'corrected', robot)
+    true = wt.effects_from_list(
+        [{'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4}], robot
+    )
+    known = load_robot('found/robot.yaml')
+    left = read_effects('found/robot_effects.yaml', known)
+    ends = np.random.default_rng(3).uniform(-2.0, 2.0, (2, robot.n))
+    anywhere = wt.Recording('anywhere', wt.JointMotion(np.arange(40.0), np.linspace(*ends, 40)))
+    for recording in (found, anywhere):
+        real, corrected = (
+            wt.Twin(*each).poses(recording, recording.joints.t).position
+            for each in ((robot, true), (known, left))
+        )
+        assert np.linalg.norm(real - corrected, axis=1).max() < 3e-5

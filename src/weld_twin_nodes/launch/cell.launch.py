@@ -28,6 +28,9 @@ ARGUMENTS = {
     'tip_link': ('', 'last link of the chain in a URDF'),
     'model': ('', 'effects file or diagnosis.json that the twin is to know'),
     'measuring_frame': ('', 'frame that measurements must be given in; empty: the first seen'),
+    'measured_frame': ('', 'frame that was measured, where measurements come as transforms'),
+    'base_from_tf': ('false', 'take from /tf where the base is: base_frame in measuring_frame'),
+    'joint_prefix': ('', "what the joint states put before the robot's joint names"),
     'base_frame': ('', "name of the robot's base in what is published; empty: base"),
     'joint_topic': ('joint_states', 'joint states of the controller'),
     'pose_topic': ('measured/tool_pose', 'poses of the tracker'),
@@ -41,7 +44,9 @@ ARGUMENTS = {
     'rviz': ('false', 'show the cell in RViz'),
     'config': ('', 'parameter file; empty: config/cell.yaml of this package'),
 }
-MODEL = ('base_frame', 'base_link', 'measuring_frame', 'robot', 'tip_link')
+MODEL = ('base_frame', 'base_from_tf', 'base_link', 'measuring_frame', 'robot', 'tip_link')
+MEASURED = ('joint_prefix', 'measured_frame')
+FLAGS = ('base_from_tf',)
 TOPICS = {
     'joint_states': 'joint_topic',
     'measured/tool_point': 'point_topic',
@@ -50,10 +55,10 @@ TOPICS = {
     'tool_wrench': 'wrench_topic',
 }
 NODES = {
-    'deviation_analyzer': (*MODEL,),
-    'deviation_markers': (*MODEL,),
-    'forward_kinematics_twin': (*MODEL, 'model'),
-    'live_diagnosis': (*MODEL, 'align', 'model'),
+    'deviation_analyzer': (*MODEL, *MEASURED),
+    'deviation_markers': (*MODEL, *MEASURED),
+    'forward_kinematics_twin': (*MODEL, 'joint_prefix', 'model'),
+    'live_diagnosis': (*MODEL, *MEASURED, 'align', 'model'),
     'recorder': (),
 }
 """Nodes, and the arguments each takes as a parameter of the same name."""
@@ -92,7 +97,8 @@ def generate_launch_description() -> LaunchDescription:
 def _node(name: str) -> Node:
     """Return a node with the arguments that are its parameters."""
     own: dict[str, ParameterValue] = {
-        key: ParameterValue(LaunchConfiguration(key), value_type=str) for key in NODES[name]
+        key: ParameterValue(LaunchConfiguration(key), value_type=bool if key in FLAGS else str)
+        for key in NODES[name]
     }
     own['use_sim_time'] = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
     if name == 'recorder':

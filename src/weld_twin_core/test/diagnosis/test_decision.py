@@ -435,11 +435,21 @@ def test_families_of_which_none_is_needed_leave_the_cause_unknown():
 
 
 def test_what_no_machine_has_is_evidence_for_something_else():
-    told = evidence(slot((PLAY, 0.99)), refused=('payload with mass -10.5 kg',))
+    told = structured(0.04, slot((PLAY, 0.99)), refused=('payload with mass -10.5 kg',))
     verdict = decide(told)
     assert verdict.status == 'unknown' and not verdict.sets
     assert 'payload with mass -10.5 kg' in verdict.reasons[0]
     assert decide(evidence(refused=('payload with mass -10.5 kg',))).status == 'unknown'
+
+
+def test_beside_what_leaves_noise_alone_what_no_machine_has_says_nothing():
+    told = evidence(slot((PLAY, 0.99)), refused=('payload with mass -10.5 kg',))
+    assert decide(told).status == 'identified'
+
+
+def test_what_was_taken_out_and_fits_better_counts_even_where_noise_is_left():
+    told = evidence(slot((PLAY, 0.99)), lacking=('friction of elbow',))
+    assert decide(told).status == 'unknown'
 
 
 @pytest.mark.parametrize(('size', 'count'), [(1.1e-6, 1), (0.9e-6, 0)])

@@ -94,3 +94,20 @@ def test_nothing_stands_in_for_play_that_was_taken_out_where_its_curve_shows():
     assert found.status == 'unknown'
     assert found.effects == ()
     assert not any(candidate.site.effect == 'backlash' for candidate in found.candidates)
+
+
+@pytest.mark.parametrize(('offset', 'told'), [(3e-4, True), (-3e-4, False)])
+def test_play_that_a_load_holds_on_one_flank_is_told_beside_an_offset_to_that_side(offset, told):
+    # About an upper arm that leans forward the load never changes sign, and pulls it down.
+    robot, joint = wt.load('ur5'), 'shoulder_lift_joint'
+    t = np.arange(0.0, 12.0, 0.02)
+    way = 0.4 * np.sin(np.outer(t, 0.9 + 0.31 * np.arange(6)))
+    q = np.array([0.0, -0.8, 0.9, -1.7, -1.5, 0.0]) + way
+    commanded = wt.Recording('swing', wt.JointMotion(t, q))
+    real = wt.Twin(robot, [wt.effects.JointOffset(joint, offset=offset)]).poses(commanded)
+    drawn = np.random.default_rng(3).normal(scale=NOISE, size=real.position.shape)
+    measured = wt.Measurements(t, real.position + drawn)
+    found = wt.diagnose(commanded.with_measured(measured), robot)
+    named = {(s.effect, s.joint) for group in found.indistinguishable for s in group}
+    assert ('joint_offset', joint) in named
+    assert (('loaded_play', joint) in named) is told

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.errors import DataError
-from weld_twin_core.history import Observation, changes, reaches
+from weld_twin_core.history import Observation, Outlook, changes, outlook, reaches
 from weld_twin_core.history.observation import series_of
 
 COUNT = 20
@@ -118,12 +118,29 @@ def test_diagnoses_of_one_instant_and_none_are_refused():
         changes([])
 
 
+def line(value, rate, rate_std):
+    return Outlook(np.array([value, rate]), np.diag([0.0, rate_std**2]))
+
+
 def test_a_limit_is_reached_when_the_line_meets_it():
-    low, middle, high = reaches(2.0, 1.0, 0.0, 0.1, 0.01)
+    low, middle, high = reaches(2.0, line(1.0, 0.1, 0.01))
     assert middle == pytest.approx(10.0, rel=0.02)
     # 90 % of the rates lie within 1.645 standard errors
     assert low == pytest.approx(1.0 / (0.1 + 0.01645), rel=0.02)
     assert high == pytest.approx(1.0 / (0.1 - 0.01645), rel=0.02)
-    assert reaches(0.5, 1.0, 0.0, 0.1, 0.01) == (0.0, 0.0, 0.0)
-    assert reaches(2.0, 1.0, 0.0, -0.1, 0.01)[1] == pytest.approx(30.0, rel=0.02)
-    assert reaches(2.0, 1.0, 0.0, 0.0, 0.0)[1] == float('inf')
+    assert reaches(0.5, line(1.0, 0.1, 0.01)) == (0.0, 0.0, 0.0)
+    assert reaches(2.0, line(1.0, -0.1, 0.01))[1] == pytest.approx(30.0, rel=0.02)
+    assert reaches(2.0, line(1.0, 0.0, 0.0))[1] == float('inf')
+
+
+def test_value_and_rise_at_the_end_are_those_of_the_line_and_vary_together():
+    seen = year(3, lambda week: 0.1 * (np.arange(COUNT) == 5) * max(week - 20, 0))
+    found = changes(seen)
+    now = outlook(seen, found, NAMES[5])
+    arm = 0.5 * np.random.default_rng(3).normal(size=COUNT)
+    error = np.sqrt(np.diag(now.covariance))
+    assert abs(now.value[0] - (arm[5] + 0.1 * 31)) < 4.0 * error[0]
+    assert abs(now.value[1] - 0.1 / 7.0) < 4.0 * error[1]
+    # A line that rises faster ends higher.
+    assert now.covariance[0, 1] > 0.0
+    assert outlook(seen, found, NAMES[4]) is None

@@ -162,6 +162,21 @@ class Hooks(Parametric, ABC):
         yield cls._at(joint)
 
     @classmethod
+    def constants(cls, view: View, joint: str | None) -> Iterable[Any]:
+        """
+        Yield instances that are no more than a constant of the joint on this motion.
+
+        No search can tell them from one, so none looks for them; they are named beside it.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+
+        """
+        return ()
+
+    @classmethod
     def trials(cls, view: View, joint: str | None) -> float:
         """Return how many instances `seeds` chose among; 0 means as many as it yields."""
         return 0.0

@@ -26,6 +26,9 @@ from .view import Parameter, Stage, Value, View
 SHARES = (0.03, 0.15)
 """Torques at which the flank is certain that a search starts from, in the largest load seen."""
 
+CHANGED = 0.3
+"""Share of half the play by which the joint must come off its flank: less looks like an offset."""
+
 
 @register
 @dataclass(frozen=True, eq=False)
@@ -86,8 +89,26 @@ class LoadedPlay(Effect):
         most = float(np.abs(torque).max(initial=0.0))
         for share in SHARES:
             # Where the load stays on one side, so does the flank, and that is an offset.
-            if (
-                most > 0.0
-                and torque.min() < -2.0 * share * most < 2.0 * share * most < torque.max()
-            ):
+            if most > 0.0 and _changes(torque, share * most):
                 yield cls(str(joint), 0.0, share * most)
+
+    @classmethod
+    def constants(cls, view: View, joint: str | None) -> Iterable[Effect]:
+        """
+        Yield play of a gear that slides easily, where the load keeps it on one flank.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+
+        """
+        torque = load(view, view.robot.index(str(joint)))
+        held = SHARES[0] * float(np.abs(torque).max(initial=0.0))
+        if held > 0.0 and not _changes(torque, held):
+            yield cls(str(joint), 0.0, held)
+
+
+def _changes(torque: Array, held: float) -> bool:
+    """Return whether a load, shape (N,), moves a gear from its flank that friction holds so far."""
+    return bool(np.ptp(torque / np.hypot(torque, held)) > CHANGED)

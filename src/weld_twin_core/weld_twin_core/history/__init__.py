@@ -3,7 +3,7 @@
 """What changed on one arm from diagnosis to diagnosis, and where it leads."""
 
 from .changes import Change, changes
-from .forecast import reaches
+from .forecast import Outlook, outlook, reaches
 from .observation import Observation
 
-__all__ = ['Change', 'Observation', 'changes', 'reaches']
+__all__ = ['Change', 'Observation', 'Outlook', 'changes', 'outlook', 'reaches']

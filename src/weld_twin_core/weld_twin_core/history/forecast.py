@@ -4,9 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
+from ..arrays import Array
 from ..errors import DataError
+from .changes import Change, value_and_rise
+from .observation import Observation
 
 DRAWS = 20_000
 """Draws of the trend; an interval's ends are good to 1 % of its width."""
@@ -15,9 +21,45 @@ SEED = 7
 NEVER = float('inf')
 
 
-def reaches(
-    limit: float, value: float, value_std: float, rate: float, rate_std: float
-) -> tuple[float, float, float]:
+class Outlook(NamedTuple):
+    """
+    Where a coordinate is at the last diagnosis, and how fast it moves.
+
+    Attributes
+    ----------
+    value : array, shape (2,)
+        Value [SI], and rise in a day.
+    covariance : array, shape (2, 2)
+
+    """
+
+    value: Array
+    covariance: Array
+
+
+def outlook(
+    observations: Sequence[Observation], found: Sequence[Change], name: str
+) -> Outlook | None:
+    """
+    Return where a coordinate is and how fast it moves; None if it has no trend.
+
+    All diagnoses are fitted together with what changed, so that value and rise have one covariance.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+    found : sequence of Change
+        What `changes` returned for them.
+    name : str
+        The coordinate.
+
+    """
+    if not any(each.name == name and each.kind == 'trend' for each in found):
+        return None
+    return Outlook(*value_and_rise(observations, found, name))
+
+
+def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
     """
     Return in how many days a value reaches a limit: the median and a 90 % interval, ends included.
 
@@ -25,10 +67,7 @@ def reaches(
     ----------
     limit : float
         Size of the value that must not be passed, on the side it moves to.
-    value, value_std : float
-        Now, and its standard error.
-    rate, rate_std : float
-        Rise in a day, and its standard error.
+    now : Outlook
 
     Returns
     -------
@@ -44,11 +83,12 @@ def reaches(
     if not limit > 0.0:
         raise DataError(f'a limit must be positive, got {limit}')
     rng = np.random.default_rng(SEED)
-    now = value + value_std * rng.standard_normal(DRAWS)
-    slope = rate + rate_std * rng.standard_normal(DRAWS)
+    spread, axes = np.linalg.eigh(now.covariance)
+    root = axes * np.sqrt(np.maximum(spread, 0.0))
+    value, slope = now.value[:, None] + root @ rng.standard_normal((2, DRAWS))
     side = np.where(slope >= 0.0, limit, -limit)
     with np.errstate(divide='ignore', invalid='ignore'):
-        days = np.where(np.abs(now) >= limit, 0.0, (side - now) / slope)
+        days = np.where(np.abs(value) >= limit, 0.0, (side - value) / slope)
     days = np.where(np.isnan(days), NEVER, np.maximum(days, 0.0))
     low, middle, high = np.quantile(days, [0.05, 0.5, 0.95], method='inverted_cdf')
     return float(low), float(middle), float(high)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -67,6 +68,10 @@ class Observation:
 
         The prior is taken out again, else every diagnosis would repeat it.
         """
+        return self._information
+
+    @cached_property
+    def _information(self) -> tuple[Array, Array]:
         width = self.prior_std
         # At unit prior the posterior variance along a direction is 1 less what the data showed.
         scaled = self.covariance / np.outer(width, width)

@@ -90,6 +90,9 @@ class Directions:
             out += [f'tool.{axis}' for axis in AXES]
         for effect, size in zip(self.effects, self.sizes, strict=True):
             where = f' {effect.site}' if effect.site else ''
+            # Two couplings of one joint differ in the joint that they come from.
+            source = effect.to_mapping().get('source')
+            where += f'<{source}' if source else ''
             out += [f'{effect.name}{where} {k}' for k in range(size)]
         for joint, knots in enumerate(self.knots):
             out += [f'curve of joint {joint + 1} at {place:.3f}' for place in knots]

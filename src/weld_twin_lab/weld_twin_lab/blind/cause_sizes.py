@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.effects.plausible import plausible as plausible_of
 
 Cause = dict[str, Any]
 """An entry of an effects file."""
@@ -87,6 +88,10 @@ MOST = {
 """The same for causes that become absurd sooner."""
 LEAST = {'servo_lag': 0.15, 'joint_compliance': 0.1}
 """The same for causes that the simulator cannot have any smaller: a servo or spring too stiff."""
+INSIDE = 0.8
+"""Share of what a machine can have up to which causes are drawn: the estimate may be higher."""
+TWINS = {('bearing_tilt', 'tilt'): 'lean'}
+"""What the twin calls the size of a cause, where it is another word."""
 RIPPLE_ORDERS = (1, 2, 3, 8, 20, 50, 80, 100)
 """Orders of ripple [1/turn]: eccentric wheels, teeth, and the waves of a strain wave gear."""
 
@@ -111,9 +116,42 @@ def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Ca
     return {'effect': family, **drawn, size: drawn[size] * float(rng.choice([-1.0, 1.0]))}
 
 
-def plausible(family: str, factor: float) -> bool:
-    """Tell whether a cause may be so many times its typical size."""
-    return LEAST.get(family, SPREAD[0]) < factor < MOST.get(family, SPREAD[1])
+def plausible(robot: Robot, cause: Mapping[str, Any], factor: float) -> bool:
+    """
+    Tell whether a cause may be so many times its typical size.
+
+    Parameters
+    ----------
+    robot : Robot
+    cause : mapping
+        Of its typical size.
+    factor : float
+
+    """
+    family = cause['effect']
+    if not LEAST.get(family, SPREAD[0]) < factor < MOST.get(family, SPREAD[1]):
+        return False
+    return all(
+        factor * float(np.abs(cause[key]).max()) < INSIDE * machines(robot, cause, key)
+        for key in SIZES[family]
+        if key in cause
+    )
+
+
+def machines(robot: Robot, cause: Mapping[str, Any], key: str) -> float:
+    """
+    Return the largest value of a parameter that a machine has.
+
+    Parameters
+    ----------
+    robot : Robot
+    cause : mapping
+    key : str
+        Of the parameter that is its size.
+
+    """
+    parameter = TWINS.get((cause['effect'], key), key)
+    return plausible_of(robot, cause['effect'], parameter, cause.get('joint')).high
 
 
 def scaled(cause: Mapping[str, Any], factor: float) -> Cause:

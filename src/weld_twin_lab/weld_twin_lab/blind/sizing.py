@@ -45,7 +45,7 @@ def sized(cell: Cell, cause: Cause, taken: Take, wanted: float) -> tuple[Cause, 
         if 1.0 / NEAR < ratio / wanted < NEAR:
             return trial, off
         factor *= wanted / max(ratio, 1e-9)
-        if not plausible(cause['effect'], factor):
+        if not plausible(cell.robot, cause, factor):
             raise Unseen(f'{cause["effect"]} is {ratio:.3g} times the noise, wanted {wanted:.3g}')
     return trial, off
 
@@ -120,6 +120,6 @@ def sized_together(
         if 1.0 / NEAR < ratio / wanted < NEAR:
             break
         factor *= wanted / max(ratio, 1e-9)
-        if not all(plausible(cause['effect'], factor) for cause in causes):
+        if not all(plausible(cell.robot, cause, factor) for cause in causes):
             raise Unseen(f'the construction is {ratio:.3g} times the noise')
     return grown, ratio

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from weld_twin_msgs_py.files import markdown
@@ -24,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what each node did under each fault."""
     import tempfile
-    from pathlib import Path
 
     from weld_twin_nodes.harness import Cell
 
@@ -33,25 +33,54 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     from .faulting.fault_list import JOINT_FAULTS, OTHER_FAULTS
 
     rows: list[dict[str, Any]] = []
+    scenes: list[dict[str, Any]] = []
+    wanted = [fault for fault in (*JOINT_FAULTS, *OTHER_FAULTS) if args.only in fault.name]
+    parameters: list[dict[str, Any]] = []
+    recorded: dict[str, Any] = {'opens': True, 'messages': 0, 'reason': ''}
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / 'bag'
-        with Cell(Path(folder) / 'cell') as cell:
-            bench = Bench(cell, bag)
-            bench.ready()
-            for fault in (*JOINT_FAULTS, *OTHER_FAULTS):
-                if args.only not in fault.name:
-                    continue
-                rows.append(_tried(bench, fault))
-                tell(_line(rows[-1]))
-            parameters = abuse(bench)
-        recorded = _recorded(bag)
-    passed = all(row['passed'] for row in rows) and all(row['refused'] for row in parameters)
+        if wanted:
+            with Cell(Path(folder) / 'cell') as cell:
+                bench = Bench(cell, bag)
+                bench.ready()
+                for fault in wanted:
+                    rows.append(_tried(bench, fault))
+                    tell(_line(rows[-1]))
+                parameters = abuse(bench)
+            recorded = _recorded(bag)
+        scenes = _scenes(args.only, Path(folder), tell)
+    passed = all(row['passed'] for row in (*rows, *scenes))
     return {
-        'passed': passed and recorded['opens'],
+        'passed': passed and recorded['opens'] and all(row['refused'] for row in parameters),
         'faults': rows,
+        'scenes': scenes,
         'parameters': parameters,
         'bag': recorded,
     }
+
+
+def _scenes(only: str, folder: Path, tell: Callable[[str], None]) -> list[dict[str, Any]]:
+    """Return what was told in each scene whose name contains a text."""
+    from .faulting.scenes import SCENES, play
+
+    rows = []
+    for k, scene in enumerate(SCENES):
+        if only in scene.name:
+            rows.append(play(scene, folder / f'scene{k}'))
+            tell(
+                f'{"ok  " if rows[-1]["passed"] else "FAIL"} {scene.name}: {_sentences(rows[-1])}'
+            )
+    return rows
+
+
+def _sentences(row: dict[str, Any]) -> str:
+    if 'reason' in row:
+        return str(row['reason'])
+    return '; '.join(
+        f'{each["what"]} after {each["seconds"]:.1f} s: {each["said"]}'
+        for each in row['told']
+        if each['seconds'] is not None
+    )
 
 
 def _tried(bench: Any, fault: Any) -> dict[str, Any]:
@@ -109,9 +138,25 @@ def table(result: dict[str, Any]) -> str:
         )
         for row in result['faults']
     ]
+    told = [
+        (
+            row['fault'],
+            each['what'],
+            each['node'].lstrip('/'),
+            '' if each['seconds'] is None else f'{each["seconds"]:.1f}',
+            each['said'],
+            'yes' if row['passed'] else 'no',
+        )
+        for row in result['scenes']
+        for each in row['told']
+        if each['within_s']
+    ]
     refused = sum(row['refused'] for row in result['parameters'])
-    return markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows) + (
-        f'\n{refused} of {len(result["parameters"])} absurd parameter values were refused in a '
+    return (
+        markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows)
+        + '\n'
+        + markdown.table(('fault', 'done', 'node', 'after [s]', 'what it said', 'passed'), *told)
+        + f'\n{refused} of {len(result["parameters"])} absurd parameter values were refused in a '
         f'sentence. The bag of the whole campaign has {result["bag"]["messages"]:,} messages; all '
         'of them can be read.\n'
     )

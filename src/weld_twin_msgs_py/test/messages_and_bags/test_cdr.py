@@ -34,7 +34,33 @@ def cdr(message, little=True):
     return bytes(TYPES.serialize_cdr(message, message.__msgtype__, little_endian=little))
 
 
+def transform(frame, child):
+    pose = MAKE.pose(NS, np.arange(3.0), TURN, frame)
+    of = TYPES.types
+    where = of['geometry_msgs/msg/Transform'](
+        translation=of['geometry_msgs/msg/Vector3'](*np.arange(3.0)),
+        rotation=pose.pose.orientation,
+    )
+    return of['geometry_msgs/msg/TransformStamped'](pose.header, child, where)
+
+
+def numbers_of(item):
+    where = item.transform
+    p, q = where.translation, where.rotation
+    return [*map(ord, item.child_frame_id), p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+
+
+SURE = MAKE.pose_with_covariance(NS, np.arange(3.0), TURN, np.diag(np.arange(1.0, 7.0)), 'tracker')
 SAMPLES = {
+    'geometry_msgs/msg/PoseWithCovarianceStamped': (
+        SURE,
+        lambda m: [*from_messages.pose(m)[0], from_messages.position_sigma(m)],
+    ),
+    'geometry_msgs/msg/TransformStamped': (transform('tracker', 'probe'), numbers_of),
+    'tf2_msgs/msg/TFMessage': (
+        TYPES.types['tf2_msgs/msg/TFMessage']([transform('a', 'bc'), transform('abc', 'd')]),
+        lambda m: [n for item in m.transforms for n in numbers_of(item)],
+    ),
     'geometry_msgs/msg/PoseStamped': (
         MAKE.pose(NS, np.arange(3.0), TURN, 'tracker'),
         lambda m: [*from_messages.pose(m)[0], *from_messages.pose(m)[1].flat],

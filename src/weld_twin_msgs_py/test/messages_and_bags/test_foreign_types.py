@@ -172,6 +172,26 @@ def test_the_reference_of_a_controller_is_the_commanded_motion(cell, tmp_path):
         read_recording(bag, ROBOT, TopicNames(joints='/controller/state:eror'))
 
 
+def test_what_a_controller_feeds_back_is_measured_against_what_it_commanded(cell, tmp_path):
+    """The servo's own gap: one topic tells of both, and no tracker is there."""
+    for k in range(N):
+        cell.add(
+            '/controller/state',
+            'control_msgs/msg/JointTrajectoryControllerState',
+            k,
+            header=cell.header(k),
+            joint_names=[f'left_{name}' for name in reversed(ROBOT.joint_names)],
+            reference=point(cell, np.flip(Q[k]).copy() - 2e-3),
+            feedback=point(cell, np.flip(Q[k]).copy()),
+        )
+    names = TopicNames(joints='/controller/state', pose='/controller/state')
+    recording = read_recording(cell.write(tmp_path), ROBOT, names)
+    np.testing.assert_allclose(recording.joints.q, Q - 2e-3, atol=1e-15)
+    np.testing.assert_allclose(
+        recording.measured.position, [tool(k) for k in range(N)], atol=1e-12
+    )
+
+
 def test_a_dynamic_joint_state_is_a_joint_state(cell, tmp_path):
     value = 'control_msgs/msg/InterfaceValue'
     for k in range(N):

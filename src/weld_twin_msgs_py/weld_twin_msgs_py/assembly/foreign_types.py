@@ -13,7 +13,16 @@ from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any
 
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import quaternion_from_matrix
+from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+
+from ..messages.cdr_types import Header, Pose, PoseStamped, Xyz, Xyzw
+from ..messages.topics import JOINT_STATES, MEASURED_POSE
+from .frame_names import WORLD
+from .joint_states import JointStates
 
 Plain = Callable[[Any, str], Iterator[Any]]
 """A message, and the frame that is looked for where it holds several; to plain messages."""
@@ -72,7 +81,19 @@ def _joints_of_controller_state(message: Any, part: str) -> Iterator[Any]:
 
 
 def _joints_of_dynamic_state(message: Any, _: str) -> Iterator[Any]:
-    """Yield the joint state of a `DynamicJointState`; a joint without a position is left out."""
+    """
+    Yield the joint state of a `DynamicJointState`; a joint without a position is left out.
+
+    Raises
+    ------
+    DataError
+        Names and values are not as many.
+
+    """
+    if len(message.joint_names) != len(message.interface_values) or any(
+        len(each.interface_names) != len(each.values) for each in message.interface_values
+    ):
+        raise DataError('it has not one value for every interface of every joint it names')
     told = [
         (name, dict(zip(values.interface_names, values.values, strict=True)))
         for name, values in zip(message.joint_names, message.interface_values, strict=True)
@@ -98,6 +119,57 @@ JOINTS: Mapping[str, Plain] = {
 }
 """Types that hold joint states."""
 FOREIGN: Mapping[str, Plain] = {**POSES, **JOINTS}
+CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
+"""Type that may also stand for a measured pose: of the joints that the controller feeds back."""
+ACCEPTED: Mapping[str, tuple[str, ...]] = {
+    JOINT_STATES.name: (JOINT_STATES.type, *JOINTS),
+    MEASURED_POSE.name: (
+        MEASURED_POSE.type,
+        'geometry_msgs/msg/PoseWithCovarianceStamped',
+        *POSES,
+        CONTROLLER,
+    ),
+}
+"""Types that a topic may have besides that of the table of topics, which comes first."""
+
+
+def stamped_pose(header: Any, T: Array, frame_id: str) -> PoseStamped:
+    """Return a pose, shape (4, 4), as a message with the stamp of a header."""
+    turn = quaternion_from_matrix(T[:3, :3])
+    pose = Pose(Xyz(*T[:3, 3].tolist()), Xyzw(*turn.tolist()))
+    return PoseStamped(Header(header.stamp, frame_id), pose)
+
+
+class FedBack:
+    """
+    Turns what a controller says of its joints into the pose that the arm had then.
+
+    Held against the twin of what was commanded, it shows the servo's own part of a gap.
+
+    Parameters
+    ----------
+    robot : Robot
+    part : str
+        Of the message; empty for what is fed back.
+    joint_names : sequence of str, optional
+        What the controller calls the joints.
+
+    """
+
+    def __init__(
+        self, robot: Robot, part: str = '', joint_names: tuple[str, ...] | None = None
+    ) -> None:
+        self._robot = robot
+        self._part = part
+        self._joints = JointStates(robot, joint_names=joint_names)
+
+    def __call__(self, message: Any) -> Iterator[PoseStamped]:
+        """Yield the pose in the measuring frame, if the message has all the joints."""
+        part = self._part or ('feedback' if hasattr(message, 'feedback') else 'actual')
+        for state in _joints_of_controller_state(message, part):
+            sample = self._joints.take(state)
+            if sample is not None:
+                yield stamped_pose(message.header, forward(self._robot, sample.q), WORLD)
 
 
 def split_topic(name: str) -> tuple[str, str]:

@@ -65,6 +65,8 @@ class Intake:
         Whether joint positions beyond the limits are refused; see `JointStates`.
     measuring_frame : str
         What poses and points must be given in; empty for the first frame that comes.
+    joint_names, mend
+        See `JointStates`.
 
     Attributes
     ----------
@@ -74,9 +76,17 @@ class Intake:
 
     """
 
-    def __init__(self, robot: Robot, *, limits: bool = True, measuring_frame: str = '') -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        limits: bool = True,
+        measuring_frame: str = '',
+        joint_names: tuple[str, ...] | None = None,
+        mend: bool = False,
+    ) -> None:
         self.measuring_frame = MeasuringFrame(measuring_frame)
-        self.joints = JointStates(robot, limits=limits)
+        self.joints = JointStates(robot, limits=limits, joint_names=joint_names, mend=mend)
         self.wrench_frame = WrenchFrame(robot)
         self._orders = {role: Forward() for role in Role}
         self._rows: dict[Role, Callable[[Any], Array]] = {
@@ -97,7 +107,8 @@ class Intake:
     def remarks(self) -> list[str]:
         """Return what is to be told of names and frames that were taken for granted."""
         told = (self.joints, self.measuring_frame, self.wrench_frame)
-        return [each.remark for each in told if each.remark]
+        remarks = [*(each.remark for each in told), self.joints.velocity_remark]
+        return [remark for remark in remarks if remark]
 
     def last(self, role: Role) -> int | None:
         """Return the stamp of the last sample of a stream [ns]."""

@@ -16,6 +16,11 @@ from weld_twin_core.errors import DataError
 
 from ..messages import from_messages
 
+TRAVEL = 0.02
+"""
+Way [rad or m] of a joint after which velocities that were zero all along are none: one degree, more
+than an arm at rest creeps, and half a second of the slowest seam.
+"""
 _SLACK = 1e-6
 """What `Robot.check_positions` allows beyond a limit [rad or m]."""
 
@@ -50,6 +55,12 @@ class JointStates:
     limits : bool
         Whether positions beyond the joints' limits are refused. A running node does; a recording
         is read with them, for they tell of swapped joints and of degrees taken for radians.
+    joint_names : sequence of str, optional
+        What the joint states call the joints of the robot, in its order; left out, as the robot
+        does, or with one prefix.
+    mend : bool
+        Whether velocities are left out that stay zero while joints move. A running node does; of a
+        recording it is told as what it is.
 
     Attributes
     ----------
@@ -57,14 +68,25 @@ class JointStates:
         Messages that hold no joint of the robot.
     parts : int
         Messages that hold some joints and wait for the rest.
-    remark : str
-        What is to be told of the names; empty where they are those of the robot.
+    remark, velocity_remark : str
+        What is to be told of the names, and of velocities; empty where there is nothing.
 
     """
 
-    def __init__(self, robot: Robot, *, limits: bool = True) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        limits: bool = True,
+        joint_names: Sequence[str] | None = None,
+        mend: bool = False,
+    ) -> None:
         self._robot = robot
-        self._names = robot.joint_names
+        self._given = joint_names is not None
+        self._names = robot.joint_names if joint_names is None else tuple(joint_names)
+        self._mend = mend
+        self._resting: Array | None = None
+        self._zeros = False
         slack = _SLACK if limits else inf
         self._ranges = [
             (low - slack, high + slack)
@@ -77,10 +99,46 @@ class JointStates:
         self._parts: dict[str, tuple[float, float]] = {}
         self.others = self.parts = 0
         self.remark = ''
+        self.velocity_remark = ''
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the robot's joints as the messages name them."""
+        return self._names
 
     def take(self, message: Any) -> JointSample | None:
         """
         Return the sample that a message completes, None if it completes none.
+
+        Raises
+        ------
+        Incomplete
+            Joints are missing and will not come any more.
+        DataError
+            The message cannot be used.
+
+        """
+        sample = self._taken(message)
+        if sample is None or not self._mend or sample.qd is None:
+            return sample
+        return sample._replace(qd=None) if self._only_zeros(sample.q, sample.qd) else sample
+
+    def _only_zeros(self, q: Array, qd: Array) -> bool:
+        """Return whether velocities stay zero while joints move, as some drivers have them."""
+        if qd.any():
+            self._resting, self._zeros = None, False
+        elif self._resting is None:
+            self._resting = q
+        elif not self._zeros and np.abs(q - self._resting).max() > TRAVEL:
+            self._zeros = True
+            self.velocity_remark = (
+                'velocities are zero while the joints move; they are taken from the positions'
+            )
+        return self._zeros
+
+    def _taken(self, message: Any) -> JointSample | None:
+        """
+        Return the sample as the message has it.
 
         Raises
         ------
@@ -122,6 +180,8 @@ class JointStates:
             There are several prefixes: those of several robots.
 
         """
+        if self._given:
+            return False
         prefixes = set.intersection(
             *(
                 {each.removesuffix(own) for each in names if each.endswith(own)}
@@ -132,8 +192,8 @@ class JointStates:
             listed = ', '.join(repr(each) for each in sorted(prefixes))
             raise DataError(
                 f'the joint state holds the joints of several robots, with the prefixes {listed}; '
-                "publish each robot's on a topic of its own, or name the joints in the robot file "
-                'as the joint state does'
+                "say which with joint_prefix, publish each robot's on a topic of its own, or name the "
+                'joints in the robot file as the joint state does'
             )
         if not prefixes:
             return False

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
 from ..assembly import Samples
@@ -45,6 +46,11 @@ class Stream:
         """Add one sample, later than the one before."""
         self._ns.append(ns)
         self._values.extend(values)
+
+    def extend(self, ns: np.ndarray, rows: Array) -> None:
+        """Add samples, shape (N,) and (N, width), later than those before."""
+        self._ns.frombytes(np.ascontiguousarray(ns, dtype=np.int64).tobytes())
+        self._values.frombytes(np.ascontiguousarray(rows, dtype=np.float64).tobytes())
 
     def leave_out(self, error: DataError) -> None:
         """

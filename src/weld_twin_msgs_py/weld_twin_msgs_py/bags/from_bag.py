@@ -16,7 +16,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 
 from ..assembly import Intake, Role, Samples, assembled
-from ..assembly.foreign_types import JOINTS, plain_messages, split_topic
+from ..assembly.foreign_types import CONTROLLER, JOINTS, FedBack, plain_messages, split_topic
 from ..messages.topics import (
     JOINT_STATES,
     MEASURED_POINT,
@@ -30,10 +30,11 @@ from .contacts import marks, touching
 from .ends import Ends, never_recorded, uneven_ends
 from .needed import POSE_TYPES, no_joints, no_measurements
 from .reader import BagReader
+from .regular import fill_regular
 
 TYPES = {
     Role.JOINTS: (JOINT_STATES.type, *JOINTS),
-    Role.POSE: POSE_TYPES,
+    Role.POSE: (*POSE_TYPES, CONTROLLER),
     Role.POINT: (MEASURED_POINT.type,),
     Role.SIGMA: (MEASURED_SIGMA.type,),
     Role.WRENCH: (TOOL_WRENCH.type,),
@@ -80,15 +81,13 @@ def read_recording(
 
     """
     names = TopicNames() if topics is None else topics
-    intake = Intake(robot, limits=False)
     with BagReader(path) as bag:
         roles = _roles(names, bag.topics)
-        streams = {role: Stream(topic, Intake.width(role, robot)) for topic, role in roles.items()}
-        _fill(bag, names, roles, streams, intake)
+        streams, intake = _read(bag, names, roles, robot)
         points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
         made = bag.provenance
         touched = marks(bag, names)
-        measured = touched or {Role.POSE, Role.POINT} & set(roles.values())
+        measured = touched or {Role.POSE, Role.POINT} & set(roles)
         if needs_measurements and not measured:
             raise DataError(f"bag '{path}': {no_measurements(names, bag.topics)}")
     if streams[Role.JOINTS].messages == intake.joints.others:
@@ -134,12 +133,12 @@ def _name(path: Path) -> str:
     return path.stem if path.is_file() else path.resolve().name
 
 
-def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[str, Role]:
+def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[Role, str]:
     """Return the topics to read; the joint states are a must, the others as they are there."""
-    roles = {_topic(names, role): role for role in Role}
+    roles = {role: _topic(names, role) for role in Role}
     space = _topic(names, Role.JOINTS).removesuffix(TopicNames().joints)
     defaults = {*vars(TopicNames()).values(), *vars(TopicNames.within(space)).values()}
-    for topic, role in list(roles.items()):
+    for role, topic in list(roles.items()):
         kind, count = present.get(topic, ('', 0))
         if role is Role.JOINTS and (count == 0 or kind not in TYPES[role]):
             raise DataError(f'the bag has {no_joints(names, present)}')
@@ -149,14 +148,14 @@ def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[st
                 raise DataError(
                     f"the bag has no message on '{topic}'; its topics are {listed or 'all empty'}"
                 )
-            del roles[topic]
+            del roles[role]
         elif kind not in TYPES[role]:
             raise DataError(
                 f"topic '{topic}' has the type {kind}, but this use needs "
                 + ' or '.join(TYPES[role])
             )
-    if _topic(names, Role.POSE) in roles:
-        roles.pop(_topic(names, Role.POINT), None)
+    if Role.POSE in roles:
+        roles.pop(Role.POINT, None)
     return roles
 
 
@@ -166,24 +165,51 @@ def _topic(names: TopicNames, role: Role) -> str:
     return split_topic(name)[0]
 
 
+def _read(
+    bag: BagReader, names: TopicNames, roles: Mapping[Role, str], robot: Robot
+) -> tuple[dict[Role, Stream], Intake]:
+    """Return the columns of a bag: read by the thousand where all is as usual, else one by one."""
+    streams, intake = _empty(roles, robot)
+    one_each = {topic: role for role, topic in roles.items()}
+    whole = not any(split_topic(getattr(names, role.value))[1] for role in roles)
+    usual = whole and len(one_each) == len(roles)
+    if not (usual and fill_regular(bag, one_each, streams, intake)):
+        streams, intake = _empty(roles, robot)
+        _fill(bag, names, streams, intake, robot)
+    return streams, intake
+
+
+def _empty(roles: Mapping[Role, str], robot: Robot) -> tuple[dict[Role, Stream], Intake]:
+    streams = {role: Stream(topic, Intake.width(role, robot)) for role, topic in roles.items()}
+    return streams, Intake(robot, limits=False)
+
+
 def _fill(
     bag: BagReader,
     names: TopicNames,
-    roles: Mapping[str, Role],
     streams: Mapping[Role, Stream],
     intake: Intake,
+    robot: Robot,
 ) -> None:
-    """Stream the bag into the columns."""
-    parts = {topic: split_topic(getattr(names, role.value))[1] for topic, role in roles.items()}
+    """Stream the bag into the columns; a topic may tell of joints commanded and fed back."""
+    parts = {role: split_topic(getattr(names, role.value))[1] for role in streams}
+    roles: dict[str, list[Role]] = {}
+    for role, stream in streams.items():
+        roles.setdefault(stream.topic, []).append(role)
+    fed_back = FedBack(robot, parts.get(Role.POSE, ''))
     for topic, kind, _, message in bag.messages(roles):
-        stream = streams[roles[topic]]
-        try:
-            plain = plain_messages(kind, message, parts[topic])
-        except DataError as error:
-            raise DataError(f"message {stream.messages} of '{topic}': {error}") from None
-        for each in plain:
-            stream.messages += 1
-            _take(each, roles[topic], stream, intake)
+        for role in roles[topic]:
+            stream = streams[role]
+            try:
+                if role is Role.POSE and kind == CONTROLLER:
+                    plain = tuple(fed_back(message))
+                else:
+                    plain = plain_messages(kind, message, parts[role])
+            except DataError as error:
+                raise DataError(f"message {stream.messages} of '{topic}': {error}") from None
+            for each in plain:
+                stream.messages += 1
+                _take(each, role, stream, intake)
 
 
 def _take(message: Any, role: Role, stream: Stream, intake: Intake) -> None:

@@ -110,10 +110,18 @@ class BagReader:
         """
         with clear_errors(self.path):
             for topic, kind, log_ns, data in self.raw(topics):
-                yield BagMessage(topic, kind, log_ns, self._decode(data, kind))
+                yield BagMessage(topic, kind, log_ns, self.decoded(data, kind))
 
-    def _decode(self, data: bytes, kind: str) -> Any:
-        """Decode by the definition of Jazzy, or by that of the bag where Jazzy has none."""
+    def decoded(self, data: bytes, kind: str) -> Any:
+        """
+        Return a message by the definition of Jazzy, or by that of the bag where Jazzy has none.
+
+        Raises
+        ------
+        DataError
+            Nobody says what such a message is.
+
+        """
         if kind in TYPES.fielddefs:
             return decode(data, kind)
         definition, idl = self._definitions.get(kind, ('', False))
@@ -137,6 +145,10 @@ class BagReader:
                 for connection, log_ns, data in reader.messages(wanted):
                     whole = unzstd(data) if self._packed else data
                     yield connection.topic, connection.msgtype, log_ns, whole
+
+    def plain_readers(self) -> tuple[Reader, ...]:
+        """Return the readers of the storage files, none where each message is packed."""
+        return () if self._packed else tuple(self._readers)
 
     def stamps(self) -> Iterator[tuple[str, int, bool]]:
         """

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from heapq import merge
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +15,14 @@ import numpy as np
 
 from weld_twin_core import __version__
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
 from weld_twin_core.contacts import Contacts
 from weld_twin_core.recording import Measurements, Recording
 
 from ..assembly.frame_names import WORLD
 from ..messages.from_messages import NANOSECONDS
+from ..messages.layout import layout_of
 from ..messages.to_messages import Messages, bag_messages
 from ..messages.topics import (
     ACTUAL_JOINT_STATES,
@@ -33,9 +37,12 @@ from ..messages.topics import (
     TWIN_COVARIANCE,
     TWIN_POSE,
 )
+from ..messages.typestore import TYPES
 from .writer import BagWriter
 
-_Entry = tuple[int, str, Any]
+_Entry = tuple[int, str, str, bytes]
+ROWS = 1_000
+"""Messages of a topic that are made at once: some 200 kB."""
 
 
 def write_recording(
@@ -96,15 +103,14 @@ def write_recording(
         parts.append(entries.poses(TWIN_POSE.name, recording.joints.t, *twin))
     if twin is not None and covariance is not None:
         parts.append(entries.sure_poses(recording.joints.t, *twin, covariance))
-    if deviation is not None and recording.measured is not None:
+    if deviation is not None and recording.measured is not None and len(deviation):
         parts.append(entries.vectors(DEVIATION.name, recording.measured.t, deviation))
     with BagWriter(path, storage=storage, provenance=made) as bag:
-        for ns, topic, message in merge(*parts, key=lambda entry: entry[0]):
-            bag.write(topic, message, ns)
+        bag.write_all(merge(*parts, key=itemgetter(0)))
 
 
 class _Entries:
-    """Makes the messages of each topic one by one, so that only a few exist at once."""
+    """Makes the messages of each topic, so that only some exist at once."""
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
@@ -118,83 +124,102 @@ class _Entries:
         """Yield the streams of the recording itself."""
         motion, measured = self.recording.joints, self.recording.measured
         wrench, temperature = self.recording.wrench, self.recording.temperature
-        make = self.make
         yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd)
         if measured is not None:
             yield from self.measured(measured)
         if self.recording.contacts is not None:
             yield self.contacts(self.recording.contacts)
         if wrench is not None:
-            frame = self.recording.wrench_frame
-            yield self._each(
-                TOOL_WRENCH.name, wrench.t, lambda ns, k: make.wrench(ns, wrench.value[k], frame)
-            )
+            frame, rows = self.recording.wrench_frame, wrench.value
+            first = partial(self.make.wrench, wrench=rows[0], frame_id=frame)
+            yield self._alike(TOOL_WRENCH.name, wrench.t, first, rows)
         if temperature is not None:
-            yield self._each(
-                TEMPERATURE.name,
-                temperature.t,
-                lambda ns, k: make.temperature(ns, temperature.value[k]),
-            )
+            degrees = temperature.value
+            rows = np.column_stack([degrees, np.zeros(degrees.size)])
+            first = partial(self.make.temperature, celsius=degrees[0])
+            yield self._alike(TEMPERATURE.name, temperature.t, first, rows)
 
     def joints(self, topic: str, robot: Robot, q: Array, qd: Array | None) -> Iterator[_Entry]:
         """Return the joint states, q and qd shape (N, n)."""
-        return self._each(
-            topic,
-            self.recording.joints.t,
-            lambda ns, k: self.make.joint_state(
-                ns, robot.joint_names, q[k], None if qd is None else qd[k]
-            ),
+        t, none = self.recording.joints.t, np.zeros((q.shape[0], 0))
+        first = partial(
+            self.make.joint_state,
+            names=robot.joint_names,
+            q=q[0],
+            qd=None if qd is None else qd[0],
         )
+        return self._alike(topic, t, first, q, none if qd is None else qd, none)
 
     def measured(self, measured: Measurements) -> Iterator[Iterator[_Entry]]:
         """Yield poses or points, and their standard deviations where they are known."""
         position, rotation, sigma = measured.position, measured.rotation, measured.sigma
+        if not measured.t.size:
+            return
         if rotation is not None:
             yield self.poses(MEASURED_POSE.name, measured.t, position, rotation)
         else:
-            yield self._each(
-                MEASURED_POINT.name,
-                measured.t,
-                lambda ns, k: self.make.point(ns, position[k], WORLD),
-            )
+            first = partial(self.make.point, position=position[0], frame_id=WORLD)
+            yield self._alike(MEASURED_POINT.name, measured.t, first, position)
         if sigma is not None:
             yield self.vectors(
                 MEASURED_SIGMA.name, measured.t, np.repeat(sigma[:, None], 3, axis=1)
             )
 
     def contacts(self, contacts: Contacts) -> Iterator[_Entry]:
-        """Return what each posture touched."""
+        """Return what each posture touched; labels differ in length, so each is made by itself."""
         none = np.zeros(contacts.size)
         value = none if contacts.value is None else contacts.value
         sigma = none if contacts.sigma is None else contacts.sigma
-        return self._each(
-            CONTACT.name,
-            self.recording.joints.t,
-            lambda ns, k: self.make.contact(ns, contacts.labels[k], value[k], sigma[k]),
-        )
+        for k, ns in enumerate(self._stamps(self.recording.joints.t).tolist()):
+            message = self.make.contact(ns, contacts.labels[k], value[k], sigma[k])
+            yield ns, CONTACT.name, message.__msgtype__, _serialised(message)
 
     def poses(self, topic: str, t: Array, position: Array, rotation: Array) -> Iterator[_Entry]:
         """Return poses, shapes (K, 3) and (K, 3, 3)."""
-        return self._each(
-            topic, t, lambda ns, k: self.make.pose(ns, position[k], rotation[k], WORLD)
-        )
+        first = partial(self.make.pose, position=position[0], rotation=rotation[0], frame_id=WORLD)
+        return self._alike(topic, t, first, _pose_rows(position, rotation))
 
     def sure_poses(
         self, t: Array, position: Array, rotation: Array, covariance: Array
     ) -> Iterator[_Entry]:
         """Return poses with covariance, shapes (K, 3), (K, 3, 3) and (K, 6, 6)."""
-        return self._each(
-            TWIN_COVARIANCE.name,
-            t,
-            lambda ns, k: self.make.pose_with_covariance(
-                ns, position[k], rotation[k], covariance[k]
-            ),
+        first = partial(
+            self.make.pose_with_covariance,
+            position=position[0],
+            rotation=rotation[0],
+            covariance=covariance[0],
         )
+        rows = np.hstack([_pose_rows(position, rotation), covariance.reshape(-1, 36)])
+        return self._alike(TWIN_COVARIANCE.name, t, first, rows)
 
     def vectors(self, topic: str, t: Array, vectors: Array) -> Iterator[_Entry]:
         """Return vectors, shape (K, 3)."""
-        return self._each(topic, t, lambda ns, k: self.make.vector3(ns, vectors[k]))
+        return self._alike(topic, t, partial(self.make.vector3, vector=vectors[0]), vectors)
 
-    def _each(self, topic: str, t: Array, maker: Callable[[int, int], Any]) -> Iterator[_Entry]:
-        stamps = self.epoch + np.round(t * 1e9).astype(np.int64)
-        return ((int(ns), topic, maker(int(ns), k)) for k, ns in enumerate(stamps))
+    def _stamps(self, t: Array) -> np.ndarray:
+        return self.epoch + np.round(t * 1e9).astype(np.int64)
+
+    def _alike(
+        self, topic: str, t: Array, first: Callable[[int], Any], *runs: Array
+    ) -> Iterator[_Entry]:
+        """Yield messages that differ from the first one in stamp and numbers, shapes (N, count)."""
+        stamps = self._stamps(t)
+        message = first(int(stamps[0]))
+        kind, data = message.__msgtype__, _serialised(message)
+        layout = layout_of(kind, data)
+        assert layout is not None, f'a {kind} has no layout'
+        for start in range(0, stamps.size, ROWS):
+            rows = slice(start, start + ROWS)
+            ns = stamps[rows]
+            whole = layout.filled(data, ns, [run[rows] for run in runs]).tobytes()
+            for k, each in enumerate(ns.tolist()):
+                yield each, topic, kind, whole[k * layout.size : (k + 1) * layout.size]
+
+
+def _serialised(message: Any) -> bytes:
+    return bytes(TYPES.serialize_cdr(message, message.__msgtype__))
+
+
+def _pose_rows(position: Array, rotation: Array) -> Array:
+    """Return position and quaternion x y z w, w >= 0, shape (K, 7)."""
+    return np.hstack([position, quaternion_from_matrix(rotation)])

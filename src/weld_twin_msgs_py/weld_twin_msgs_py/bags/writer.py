@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -102,6 +102,25 @@ class BagWriter:
         segment = self._opened()
         with self._clear_errors():
             segment.write(Channel(topic, kind), data, log_ns)
+
+    def write_all(self, entries: Iterable[tuple[int, str, str, bytes]]) -> None:
+        """
+        Write many messages: time of recording [ns], topic, type and serialised message of each.
+
+        Raises
+        ------
+        DataError
+            The bag is not open, or the disk refuses.
+
+        """
+        segment = self._opened()
+        channels: dict[tuple[str, str], Channel] = {}
+        with self._clear_errors():
+            for ns, topic, kind, data in entries:
+                channel = channels.get((topic, kind))
+                if channel is None:
+                    channel = channels[topic, kind] = Channel(topic, kind)
+                segment.write(channel, data, ns)
 
     def add_topic(self, topic: str, kind: str) -> None:
         """Announce a topic that may stay without messages."""

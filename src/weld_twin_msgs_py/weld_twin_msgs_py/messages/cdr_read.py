@@ -29,10 +29,15 @@ from .cdr_types import (
     PointStamped,
     Pose,
     PoseStamped,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
     String,
     Temperature,
+    TFMessage,
     Time,
     TrajectoryPoint,
+    Transform,
+    TransformStamped,
     Vector3Stamped,
     Wrench,
     WrenchStamped,
@@ -155,6 +160,20 @@ def _point(c: _Cursor) -> PointStamped:
     return PointStamped(c.header(), Xyz(*c.doubles(3)))
 
 
+def _sure_pose(c: _Cursor) -> PoseWithCovarianceStamped:
+    pose = c.pose_stamped()
+    return PoseWithCovarianceStamped(pose.header, PoseWithCovariance(pose.pose, c.doubles(36)))
+
+
+def _transform(c: _Cursor) -> TransformStamped:
+    header, child, v = c.header(), c.string(), c.doubles(7)
+    return TransformStamped(header, child, Transform(Xyz(*v[:3]), Xyzw(*v[3:])))
+
+
+def _transforms(c: _Cursor) -> TFMessage:
+    return TFMessage(tuple(_transform(c) for _ in range(c.count(64))))
+
+
 def _vector(c: _Cursor) -> Vector3Stamped:
     return Vector3Stamped(c.header(), Xyz(*c.doubles(3)))
 
@@ -183,12 +202,15 @@ def _path(c: _Cursor) -> Path:
 
 READERS: dict[str, Callable[[_Cursor], Any]] = {
     'geometry_msgs/msg/PoseStamped': _Cursor.pose_stamped,
+    'geometry_msgs/msg/PoseWithCovarianceStamped': _sure_pose,
     'geometry_msgs/msg/PointStamped': _point,
+    'geometry_msgs/msg/TransformStamped': _transform,
     'geometry_msgs/msg/Vector3Stamped': _vector,
     'geometry_msgs/msg/WrenchStamped': _wrench,
     'sensor_msgs/msg/Temperature': _temperature,
     'trajectory_msgs/msg/JointTrajectory': _trajectory,
     'nav_msgs/msg/Path': _path,
+    'tf2_msgs/msg/TFMessage': _transforms,
     'std_msgs/msg/String': lambda c: String(c.string()),
 }
 

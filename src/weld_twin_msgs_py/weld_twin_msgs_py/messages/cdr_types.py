@@ -52,6 +52,41 @@ class PoseStamped(NamedTuple):
     pose: Pose
 
 
+class PoseWithCovariance(NamedTuple):
+    """geometry_msgs/PoseWithCovariance."""
+
+    pose: Pose
+    covariance: tuple[float, ...]
+
+
+class PoseWithCovarianceStamped(NamedTuple):
+    """geometry_msgs/PoseWithCovarianceStamped."""
+
+    header: Header
+    pose: PoseWithCovariance
+
+
+class Transform(NamedTuple):
+    """geometry_msgs/Transform."""
+
+    translation: Xyz
+    rotation: Xyzw
+
+
+class TransformStamped(NamedTuple):
+    """geometry_msgs/TransformStamped."""
+
+    header: Header
+    child_frame_id: str
+    transform: Transform
+
+
+class TFMessage(NamedTuple):
+    """tf2_msgs/TFMessage."""
+
+    transforms: tuple[TransformStamped, ...]
+
+
 class PointStamped(NamedTuple):
     """geometry_msgs/PointStamped."""
 

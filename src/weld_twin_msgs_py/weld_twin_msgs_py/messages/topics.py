@@ -79,8 +79,8 @@ class Topic:
 
     @property
     def relative(self) -> str:
-        """Return the name that a node's namespace goes before; `DIAGNOSTICS` is one for all."""
-        return self.name if self.name == DIAGNOSTICS.name else self.name.lstrip('/')
+        """Return the name that a node's namespace goes before, unless it is one for all."""
+        return self.name if self.name in ONE_FOR_ALL else self.name.lstrip('/')
 
     def message_class(self) -> Any:
         """Return the rclpy message class; needs a ROS installation."""
@@ -250,6 +250,25 @@ DIAGNOSTICS = _result(
     10,
     'health of every node: each input with its rate, age, refusals and the last reason',
 )
+
+TF = _stream(
+    '/tf',
+    'tf2_msgs/msg/TFMessage',
+    100,
+    'where frames are that move: those of measurements and of the base',
+)
+TF_STATIC = Topic(
+    '/tf_static',
+    'tf2_msgs/msg/TFMessage',
+    Qos(RELIABLE, 1, LATCHED),
+    Qos(RELIABLE, 100, LATCHED),
+    'where frames are that do not move',
+    steady=False,
+)
+FRAMES = (TF, TF_STATIC)
+"""Listened to where a node is told the name of the measuring frame."""
+ONE_FOR_ALL = (DIAGNOSTICS.name, TF.name, TF_STATIC.name)
+"""Topics that all robots share, whatever their namespaces."""
 
 AROUND = (
     ROBOT_DESCRIPTION,

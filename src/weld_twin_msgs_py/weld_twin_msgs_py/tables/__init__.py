@@ -5,6 +5,7 @@
 from .build import Table, read_table
 from .contacts import quoted, read_contacts, write_touches
 from .table_options import TableOptions
+from .two_tables import read_two_tables
 
 __all__ = [
     'Table',
@@ -12,5 +13,6 @@ __all__ = [
     'quoted',
     'read_contacts',
     'read_table',
+    'read_two_tables',
     'write_touches',
 ]

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import NamedTuple
 from zlib import crc32
@@ -21,13 +22,16 @@ from .cells import Cells, read_cells
 from .clock_column import stamps
 from .header import Columns, find_columns
 from .rotations import AGREES, disagreement, find_convention, rotations
-from .table_options import TableOptions
+from .table_options import TableOptions, flag_of
 from .unit_guess import METRES, RADIANS, angle_unit, length_unit
+from .words import OWN, tokens
 
 _FAR = 10.0
 """A row this many times farther off than the median row is pointed out."""
 _FARTHEST = 1e9
 """A coordinate beyond this is a slip in any unit, and its square may be no number."""
+_TOO_GOOD = 2e-6
+"""A typical misfit [m] below what any tracker repeats, a fifth of its best."""
 _WRONG = 0.05
 """A typical misfit beyond this share of the arm's reach means that the table is wrong or misread."""
 
@@ -60,8 +64,13 @@ def read_table(path: Path | str, robot: Robot, options: TableOptions | None = No
 
     """
     options = options or TableOptions()
-    cells = read_cells(path, options.delimiter, options.decimal)
-    said = list(cells.said)
+    cells = read_cells(path, options.delimiter, options.decimal, options.marker)
+    return table_of(cells, robot, options, list(cells.said))
+
+
+def table_of(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) -> Table:
+    """Return what the cells of a table mean; the same errors as `read_table`."""
+    path = cells.path
     try:
         return _read(cells, robot, options, said)
     except DataError as error:
@@ -84,7 +93,7 @@ def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) ->
     rotation = _rotation(cells, robot, q, columns, options, said) if columns.rotation else None
     sigma = _sigma(cells, columns, scale, said) if columns.sigma else None
     _check(cells, robot, q, position, options, said)
-    t, sentence = stamps(cells, columns.time, columns.unit((columns.time or '',)))
+    t, sentence = stamps(cells, columns.time, columns.unit((columns.time or '',)), columns.date)
     said.append(sentence)
     if t is None:
         epoch, t = own_epoch(cells.path), np.arange(float(len(q)))
@@ -183,10 +192,52 @@ def joint_angles(
     if sentence:
         said.append(sentence)
     q[:, turning] *= RADIANS[unit]
+    q = as_modelled(q, robot, options, said)
     outside = ((q < robot.lower - 1e-6) | (q > robot.upper + 1e-6)).any(axis=1)
     if outside.any():
         said.append(f'{outside.sum()} rows leave the joint limits of robot {robot.name!r}')
     return q
+
+
+def as_modelled(q: Array, robot: Robot, options: TableOptions, said: list[str]) -> Array:
+    """
+    Return joint columns, shape (M, n) [rad or m], counted as the model counts them.
+
+    Signs come first, then what one joint adds to another, then offsets, which are in the
+    model's sense.
+    """
+    for name in ('joint_signs', 'joint_offsets'):
+        given = getattr(options, name)
+        if given is not None and len(given) != robot.n:
+            raise DataError(f'{flag_of(name)} needs {robot.n} numbers, got {len(given)}')
+    if options.joint_signs is not None:
+        q = q * np.array(options.joint_signs)
+        said.append('signs of the joints are ' + _listed(options.joint_signs))
+    if options.coupled is not None:
+        q = _coupled(q, options.coupled)
+        said.append(f'joints are coupled by {options.coupled}')
+    if options.joint_offsets is not None:
+        q = q + np.array(options.joint_offsets) * np.where(robot.prismatic, 1e-3, np.pi / 180.0)
+        said.append(
+            f'added to the joints are {_listed(options.joint_offsets)} deg (mm for a slide)'
+        )
+    return q
+
+
+def _listed(values: tuple[float, ...]) -> str:
+    return ', '.join(f'{value:g}' for value in values)
+
+
+def _coupled(q: Array, text: str) -> Array:
+    """Return joint columns after '3+2': what the model's third joint is, the second added."""
+    match = re.fullmatch(r'\s*(\d+)\s*([+-])\s*(\d+)\s*', text)
+    count = q.shape[1]
+    one, other = (int(match[1]), int(match[3])) if match else (0, 0)
+    if match is None or not (1 <= one <= count and 1 <= other <= count) or one == other:
+        raise DataError(f'--coupled needs two joints such as 3+2 or 3-2, got {text!r}')
+    out = np.array(q)
+    out[:, one - 1] += (1.0 if match[2] == '+' else -1.0) * q[:, other - 1]
+    return out
 
 
 def _position(
@@ -202,6 +253,10 @@ def _position(
         named = columns.position
         position = cells.stack(named)
         said.append('measured positions are ' + ', '.join(named))
+        if any(set(tokens(name)) & OWN for name in named):
+            said.append(
+                f'{named[0]} may be what the controller computes; only an instrument measures'
+            )
     else:
         named = columns.target
         sign = 1.0 if options.difference == 'add' else -1.0
@@ -279,6 +334,11 @@ def _check(
         f'with base and tool fitted, positions are {typical * 1e3:.3g} mm (median) from the '
         'nominal arm'
     )
+    if typical < _TOO_GOOD:
+        said.append(
+            'no instrument agrees so well with an arm: these positions were computed, not measured, '
+            'and a diagnosis of them will find no gap'
+        )
     if typical > _WRONG * reach:
         sentence = (
             f'positions are {typical * 1e3:.3g} mm from where robot {robot.name!r} would be, with '

@@ -15,9 +15,17 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
+from .formats import Format, read, recognised
+from .words import UNITS
+
 DELIMITERS = (';', '\t', ',')
 _LOOK = 20
 """Lines from which the delimiter is read."""
+_TITLE = 2
+"""Cells that a line of a title or 'Date;22.11.2026' above the header may have; a row that lost cells
+has more."""
+_COMMENTS = ('//', '%', '!')
+_SEP = re.compile(r'^"?sep=(.?|\\t)"?[;,]*$', re.IGNORECASE)
 _EMPTY = {'', 'nan', 'na', 'n/a', 'null', 'none', '-'}
 _NUMBER = re.compile(r'^[-+]?\d*[.,]?\d+(?:[eE][-+]?\d+)?$')
 _COMMA_NUMBER = re.compile(r'^[-+]?\d+,\d+(?:[eE][-+]?\d+)?$')
@@ -96,9 +104,19 @@ class Cells:
         return np.stack([self.numbers(name) for name in names], axis=1)
 
 
-def read_cells(path: Path | str, delimiter: str | None, decimal: str | None) -> Cells:
+def read_cells(
+    path: Path | str, delimiter: str | None, decimal: str | None, marker: str | None = None
+) -> Cells:
     """
-    Read a delimited text file with a header line.
+    Read a delimited text file with a header line, or a log or export in a form that is known.
+
+    Parameters
+    ----------
+    path : Path or str
+    delimiter, decimal : str, optional
+        Left out, they are found.
+    marker : str, optional
+        What is meant, where an export holds several things that were tracked.
 
     Raises
     ------
@@ -112,18 +130,95 @@ def read_cells(path: Path | str, delimiter: str | None, decimal: str | None) -> 
         text = path.read_bytes()
     except OSError as error:
         raise DataError(f"table '{path}' cannot be read: {error.strerror or error}") from None
-    lines = _decoded(path, text).splitlines()
+    decoded = _decoded(path, text)
+    known = None if delimiter else recognised(decoded)
+    if known is not None:
+        return _of_known(path, known, decoded, marker)
+    lines = _without_comments(decoded.splitlines())
     if sum(1 for line in lines if line.strip()) < 2:
         raise DataError(f"table '{path}' needs a header line and at least one row")
     if delimiter is None:
-        delimiter = _delimiter(path, lines)
+        delimiter = _excel(lines) or _delimiter(path, lines)
         said.append(f'columns are separated by {_spoken(delimiter)}')
+    lines = _from_header(lines, delimiter, said)
     header, rows, numbers = _split(path, lines, delimiter)
+    header, rows, numbers = _with_units(header, rows, numbers)
     if decimal is None:
         decimal = _decimal(path, rows, delimiter)
         if decimal == ',':
             said.append('the decimal sign is a comma')
     return Cells(path, header, rows, numbers, decimal, said)
+
+
+def _of_known(path: Path, known: Format, text: str, marker: str | None) -> Cells:
+    try:
+        header, rows, lines, said = read(known, text, marker)
+    except DataError as error:
+        raise DataError(f"table '{path}': {error}") from None
+    if not rows:
+        raise DataError(f"table '{path}' has a header of {known.name} and no row under it")
+    comma = any(_COMMA_NUMBER.match(cell) for row in rows[:_LOOK] for cell in row)
+    return Cells(path, header, rows, lines, ',' if comma else '.', said)
+
+
+def _without_comments(lines: list[str]) -> list[str]:
+    """Return the lines with those of a comment emptied; a header may begin with '#'."""
+    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+    out = ['' if line.lstrip().startswith(_COMMENTS) else line for line in lines]
+    if not out[first:] or not out[first].lstrip().startswith('#'):
+        return out
+    after = [line for line in out[first + 1 :] if line.strip() and not line.startswith('#')]
+    for sign in DELIMITERS:  # '# time,x,y' names the columns, '# made on Monday' does not
+        if after and out[first].count(sign) == after[0].count(sign) > 0:
+            out[first] = out[first].lstrip().lstrip('# ')
+            return out
+    return ['' if line.startswith('#') else line for line in out]
+
+
+def _excel(lines: list[str]) -> str | None:
+    """Return the delimiter of a first line ``sep=;`` as Excel writes it, and empty that line."""
+    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+    match = _SEP.match(lines[first].strip())
+    if match is None:
+        return None
+    lines[first] = ''
+    return '\t' if match[1] in ('\\t', '') else match[1]
+
+
+def _from_header(lines: list[str], delimiter: str, said: list[str]) -> list[str]:
+    """Return the lines with those before the header emptied: titles, dates, names of jobs."""
+    rows = [(k, row) for k, row in enumerate(csv.reader(lines, delimiter=delimiter)) if row]
+    first = _header_at([len(row) for _, row in rows[:_LOOK]])
+    if not first:
+        return lines
+    start = rows[first][0]
+    passed = sum(1 for line in lines[:start] if line.strip())
+    said.append(f'{passed} lines before the header are passed over')
+    return ['' if k < start else line for k, line in enumerate(lines)]
+
+
+def _header_at(counts: list[int]) -> int:
+    """Return the first of the lines, by their numbers of cells, that is no title."""
+    usual = max(counts, key=counts.count)
+    start = next(k for k, count in enumerate(counts) if count == usual)
+    return start if all(count <= min(_TITLE, usual - 1) for count in counts[:start]) else 0
+
+
+def _with_units(
+    header: list[str], rows: list[list[str]], numbers: list[int]
+) -> tuple[list[str], list[list[str]], list[int]]:
+    """Return the table with a row of units under the header taken into the header."""
+    if not rows:
+        return header, rows, numbers
+    units = [cell.strip('[]() ') for cell in rows[0]]
+    named = [unit for unit in units if unit not in ('', '-')]
+    if not named or any(unit.lower() not in UNITS for unit in named):
+        return header, rows, numbers
+    joined = [
+        f'{name} [{unit}]' if unit not in ('', '-') else name
+        for name, unit in zip(header, units, strict=True)
+    ]
+    return joined, rows[1:], numbers[1:]
 
 
 def _decoded(path: Path, data: bytes) -> str:
@@ -142,12 +237,15 @@ def _spoken(delimiter: str) -> str:
 def _delimiter(path: Path, lines: list[str]) -> str:
     """Return the one delimiter that cuts the first lines into equally many cells."""
     head = list(islice((line for line in lines if line.strip()), _LOOK))
-    even = []
+    even = {}
     for sign in DELIMITERS:
-        counts = {len(row) for row in csv.reader(head, delimiter=sign)}
-        if len(counts) == 1 and counts.pop() > 1:
-            even.append(sign)
-    in_header = [sign for sign in even or DELIMITERS if sign in head[0]]
+        counts = [len(row) for row in csv.reader(head, delimiter=sign)]
+        start = _header_at(counts)
+        if counts[start] > 1 and len(set(counts[start:])) == 1:
+            even[sign] = start
+    first = min(even.values(), default=0)
+    signs = [sign for sign, start in even.items() if start == first] or DELIMITERS
+    in_header = [sign for sign in signs if sign in head[first]]
     if len(in_header) != 1:
         raise DataError(
             f"table '{path}': no single delimiter (comma, semicolon or tab) cuts its lines "

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime, timezone
+from functools import partial
 
 import numpy as np
 
@@ -19,17 +21,25 @@ _LARGEST = (('s', 1e11), ('ms', 1e14), ('us', 1e17), ('ns', np.inf))
 """Beyond these, stamps since 1970 must be in the next finer unit."""
 
 
-def stamps(cells: Cells, column: str | None, unit: str | None) -> tuple[Array | None, str]:
+_DATES = ('%d.%m.%Y', '%Y/%m/%d', '%d-%b-%Y', '%Y-%m-%d', '%m/%d/%Y', '%d/%m/%Y', '')
+"""Dates as instruments and spreadsheets write them, American before British; or none."""
+_CLOCKS = ('%H:%M:%S.%f', '%H:%M:%S', '%H:%M', '%I:%M:%S.%f %p', '%I:%M:%S %p', '%I.%M.%S.%f %p')
+
+
+def stamps(
+    cells: Cells, column: str | None, unit: str | None, date: str | None = None
+) -> tuple[Array | None, str]:
     """
     Return stamps of the rows, shape (rows,) [s], and a sentence; None when they are no use.
 
-    Stamps that are missing, rounded until they repeat, or not increasing say nothing that the
-    order of the rows does not.
+    ``date`` is the column of the day, where the time of day has a column of its own. Stamps that
+    are missing, rounded until they repeat, or not increasing say nothing that the order of the
+    rows does not.
     """
     order = 'rows are taken in their order, one station per second'
     if column is None:
         return None, f'the table has no stamps; {order}'
-    values = _parsed(cells, column)
+    values = _parsed(cells, column, date)
     if values is None:
         return None, f'stamps in {column!r} cannot be read; {order}'
     if np.isnan(values).any() or (values.size > 1 and np.diff(values).min() <= 0.0):
@@ -38,15 +48,39 @@ def stamps(cells: Cells, column: str | None, unit: str | None) -> tuple[Array | 
     return values * _SECONDS[chosen], f'stamps in {column!r} are in {chosen}'
 
 
-def _parsed(cells: Cells, column: str) -> Array | None:
-    try:
-        return cells.numbers(column)
-    except DataError:
-        pass
-    try:
-        times = [datetime.fromisoformat(text) for text in cells.column(column)]
-    except ValueError:
+def _parsed(cells: Cells, column: str, date: str | None) -> Array | None:
+    if date is None:
+        try:
+            return cells.numbers(column)
+        except DataError:
+            pass
+    texts = cells.column(column)
+    if date is not None:
+        texts = [f'{day} {clock}' for day, clock in zip(cells.column(date), texts, strict=True)]
+    read = _reader(texts)
+    if read is None:
         return None
-    return np.array(
-        [(t if t.tzinfo else t.replace(tzinfo=timezone.utc)).timestamp() for t in times]
-    )
+    times = [read(text) for text in texts]
+    zoned = [t if t.tzinfo else t.replace(tzinfo=timezone.utc) for t in times]
+    return np.array([t.timestamp() for t in zoned])
+
+
+def _reader(texts: list[str]) -> Callable[[str], datetime] | None:
+    """Return what reads every one of the texts as a date with a time, or a time alone."""
+    formats = [f'{day} {clock}'.strip() for day in _DATES for clock in _CLOCKS]
+    readers: list[Callable[[str], datetime]] = [datetime.fromisoformat]
+    readers += [partial(_by_format, form=form) for form in formats]
+    for read in readers:
+        try:
+            for text in texts:
+                read(text)
+        except ValueError:
+            continue
+        return read
+    return None
+
+
+def _by_format(text: str, form: str) -> datetime:
+    # A comma before the fraction of a second, as German spreadsheets have it.
+    found = datetime.strptime(text.replace(',', '.').strip(), form)
+    return found if '%Y' in form else found.replace(year=2000)

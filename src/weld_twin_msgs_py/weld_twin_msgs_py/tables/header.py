@@ -5,22 +5,36 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError
 
 from .table_options import TableOptions, flag_of
+from .words import (
+    ANGLES,
+    CLOCK,
+    DATE,
+    DIFFERENCE,
+    FANUC,
+    JOINT,
+    KUKA,
+    LETTERS,
+    MEASURED,
+    NAMES_A_JOINT,
+    NEUTRAL,
+    QUATERNION,
+    SIGMA,
+    TARGET,
+    TEMPERATURE,
+    TURNS,
+    UNITS,
+    tokens,
+)
 
-MEASURED = {'measurement', 'measured', 'meas', 'actual', 'tracker', 'laser', 'real', 'observed'}
-TARGET = {'t', 'target', 'goal', 'nominal', 'cmd', 'command', 'commanded', 'desired', 'set', 'ref'}
-DIFFERENCE = {'dif', 'diff', 'difference', 'delta', 'err', 'error', 'dev', 'deviation'}
-SIGMA = {'std', 'sigma', 'sd', 'stdev', 'stddev', 'uncertainty'}
-UNITS = {'m', 'mm', 'rad', 'deg', 'degree', 'degrees', 's', 'ms', 'us', 'ns'}
-_UNIT_NAMES = {'degree': 'deg', 'degrees': 'deg', '\u00b0': 'deg'}
-_ANGLES = {'roll': 'x', 'pitch': 'y', 'yaw': 'z'}
-_JOINT = re.compile(r'^(?:joint|axis|theta|q|j|a)_?(\d+)$')
+_ANGLES = (('angle', 'xyz'), ('rpy', 'xyz'), ('abc', 'xyz'), ('wpr', 'xyz'))
+"""Kinds of three angles, and the axes that make them whole."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +60,7 @@ class Columns:
     sigma: tuple[str, ...] = ()
     temperature: str | None = None
     time: str | None = None
+    date: str | None = None
     units: dict[str, str | None] = field(default_factory=dict)
 
     def unit(self, names: Iterable[str]) -> str | None:
@@ -72,12 +87,15 @@ def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> 
             f'robot {robot.name!r} has {robot.n} joints, but {len(out.joints)} joint columns are '
             'named in --joint-columns'
         )
-    _positions(parts, options, out)
+    left = [part for part in parts if part.name not in out.joints]
+    names = [part.name for part in left]
+    out.temperature = options.temperature_column or _first(names, TEMPERATURE)
+    given = options.time_column
+    out.date, out.time = (None, given) if given else time_columns(names)
+    _positions(left, options, out)
     if not options.positions_only:
-        out.rotation = options.rotation_columns or _rotation(parts)
-    out.sigma = options.sigma_columns or _one_group(parts, 'length', SIGMA, 'sigma_columns', False)
-    out.temperature = options.temperature_column or _first(header, r'temp')
-    out.time = options.time_column or _first(header, r'time|stamp|^t$')
+        out.rotation = options.rotation_columns or _rotation(left)
+    out.sigma = options.sigma_columns or _one_group(left, 'length', SIGMA, 'sigma_columns', False)
     return out
 
 
@@ -95,47 +113,90 @@ def joint_columns(header: Sequence[str], robot: Robot, options: TableOptions) ->
 
 
 def _taken_apart(name: str) -> Named:
-    tokens = [t for t in re.split(r'[^0-9a-z\u00b0]+', name.lower()) if t]
+    words = tokens(name)
     unit = None
-    if len(tokens) > 1 and tokens[-1] in UNITS | set(_UNIT_NAMES):
-        unit = _UNIT_NAMES.get(tokens[-1], tokens[-1])
-        tokens = tokens[:-1]
-    for k, token in enumerate(tokens):
-        stem = tuple(tokens[:k] + tokens[k + 1 :])
-        if token in ('x', 'y', 'z'):
-            return Named(name, stem, token, 'length', unit)
-        if re.fullmatch(r'q[xyzw]', token):
-            return Named(name, stem, token[1], 'quaternion', unit)
-        if re.fullmatch(r'r[xyz]', token):
-            return Named(name, stem, token[1], 'angle', unit)
-        if token in _ANGLES:
-            return Named(name, stem, _ANGLES[token], 'rpy', unit)
-    return Named(name, tuple(tokens), unit=unit)
+    if len(words) > 1 and words[-1] in UNITS:
+        unit = UNITS[words[-1]]
+        words = words[:-1]
+    for k, word in enumerate(words):
+        kind, axis = _axis(word, words)
+        if kind:
+            said = {'quaternion': QUATERNION, 'angle': TURNS}.get(kind, set())
+            stem = [w for w in words[:k] + words[k + 1 :] if w not in said]
+            return Named(name, tuple(stem), axis, kind, unit)
+    return Named(name, tuple(words), unit=unit)
+
+
+def _axis(word: str, words: Sequence[str]) -> tuple[str, str]:
+    """Return what kind of number a word makes of a column, and about which axis."""
+    others = set(words) - {word}
+    if word in ('x', 'y', 'z', 'w') and others & QUATERNION and not others & {'j', 'joint'}:
+        return 'quaternion', word
+    if word in ('x', 'y', 'z'):
+        return ('angle' if others & TURNS else 'length'), word
+    if re.fullmatch(r'q[xyzw]', word):
+        return 'quaternion', word[1]
+    if re.fullmatch(r'r[xyz]', word):
+        return 'angle', word[1]
+    if word in ANGLES:
+        return 'rpy', ANGLES[word]
+    if not others - MEASURED - NEUTRAL:
+        for kind, letters in (('abc', KUKA), ('wpr', FANUC)):
+            if word in letters:
+                return kind, letters[word]
+    return '', ''
 
 
 def _joints(parts: Sequence[Named], robot: Robot) -> tuple[str, ...]:
     """Return columns with the joints' own names, else numbered ones."""
     plain = {'_'.join(part.stem): part.name for part in parts if not part.axis}
-    own = [plain.get(re.sub(r'[^0-9a-z]+', '_', joint.lower())) for joint in robot.joint_names]
+    own = [plain.get('_'.join(tokens(joint))) for joint in robot.joint_names]
     if all(own):
         return tuple(str(name) for name in own)
-    numbered: dict[str, dict[int, str]] = {}
-    for stem, name in plain.items():
-        match = _JOINT.match(stem)
-        if match:
-            numbered.setdefault(stem[: match.start(1)], {})[int(match.group(1))] = name
-    fitting = [
-        tuple(group[k] for k in sorted(group))
-        for group in numbered.values()
-        if sorted(group) in (list(range(robot.n)), list(range(1, robot.n + 1)))
-    ]
-    if len(fitting) != 1:
-        found = 'more than one set of' if fitting else 'no'
+    letters = {tokens(p.name)[0]: p.name for p in parts if tokens(p.name)[:1]}
+    if robot.n == len(LETTERS) and set(LETTERS) <= set(letters):
+        return tuple(letters[letter] for letter in LETTERS)
+    numbered = _numbered(parts)
+    whole = [list(range(robot.n)), list(range(1, robot.n + 1))]
+    fitting = {words: group for words, group in numbered.items() if sorted(group) in whole}
+    # What the encoders read comes before what the controller wanted.
+    best = max((_rank(words) for words in fitting), default=0)
+    chosen = [group for words, group in fitting.items() if _rank(words) == best]
+    if len(chosen) != 1:
+        found = 'more than one set of' if chosen else 'no'
         raise DataError(
             f'the table has {found} columns for the {robot.n} joints of robot {robot.name!r} '
-            f'({", ".join(robot.joint_names)}); --joint-columns decides'
+            f'({", ".join(robot.joint_names)}){_found(parts, numbered)}; --joint-columns decides'
         )
-    return fitting[0]
+    return tuple(chosen[0][k] for k in sorted(chosen[0]))
+
+
+def _rank(words: tuple[str, ...]) -> int:
+    return 2 if set(words) & MEASURED else 0 if set(words) & TARGET else 1
+
+
+def _numbered(parts: Sequence[Named]) -> dict[tuple[str, ...], dict[int, str]]:
+    """Return the columns that are called a joint and a number, by words and number."""
+    out: dict[tuple[str, ...], dict[int, str]] = {}
+    for part in parts:
+        if part.axis:
+            continue
+        pieces = [piece for word in part.stem for piece in re.findall(r'[^0-9]+|[0-9]+', word)]
+        numbers = [int(piece) for piece in pieces if piece.isdecimal()]
+        words = tuple(piece for piece in pieces if not piece.isdecimal())
+        known = JOINT | MEASURED | TARGET
+        if len(numbers) == 1 and set(words) & NAMES_A_JOINT and set(words) <= known:
+            out.setdefault(words, {}).setdefault(numbers[0], part.name)
+    return out
+
+
+def _found(parts: Sequence[Named], numbered: Mapping[tuple[str, ...], Mapping[int, str]]) -> str:
+    """Return what the header has: the joints that were understood, then the other names."""
+    joints = [name for group in numbered.values() for _, name in sorted(group.items())]
+    others = [part.name for part in parts if part.name not in joints]
+    told = [('joints', joints), ('besides', others)] if joints else [('columns', others)]
+    said = ', '.join(f'{word} {", ".join(names)}' for word, names in told if names)
+    return f'; found {said}' if said else ''
 
 
 def _positions(parts: Sequence[Named], options: TableOptions, out: Columns) -> None:
@@ -153,14 +214,25 @@ def _positions(parts: Sequence[Named], options: TableOptions, out: Columns) -> N
     if not target or not difference:
         raise DataError(
             'the table has no columns with measured positions, nor target and difference; '
-            '--position-columns, or --target-columns and --difference-columns, decide'
+            f'--position-columns, or --target-columns and --difference-columns, decide{_lacking(parts)}'
         )
     out.target, out.difference = target, difference
 
 
+def _lacking(parts: Sequence[Named]) -> str:
+    """Return which axes of a position are there, which are missing, and what else there is."""
+    there = {part.axis: part.name for part in parts if part.kind == 'length'}
+    missing = [axis for axis in 'xyz' if axis not in there]
+    others = [part.name for part in parts if part.name not in there.values()]
+    said = [f'found {", ".join(there.values())}'] if there else []
+    said += [f'missing {", ".join(missing)}'] if missing else []
+    said += [f'besides the joints there are {", ".join(others)}'] if others else []
+    return f' ({"; ".join(said)})' if said else ''
+
+
 def _rotation(parts: Sequence[Named]) -> tuple[str, ...]:
     """Return the measured quaternion or angles, nothing when the table has none."""
-    for kind, axes in (('quaternion', 'xyzw'), ('angle', 'xyz'), ('rpy', 'xyz')):
+    for kind, axes in (('quaternion', 'xyzw'), *_ANGLES):
         found = _one_group(parts, kind, MEASURED, 'rotation_columns', True, axes)
         if found:
             return found
@@ -183,13 +255,26 @@ def _one_group(
     whole = {stem: group for stem, group in groups.items() if set(axes) <= set(group)}
     spread = SIGMA | DIFFERENCE
     named = [stem for stem in whole if set(stem) & words and not (set(stem) - words) & spread]
-    if not named and bare and () in whole:
-        named = [()]
+    if not named and bare:
+        plain = [stem for stem in whole if not set(stem) - NEUTRAL]
+        named = [()] if () in whole else plain
     if len(named) > 1:
         listed = '; '.join(', '.join(whole[stem][axis] for axis in axes) for stem in named)
         raise DataError(f'several columns could serve ({listed}); {flag_of(option)} decides')
     return tuple(whole[named[0]][axis] for axis in axes) if named else ()
 
 
-def _first(header: Sequence[str], pattern: str) -> str | None:
-    return next((name for name in header if re.search(pattern, name.lower())), None)
+def time_columns(header: Sequence[str]) -> tuple[str | None, str | None]:
+    """Return the columns of the date, where it has one of its own, and of the time."""
+    date = _first(header, DATE)
+    clock = _first([name for name in header if name != date], CLOCK)
+    return (date, clock) if date and clock else (None, clock or date)
+
+
+def unit_of(name: str) -> str | None:
+    """Return the unit that a header cell names, None for none."""
+    return _taken_apart(name).unit
+
+
+def _first(header: Sequence[str], pattern: re.Pattern[str]) -> str | None:
+    return next((name for name in header if pattern.search(name.lower())), None)

@@ -54,6 +54,15 @@ class TableOptions:
     sigma_columns : tuple of 1 or 3 str, optional
         Standard deviation of the position, in its unit.
     temperature_column, time_column : str, optional
+    joint_signs : tuple of n float, optional
+        1 or -1 for every joint, where the controller counts it the other way than the model.
+    joint_offsets : tuple of n float, optional [deg, mm for a slide]
+        Added to the columns, in the model's sense.
+    coupled : str, optional
+        '3+2': the model's joint 3 is the column of joint 3 plus that of joint 2, where a
+        pendant counts joint 3 against the ground; '3-2' takes it off.
+    marker : str, optional
+        Of an export that holds several things that were tracked.
     positions_only : bool
         Leave measured orientation out.
     skip_rows : tuple of int
@@ -76,6 +85,10 @@ class TableOptions:
     sigma_columns: tuple[str, ...] | None = None
     temperature_column: str | None = None
     time_column: str | None = None
+    joint_signs: tuple[float, ...] | None = None
+    joint_offsets: tuple[float, ...] | None = None
+    coupled: str | None = None
+    marker: str | None = None
     positions_only: bool = False
     skip_rows: tuple[int, ...] = ()
 

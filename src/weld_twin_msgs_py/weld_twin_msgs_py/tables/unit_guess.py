@@ -10,7 +10,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 
-METRES = {'m': 1.0, 'mm': 1e-3}
+METRES = {'m': 1.0, 'mm': 1e-3, 'cm': 1e-2}
 """Lengths a table may be in."""
 RADIANS = {'rad': 1.0, 'deg': np.pi / 180.0}
 """Angles a table may be in."""
@@ -42,7 +42,8 @@ def length_unit(position: Array, robot: Robot, q: Array, given: str | None) -> t
         return given, ''
     own = _spread(forward(robot, q)[:, :3, 3])
     theirs = _spread(position)
-    for unit, factor in METRES.items():
+    for unit in ('m', 'mm'):  # inches must not pass for centimetres
+        factor = METRES[unit]
         if own / _DOUBT < theirs * factor < own * _DOUBT:
             return unit, f'positions are in {unit} (they spread as far as the arm moves)'
     unit = 'mm' if theirs > _WIDEST else 'm'

@@ -39,7 +39,7 @@ def test_the_demo_leaves_bag_table_and_picture_that_agree(tmp_path):
     rows = np.genfromtxt(out / 'deviation.csv', delimiter=',', names=True)
     off = recording.measured.position - expected
     np.testing.assert_allclose(
-        np.column_stack([rows['x_m'], rows['y_m'], rows['z_m']]), off, rtol=1e-8, atol=1e-12
+        np.column_stack([rows['dx_m'], rows['dy_m'], rows['dz_m']]), off, rtol=1e-8, atol=1e-12
     )
     seam = np.column_stack([rows['along_m'], rows['across_m'], rows['normal_m']])
     np.testing.assert_allclose(

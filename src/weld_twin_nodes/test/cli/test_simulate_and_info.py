@@ -232,10 +232,10 @@ def test_every_subcommand_has_help(weld_twin):
         assert weld_twin(name, '--help').code == 0
 
 
-def simulated_with(weld_twin, folder, effect):
+def simulated_with(weld_twin, folder, effect, *more):
     """Return what the command says of a short motion with one effect."""
     (folder / 'e.yaml').write_text(f'- {effect}\n')
-    words = ('--effects', folder / 'e.yaml', '--rate', 20, '--out', folder / 'bag')
+    words = ('--effects', folder / 'e.yaml', '--rate', 20, '--out', folder / 'bag', *more)
     return weld_twin('simulate', '--robot', 'ur5', *words)
 
 
@@ -243,7 +243,7 @@ def simulated_with(weld_twin, folder, effect):
     ('effect', 'said'),
     [
         (
-            '{effect: joint_offset, joint: elbow_joint, offset: 5}',
+            '{effect: joint_offset, joint: elbow_joint, offset: 0.5}',
             'no machine is known beyond 0.13',
         ),
         ('{effect: time_delay, delay: 0.6}', 'no machine is known beyond 0.5'),
@@ -255,8 +255,27 @@ def test_a_value_that_no_machine_has_is_doubted_in_a_sentence(weld_twin, tmp_pat
     assert said in result.err
 
 
+def test_a_value_that_no_machine_comes_near_is_refused_unless_it_is_meant(weld_twin, tmp_path):
+    effect = '{effect: joint_offset, joint: elbow_joint, offset: 5}'
+    result = simulated_with(weld_twin, tmp_path, effect)
+    assert result.code == 2
+    assert "e.yaml': offset of joint_offset of elbow_joint is 5; no machine" in result.err
+    assert not (tmp_path / 'bag').exists()
+    assert simulated_with(weld_twin, tmp_path, effect, '--allow-implausible').code == 0
+
+
 def test_a_delay_beyond_the_motion_leaves_a_sentence_and_no_bag(weld_twin, tmp_path):
-    result = simulated_with(weld_twin, tmp_path, '{effect: time_delay, delay: 200}')
+    effect = '{effect: time_delay, delay: 200}'
+    result = simulated_with(weld_twin, tmp_path, effect, '--allow-implausible')
     assert result.code == 2
     assert 'no measurement meets a pose of the twin' in result.err
     assert not (tmp_path / 'bag').exists()
+
+
+def test_info_tells_the_effects_in_words(weld_twin, tmp_path):
+    effect = '{effect: backlash, joint: elbow_joint, width: 5e-4}'
+    assert simulated_with(weld_twin, tmp_path, effect).code == 0
+    said = weld_twin('info', tmp_path / 'bag').out
+    assert 'effects: backlash of elbow_joint (width 0.0005 rad)' in said
+    assert 'twin_effects: none' in said
+    assert '[' not in said.split('usable')[0].partition('note:')[2]

@@ -101,6 +101,20 @@ def test_a_clock_that_drifts_is_told_with_its_rate(now):
     assert rates and rates[-1] == pytest.approx(100.0, rel=0.15)
 
 
+def test_a_clock_that_is_set_does_not_look_like_one_that_drifts(now):
+    """A step of 20 ms, and 100 ppm from then on: the rate told is that of the drift."""
+    said = said_of(now, lambda t: (0.02 + 100e-6 * (t - 15.0)) * (t > 15.0), seconds=90.0)
+    rates = [float(m[1]) for line in said if (m := re.search(r'drifts by ([+-]\d+) ppm', line))]
+    assert rates
+    assert all(rate == pytest.approx(100.0, rel=0.3) for rate in rates)
+
+
+def test_an_offset_that_comes_while_the_cell_works_is_named_within_five_seconds(now):
+    said = said_of(now, lambda t: 0.05 * (t > 15.0), seconds=21.0)
+    assert not any(said[:15])
+    assert offset_told(said[:20]) == pytest.approx(0.05, abs=0.003)
+
+
 def run_cell(cell, offset, until, shift=0.0, limit=60.0):
     """Publish twin and measurements in real time until something is so."""
     twin, measured = cell.publisher(TWIN_POSE), cell.publisher(MEASURED_POSE)

@@ -137,7 +137,7 @@ def test_measurements_in_another_frame_than_the_one_set_are_refused(cell):
     cell.add(DeviationAnalyzer, reliable_inputs=True, measuring_frame='world')
     health, points = HealthListener(cell.node), cell.publisher(MEASURED_POINT)
     key = '/deviation_analyzer: /measured/tool_point'
-    said = "given in 'tracker', but measuring_frame is 'world'; publish it in that frame, or set"
+    said = "given in 'tracker', but measuring_frame is 'world', and the way from 'tracker' to"
     sent = [0]
 
     def refused():

@@ -26,7 +26,7 @@ from weld_twin_msgs_py.robots import write_urdf
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.cell_node import CellNode
-from weld_twin_nodes.live.recorded_topic import message_class
+from weld_twin_nodes.live.message_classes import message_class
 
 pytestmark = pytest.mark.cells
 

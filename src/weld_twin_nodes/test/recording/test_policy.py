@@ -12,10 +12,12 @@ from defusedxml.ElementTree import parse
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-from weld_twin_msgs_py.messages.topics import BY_NAME, ROBOT_DESCRIPTION
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.messages.topics import BY_NAME, FRAMES, ROBOT_DESCRIPTION
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.process import MODULES
 from weld_twin_nodes.live.cell_node import CellNode
+from weld_twin_nodes.live.policy import policy
 
 pytestmark = pytest.mark.cells
 
@@ -32,7 +34,8 @@ WAYS = {
         {'source': 'path'},
         {'source': 'joint_trajectory'},
     ],
-    'recorder': [{'topics': list(BY_NAME)}],
+    'recorder': [{'topics': list(BY_NAME)}, {'managed': True}],
+    'live_diagnosis': [{}, {'managed': True}],
 }
 """Parameters that between them bring out everything a node can do."""
 
@@ -51,7 +54,7 @@ def allowed(profile, kind, permission):
         for item in block
     ]
     assert len(names) == len(set(names))
-    return {own + name[1:] if name.startswith('~') else f'/{name}' for name in names}
+    return {own + n[1:] if n.startswith('~') else f'/{n.lstrip("/")}' for n in names}
 
 
 def node_class(name):
@@ -79,7 +82,10 @@ def test_the_policy_is_exactly_what_a_node_does(name, tmp_path):
                 seen[key] |= {topic for topic, _ in getattr(node, query)(name, '/')}
             cell.remove(node)
     if any(setting.name == 'robot' for setting in kind.settings):
-        seen['topics', 'subscribe'].add(ROBOT_DESCRIPTION.name)  # waits for one before all else
+        # It waits for these before all else, or where tf2_msgs is installed.
+        seen['topics', 'subscribe'] |= {row.name for row in (ROBOT_DESCRIPTION, *FRAMES)}
+    if name == 'recorder':
+        seen['topics', 'subscribe'] |= {row.name for row in FRAMES}
     for (what, permission), names in seen.items():
         assert allowed(profiles()[name], what, permission) == names, (what, permission)
 
@@ -97,3 +103,39 @@ def test_the_policy_speaks_of_the_nodes_there_are_and_denies_nothing_by_name():
         assert values == {'ALLOW'}
         for block in profile:
             assert not any('*' in item.text for item in block)
+
+
+def test_the_file_is_what_the_command_prints(weld_twin):
+    code, printed, _ = weld_twin('policy')
+    assert code == 0
+    assert printed == POLICY.read_text(encoding='utf-8')
+
+
+def test_a_namespace_and_remaps_change_the_names_they_mean(tmp_path, weld_twin):
+    out = tmp_path / 'left.xml'
+    words = [
+        'policy',
+        '--namespace',
+        '/left',
+        '--nodes',
+        'forward_kinematics_twin',
+        '--out',
+        str(out),
+    ]
+    code, *_ = weld_twin(*words, '--remap', 'joint_states:=/cell/states', '--remap', '/tf:=tf')
+    assert code == 0
+    (profile,) = parse(out).getroot().iter('profile')
+    assert (profile.get('ns'), profile.get('node')) == ('/left', 'forward_kinematics_twin')
+    heard = next(b for b in profile if b.get('subscribe') == 'ALLOW')
+    names = {item.text for item in heard}
+    assert {'/cell/states', '/left/tf', '/tf_static', 'tool_wrench'} <= names
+    assert not {'joint_states', '/tf'} & names
+
+
+def test_what_no_node_has_is_not_remapped():
+    with pytest.raises(DataError, match='/joint_sates is remapped, but none of the nodes has'):
+        policy(remaps={'joint_sates': '/x'})
+    with pytest.raises(
+        DataError, match="no node is called 'twin'; there are trajectory_generator"
+    ):
+        policy(nodes=['twin'])

@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import entry_points
-from pathlib import Path
+from importlib.util import find_spec
 
 from .options import add_command
 
@@ -18,12 +18,10 @@ USAGE_ERROR = 2
 """Exit code where the user can do something about it."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
-PROOFS = 'weld_twin.commands'
-"""Entry points under which other packages, such as weld_twin_lab, bring subcommands."""
 FIRST = ('diagnose', 'demo', 'import', 'info', 'predict', 'compensate', 'export')
 """What people come for, in the order of a first day; the list of commands begins with it."""
 LAB = ('benchmark', 'blind', 'campaign', 'real-robots', 'lab')
-"""What weld_twin_lab brings; named here to say so where it is not installed."""
+"""What weld_twin_lab brings, a file each; named here to say so where it is not installed."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -62,18 +60,24 @@ def _end(*_: object) -> None:
 
 
 def _commands() -> dict[str, str]:
-    """Return the module of every subcommand: own ones by file name, others by entry point."""
-    folder = Path(__file__).parent / 'commands'
-    own = {
-        path.stem.rstrip('_').replace('_', '-'): f'{__package__}.commands.{path.stem}'
-        for path in folder.glob('[!_]*.py')
-    }
-    proofs = {point.name: point.value for point in entry_points(group=PROOFS)}
+    """Return the module of every subcommand, a file each: own ones, then those of the lab."""
+    own = _modules(f'{__package__}.commands', os.path.join(os.path.dirname(__file__), 'commands'))
+    lab = find_spec('weld_twin_lab')
+    proofs = {}
+    if lab is not None and lab.submodule_search_locations:
+        where = os.path.join(lab.submodule_search_locations[0], 'cli')
+        proofs = _modules('weld_twin_lab.cli', where)
     return {
         **{name: own[name] for name in FIRST},
         **dict(sorted((name, own[name]) for name in own.keys() - FIRST)),
         **dict(sorted(proofs.items())),
     }
+
+
+def _modules(package: str, folder: str) -> dict[str, str]:
+    """Return the modules of a folder by the name of their subcommand."""
+    stems = [name[:-3] for name in os.listdir(folder) if name.endswith('.py') and name[0] != '_']
+    return {stem.rstrip('_').replace('_', '-'): f'{package}.{stem}' for stem in stems}
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:

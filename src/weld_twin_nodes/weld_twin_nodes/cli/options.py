@@ -5,14 +5,16 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
-from inspect import getdoc
+import sys
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.messages.topics import TopicNames
+    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
 
 PARTS = {
     'joint': 'JointState, DynamicJointState or JointTrajectoryControllerState (TOPIC:feedback)',
@@ -41,6 +43,27 @@ def robot_of(args: argparse.Namespace) -> Robot:
     return load_robot(args.robot, args.base_link, args.tip_link)
 
 
+def given_urdf(args: argparse.Namespace) -> GivenUrdf | None:
+    """Return the URDF that the robot was read from, None for another robot file."""
+    from weld_twin_msgs_py.robots.load import URDF_SUFFIXES
+    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
+
+    path = Path(args.robot)
+    if path.suffix.lower() not in URDF_SUFFIXES:
+        return None
+    return GivenUrdf(path, args.base_link, args.tip_link)
+
+
+def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
+    """Return the robot with the effects of a file; say which values no machine has."""
+    from ..offline.told_twin import build_twin, doubts
+
+    twin = build_twin(robot, path, implausible=implausible)
+    for doubt in doubts(twin):
+        print(f'weld-twin: {path}: {doubt}', file=sys.stderr)
+    return twin
+
+
 def add_topics(parser: argparse.ArgumentParser) -> None:
     """Add the options that say what the topics of a bag are called."""
     group = parser.add_argument_group('topics, for bags recorded elsewhere')
@@ -56,6 +79,8 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
     """Return the names of the topics."""
+    from dataclasses import replace
+
     from weld_twin_msgs_py.messages.topics import TopicNames
 
     given = {name: getattr(args, f'{name}_topic') for name in TOPIC_OPTIONS}
@@ -85,7 +110,7 @@ def add_command(subparsers: Any, name: str, module: ModuleType) -> argparse.Argu
         With ``add_arguments(parser)``; the first line of its docstring is the short help.
 
     """
-    text = getdoc(module) or ''
+    text = (module.__doc__ or '').strip()
     parser: argparse.ArgumentParser = subparsers.add_parser(
         name,
         help=text.partition('\n')[0].replace('%', '%%'),

@@ -12,7 +12,8 @@ from weld_twin_msgs_py.files.whole_files import write_text
 from .hand_over import Job
 
 MARK = 'summary.txt'
-COLUMNS = 't_s,x_m,y_m,z_m,along_m,across_m,normal_m,d_m'
+COLUMNS = 't_s,dx_m,dy_m,dz_m,along_m,across_m,normal_m,d_m'
+"""Measured minus twin, in the robot's base frame and along the seam; ``d_m`` is its length."""
 
 
 def write_table(job: Job, _: object) -> None:

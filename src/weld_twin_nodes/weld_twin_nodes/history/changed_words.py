@@ -9,7 +9,7 @@ from datetime import datetime, timezone
 from math import isfinite
 from typing import Any
 
-from weld_twin_core.history import Change, Observation, reaches
+from weld_twin_core.history import Change, Observation, outlook, reaches
 
 from ..report.quantities import uncertain
 from .coordinate_words import coordinate
@@ -48,7 +48,10 @@ def sentence(change: Change) -> str:
 
 
 def forecast(
-    change: Change, latest: Observation, limits: Mapping[str, float]
+    change: Change,
+    seen: Sequence[Observation],
+    found: Sequence[Change],
+    limits: Mapping[str, float],
 ) -> dict[str, Any] | None:
     """
     Return when a trend reaches its limit; None where there is no trend or no limit.
@@ -56,23 +59,21 @@ def forecast(
     Parameters
     ----------
     change : Change
-    latest : Observation
-        The last diagnosis.
+    seen : sequence of Observation
+        All diagnoses of the cell.
+    found : sequence of Change
+        All that changed.
     limits : mapping of str to float
         Largest value allowed of an effect, SI units.
 
     """
     what = coordinate(change.name)
-    if change.kind != 'trend' or what.effect not in limits or change.name not in latest.names:
+    if change.kind != 'trend' or what.effect not in limits:
         return None
-    at = latest.names.index(change.name)
-    days = reaches(
-        limits[what.effect],
-        float(latest.value[at]),
-        float(latest.covariance[at, at]) ** 0.5,
-        change.size,
-        change.std,
-    )
+    now = outlook(seen, found, change.name)
+    if now is None:
+        return None
+    days = reaches(limits[what.effect], now)
     weeks = [each / WEEK if isfinite(each) else None for each in days]
     return {
         'limit': limits[what.effect],

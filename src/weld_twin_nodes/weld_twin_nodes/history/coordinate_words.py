@@ -50,7 +50,8 @@ def coordinate(name: str) -> Coordinate:
     if told:
         parameter = told[min(int(number), len(told) - 1)]
         factor, unit = display_unit(parameter.name, parameter.unit)
-    where = ' '.join(joint) or None
+    where, _, source = ' '.join(joint).partition('<')
     one = len(told) == 1 and number == '0'
-    words = cause(effect, where) + ('' if one else f', part {int(number) + 1}')
-    return Coordinate(effect, where, words, factor, unit)
+    words = cause(effect, where or None) + ('' if one else f', part {int(number) + 1}')
+    words += f' from {source}' if source else ''
+    return Coordinate(effect, where or None, words, factor, unit)

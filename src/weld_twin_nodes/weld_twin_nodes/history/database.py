@@ -13,7 +13,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import datetime, timezone
+from datetime import timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,13 +23,10 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
 from .entry import Entry
+from .schema import ARRAYS, VERSION, schema, stored
 
 if TYPE_CHECKING:
-    from sqlalchemy import Engine, MetaData, Row
-
-VERSION = 1
-"""Of the schema; a database of another one is refused."""
-ARRAYS = ('value', 'prior_std', 'covariance', 'tool')
+    from sqlalchemy import Connection, Engine, Row
 
 
 class Database:
@@ -55,11 +52,13 @@ class Database:
             raise DataError(
                 "a history needs SQLAlchemy; install it with: pip install 'weld-twin[history]'"
             ) from None
-        self._sql = sqlalchemy
+        self.sql = sqlalchemy
         self.url = url if '://' in url else f'sqlite:///{Path(url).absolute()}'
         with self._clear():
-            self._engine: Engine = sqlalchemy.create_engine(self.url)
-            self._tables = _schema()
+            address = sqlalchemy.make_url(self.url)
+            self.url = address.render_as_string(hide_password=True)
+            self._engine: Engine = sqlalchemy.create_engine(address)
+            self._tables = schema()
             self._tables.create_all(self._engine)
             self._check_version()
 
@@ -83,43 +82,65 @@ class Database:
             The cell has another robot, or a diagnosis of that instant already.
 
         """
-        sql, cells, verdicts = self._sql, self._table('cells'), self._table('verdicts')
-        with self._clear(), self._engine.begin() as connection:
-            row = connection.execute(sql.select(cells).where(cells.c.name == cell)).first()
-            if row is None:
-                made = connection.execute(
-                    cells.insert().values(
-                        name=cell, robot=entry.robot, kinematics=entry.kinematics
-                    )
-                )
-                assert made.inserted_primary_key is not None
-                number = made.inserted_primary_key[0]
-            else:
-                number = row.id
-                _same_robot(cell, row, entry)
-            mine = verdicts.c.cell_id == number
-            query = sql.select(verdicts.c.id).where(mine, verdicts.c.recording == entry.recording)
-            if connection.execute(query).first() is not None:
-                return False
-            query = sql.select(verdicts.c.id).where(mine, verdicts.c.at == _stored(entry.at))
-            if connection.execute(query).first() is not None:
-                raise DataError(
-                    f'cell {cell!r} has another recording of {entry.at.isoformat()}; give this one '
-                    'its own date with --at'
-                )
-            connection.execute(verdicts.insert().values(cell_id=number, **_row(entry)))
-        return True
+        with self.transaction() as connection:
+            return self.put(connection, cell, entry) is not None
+
+    def put(self, connection: Connection, cell: str, entry: Entry) -> int | None:
+        """
+        Add a diagnosis within a transaction; return its number, None if it was there already.
+
+        Raises
+        ------
+        DataError
+            As of `add`; nothing was written then.
+
+        """
+        sql, verdicts = self.sql, self.table('verdicts')
+        number = self._number(connection, cell, entry)
+        mine = verdicts.c.cell_id == number
+        query = sql.select(verdicts.c.id).where(mine, verdicts.c.recording == entry.recording)
+        if number is not None and connection.execute(query).first() is not None:
+            return None
+        query = sql.select(verdicts.c.id).where(mine, verdicts.c.at == stored(entry.at))
+        if number is not None and connection.execute(query).first() is not None:
+            raise DataError(
+                f'cell {cell!r} has another recording of {entry.at.isoformat()}; give this one '
+                'its own date with --at'
+            )
+        if number is None:
+            new = self.table('cells').insert()
+            made = connection.execute(
+                new.values(name=cell, robot=entry.robot, kinematics=entry.kinematics)
+            )
+            number = _key(made)
+        made = connection.execute(verdicts.insert().values(cell_id=number, **_row(entry)))
+        return _key(made)
+
+    def _number(self, connection: Connection, cell: str, entry: Entry) -> int | None:
+        """Return the number of a cell, None if there is none; refuse another robot."""
+        cells = self.table('cells')
+        row = connection.execute(self.sql.select(cells).where(cells.c.name == cell)).first()
+        if row is None:
+            return None
+        _same_robot(cell, row, entry)
+        return int(row.id)
 
     def cells(self) -> list[str]:
         """Return the names of all cells."""
-        cells = self._table('cells')
+        cells = self.table('cells')
         with self._clear(), self._engine.connect() as connection:
-            query = self._sql.select(cells.c.name).order_by(cells.c.name)
+            query = self.sql.select(cells.c.name).order_by(cells.c.name)
             return [row.name for row in connection.execute(query)]
 
-    def entries(self, cell: str) -> list[Entry]:
+    def entries(self, cell: str, newest: int | None = None) -> list[Entry]:
         """
         Return the diagnoses of a cell, in the order of time.
+
+        Parameters
+        ----------
+        cell : str
+        newest : int, optional
+            Only so many, the last ones.
 
         Raises
         ------
@@ -127,27 +148,35 @@ class Database:
             There is no such cell.
 
         """
-        cells, verdicts = self._table('cells'), self._table('verdicts')
+        cells, verdicts = self.table('cells'), self.table('verdicts')
         if cell not in (known := self.cells()):
             raise DataError(
                 f'there is no cell {cell!r} in the history; it has {", ".join(known) or "none yet"}'
             )
         query = (
-            self._sql.select(verdicts, cells.c.robot, cells.c.kinematics)
+            self.sql.select(verdicts, cells.c.robot, cells.c.kinematics)
             .join(cells, cells.c.id == verdicts.c.cell_id)
             .where(cells.c.name == cell)
-            .order_by(verdicts.c.at)
+            .order_by(verdicts.c.at.desc())
+            .limit(newest)
         )
         with self._clear(), self._engine.connect() as connection:
-            return [_entry(row) for row in connection.execute(query)]
+            return [_entry(row) for row in connection.execute(query)][::-1]
 
-    def _table(self, name: str) -> Any:
+    def table(self, name: str) -> Any:
+        """Return a table of the schema."""
         return self._tables.tables[name]
 
+    @contextmanager
+    def transaction(self) -> Iterator[Connection]:
+        """Yield a connection; what is written through it is written whole or not at all."""
+        with self._clear(), self._engine.begin() as connection:
+            yield connection
+
     def _check_version(self) -> None:
-        about = self._table('about')
+        about = self.table('about')
         with self._engine.begin() as connection:
-            row = connection.execute(self._sql.select(about)).first()
+            row = connection.execute(self.sql.select(about)).first()
             if row is None:
                 connection.execute(about.insert().values(version=VERSION))
             elif row.version != VERSION:
@@ -161,43 +190,19 @@ class Database:
         """Turn errors of the database into one sentence."""
         try:
             yield
-        except (self._sql.exc.SQLAlchemyError, ModuleNotFoundError) as error:
+        except ModuleNotFoundError as error:
+            raise DataError(
+                f"the history '{self.url}' needs {error.name}; for PostgreSQL install it with: "
+                "pip install 'weld-twin[postgresql]'"
+            ) from None
+        except self.sql.exc.SQLAlchemyError as error:
             said = str(getattr(error, 'orig', None) or error).splitlines()[0]
             raise DataError(f"the history '{self.url}' cannot be used: {said}") from None
 
 
-def _schema() -> MetaData:
-    import sqlalchemy as sql
-
-    tables = sql.MetaData()
-    sql.Table('about', tables, sql.Column('version', sql.Integer, primary_key=True))
-    sql.Table(
-        'cells',
-        tables,
-        sql.Column('id', sql.Integer, primary_key=True),
-        sql.Column('name', sql.String(200), unique=True, nullable=False),
-        sql.Column('robot', sql.String(200), nullable=False),
-        sql.Column('kinematics', sql.String(64), nullable=False),
-    )
-    sql.Table(
-        'verdicts',
-        tables,
-        sql.Column('id', sql.Integer, primary_key=True),
-        sql.Column('cell_id', sql.ForeignKey('cells.id'), nullable=False),
-        sql.Column('at', sql.DateTime, nullable=False),
-        sql.Column('recording', sql.Text, nullable=False),
-        sql.Column('status', sql.String(40), nullable=False),
-        *(
-            sql.Column(name, sql.Float)
-            for name in ('confidence', 'gap_m', 'floor_m', 'unexplained_m')
-        ),
-        sql.Column('effects', sql.JSON, nullable=False),
-        sql.Column('names', sql.JSON, nullable=False),
-        *(sql.Column(name, sql.LargeBinary, nullable=False) for name in ARRAYS),
-        sql.UniqueConstraint('cell_id', 'at'),
-        sql.Index('verdicts_of_a_cell', 'cell_id', 'at'),
-    )
-    return tables
+def _key(made: Any) -> int:
+    assert made.inserted_primary_key is not None
+    return int(made.inserted_primary_key[0])
 
 
 def _same_robot(cell: str, row: Row[Any], entry: Entry) -> None:
@@ -208,16 +213,12 @@ def _same_robot(cell: str, row: Row[Any], entry: Entry) -> None:
         )
 
 
-def _stored(at: datetime) -> datetime:
-    return at.astimezone(timezone.utc).replace(tzinfo=None)
-
-
 def _row(entry: Entry) -> dict[str, Any]:
     plain = ('recording', 'status', 'confidence', 'gap_m', 'floor_m', 'unexplained_m', 'effects')
     return {
         **{name: getattr(entry, name) for name in plain},
         **{name: _packed(getattr(entry, name)) for name in ARRAYS},
-        'at': _stored(entry.at),
+        'at': stored(entry.at),
         'names': list(entry.names),
     }
 

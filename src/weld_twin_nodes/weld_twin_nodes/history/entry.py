@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
@@ -19,9 +20,9 @@ from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
 FIRST_YEAR = 2000
 """Stamps before it are counted from the start of a machine, not from a date."""
-PASSING = ('base ', 'curve of ')
-"""Coordinates that are of one set-up or one motion only: where the instrument stood, and curves on
-the angles that were visited."""
+PASSING = ('base ', 'curve of ', 'transmission_ripple ')
+"""Coordinates that are of one set-up or one diagnosis only: where the instrument stood, curves on the
+angles that were visited, and waves along a gear, whose orders differ from diagnosis to diagnosis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +145,13 @@ def _coordinates(
             'wrote it; diagnose the recording again'
         )
     assert posterior is not None
-    keep = [k for k, each in enumerate(told) if not each['name'].startswith(PASSING)]
+    count = Counter(each['name'] for each in told)
+    # What has no name of its own cannot be followed from one diagnosis to the next.
+    keep = [
+        k
+        for k, each in enumerate(told)
+        if not each['name'].startswith(PASSING) and count[each['name']] == 1
+    ]
     whole = np.zeros((len(told), len(told)))
     for k, row in enumerate(posterior['covariance']):
         whole[k, : k + 1] = row

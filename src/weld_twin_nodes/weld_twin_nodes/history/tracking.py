@@ -10,12 +10,27 @@ import numpy as np
 
 from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
-from weld_twin_core.history import Observation
+from weld_twin_core.history import Change, Observation, changes
 
 from .entry import Entry
 
 DAY = 86_400.0
 """Seconds."""
+IN_USE = (
+    'joint_offset',
+    'tool_pose',
+    'tool',
+    'backlash',
+    'friction',
+    'hysteresis',
+    'joint_compliance',
+    'payload',
+    'link_length',
+)
+"""
+Effects that use changes: motors and belts are taken off, tools are knocked, gears wear, loads are
+swapped, links grow with the warmth. Angles between axes and ratios of gears stay as they were made.
+"""
 
 
 def observations(entries: Sequence[Entry]) -> list[Observation]:
@@ -45,6 +60,27 @@ def named(entries: Sequence[Entry]) -> set[str]:
     """Return the coordinates of the causes that entries name."""
     found = ((each['effect'], each.get('joint')) for entry in entries for each in entry.effects)
     return {f'{effect} {joint} 0' if joint else f'{effect} 0' for effect, joint in found}
+
+
+def likely(entries: Sequence[Entry]) -> set[str]:
+    """Return the coordinates that use can change."""
+    names = {name for entry in entries for name in entry.names}
+    return {name for name in names if name.replace('.', ' ').split(' ')[0] in IN_USE}
+
+
+def changed(entries: Sequence[Entry], seen: Sequence[Observation]) -> tuple[Change, ...]:
+    """
+    Return what changed on a cell, the surest first.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        Of one cell, in the order of time.
+    seen : sequence of Observation
+        What `observations` made of them.
+
+    """
+    return changes(seen, named=named(entries), likely=likely(entries))
 
 
 def _moved(entry: Entry, first: Array) -> Array:

@@ -48,8 +48,18 @@ class AskedNodes:
         self._description = ''
         self._waiting: list[tuple[str, list[Any]]] = []
         self._robot_known = False
-        node.create_subscription(ParameterEvent, '/parameter_events', self._changed, 10)
+        self._clients = [*self._unasked.values()]
+        self._events = node.create_subscription(
+            ParameterEvent, '/parameter_events', self._changed, 10
+        )
         self._asking = node.every(ASK_EVERY, self._ask)
+
+    def close(self) -> None:
+        """Ask and listen no more."""
+        self._node.destroy_timer(self._asking)
+        self._node.destroy_subscription(self._events)
+        for client in self._clients:
+            self._node.destroy_client(client)
 
     def describe(self, urdf: str) -> None:
         """Take the robot that robot_state_publisher tells; a node's own word counts more."""

@@ -15,6 +15,7 @@ from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly.frame_names import BASE, WORLD
 
+from .base_on_tf import base_on_tf
 from .cell_node import CellNode
 from .settings import NUMBERS, Setting
 
@@ -26,6 +27,11 @@ FRAME_SETTINGS = (
         'that comes, and world',
     ),
     Setting('base_frame', '', "name of the robot's base in what is published; empty: base"),
+    Setting(
+        'base_from_tf',
+        False,
+        'take from /tf where the base is: base_frame in measuring_frame, when the node starts',
+    ),
     Setting(
         'T_measuring_base',
         NUMBERS,
@@ -52,11 +58,17 @@ def placed(node: CellNode, robot: Robot) -> Robot:
     Raises
     ------
     ModelError
-        ``T_measuring_base`` is no pose.
+        ``T_measuring_base`` is no pose, or the node is stopped before `/tf` tells one.
 
     """
     values = node.setting('T_measuring_base')
-    return robot if values is None else robot.with_frames(base=frame_from(values))
+    if values is not None:
+        return robot.with_frames(base=frame_from(values))
+    if not node.setting('base_from_tf'):
+        return robot
+    if node.arm is not None:  # it was asked for when the node took its robot
+        return robot.with_frames(base=node.arm.T_world_base)
+    return robot.with_frames(base=base_on_tf(node))
 
 
 def placed_twin(node: CellNode, twin: Twin) -> Twin:
@@ -64,7 +76,7 @@ def placed_twin(node: CellNode, twin: Twin) -> Twin:
     robot = placed(node, twin.robot)
     moved = abs(robot.T_world_base - twin.robot.T_world_base).max()
     if moved > 0.0:
-        node.remark('T_measuring_base is used; the base of the model differs from it')
+        node.remark('the base that was told is used; the base of the model differs from it')
     return twin if moved == 0.0 else Twin(robot, twin.effects)
 
 

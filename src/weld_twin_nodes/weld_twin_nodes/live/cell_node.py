@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
@@ -15,17 +15,19 @@ from rclpy.duration import Duration
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import TwinError
-from weld_twin_msgs_py.messages.cdr_read import checked, decoder
+from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, CONTROLLER, FedBack, plain_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
-from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, VOLATILE, Topic
+from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, MEASURED_POSE, VOLATILE, Topic
 
 from . import qos_events
 from .all_nodes import refuse_unknown
 from .health import Health, Input
 from .outputs import Output
-from .partners import unheard_publishers, unreached_subscribers
+from .partners import unreached_subscribers
 from .settings import Setting
+from .typed_input import TypedInput, reader
 
 WARN_EVERY = 5.0
 """Seconds between two warnings about the same topic."""
@@ -78,17 +80,20 @@ class CellNode(Node):
         self.refused = 0
         self.finished = False
         self.failure: TwinError | None = None
+        self.frames: Any = None
+        """What the node knows of `/tf`, if it listens to it; see `tf_frames`."""
         self._warned: dict[str, float] = {}
         self._outputs: list[Output] = []
         self._awaited: list[Output] = []
         self._waiting: list[Callable[[], None]] = []
         self._partners: list[Callable[[], list[str]]] = []
+        self._sources: list[TypedInput] = []
         self._unmatched: list[str] = []
         for item in self.every_setting():
             self.declare_parameter(item.name, item.default, item.descriptor())
         refuse_unknown(self._parameter_overrides, [item.name for item in self.every_setting()])
         self.health = Health(self.get_fully_qualified_name(), self.setting('stale_after'))
-        self.take_robot_name('')
+        self.take_robot(None)
         self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
         self.every(HEALTH_EVERY, self._tell_health)
         self._jumps = self.get_clock().create_jump_callback(
@@ -122,9 +127,19 @@ class CellNode(Node):
                 output.wait_for_all_acked(Duration(seconds=left))
         super().destroy_node()  # type: ignore[no-untyped-call]
 
-    def take_robot_name(self, name: str) -> None:
-        """Take the name of the robot model, for the diagnostics to tell robots apart."""
-        parts = self.get_namespace().strip('/'), name
+    def take_robot(self, robot: Robot | None, joint_names: tuple[str, ...] | None = None) -> None:
+        """
+        Take the robot: for the diagnostics to tell robots apart, and for what tells its joints.
+
+        Parameters
+        ----------
+        robot : Robot, optional
+        joint_names : sequence of str, optional
+            What its joint states call its joints.
+
+        """
+        self.arm, self.joint_names = robot, joint_names
+        parts = self.get_namespace().strip('/'), '' if robot is None else robot.name
         self.health.hardware_id = self.setting('hardware_id') or '/'.join(filter(None, parts))
 
     def setting(self, name: str) -> Any:
@@ -172,8 +187,8 @@ class CellNode(Node):
         topic: Topic,
         callback: Callable[[Any], None],
         *,
-        raw: bool = False,
         required: bool = False,
+        at_once: bool = False,
     ) -> Input:
         """
         Subscribe to a topic of the table once the outputs have their subscribers.
@@ -182,43 +197,90 @@ class CellNode(Node):
         ----------
         topic : Topic
         callback : callable
-            Takes an object that `weld_twin_msgs_py.messages.from_messages` reads.
-        raw : bool
-            Give it the serialised bytes instead, once they proved to be such a message.
+            Takes an object that `weld_twin_msgs_py.messages.from_messages` reads. Messages of
+            other types that stand for the same are turned into those of the table before.
         required : bool
             The node can do nothing without this input; health calls its absence stale.
+        at_once : bool
+            Do not wait for the subscribers of the outputs.
 
         """
         name = self.resolve_topic_name(topic.relative)
         state = self.health.watch(name, required=required, steady=topic.steady)
-        decode = checked(topic.type) if raw else decoder(topic.type)
+        kinds = ACCEPTED.get(topic.name, (topic.type,))
+        usual, read = kinds[0], {kinds[0]: reader(kinds[0])}
+        turn = self._plain(topic)
 
-        def guarded(data: bytes) -> None:
+        def guarded(kind: str, data: bytes) -> None:
             state.received += 1
             state.last = time.monotonic()
             try:
-                callback(decode(data))
+                if kind == usual:
+                    callback(read[usual](data))
+                    return
+                if kind not in read:
+                    read[kind] = reader(kind)
+                for message in turn(kind, read[kind](data)):
+                    callback(message)
             except TwinError as error:
                 self.refuse(name, str(error))
             except Exception:
                 self._raise_unless_over()
 
-        self.when_ready(partial(self._subscribe_to, topic, name, guarded))
+        subscribe = partial(self._subscribe_to, topic, kinds, guarded, required=required)
+        if at_once:
+            subscribe()
+        else:
+            self.when_ready(subscribe)
         return state
 
-    def _subscribe_to(self, topic: Topic, name: str, callback: Callable[[bytes], None]) -> None:
+    def stop_listening(self) -> None:
+        """Take no input any more, until somebody listens again."""
+        for source in self._sources:
+            source.close()
+        self._sources.clear()
+        self.health.inputs.clear()
+        self.frames = None
+
+    def _plain(self, topic: Topic) -> Callable[[str, Any], Iterable[Any]]:
+        """Return what turns messages of other types into those that the topic usually has."""
+        part = self.setting('measured_frame') if self.has_parameter('measured_frame') else ''
+        of_joints = self.setting('joint_part') if self.has_parameter('joint_part') else ''
+        robot, names = self.arm, self.joint_names
+        if topic is not MEASURED_POSE:
+            return partial(plain_messages, part=of_joints)
+        fed_back = None if robot is None else FedBack(robot, of_joints, names)
+
+        def turn(kind: str, message: Any) -> Iterable[Any]:
+            if kind == CONTROLLER and fed_back is not None:
+                return fed_back(message)
+            return plain_messages(kind, message, part)
+
+        return turn
+
+    def _subscribe_to(
+        self,
+        topic: Topic,
+        kinds: Sequence[str],
+        take: Callable[[str, bytes], None],
+        *,
+        required: bool,
+    ) -> None:
         wanted = topic.requested
         if self.setting('reliable_inputs'):
             wanted = replace(wanted, reliability=topic.offered.reliability)
-        self.create_subscription(
-            topic.message_class(),
-            topic.relative,
-            callback,
-            wanted.to_rclpy(),
-            raw=True,
-            event_callbacks=qos_events.of_subscription(name, wanted, self._unmatched_event),
+        source = TypedInput(
+            self,
+            topic,
+            kinds,
+            wanted,
+            take,
+            required=required,
+            remark=self.remark,
+            lack=self._lack,
+            unmatched=self._unmatched_event,
         )
-        self._partners.append(partial(unheard_publishers, self, name, topic.type, wanted))
+        self._sources.append(source)
 
     def refuse(self, source: str, reason: str) -> None:
         """Count a sample that cannot be used, and say why, now and then."""
@@ -243,6 +305,12 @@ class CellNode(Node):
         if now - self._warned.get(source, -WARN_EVERY) >= WARN_EVERY:
             self._warned[source] = now
             self.get_logger().warning(sentence)
+
+    def _tell_once(self, sentence: str) -> None:
+        """Tell something in the log and in the next health message, if there is something."""
+        if sentence:
+            self.get_logger().warning(sentence)
+            self.health.say(sentence)
 
     def time_went_back(self) -> None:
         """Forget what was heard: the clock begins anew, as when a bag is played in a loop."""
@@ -306,12 +374,20 @@ class CellNode(Node):
         self.time_went_back()
 
     def _tell_health(self) -> None:
+        for source in self._sources:
+            source.adapt()
+            self._tell_once(source.switched())
         for name, state in self.health.inputs.items():
             state.publishers = self.count_publishers(name)
         self._look_at_partners()
         self._diagnostics.publish(
             self.messages.statuses(self.get_clock().now().nanoseconds, self.health.statuses())
         )
+
+    def _lack(self, sentence: str) -> None:
+        """Tell of what is missing here, from now on."""
+        self.get_logger().warning(sentence)
+        self.health.lasting[sentence] = sentence
 
     def _unmatched_event(self, _: str) -> None:
         """Tell at once of what the graph shows; the event itself does not know the partner."""
@@ -322,7 +398,8 @@ class CellNode(Node):
         for key in [key for key in self.health.lasting if key.startswith('/')]:
             if not self.count_publishers(key) * self.count_subscribers(key):
                 del self.health.lasting[key]
-        unmatched = [sentence for look in self._partners for sentence in look()]
+        looks = (*self._partners, *(source.unheard for source in self._sources))
+        unmatched = [sentence for look in looks for sentence in look()]
         for sentence in unmatched:
             if sentence not in self._unmatched:
                 self.get_logger().warning(sentence)

@@ -17,6 +17,10 @@ STEP = 0.5
 not given a processor, has not listened meanwhile."""
 
 
+AT_START = 'at the start'
+"""Where messages are missing that were sent before the recorder was there."""
+
+
 class SentBook:
     """Keeps what every node last told of the messages it sent; each start counts by itself."""
 
@@ -104,7 +108,7 @@ def shortfall(sent: Sent | None, recorded: Sent) -> Shortfall | None:
         early = recorded.last < sent.last  # type: ignore[operator]
     where = {
         (True, True): 'at both ends',
-        (True, False): 'at the start',
+        (True, False): AT_START,
         (False, True): 'at the end',
         (False, False): 'in between',
     }[late, early]

@@ -15,8 +15,6 @@ from weld_twin_msgs_py.messages.cdr_write import Vector3Encoder
 from weld_twin_msgs_py.messages.topics import (
     DEVIATION,
     DEVIATION_METRICS,
-    MEASURED_POINT,
-    MEASURED_POSE,
     TWIN_BASE,
     TWIN_POSE,
 )
@@ -24,11 +22,13 @@ from weld_twin_msgs_py.messages.topics import (
 from ..streams.deviation_stream import METRICS, Deviation, Deviations
 from .cell_frames import base_frame
 from .cell_node import CellNode
+from .input_settings import JOINT_SETTINGS, MEASURED_SETTINGS
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run
 from .settings import Setting
+from .tf_frames import MeasuredInputs
 
-LOOK_EVERY = 1.0
+LOOK_EVERY = 0.5
 """Seconds between two looks at the clocks."""
 BASE_EVERY = 0.1
 """Seconds between two looks at whether the base is told, until it is known."""
@@ -43,6 +43,8 @@ class DeviationAnalyzer(CellNode):
 
     settings: ClassVar[tuple[Setting, ...]] = (
         *ROBOT_SETTINGS,
+        *JOINT_SETTINGS,
+        *MEASURED_SETTINGS,
         Setting(
             'path_length', 0.0, 'length of the seam [m]; 0: the way the twin has gone', 0.0, 1e4
         ),
@@ -86,12 +88,12 @@ class DeviationAnalyzer(CellNode):
         self.every(self.setting('metrics_idle'), self._on_idle)
         self.every(LOOK_EVERY, self._look_at_clocks)
         self.listen(TWIN_BASE, self._on_base)
-        self.listen(MEASURED_POSE, self._on_pose)
-        self.listen(MEASURED_POINT, self._on_point)
+        self._measured_inputs = MeasuredInputs(self, self._on_pose, self._on_point)
         self.listen(TWIN_POSE, self._on_twin, required=True)
 
     def time_went_back(self) -> None:
         """Forget what was not paired, and begin the metrics anew."""
+        self._measured_inputs.clear()
         self._deviations.reset()
         self._seen = self._told = 0
 

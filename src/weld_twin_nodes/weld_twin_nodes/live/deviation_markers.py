@@ -10,17 +10,17 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import (
     DEVIATION,
     MARKERS,
-    MEASURED_POINT,
-    MEASURED_POSE,
     TWIN_BASE,
 )
 
 from .cell_frames import measuring_frame
 from .cell_node import CellNode
 from .deviation_lines import DeviationLines
+from .input_settings import JOINT_SETTINGS, MEASURED_SETTINGS
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run
 from .settings import Setting
+from .tf_frames import MeasuredInputs
 
 
 class DeviationMarkers(CellNode):
@@ -28,6 +28,8 @@ class DeviationMarkers(CellNode):
 
     settings: ClassVar[tuple[Setting, ...]] = (
         *ROBOT_SETTINGS,
+        *JOINT_SETTINGS,
+        *MEASURED_SETTINGS,
         Setting('magnification', 200.0, 'length of a deviation in the picture [1]', 1.0, 1e6),
         Setting('tolerance', 0.001, 'deviation that is drawn red [m]', 1e-9, 1.0),
         Setting('spacing', 0.001, 'shortest way between two points drawn [m]', 0.0, 1.0),
@@ -42,8 +44,7 @@ class DeviationMarkers(CellNode):
         self._markers = self.offer(MARKERS)
         self.time_went_back()
         self.listen(TWIN_BASE, self._on_base)
-        self.listen(MEASURED_POSE, self._on_pose)
-        self.listen(MEASURED_POINT, self._on_point)
+        self._measured_inputs = MeasuredInputs(self, self._on_pose, self._on_point)
         self.listen(DEVIATION, self._on_deviation, required=True)
         self.every(self.setting('every'), self._draw)
 

@@ -39,13 +39,23 @@ class Window:
     duration : float [s]
     measuring_frame : str
         What measurements must be given in; empty for the first frame that comes.
+    joint_names : sequence of str, optional
+        What the joint states call the joints, in the order of the robot.
 
     """
 
-    def __init__(self, robot: Robot, duration: float, measuring_frame: str = '') -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        duration: float,
+        measuring_frame: str = '',
+        joint_names: tuple[str, ...] | None = None,
+    ) -> None:
         self._robot = robot
         self._duration = round(duration * NANOSECONDS)
-        self._intake = Intake(robot, measuring_frame=measuring_frame)
+        self._intake = Intake(
+            robot, measuring_frame=measuring_frame, joint_names=joint_names, mend=True
+        )
         self._streams: dict[Role, deque[Row]] = {}
 
     def reset(self) -> None:

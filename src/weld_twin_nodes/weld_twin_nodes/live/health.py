@@ -97,6 +97,8 @@ class Health:
         self.outputs: list[Output] = []
         self.lasting: dict[str, str] = {}
         self.remarks: list[str] = []
+        self.running = 'running'
+        """What a node says of itself while nothing else is to be told."""
         self.fault = ''
         """What makes the work of the node worthless as long as it lasts; empty for nothing."""
         self._run = time.time_ns()
@@ -121,7 +123,7 @@ class Health:
         own = Status(
             self._node,
             ERROR if self.fault else WARN if told else OK,
-            '; '.join(told) or 'running',
+            '; '.join(told) or self.running,
             {
                 'inputs': len(self.inputs),
                 'told': self._said_in_all,

@@ -13,8 +13,6 @@ from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.messages.topics import (
     DIAGNOSIS,
     JOINT_STATES,
-    MEASURED_POINT,
-    MEASURED_POSE,
     MEASURED_SIGMA,
     TEMPERATURE,
     TOOL_WRENCH,
@@ -22,12 +20,14 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.told_twin import build_twin
 from .cell_frames import placed_twin
-from .cell_node import CellNode
 from .diagnosis_window import Window
 from .diagnosis_worker import Finding, Job, Worker
+from .input_settings import JOINT_SETTINGS, MEASURED_SETTINGS
+from .managed_node import ManagedNode
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .run_node import run
 from .settings import Setting
+from .tf_frames import MeasuredInputs
 
 LOOK_EVERY = 0.2
 """Seconds between two looks at whether the worker has finished."""
@@ -37,13 +37,11 @@ INPUTS = {
     TOOL_WRENCH: Role.WRENCH,
     TEMPERATURE: Role.TEMPERATURE,
     MEASURED_SIGMA: Role.SIGMA,
-    MEASURED_POSE: Role.POSE,
-    MEASURED_POINT: Role.POINT,
     JOINT_STATES: Role.JOINTS,
 }
 
 
-class LiveDiagnosis(CellNode):
+class LiveDiagnosis(ManagedNode):
     """
     Diagnoses a sliding window again and again, in another process.
 
@@ -52,7 +50,10 @@ class LiveDiagnosis(CellNode):
     """
 
     settings: ClassVar[tuple[Setting, ...]] = (
+        *ManagedNode.settings,
         *ROBOT_SETTINGS,
+        *JOINT_SETTINGS,
+        *MEASURED_SETTINGS,
         Setting('model', '', 'what the twin knows: an effects file or diagnosis.json'),
         Setting('align', '', 'frames fitted along: base, tool, or base,tool'),
         Setting('window', 60.0, 'length of the window [s]', 1.0, 600.0),
@@ -65,17 +66,42 @@ class LiveDiagnosis(CellNode):
         self._twin = placed_twin(self, build_twin(robot_of(self), self.setting('model')))
         self._align = frames_named(self.setting('align'))
         self._window = Window(
-            self._twin.robot, self.setting('window'), self.setting('measuring_frame')
+            self._twin.robot,
+            self.setting('window'),
+            self.setting('measuring_frame'),
+            self.joint_names,
         )
         self._worker = Worker()
         self._begun = -float('inf')
         self._seen: int | None = None
         self._speaking = False
         self._verdict = self.offer(DIAGNOSIS)
+        self._measured: MeasuredInputs | None = None
+        self._looking: Any = None
+        self.start()
+
+    def prepare(self) -> None:
+        """Nothing is left to look at: robot and model were read when the node started."""
+
+    def begin(self) -> None:
+        """Listen, and diagnose from time to time."""
         for topic, role in INPUTS.items():
             required = role is Role.JOINTS
             self.listen(topic, partial(self._take, role), required=required)
-        self.every(LOOK_EVERY, self._look)
+        self._measured = MeasuredInputs(
+            self, partial(self._take, Role.POSE), partial(self._take, Role.POINT)
+        )
+        self._looking = self.every(LOOK_EVERY, self._look)
+
+    def finish(self) -> None:
+        """Listen no more; forget the window and the diagnosis under way."""
+        self.stop_listening()
+        if self._looking is not None:
+            self.destroy_timer(self._looking)
+        self._worker.stop()
+        self._worker = Worker()
+        self.time_went_back()
+        self._begun = -float('inf')
 
     def destroy_node(self) -> None:
         """End the diagnosis under way."""
@@ -89,6 +115,8 @@ class LiveDiagnosis(CellNode):
 
     def time_went_back(self) -> None:
         """Forget the window."""
+        if self._measured is not None:
+            self._measured.clear()
         self._window.reset()
         self._seen = None
 

@@ -19,11 +19,13 @@ from ..offline.told_twin import build_twin, doubts
 from ..streams.twin_stream import JointStream, Sample
 from .cell_frames import placed_twin
 from .cell_node import CellNode
+from .input_settings import JOINT_SETTINGS
 from .robot_settings import ROBOT_SETTINGS, robot_of
 from .settings import Setting
 
 MODEL_SETTINGS = (
     *ROBOT_SETTINGS,
+    *JOINT_SETTINGS,
     Setting(
         'model',
         '',
@@ -41,7 +43,7 @@ class ModelNode(CellNode):
     def __init__(self, name: str, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
         self.robot = robot_of(self)
-        self.stream = JointStream(self._twin(self.setting('effects')))
+        self.stream = JointStream(self._twin(self.setting('effects')), self.joint_names)
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._changed)
         self.create_service(Trigger, '~/reload', self._reload)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.node import Node
@@ -11,8 +12,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from weld_twin_msgs_py.messages.topics import Qos
 
+UNKNOWN = '_NODE_NAME_UNKNOWN_'
+"""What rmw calls a node whose participant has told of its topics and not of its nodes yet."""
 
-def unheard_publishers(node: Node, topic: str, kind: str, wanted: Qos) -> list[str]:
+
+def unheard_publishers(
+    node: Node, topic: str, kind: str, wanted: Qos, understood: Sequence[str] = ()
+) -> list[str]:
     """
     Return a sentence for every publisher of a topic of which nothing arrives.
 
@@ -25,17 +31,70 @@ def unheard_publishers(node: Node, topic: str, kind: str, wanted: Qos) -> list[s
         Message type that is asked for.
     wanted : Qos
         Quality of service that is asked for.
+    understood : sequence of str
+        Types that could be taken instead, if nobody published the one that is.
 
     """
     out = []
     for info in node.get_publishers_info_by_topic(topic):
-        if info.topic_type != kind:
-            reason = f'sends {info.topic_type}, this node needs {kind}'
+        if info.topic_type != kind and info.topic_type in understood:
+            reason = f'sends {info.topic_type} where another sends {kind}, which is taken'
+        elif info.topic_type != kind:
+            reason = f'sends {info.topic_type}, this node needs {" or ".join(understood) or kind}'
         else:
             reason = _gap(info.qos_profile, wanted.to_rclpy())
         if reason:
             out.append(f'{topic}: {_name(info)} {reason}; nothing of it arrives')
     return out
+
+
+def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
+    """
+    Return where the input may be that nobody publishes, in a sentence; empty where nowhere.
+
+    Parameters
+    ----------
+    node : Node
+    topic : str
+        The input's name after remapping, with the namespace.
+    own : str
+        Its name in the table of topics, which another namespace would go before.
+    kinds : sequence of str
+        Types that are understood.
+
+    """
+    for name, there in node.get_topic_names_and_types():
+        if name != topic and name.endswith(own) and set(there) & set(kinds):
+            publishers = node.get_publishers_info_by_topic(name)
+            if publishers:
+                space = name.removesuffix(own) or '/'
+                return (
+                    f'{topic} has no publisher, but {_name(publishers[0])} publishes {name}: '
+                    f'start this node in the namespace {space}, or remap the topic'
+                )
+    return ''
+
+
+class Senders:
+    """Who publishes an input: told when it is somebody else, as when a controller is switched."""
+
+    def __init__(self) -> None:
+        self._before: frozenset[str] = frozenset()
+
+    def changed(self, node: Node, topic: str) -> str:
+        """Return in a sentence that others publish it than before, empty where they do not."""
+        infos = node.get_publishers_info_by_topic(topic)
+        now = frozenset(_name(info) for info in infos if UNKNOWN not in info.node_name)
+        if not now or len(now) < len({info.node_name for info in infos}):
+            return ''  # the graph does not have their names yet
+        before = self._before
+        self._before = before & now or now  # who joins is none of them until all have gone
+        if not before or before & now:
+            return ''
+        return (
+            f'{topic} comes from {" and ".join(sorted(now))} now, '
+            f'it came from {" and ".join(sorted(before))}'
+        )
 
 
 def unreached_subscribers(node: Node, topic: str, kind: str, offered: Qos) -> list[str]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
 from weld_twin_core.errors import TwinError
@@ -23,6 +22,7 @@ from weld_twin_msgs_py.messages.topics import (
 
 from . import qos_events
 from .cell_node import CellNode
+from .message_classes import message_class
 from .outputs import Sent, header_stamp
 
 DEEP = 10_000
@@ -141,6 +141,11 @@ class RecordedTopic:
                 count += 1
         return count
 
+    def close(self) -> None:
+        """Take nothing more."""
+        self._node.destroy_subscription(self._subscription)
+        self._node.health.inputs.pop(self.name, None)
+
     def _subscribe(self) -> Any:
         return self._node.create_subscription(
             self._class,
@@ -168,22 +173,3 @@ class RecordedTopic:
             self._first = whole
         self._last = whole
         self._write(self, whole)
-
-
-def message_class(kind: str) -> Any:
-    """
-    Return the rclpy class of a message type.
-
-    Raises
-    ------
-    ImportError
-        The package is not installed here, or has no such message.
-
-    """
-    package, space, name = kind.split('/')
-    try:
-        return getattr(import_module(f'{package}.{space}'), name)
-    except (ImportError, AttributeError):
-        raise ImportError(
-            f'the message type {kind} is not installed here; install the package {package}'
-        ) from None

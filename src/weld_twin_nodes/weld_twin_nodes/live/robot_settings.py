@@ -4,19 +4,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rclpy.executors import SingleThreadedExecutor
-
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import ModelError
+from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
+from .awaiting import spin_until
 from .cell_frames import FRAME_SETTINGS, placed
 from .cell_node import CellNode
+from .input_settings import joint_names
 from .settings import Setting
 
 ROBOT_SETTINGS = (
@@ -30,8 +31,10 @@ ROBOT_SETTINGS = (
     Setting('tip_link', '', 'last link of the chain in a URDF; empty: its only leaf'),
     *FRAME_SETTINGS,
 )
-LOOK = 0.1
-"""Seconds of one turn of the loop that waits for a description."""
+
+
+CHANGED = 'robot changed'
+"""Under which a node keeps what it says of a robot that changes while it runs."""
 
 
 def robot_of(node: CellNode) -> Robot:
@@ -48,11 +51,13 @@ def robot_of(node: CellNode) -> Robot:
     base, tip = node.setting('base_link') or None, node.setting('tip_link') or None
     if told_by_topic(name):
         topic = node.resolve_topic_name(ROBOT_DESCRIPTION.relative if name == 'topic' else name)
-        robot = parse_urdf(_described(node, topic), topic, base, tip)
+        robot = _described(node, topic, lambda text: parse_urdf(text, topic, base, tip))
     else:
         robot = load_robot(name, base, tip)
-    node.take_robot_name(robot.name)
-    return placed(node, robot)
+    robot = placed(node, robot)
+    given = node.has_parameter('joint_map')
+    node.take_robot(robot, joint_names(node, robot) if given else None)
+    return robot
 
 
 def told_by_topic(name: str) -> bool:
@@ -61,33 +66,35 @@ def told_by_topic(name: str) -> bool:
     return name == 'topic' or absolute
 
 
-def _described(node: CellNode, topic: str) -> str:
-    """Return the next text on a topic; the node's health is told meanwhile."""
-    texts: list[str] = []
+def _described(node: CellNode, topic: str, read: Callable[[str], Robot]) -> Robot:
+    """Return the robot that a topic tells; what it tells from then on is held against that."""
+    first: list[Robot] = []
     decode = decoder(ROBOT_DESCRIPTION.type)
 
     def take(data: Any) -> None:  # bytes, as the subscription is raw
-        texts.append(decode(data).data)
+        if not first:
+            first.append(read(decode(data).data))
+            return
+        try:
+            same = read(decode(data).data).to_mapping() == first[0].to_mapping()
+        except TwinError as error:
+            node.refuse(topic, str(error))
+            return
+        node.health.lasting.pop(CHANGED, None)
+        if not same:
+            sentence = (
+                f'another robot is told on {topic} now; this node goes on with the one that it '
+                'started with: start it anew'
+            )
+            node.get_logger().warning(sentence)
+            node.health.lasting[CHANGED] = sentence
 
-    subscription = node.create_subscription(
+    node.create_subscription(
         ROBOT_DESCRIPTION.message_class(),
         topic,
         take,
         ROBOT_DESCRIPTION.requested.to_rclpy(),
         raw=True,
     )
-    node.get_logger().info(f'waiting for the robot on {topic}')
-    node.health.lasting['robot'] = f'waiting for the robot on {topic}'
-    runner = SingleThreadedExecutor(context=node.context)
-    runner.add_node(node)
-    try:
-        while not texts:
-            if not node.context.ok():
-                raise ModelError(f'stopped before a robot was told on {topic}')
-            runner.spin_once(timeout_sec=LOOK)
-    finally:
-        runner.remove_node(node)
-        runner.shutdown()
-    node.destroy_subscription(subscription)
-    del node.health.lasting['robot']
-    return texts[-1]
+    spin_until(node, lambda: bool(first), f'the robot on {topic}')
+    return first[0]

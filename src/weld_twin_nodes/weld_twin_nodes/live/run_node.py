@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import gc
+import re
 import signal
 import sys
 from collections.abc import Callable
@@ -120,6 +121,13 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     return 0 if node is None or node.failure is None else _told(node.failure)
 
 
+QUOTED = (
+    'a list or a mapping is given as text, in two kinds of quotes: '
+    '-p \'effects:="[{effect: backlash, joint: elbow_joint, width: 5e-4}]"\''
+)
+"""What to do where ROS could not read a list after ``-p``."""
+
+
 def _open(args: list[str] | None) -> None:
     """
     Open ROS; raise a sentence where it cannot read the arguments.
@@ -134,10 +142,9 @@ def _open(args: list[str] | None) -> None:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's own error of it has no public name
         said = str(error).partition(', at /')[0]
-        raise ModelError(
-            f'{said}; a list or a mapping is given as text, in two kinds of quotes: '
-            '-p \'effects:="[{effect: backlash, joint: elbow_joint, width: 5e-4}]"\''
-        ) from None
+        bracket = re.search(r"'(-p|--param) [^\s:]+:=\s*[\[{]", said)
+        hint = 'a parameter is given as -p NAME:=VALUE' if bracket is None else QUOTED
+        raise ModelError(f'{said}; {hint}') from None
 
 
 def _told(error: Exception) -> int:

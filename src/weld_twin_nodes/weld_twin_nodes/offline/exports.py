@@ -90,9 +90,13 @@ def write_all(
     for name, write in FORMATS.values():
         write(directory / name, model, notes)
     if given is not None:
-        said = [*_mended(model), *notes]
-        robot = _corrected(model)[0]
-        write_urdf_like(directory / FORMATS['urdf'][0], given, robot, overwrite=True, notes=said)
+        write_given_urdf(directory / FORMATS['urdf'][0], model, notes, given)
+
+
+def write_given_urdf(path: Path, model: Model, notes: Sequence[str], given: GivenUrdf) -> None:
+    """Write the corrected robot as the URDF that it was read from, its names kept."""
+    robot, said = _corrected(model)[0], [*_mended(model), *notes]
+    write_urdf_like(path, given, robot, overwrite=True, notes=said)
 
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:

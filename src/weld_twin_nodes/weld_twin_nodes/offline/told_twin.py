@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects import Effect, effects_from_list
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.errors import ModelError
@@ -18,8 +18,14 @@ from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
 from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.files.yaml_file import parse_yaml
 
+IMPOSSIBLE = 10.0
+"""Times the range of a parameter beyond which a value of a file is a slip of its unit: degrees taken
+for radians are 57 times, millimetres taken for metres a thousand times too large."""
 
-def build_twin(robot: Robot, model: Path | str = '', effects: str = '') -> Twin:
+
+def build_twin(
+    robot: Robot, model: Path | str = '', effects: str = '', *, implausible: bool = False
+) -> Twin:
     """
     Return a robot with the effects of a file and those of a text.
 
@@ -31,18 +37,26 @@ def build_twin(robot: Robot, model: Path | str = '', effects: str = '') -> Twin:
         set-up moved left out; empty for none.
     effects : str
         More effects, in the form of an effects file.
+    implausible : bool
+        Take values that no machine comes near, too.
 
     Raises
     ------
     ModelError
-        A file or the text cannot be read, or names an effect the robot cannot have.
+        A file or the text cannot be read, or names an effect the robot cannot have, or a value
+        that no machine comes near.
 
     """
     more = effects_from_list(parse_yaml(effects, 'effects'), robot)
+    if not implausible:
+        _possible(robot, more, 'effects')
     if not str(model):
         return Twin(robot, more)
     if Path(model).suffix.lower() != '.json':
-        return Twin(robot, read_effects(model, robot) + more)
+        read = read_effects(model, robot)
+        if not implausible:
+            _possible(robot, read, f"effects file '{model}'")
+        return Twin(robot, read + more)
     known = _diagnosed(robot, model)
     return Twin(known.robot, of_the_robot(known.effects) + more)
 
@@ -50,11 +64,25 @@ def build_twin(robot: Robot, model: Path | str = '', effects: str = '') -> Twin:
 def doubts(twin: Twin) -> list[str]:
     """Return a sentence for every value of an effect that no machine has: a unit may be wrong."""
     return [
-        f'{parameter} of {effect.name}{f" of {effect.site}" if effect.site else ""} is {value:g}; '
-        f'no machine is known beyond {limit:g}, so check its unit (rad, m, s, kg)'
+        _doubt(effect, parameter, value, limit)
         for effect in twin.effects
         for parameter, value, limit in beyond(twin.robot, effect)
     ]
+
+
+def _doubt(effect: Effect, parameter: str, value: float, limit: float) -> str:
+    return (
+        f'{parameter} of {effect.name}{f" of {effect.site}" if effect.site else ""} is {value:g}; '
+        f'no machine is known beyond {limit:g}, so check its unit (rad, m, s, kg)'
+    )
+
+
+def _possible(robot: Robot, effects: Sequence[Effect], source: str) -> None:
+    """Refuse values that no machine comes near."""
+    for effect in effects:
+        for parameter, value, limit in beyond(robot, effect):
+            if abs(value) > IMPOSSIBLE * abs(limit) > 0.0:
+                raise ModelError(f'{source}: {_doubt(effect, parameter, value, limit)}')
 
 
 def _diagnosed(robot: Robot, path: Path | str) -> Twin:

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from typing import Any
 
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_msgs_py.files.input_files import InputFile
@@ -14,6 +12,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 from .cause_levels import levels_section
 from .cause_list import causes_section
 from .changed_section import changed_section
+from .charts import embedded
 from .contact_clouds import contacts_section
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
@@ -45,9 +44,9 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
         inputs_section(inputs),
     )
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
-    data = tag('script', _embedded(seam_data(diagnosis)), type='application/json', id_='data')
+    data = embedded(seam_data(diagnosis), 'data')
     script = tag('script', own_file('page.js'))
-    return document(title, body, data, script, allowed="script-src 'unsafe-inline'")
+    return document(title, body, data, script, charts=True)
 
 
 def _causes(diagnosis: Diagnosis) -> tuple[Html | None, ...]:
@@ -61,8 +60,3 @@ def _causes(diagnosis: Diagnosis) -> tuple[Html | None, ...]:
         shrink_section(diagnosis),
         next_section(diagnosis),
     )
-
-
-def _embedded(data: dict[str, Any]) -> Html:
-    """Return JSON that no name in it can end the script element with."""
-    return Html(json.dumps(data, separators=(',', ':')).replace('<', '\\u003c'))

@@ -85,6 +85,9 @@ def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 """What a page may load: nothing but its own style; a page that needs more says so."""
 
+OWN_SCRIPTS = "script-src 'unsafe-inline'"
+"""What a page with scripts of its own may run besides: what stands in the page, nothing fetched."""
+
 
 @cache
 def own_file(name: str) -> Html:
@@ -92,7 +95,9 @@ def own_file(name: str) -> Html:
     return Html((files(__package__) / name).read_text(encoding='utf-8'))
 
 
-def document(title: str, *body: Child, allowed: str = '', style: str = '') -> str:
+def document(
+    title: str, *body: Child, allowed: str = '', style: str = '', charts: bool = False
+) -> str:
     """
     Return a whole page that needs no other file and no network.
 
@@ -105,8 +110,16 @@ def document(title: str, *body: Child, allowed: str = '', style: str = '') -> st
         What the page may load besides its own style, in the words of a content security policy.
     style : str
         CSS after that of all pages.
+    charts : bool
+        Whether figures of `charts` stand on it; what draws them is then embedded.
 
     """
+    if charts:
+        allowed = '; '.join(filter(None, [allowed, OWN_SCRIPTS]))
+        style = own_file('uplot/uPlot.min.css') + own_file('charts.css') + style
+        body += tuple(
+            tag('script', own_file(name)) for name in ('uplot/uPlot.iife.min.js', 'charts.js')
+        )
     policy = '; '.join(filter(None, [POLICY, allowed]))
     head = joined(
         [

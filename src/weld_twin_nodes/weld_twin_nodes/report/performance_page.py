@@ -10,15 +10,12 @@ from weld_twin_core.metrics.performance import PathTest, Performance
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.input_files import InputFile
 
+from .charts import Axis, Line, chart
 from .footing import inputs_section
 from .headline import recorded_at
 from .html import Html, document, section, table, tag
-from .line_chart import line_chart
 from .performance_table import MEANINGS, POSE_HEADS, path_row, pose_rows, sentence
 from .quantities import millimetres
-
-_ROOM = 1.15
-"""Height of the chart over the largest value in it."""
 
 
 def performance_page(
@@ -58,7 +55,7 @@ def performance_page(
         _meanings(),
         inputs_section(inputs),
     )
-    return document(f'ISO 9283 · {robot} · {recording.name}', body)
+    return document(f'ISO 9283 · {robot} · {recording.name}', body, charts=True)
 
 
 def _figures(found: Performance) -> Html:
@@ -96,26 +93,20 @@ def _poses(found: Performance) -> Html | None:
 
 
 def _path(path: PathTest) -> Html:
-    top = _ROOM * max(float(path.at.max()), float(path.rt.max()), 1e-7)
     length, cycles, *_, takes = path_row(path)
-    chart = line_chart(
+    picture = chart(
         f'{length}, {cycles} cycles of {takes}',
-        'Accuracy and repeatability along the path',
         path.arc,
-        {'before': path.at, 'after': path.rt},
-        (f'{path.arc[0]:.2f} m', f'{path.arc[-1]:.2f} m'),
-        top,
-    )
-    keys = tag(
-        'p',
-        tag('span', 'accuracy', class_='key before'),
-        tag('span', 'repeatability', class_='key after'),
-        class_='keys',
+        [
+            Line('accuracy', 1e3 * path.at, 'before'),
+            Line('repeatability', 1e3 * path.rt, 'after'),
+        ],
+        (Axis('along the path', 'm'), Axis('distance', 'mm')),
+        from_zero=True,
     )
     return section(
         'The path',
-        keys,
-        chart,
+        picture,
         id_='path',
         lead='At every point of the path, in the plane square to it. AT and RT are the largest.',
     )

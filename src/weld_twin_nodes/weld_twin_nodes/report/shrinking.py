@@ -9,8 +9,8 @@ import numpy as np
 from weld_twin_core.diagnosis.result import Diagnosis
 
 from .cause_list import leftover
+from .charts import Axis, Line, chart, thinned
 from .html import Html, section, tag
-from .line_chart import line_chart
 from .quantities import interval, millimetres, milliradians, percent, turns_only
 from .seam_view import at_rest, trusted
 from .words import cause
@@ -32,7 +32,6 @@ def shrink_section(diagnosis: Diagnosis) -> Html:
         _waterfall(diagnosis),
         tag('p', _judged(diagnosis)),
         tag('h3', title),
-        _key(),
         *charts,
         note,
         leftover(diagnosis),
@@ -107,16 +106,6 @@ def _step(label: str, share: float, before: float, rms: float, class_: str = '')
     )
 
 
-def _key() -> Html:
-    return tag(
-        'p',
-        tag('span', 'before', class_='key before'),
-        tag('span', 'after', class_='key after'),
-        tag('span', 'noise floor', class_='key floor'),
-        class_='keys',
-    )
-
-
 def _chart(diagnosis: Diagnosis, k: int) -> Html:
     """Return |deviation| over time; over the station number where nothing moved."""
     traces = diagnosis.traces
@@ -126,14 +115,18 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     sizes = [np.linalg.norm(part[good], axis=1) for part in (traces.before[k], traces.after[k])]
     if sizes[0].size == 0:
         return tag('p', 'No samples.')
-    x = (np.arange(good.size, dtype=float) if static else traces.t[k])[good]
-    # a single outlier must not flatten the rest
-    top = 1.15 * max(float(np.percentile(np.concatenate(sizes), 99.5)), 1e-7)
-    ends = ('station 1', f'station {good.size}') if static else (f'{x[0]:.1f} s', f'{x[-1]:.1f} s')
+    x = (np.arange(1.0, good.size + 1.0) if static else traces.t[k])[good]
     title = recording.name if recording is not None else f'recording {k + 1}'
     outliers = int((~good).sum())
     if outliers:
         title += f' ({outliers} outlier{"s"[: outliers > 1]} not drawn)'
-    lines = dict(zip(('before', 'after'), sizes, strict=True))
-    label = 'Deviation before and after'
-    return line_chart(title, label, x, lines, ends, top, floor=diagnosis.gap.noise_floor_m)
+    kept = thinned(sizes)
+    before, after = (1e3 * size[kept] for size in sizes)
+    floor = np.full(kept.size, 1e3 * diagnosis.gap.noise_floor_m)
+    lines = [
+        Line('before', before, 'before', points=static),
+        Line('after', after, 'after', points=static),
+        Line('noise floor', floor, 'soft', dashed=True),
+    ]
+    axes = (Axis('station') if static else Axis('time', 's'), Axis('deviation', 'mm'))
+    return chart(title, x[kept], lines, axes, key=f'run{k}', from_zero=True)

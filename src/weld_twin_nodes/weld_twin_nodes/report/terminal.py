@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.console import Console
 from rich.markup import escape
 from rich.padding import Padding
@@ -27,6 +29,8 @@ _COLOURS = {
 }
 _MOST = 8
 """Rows of a table; the files have all."""
+_BETWEEN = '  '
+"""Between the columns of a table."""
 
 
 def print_summary(diagnosis: Diagnosis, console: Console) -> None:
@@ -42,11 +46,11 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     if diagnosis.families:
         _print_families(diagnosis, console)
     elif diagnosis.effects:
-        console.print(_effects(diagnosis))
+        _print_effects(diagnosis, console)
     if diagnosis.status == 'unknown' and diagnosis.causes:
-        console.print(_levels(diagnosis))
+        _print_levels(diagnosis, console)
     elif len(diagnosis.candidates) > 1:
-        console.print(_candidates(diagnosis))
+        _print_candidates(diagnosis, console)
     _print_sets(diagnosis, console)
     _print_changed(diagnosis, console)
     for check in diagnosis.checks:
@@ -68,12 +72,7 @@ def _print_changed(diagnosis: Diagnosis, console: Console) -> None:
         console.print(escape(nothing_changed(diagnosis)))
         return
     title = f'changed since {diagnosis.recordings[0].name}'
-    table = Table(box=None, title=escape(title), title_justify='left', pad_edge=False)
-    for head in CHANGED_HEADS:
-        table.add_column(head, header_style='dim', overflow='fold')
-    for row in changed_rows(diagnosis):
-        table.add_row(*(escape(cell) for cell in row))
-    console.print(table)
+    _print_table(console, title, CHANGED_HEADS, changed_rows(diagnosis))
 
 
 def _print_holds(diagnosis: Diagnosis, console: Console) -> None:
@@ -93,49 +92,59 @@ def _print_families(diagnosis: Diagnosis, console: Console) -> None:
     ]
     for title, heads, rows in parts:
         if rows:
-            table = Table(box=None, title=title, title_justify='left', pad_edge=False)
-            for head in heads:
-                table.add_column(head.lower(), header_style='dim', overflow='fold')
-            for row in rows:
-                table.add_row(*(escape(cell) for cell in row))
-            console.print(table)
+            _print_table(console, title, [head.lower() for head in heads], rows)
 
 
-def _effects(diagnosis: Diagnosis) -> Table:
-    table = Table(box=None, title='effects found', title_justify='left', pad_edge=False)
-    for head in ('effect', 'parameter', 'value ± standard error'):
-        table.add_column(head, header_style='dim', overflow='fold')
+def _print_effects(diagnosis: Diagnosis, console: Console) -> None:
+    rows = []
     for found in diagnosis.effects[:_MOST]:
         for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
-            table.add_row(escape(found_name(found)) if k == 0 else '', name, value)
+            rows.append([found_name(found) if k == 0 else '', name, value])
+    _print_table(console, 'effects found', ('effect', 'parameter', 'value ± standard error'), rows)
     more = len(diagnosis.effects) - _MOST
     if more > 0:
-        table.add_row(f'and {more} more in effects.yaml')
-    return table
+        console.print(f'and {more} more in effects.yaml')
 
 
-def _levels(diagnosis: Diagnosis) -> Table:
-    """Return what is certain of each cause although it has no name."""
-    table = Table(box=None, title='what is certain', title_justify='left', pad_edge=False)
-    for head in LEVEL_HEADS:
-        table.add_column(head.lower(), header_style='dim', overflow='fold')
-    for cause in diagnosis.causes[:_MOST]:
-        table.add_row(*(escape(cell) for cell in level_row(cause)))
-    return table
+def _print_levels(diagnosis: Diagnosis, console: Console) -> None:
+    """Print what is certain of each cause although it has no name."""
+    rows = [level_row(cause) for cause in diagnosis.causes[:_MOST]]
+    _print_table(console, 'what is certain', [head.lower() for head in LEVEL_HEADS], rows)
 
 
-def _candidates(diagnosis: Diagnosis) -> Table:
-    table = Table(box=None, title='candidates', title_justify='left', pad_edge=False)
-    for head in ('effect', 'probability', 'gap left', 'change'):
-        table.add_column(head, header_style='dim', overflow='fold')
-    for item in diagnosis.candidates[:_MOST]:
-        table.add_row(
-            escape(site_name(item.site)),
+def _print_candidates(diagnosis: Diagnosis, console: Console) -> None:
+    rows = [
+        [
+            site_name(item.site),
             odds(item.probability),
             millimetres(item.rms_after_m),
             change(item.shrink),
-        )
-    return table
+        ]
+        for item in diagnosis.candidates[:_MOST]
+    ]
+    _print_table(console, 'candidates', ('effect', 'probability', 'gap left', 'change'), rows)
+
+
+def _print_table(
+    console: Console, title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]
+) -> None:
+    """Print a table; where its longest words do not fit side by side, a paragraph for each row."""
+    columns = list(zip(heads, *rows, strict=True))
+    longest = [max(len(word) for cell in column for word in cell.split()) for column in columns]
+    if sum(longest) + len(_BETWEEN) * (len(heads) - 1) <= console.width:
+        table = Table(box=None, title=escape(title), title_justify='left', pad_edge=False)
+        for head, width in zip(heads, longest, strict=True):
+            table.add_column(head, header_style='dim', min_width=width)
+        for row in rows:
+            table.add_row(*(escape(cell) for cell in row))
+        console.print(table)
+        return
+    console.print(f'[italic]{escape(title)}[/]')
+    for first, *rest in rows:
+        if first:
+            console.print(escape(first))
+        for head, cell in zip(heads[1:], rest, strict=True):
+            console.print(Padding(f'[dim]{escape(head)}:[/] {escape(cell)}', (0, 0, 0, 2)))
 
 
 def _print_sets(diagnosis: Diagnosis, console: Console) -> None:

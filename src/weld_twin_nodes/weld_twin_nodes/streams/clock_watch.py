@@ -28,6 +28,8 @@ PACE = (0.7, 1.4)
 """Speed of the stamps against real time between which arrivals tell of clocks."""
 SPAN = 8.0
 """Seconds of motion that are compared."""
+RECENT = 4.0
+"""Seconds that are compared where all of them show no one shift: a clock that was set just now."""
 REACH = 1.0
 """Largest shift [s] that is looked for in the motion."""
 STEP = 0.02
@@ -114,6 +116,7 @@ class ClockWatch:
         self._paired, self._paired_at = 0, -np.inf
         self._begun: float | None = None
         self._before: float | None = None
+        self._set_at = -np.inf
         self._history: deque[tuple[float, float]] = deque(maxlen=300)
 
     def look(self, now: float, paired: int, waiting: int, dropped: int) -> str:
@@ -152,10 +155,16 @@ class ClockWatch:
 
     def _by_motion(self, now: float) -> str:
         found = shift(self.measured.samples, self.twin.samples)
+        if found is None:
+            found = shift(_recent(self.measured.samples), _recent(self.twin.samples))
         before, self._before = self._before, found
         if found is None:
             return ''
-        self._history.append((now, found))
+        if before is None or abs(found - before) > STEADY:
+            self._set_at = now
+            self._history.clear()
+        if now - self._set_at > SPAN:  # what is compared is all of after the clock was set
+            self._history.append((now, found))
         drift = self._drift()
         if drift:
             return drift
@@ -166,9 +175,9 @@ class ClockWatch:
 
     def _drift(self) -> str:
         """Return what is to be told of a shift that grows with time."""
-        t, offset = np.array(self._history).T
-        if t[-1] - t[0] < DRIFT_SPAN:
+        if not self._history or self._history[-1][0] - self._history[0][0] < DRIFT_SPAN:
             return ''
+        t, offset = np.array(self._history).T
         rate, start = np.polyfit(t - t[0], offset, 1)
         change = rate * (t[-1] - t[0])
         scatter = float(np.std(offset - start - rate * (t - t[0])))
@@ -184,6 +193,13 @@ def told(offset: float, digits: int) -> str:
     """Return an offset [s] in words."""
     where = 'ahead of' if offset > 0.0 else 'behind'
     return f'measurements are {abs(offset):.{digits}f} s {where} the joints'
+
+
+def _recent(samples: deque[Sample]) -> deque[Sample]:
+    """Return the last `RECENT` seconds of a stream."""
+    if not samples:
+        return samples
+    return deque(s for s in samples if samples[-1].stamp - s.stamp < RECENT / NANOSECOND)
 
 
 def shift(measured: deque[Sample], twin: deque[Sample]) -> float | None:

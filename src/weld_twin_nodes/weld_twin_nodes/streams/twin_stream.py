@@ -50,13 +50,20 @@ class JointStream:
 
     Wrench and temperature are in force from their own stamp to the next one's. The poses are
     those that the twin gives over the recording of the same messages.
+
+    Parameters
+    ----------
+    twin : Twin
+    joint_names : sequence of str, optional
+        What the joint states call the joints, in the order of the robot.
+
     """
 
-    def __init__(self, twin: Twin) -> None:
+    def __init__(self, twin: Twin, joint_names: tuple[str, ...] | None = None) -> None:
         self._twin = twin
         self._live = twin.live()
         self._delay = round(twin.delay * NANOSECONDS)
-        self._intake = Intake(twin.robot)
+        self._intake = Intake(twin.robot, joint_names=joint_names, mend=True)
         self._epoch: int | None = None
         self._wrench = HeldSignal()
         self._temperature = HeldSignal()

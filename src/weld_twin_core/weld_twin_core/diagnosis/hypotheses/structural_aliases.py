@@ -31,7 +31,7 @@ from ..beliefs import Beliefs
 from ..result import Site
 from .rivals import Rival, nats_in_place, weighed
 from .search import Search
-from .selection import fitted_with
+from .selection import fitted_with, implausible
 
 POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
@@ -59,13 +59,12 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
     """
     known = [name for name in exclude if name in REGISTRY and REGISTRY[name].cause]
     kinds = [name for name in known if _constant(REGISTRY[name])]
-    if not known or not found.slots:
-        return found
     slots, better = [], list(found.refused)
     for k, slot in enumerate(found.slots):
         if k < len(found.small.model.found):
             kin = _fitted_kin(found, k, _kin(found.small.model.found[k], known))
             slot = _extended(found, k, slot, kinds, beliefs) if kinds else slot
+            slot = _with_constants(found, k, slot, beliefs)
             most = max(rival.nats for rival in slot)
             clearly = [rival for rival in kin if rival.nats > most + beliefs.enter_nats]
             better += [rival.fit.model.found[-1] for rival in clearly]
@@ -131,6 +130,39 @@ def _extended(
             nats = nats_in_place(rest, tried, count)
             more.append(Rival(Site(other.name, other.site), nats, tried))
     return weighed([*slot, *more], beliefs.temperature) if more else slot
+
+
+def _with_constants(
+    found: Search, k: int, slot: tuple[Rival, ...], beliefs: Beliefs
+) -> tuple[Rival, ...]:
+    """Return a slot with what is a constant of a joint on these motions, as its constants are."""
+    joints = [
+        rival.site.joint
+        for rival in slot
+        if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
+    ]
+    work, listed = found.work, {rival.site for rival in slot}
+    maker = work.problem.features(found.small.model)[0]
+    seeds = [
+        seed
+        for joint in dict.fromkeys(joints)
+        if joint is not None
+        for kind in REGISTRY.values()
+        if kind.of == 'joint' and kind.applicable(maker.view, joint) is None
+        for seed in kind.constants(maker.view, joint)
+        if Site(kind.name, joint) not in listed
+    ]
+    if not seeds:
+        return slot
+    rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
+    count, most = found.effective(found.small), max(rival.nats for rival in slot)
+    tried = [(seed, fitted_with(work, rest.model, seed)) for seed in seeds]
+    more = [
+        Rival(Site(seed.name, seed.site), min(nats_in_place(rest, own, count), most), own)
+        for seed, own in tried
+        if not implausible(own.model)
+    ]
+    return weighed([*slot, *more], beliefs.temperature)
 
 
 def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> Iterator[Effect]:

@@ -161,7 +161,7 @@ def _of_gap(case: Weighed) -> Numbers:
         'structure_gain': left.gain,
         'structure_sure': left.sure,
         'independent': float(told.independent),
-        'refused': len(told.refused),
+        'refused': len(told.refused) + len(told.lacking),
         'glimpsed': len(told.glimpsed),
         'cancel': _log(sum(told.parts)) if told.parts else 0.0,
     }

@@ -76,7 +76,7 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
 def _of_nothing(case: Weighed) -> Verdict:
     """Return the verdict where no effect was found."""
     told, beliefs = case.evidence, case.beliefs
-    if told.refused:
+    if told.refused or told.lacking:
         return Verdict('unknown', beliefs.doubted, (), (_absurd(told),))
     if case.left > beliefs.unexplained and case.above_noise:
         return Verdict('unknown', _unknown_confidence(case), (), (_depends(told),))
@@ -157,7 +157,9 @@ def _confidence(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> float:
 def _doubt(case: Weighed) -> str | None:
     """Return why the effects found are no plausible explanation, however well they fit."""
     told, beliefs = case.evidence, case.beliefs
-    if told.refused:
+    # Beside effects that leave noise alone, what no machine has would mend a formula at most.
+    remains = case.above_noise or told.structure.gain > beliefs.structure_gain
+    if told.lacking or (told.refused and remains):
         return _absurd(told)
     if len(told.slots) > 1 and sum(told.parts) > beliefs.cancel:
         return (
@@ -186,9 +188,10 @@ def _doubt(case: Weighed) -> str | None:
 
 
 def _absurd(evidence: Evidence) -> str:
-    """Return that only what no machine has would explain the rest."""
+    """Return that only what no machine has, or the library lacks, would explain the rest."""
+    first, *_ = (*evidence.lacking, *evidence.refused)
     return (
-        f'what remains would be explained best by {evidence.refused[0]}: it imitates a cause that '
+        f'what remains would be explained best by {first}: it imitates a cause that '
         'is not in the library, or the data are not what they seem'
     )
 

@@ -37,6 +37,8 @@ class Evidence:
         Joints of which a wave was seen over too little of a period.
     refused : tuple of str
         What would explain the rest best but no machine has, in words.
+    lacking : tuple of str
+        What was taken out of the library and fits clearly better than what was found, in words.
     families : tuple of WeighedFamily, optional
         Where many small errors were fitted together: what each kind accounts for.
     least : float, optional
@@ -56,5 +58,6 @@ class Evidence:
     causes: tuple[int, ...] = ()
     glimpsed: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
+    lacking: tuple[str, ...] = ()
     families: tuple[WeighedFamily, ...] | None = None
     least: float | None = None

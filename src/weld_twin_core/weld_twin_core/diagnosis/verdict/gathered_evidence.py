@@ -46,6 +46,7 @@ def gathered(
         As `parted_elsewhere` gives it.
 
     """
+    robot = found.final.model.robot
     everything = range(len(found.final.model.found))
     return Evidence(
         slots=found.slots,
@@ -58,7 +59,8 @@ def gathered(
         parts=_parts(unseen),
         causes=tuple(_causes(slot[0]) for slot in found.slots),
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),
-        refused=tuple(_refused(found.final.model.robot, effect) for effect in found.refused),
+        refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
+        lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
         families=weighed_families(found, unseen) if found.dense else None,
         least=least,
     )
@@ -72,15 +74,18 @@ def _parts(unseen: Unseen) -> tuple[float, ...]:
 
 
 def _refused(robot: Robot, effect: Effect) -> str:
-    """Return an effect that no machine has, with the values that say so, or one taken out."""
-    if not beyond(robot, effect):
-        return f'{Site(effect.name, effect.site)}, which was taken out of the library'
+    """Return an effect that no machine has, with the values that say so."""
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
     values = ', '.join(
-        f'{name} {value:.3g} {units[name]} (a machine has {limit:.3g} at most)'
+        f'{name} {value:.3g} {units[name]} (the limit of machines is {limit:.3g})'
         for name, value, limit in beyond(robot, effect)
     )
     return f'{Site(effect.name, effect.site)} with {values}'
+
+
+def _lacking(effect: Effect) -> str:
+    """Return an effect that was taken out of the library."""
+    return f'{Site(effect.name, effect.site)}, which was taken out of the library'
 
 
 def _causes(rival: Rival) -> int:

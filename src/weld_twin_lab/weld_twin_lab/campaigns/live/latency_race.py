@@ -25,6 +25,7 @@ from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE
 from weld_twin_nodes.harness.ros_domain import own_domain
 from weld_twin_nodes.live.run_node import executor
 
+from ..building.message_packages import messages_importable
 from .usage import cpu_ns
 
 SETTLE = 0.15
@@ -104,6 +105,7 @@ class Race:
 
     def __enter__(self) -> Race:
         """Start the contenders and what feeds them."""
+        self._stack.enter_context(messages_importable())
         self._stack.enter_context(own_domain())
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._stack.callback(rclpy.try_shutdown)
@@ -118,6 +120,12 @@ class Race:
             node.create_subscription(
                 contender.kind, contender.answer, contender.hear, deep, raw=True
             )
+        frames = subprocess.Popen(
+            [sys.executable, '-m', f'{__package__}.frames'], stdin=subprocess.PIPE
+        )
+        assert frames.stdin is not None
+        self._stack.callback(frames.wait)
+        self._stack.callback(frames.stdin.close)
         self._pulse = subprocess.Popen(
             [sys.executable, '-m', f'{__package__}.pulse'],
             text=True,

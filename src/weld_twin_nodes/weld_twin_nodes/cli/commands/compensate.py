@@ -36,6 +36,10 @@ def run(args: argparse.Namespace) -> int:
         f'{args.out}: by the model the tool is {before * 1e3:.4f} mm RMS off with the nominal '
         f'commands and {after * 1e3:.4f} mm with these'
     )
+    print(
+        'this is what the effects in the model do on these commands; the gap of a diagnosis also '
+        'holds noise and whatever it left unexplained'
+    )
     for sentence in told_trust(made):
         print(sentence)
     if made.result.left_out:

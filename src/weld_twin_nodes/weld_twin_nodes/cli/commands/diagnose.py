@@ -10,6 +10,8 @@ diagnosis.json then say what, and no model is written.
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,14 +19,15 @@ from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..options import add_robot, add_topics, robot_of, topics_of
+from ..options import add_robot, add_topics, given_urdf, robot_of, topics_of, twin_of
 
 if TYPE_CHECKING:
     from weld_twin_core.diagnosis import Diagnosis
     from weld_twin_core.recording import Recording
     from weld_twin_msgs_py.files.input_files import InputFile
-    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
 
+LINES = 'WELD_TWIN_PROGRESS'
+"""Variable of the environment: 'lines' has every step told as a line on stderr."""
 UNSOUND = 3
 """Exit code where data or set-up are wrong."""
 MEASUREMENTS = 40_000
@@ -105,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
 
     with new_directory(args.out, mark=RESULT) as place:
         diagnosis = _diagnosis(args)
-        write_results(place, diagnosis, _inputs(args), _given_urdf(args))
+        write_results(place, diagnosis, _inputs(args), given_urdf(args))
     console = Console(highlight=False)
     print_summary(diagnosis, console)
     console.print(f'report: {Path(args.out) / PAGE}', markup=False)
@@ -119,13 +122,11 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.errors import ModelError
     from weld_twin_msgs_py.bags import read_recording
 
-    from ...offline.told_twin import build_twin
-
     align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
     changing = families_named(args.may_change, '--may-change')
     if changing and len(args.bags) < 2:
         raise ModelError('--may-change compares recordings; give two or more bags of one arm')
-    twin = build_twin(robot_of(args), args.effects_known)
+    twin = twin_of(robot_of(args), args.effects_known)
     topics = topics_of(args)
     with _progress() as tell:
         recordings = []
@@ -193,17 +194,6 @@ def _families(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _given_urdf(args: argparse.Namespace) -> GivenUrdf | None:
-    """Return the URDF that the robot was read from, None for another robot file."""
-    from weld_twin_msgs_py.robots.load import URDF_SUFFIXES
-    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
-
-    path = Path(args.robot)
-    if path.suffix.lower() not in URDF_SUFFIXES:
-        return None
-    return GivenUrdf(path, args.base_link, args.tip_link)
-
-
 def _inputs(args: argparse.Namespace) -> list[InputFile]:
     from weld_twin_msgs_py.files.input_files import hashed
 
@@ -218,10 +208,17 @@ def _inputs(args: argparse.Namespace) -> list[InputFile]:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str], None]]:
-    """Yield where to tell progress; it shows on a terminal and leaves other streams alone."""
+    """
+    Yield where to tell progress; it shows on a terminal and leaves other streams alone.
+
+    A program that shows it elsewhere asks for lines.
+    """
     from rich.console import Console
     from rich.markup import escape
 
+    if os.environ.get(LINES) == 'lines':
+        yield lambda text: print(text, file=sys.stderr, flush=True)
+        return
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda text: None

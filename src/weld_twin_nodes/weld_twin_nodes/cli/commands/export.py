@@ -8,7 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..options import add_robot, robot_of
+from ..options import add_robot, given_urdf, robot_of
 
 _FORMATS = ('yaml', 'urdf', 'offsets', 'effects', 'left-over')
 
@@ -30,19 +30,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write one file, or print it."""
+    from functools import partial
     from tempfile import TemporaryDirectory
 
     from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.files.diagnosis_model import read_model
     from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
-    from ...offline.exports import FORMATS
+    from ...offline.exports import FORMATS, write_given_urdf
     from ...offline.where_it_holds import where_it_holds
 
     robot = robot_of(args)
     model, posterior = read_model(robot, args.model), read_posterior(robot, args.model)
     notes = [] if posterior is None else where_it_holds(posterior)
     name, write = FORMATS[args.format]
+    given = given_urdf(args)
+    if given is not None and args.format == 'urdf':
+        write = partial(write_given_urdf, given=given)
     if args.out is None:
         with TemporaryDirectory() as scratch:
             write(Path(scratch) / name, model, notes)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arrays import Array
     from weld_twin_core.recording import Recording
-    from weld_twin_msgs_py.tables import TableOptions
+    from weld_twin_msgs_py.tables import Table, TableOptions
 
 LISTS = ('joint', 'position', 'target', 'difference', 'rotation', 'sigma')
 """Options that take several columns."""
@@ -33,8 +33,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='ARTEFACT.yaml',
         help='the table holds joint angles and what was touched; this file describes it',
     )
+    parser.add_argument(
+        '--measured',
+        metavar='FILE',
+        help='FILE.csv has the joints alone; this one has what the instrument measured',
+    )
+    parser.add_argument(
+        '--clock-offset',
+        type=float,
+        default=0.0,
+        metavar='S',
+        help='added to the stamps of --measured',
+    )
     parser.add_argument('--table', metavar='CSV', help='also write every deviation from the twin')
     parser.add_argument('--picture', metavar='PNG', help='also draw the deviations')
+    _add_reading(parser)
+
+
+def _add_reading(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('how to read the table')
     for name in LISTS:
         group.add_argument(f'--{name}-columns', metavar='A,B,C', type=_names)
@@ -62,8 +78,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=(),
         help='rows to leave out; the first row under the header is 1',
     )
+    group.add_argument(
+        '--marker', metavar='NAME', help='what is meant, where an export has several markers'
+    )
     group.add_argument('--delimiter', help='comma, semicolon or tab')
     group.add_argument('--decimal', choices=('.', ','))
+    _add_counting(parser)
+
+
+def _add_counting(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group('how the controller counts its joints')
+    group.add_argument(
+        '--joint-signs',
+        metavar='1,-1,...',
+        type=_floats,
+        help='of every joint, where the controller counts it the other way than the model',
+    )
+    group.add_argument(
+        '--joint-offsets',
+        metavar='DEG,DEG,...',
+        type=_floats,
+        help='added to every joint [deg, mm for a slide], such as 0,-90,90,0,0,0',
+    )
+    group.add_argument(
+        '--coupled',
+        metavar='3+2',
+        help="the model's joint 3 is that of the table plus joint 2; 3-2 takes it off",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -73,13 +114,13 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_core.metrics.deviation import deviation_metrics
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.bags import write_recording
-    from weld_twin_msgs_py.tables import TableOptions, read_table
+    from weld_twin_msgs_py.tables import TableOptions
 
     robot = robot_of(args)
     options = TableOptions(**{f.name: getattr(args, f.name) for f in fields(TableOptions)})
     if args.contacts is not None:
         return _touched(args, robot, options)
-    recording, said = read_table(args.file, robot, options)
+    recording, said = _read(args, robot, options)
     measured = recording.measured
     assert measured is not None
     expected = Twin(robot).poses(recording, measured.t)
@@ -97,12 +138,22 @@ def run(args: argparse.Namespace) -> int:
         print(sentence)
     if args.table or args.picture:
         _write_deviations(args, recording, off)
+    kind = 'stations' if recording.joints.static else 'measurements along a motion'
     found = deviation_metrics(measured.position, expected.position)
     print(
-        f'{args.out}: {found.samples} stations; from the nominal twin, base and tool frame not '
+        f'{args.out}: {found.samples} {kind}; from the nominal twin, base and tool frame not '
         f'fitted: RMS {found.rms_m * 1e3:.3f} mm, max {found.max_m * 1e3:.3f} mm'
     )
     return 0
+
+
+def _read(args: argparse.Namespace, robot: Robot, options: TableOptions) -> Table:
+    """Return the recording of one file, or of a log and what was measured beside it."""
+    from weld_twin_msgs_py.tables import read_table, read_two_tables
+
+    if args.measured is None:
+        return read_table(args.file, robot, options)
+    return read_two_tables(args.file, args.measured, robot, options, args.clock_offset)
 
 
 def _touched(args: argparse.Namespace, robot: Robot, options: TableOptions) -> int:
@@ -141,6 +192,10 @@ def _write_deviations(args: argparse.Namespace, recording: Recording, off: Array
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(','))
+
+
+def _floats(text: str) -> tuple[float, ...]:
+    return tuple(float(part) for part in text.split(','))
 
 
 def _numbers(text: str) -> tuple[int, ...]:

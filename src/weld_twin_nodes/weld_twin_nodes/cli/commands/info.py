@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
+from typing import Any
 
 from ..options import add_topics, topics_of
 
@@ -57,10 +59,36 @@ def _sentences(info: object) -> list[str]:
                 total = sum(row['sent'] for row in value.values())
                 out.append(f'complete: all {total:,} messages that were sent are here')
             continue
-        shown = value.get('name', '') if isinstance(value, dict) else value
-        out.append(f'{key}: {shown}')
+        out += [f'{key}: {text}' for text in _in_words(value)]
     out.append('usable for a diagnosis' if info.usable else 'not usable for a diagnosis')
     return out
+
+
+def _in_words(value: Any) -> list[str]:
+    """Return what is kept of a bag's origin as lines for people."""
+    if isinstance(value, dict):
+        return [str(value.get('name', ''))]
+    if not isinstance(value, list):
+        return [str(value)]
+    if all(isinstance(each, dict) and 'effect' in each for each in value):
+        return [', '.join(_effect(each) for each in value) or 'none']
+    return [str(each) for each in value]
+
+
+def _effect(entry: Mapping[str, Any]) -> str:
+    """Return an entry of an effects file in words, with its units where the effect is known."""
+    from weld_twin_core.effects import REGISTRY
+
+    from ...report.words import cause
+
+    kind = REGISTRY.get(entry['effect'])
+    units = {} if kind is None else {p.name: p.unit.strip('-') for p in kind.parameters}
+    values = [
+        f'{name} {value} {units.get(name, "")}'.rstrip()
+        for name, value in entry.items()
+        if name not in ('effect', 'joint')
+    ]
+    return f'{cause(entry["effect"], entry.get("joint"))} ({", ".join(values)})'
 
 
 def _print_robots() -> int:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..options import add_bag_output, add_robot, robot_of
+from ..options import add_bag_output, add_robot, robot_of, twin_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,6 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FILE',
         default='',
         help='effects that the twin knows: an effects file or diagnosis.json',
+    )
+    parser.add_argument(
+        '--allow-implausible',
+        action='store_true',
+        help='take values of effects that no machine comes near, for a study of extremes',
     )
     _add_motion(parser)
     add_bag_output(parser)
@@ -59,21 +64,19 @@ def _add_motion(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the bag and print the deviation."""
-    import sys
-
     from weld_twin_core.errors import DataError
 
     from ...offline.seam_motion import plan_motion, stamps
     from ...offline.simulated_bag import write_simulation
     from ...offline.simulation import Simulation
-    from ...offline.told_twin import build_twin, doubts
 
     if args.start_stamp <= 0 or args.seed < 0:
         raise DataError('--start-stamp must be positive and --seed not negative')
     robot = robot_of(args)
-    real, model = build_twin(robot, args.effects), build_twin(robot, args.model)
-    for doubt in doubts(real):
-        print(f'weld-twin: {args.effects}: {doubt}', file=sys.stderr)
+    real, model = (
+        twin_of(robot, path, implausible=args.allow_implausible)
+        for path in (args.effects, args.model)
+    )
     plan = plan_motion(robot, args.path, args.profile, args.rate, args.speed)
     simulation = Simulation(
         real,

@@ -31,7 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print what changed."""
-    from weld_twin_core.history import changes
     from weld_twin_nodes.history import observations
     from weld_twin_nodes.history.changed_words import (
         as_dict,
@@ -40,15 +39,16 @@ def run(args: argparse.Namespace) -> int:
         sentence,
         since,
     )
-    from weld_twin_nodes.history.tracking import DAY, named
+    from weld_twin_nodes.history.tracking import DAY, changed
 
     limits = _limits(args.limit)
     with opened(args) as database:
         entries = database.entries(args.cell)
     seen = observations(entries)
     day = date_of(args.since).timestamp() / DAY if args.since else None
-    found = since(changes(seen, named=named(entries)), day)
-    ahead = [forecast(change, seen[-1], limits) for change in found]
+    everything = changed(entries, seen)
+    found = since(everything, day)
+    ahead = [forecast(change, seen, everything, limits) for change in found]
     if args.json:
         rows = [
             {**as_dict(change), 'forecast': told}

@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How sure a fitted model will be after so many stations, before anybody measures.
+
+To first order the covariance of what a fit leaves open does not depend on what is measured, only
+on where [1]_. So the cloud of models that `allowed` finds after a measurement is known beforehand,
+from what arms of this kind may have. Stations are taken one after the other, each the one that
+makes the poses in the region surest.
+
+References
+----------
+.. [1] V. V. Fedorov, "Theory of Optimal Experiments", Academic Press, 1972.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arm.chain import frames
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...errors import DataError
+from ...motion.paths import default_seam
+from ...motion.planned_motion import plan
+from ...recording import JointMotion, Recording
+from ...sequences import halton
+from ...twin.features import Features
+from ...twin.posterior import Directions
+from ...twin.twin import Twin
+from . import plausible_arm
+from .allowed import FRAME_WIDTHS
+
+SPREAD = np.radians(75.0)
+"""Half the range of every joint about the posture of a usual seam [rad]: wide enough to show every
+link, and not so wide that a reflector turns away from the instrument or an arm into itself."""
+SLIDE = 0.3
+"""The same of a joint that slides [m]."""
+CLEAR = 0.1
+"""Least height of wrist and tool above the base plane, and distance from the base's axis, in
+reaches: what keeps most postures out of the floor and the arm's own column."""
+CANDIDATES = 160
+"""Stations to choose from; twice as many make the choice better by per cents."""
+JUDGED = 48
+"""Other postures of the region, at which it is judged how sure the model is."""
+TRIED = 6000
+"""Postures drawn to find so many that are clear."""
+CHOICE = 25.0
+"""Stations at which a diagnosis, which has to choose among small errors, leaves twice what they would
+show it if all errors were fitted: measured on plans that the plant carried out, eleven of 16, 24
+and 40 stations (weld-twin lab plans, docs/first_measurement.md)."""
+DRAWS = 400
+"""Of a tool's error at each posture, to count how many lie within the tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementPlan:
+    """
+    Stations to measure, and how sure the model will be after each.
+
+    Attributes
+    ----------
+    q : array, shape (N, n) [rad, m]
+        In the order in which they say most.
+    sigma : array, shape (N + 1,) [m]
+        Standard deviation of the tool in its worst direction, in the middle of the region's
+        postures, after that many stations.
+    within : array, shape (N + 1,)
+        Probability that the tool is within the tolerance at such a posture.
+
+    """
+
+    q: Array
+    sigma: Array
+    within: Array
+
+
+def plan_stations(
+    robot: Robot, count: int, tolerance: float, noise: float, spread: float = SPREAD
+) -> MeasurementPlan:
+    """
+    Return the stations that make a fitted model surest, with base and tool frame not known.
+
+    Parameters
+    ----------
+    robot : Robot
+    count : int
+    tolerance : float [m]
+        Of the tool's position, in any direction.
+    noise : float [m]
+        Standard deviation of a measured coordinate, of instrument and arm together.
+    spread : float [rad]
+        Half the range of every joint about the posture of a usual seam.
+
+    Raises
+    ------
+    DataError
+        A number means nothing, or hardly any posture of the region is clear of the floor.
+
+    """
+    if not (0.0 < tolerance < 1.0 and 0.0 < noise < 0.1 and count >= 1 and 0.0 < spread < 4.0):
+        raise DataError('a plan needs stations, a tolerance, a noise and a spread above zero')
+    clear = clear_postures(robot, spread)
+    if len(clear) < JUDGED + min(count, CANDIDATES):
+        raise DataError(
+            f'only {len(clear)} postures about a usual seam of {robot.name} are clear of floor and '
+            'column; give a smaller --spread'
+        )
+    judged, offered = clear[:JUDGED], clear[JUDGED : JUDGED + max(CANDIDATES, count)]
+    effects = plausible_arm.directions(robot, ())
+    what = Directions(('base', 'tool'), 1, effects, plausible_arm.fine_knots([offered]))
+    columns = _columns(robot, np.concatenate([judged, offered]), what)
+    seen = columns * _widths(robot, what)
+    taken, sigma, within = _chosen(seen[:JUDGED], seen[JUDGED:], (tolerance, noise), count)
+    return MeasurementPlan(offered[taken], sigma, within)
+
+
+def clear_postures(robot: Robot, spread: float) -> Array:
+    """
+    Return postures about that of a usual seam, clear of floor and column, shape (K, n).
+
+    Parameters
+    ----------
+    robot : Robot
+    spread : float [rad]
+        Half the range of every joint.
+
+    """
+    middle = plan(robot, default_seam(robot, 'line'), 'smooth', rate_hz=10.0).motion.q
+    centre = middle[len(middle) // 2]
+    half = np.where(robot.prismatic, SLIDE, spread)
+    low, high = np.maximum(centre - half, robot.lower), np.minimum(centre + half, robot.upper)
+    q = low + halton(robot.n, TRIED) * (high - low)
+    still = robot.with_frames(base=np.eye(4))
+    chain = frames(still, q)
+    wrist = [np.broadcast_to(row.z_point.T, (TRIED, 3)) for row in chain.rows[robot.n // 2 :]]
+    points = np.stack([*wrist, chain.flange_point, chain.position], axis=1)
+    least = CLEAR * float(abs(robot.a).sum() + abs(robot.d).sum())
+    above = points[..., 2].min(axis=1) > least
+    off = np.linalg.norm(points[..., :2], axis=-1).min(axis=1) > least
+    return np.asarray(q[above & off])
+
+
+def _columns(robot: Robot, q: Array, what: Directions) -> Array:
+    """Return d position / d coordinate at postures at rest, shape (K, 3, P)."""
+    t = np.arange(float(len(q)))
+    still = Recording('stations', JointMotion(t, q, static=True))
+    return np.asarray(what.columns(Features(Twin(robot), still, t), 0)[:, :3].transpose(2, 1, 0))
+
+
+def _widths(robot: Robot, what: Directions) -> Array:
+    fine = sum(knots.size for knots in what.knots)
+    frames_ = np.tile(np.repeat(FRAME_WIDTHS, 3), what.frame_count // 6)
+    own = plausible_arm.widths(robot, what.effects)
+    return np.concatenate([frames_, own, np.full(fine, plausible_arm.FINE)])
+
+
+def _chosen(
+    judged: Array, offered: Array, given: tuple[float, float], count: int
+) -> tuple[list[int], Array, Array]:
+    """Take stations one by one; every column is that of a coordinate in units of its prior."""
+    tolerance, noise = given
+    covariance = np.eye(judged.shape[2])
+    draws = np.random.default_rng(1).standard_normal((DRAWS, 3))
+    taken: list[int] = []
+    found = [_judged(judged, covariance, tolerance, draws)]
+    for number in range(1, count + 1):
+        best = _best(judged, offered, covariance, noise, taken)
+        taken.append(best)
+        rows = offered[best]
+        gain = covariance @ rows.T
+        covariance -= gain @ np.linalg.solve(rows @ gain + noise**2 * np.eye(3), gain.T)
+        factor = 1.0 + (CHOICE / number) ** 3
+        found.append(_judged(judged, covariance, tolerance / factor, draws))
+        found[-1] = (min(found[-1][0] * factor, found[0][0]), found[-1][1])
+    sigma, within = np.array(found).T
+    return taken, sigma, within
+
+
+def _best(judged: Array, offered: Array, covariance: Array, noise: float, taken: list[int]) -> int:
+    """Return the station that takes most off the variance of the poses judged."""
+    rows = offered.reshape(-1, offered.shape[2]) @ covariance
+    spread = np.einsum('kip,kjp->kij', rows.reshape(offered.shape), offered)
+    spread += noise**2 * np.eye(3)
+    cross = (judged.reshape(-1, judged.shape[2]) @ rows.T).reshape(-1, *offered.shape[:2])
+    joint = np.einsum('mki,mkj->kij', cross, cross)
+    gain = np.trace(np.linalg.solve(spread, joint), axis1=1, axis2=2)
+    gain[taken] = -np.inf
+    return int(gain.argmax())
+
+
+def _judged(
+    judged: Array, covariance: Array, tolerance: float, draws: Array
+) -> tuple[float, float]:
+    """Return the usual standard deviation, and how probably the tool is within the tolerance."""
+    spread = np.einsum('mip,pq,mjq->mij', judged, covariance, judged, optimize=True)
+    size = np.sqrt(np.maximum(np.linalg.eigvalsh(spread), 0.0))
+    length = np.linalg.norm(draws[:, None] * size, axis=-1)
+    return float(np.median(size[:, -1])), float((length < tolerance).mean())

@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+`tf2_msgs` and what is needed of `control_msgs`, for real messages where no wheels of them exist.
+
+ROS's own generators and a C compiler make the Python package and the type supports of the
+middleware, as `rosidl_generate_interfaces` does in a workspace. The result is kept, and used again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout, suppress
+from importlib.util import find_spec
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core.errors import TwinError
+
+DEFINITIONS: Mapping[str, Mapping[str, str]] = {
+    'tf2_msgs': {'TFMessage': 'geometry_msgs/TransformStamped[] transforms\n'},
+    'control_msgs': {
+        'InterfaceValue': 'string[] interface_names\nfloat64[] values\n',
+        'DynamicJointState': 'std_msgs/Header header\nstring[] joint_names\n'
+        'InterfaceValue[] interface_values\n',
+        'JointTrajectoryControllerState': 'std_msgs/Header header\nstring[] joint_names\n'
+        + ''.join(
+            f'trajectory_msgs/JointTrajectoryPoint {part}\n'
+            for part in ('reference', 'feedback', 'error', 'output')
+        )
+        + 'string[] multi_dof_joint_names\n'
+        + ''.join(
+            f'trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_{part}\n'
+            for part in ('reference', 'feedback', 'error', 'output')
+        )
+        + 'float64 speed_scaling_factor\n',
+    },
+}
+"""Packages, their messages, and the definitions of these in Jazzy."""
+NEEDED = ('builtin_interfaces', 'std_msgs', 'geometry_msgs', 'trajectory_msgs', 'service_msgs')
+"""Packages whose types they are made of."""
+SUPPORTS = ('rosidl_typesupport_fastrtps_c', 'rosidl_typesupport_introspection_c')
+"""Type supports that rmw_fastrtps_cpp asks for; the second tells of the type on the graph."""
+PREFIX = Path(sys.prefix)
+
+
+def folder_of_messages() -> Path | None:
+    """
+    Return a folder for ``PYTHONPATH`` that has the packages; None where they are installed.
+
+    Raises
+    ------
+    TwinError
+        They cannot be built here; the message says why.
+
+    """
+    absent = [package for package in DEFINITIONS if not _installed(package)]
+    if not absent:
+        return None
+    name = hashlib.sha256(f'{DEFINITIONS}{PREFIX}{sys.version}'.encode()).hexdigest()[:12]
+    kept = Path(tempfile.gettempdir()) / f'weld_twin_messages_{os.getuid()}_{name}'
+    if kept.is_dir():
+        return kept
+    _refuse_unable()
+    with tempfile.TemporaryDirectory(dir=kept.parent) as folder:
+        for package in absent:
+            _build(package, Path(folder))
+        with suppress(OSError):  # another process has put it there meanwhile
+            Path(folder, 'site').rename(kept)
+    return kept
+
+
+@contextmanager
+def messages_importable() -> Iterator[None]:
+    """Let this process and its children import the packages, for a while."""
+    folder = folder_of_messages()
+    if folder is None:
+        yield
+        return
+    before = os.environ.get('PYTHONPATH')
+    os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(folder), before]))
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        if before is None:
+            del os.environ['PYTHONPATH']
+        else:
+            os.environ['PYTHONPATH'] = before
+
+
+def _installed(package: str) -> bool:
+    spec = find_spec(package)
+    return spec is not None and spec.origin is not None
+
+
+def _refuse_unable() -> None:
+    header = Path(sysconfig.get_path('include'), 'Python.h')
+    lacking = [tool for tool in ('gcc', 'g++') if shutil.which(tool) is None]
+    lacking += [] if header.is_file() else [str(header)]
+    lacking += [] if find_spec('rosidl_generator_py') else ['rosidl_generator_py']
+    if lacking:
+        raise TwinError(
+            f'tf2_msgs and control_msgs are not installed and cannot be built: {lacking[0]} is '
+            'not here; install the packages, or a compiler and the headers of Python'
+        )
+
+
+def _build(package: str, folder: Path) -> None:
+    """Write, generate and compile one package into ``folder/site``."""
+    source, made = folder / 'source' / package, folder / 'made' / package
+    site = folder / 'site' / package
+    for place in (source / 'msg', made / 'msg', site / 'msg'):
+        place.mkdir(parents=True)
+    for name, text in DEFINITIONS[package].items():
+        (source / 'msg' / f'{name}.msg').write_text(text)
+    with redirect_stdout(StringIO()):  # the generators tell of every file
+        _generate(package, source, made, site)
+    (site / '__init__.py').touch()
+    _compile(package, folder, made, site)
+
+
+def _generate(package: str, source: Path, made: Path, site: Path) -> None:
+    """Run the generators of ROS over the definitions."""
+    import rosidl_generator_c
+    import rosidl_generator_py
+    import rosidl_generator_type_description
+    import rosidl_typesupport_c
+    import rosidl_typesupport_fastrtps_c
+    import rosidl_typesupport_introspection_c
+    from rosidl_adapter.msg import convert_msg_to_idl
+
+    for name in DEFINITIONS[package]:
+        convert_msg_to_idl(source, package, Path('msg', f'{name}.msg'), source / 'msg')
+    common = _arguments(package, source, made)
+    joint = made / 'rosidl_typesupport_c'
+    describe = rosidl_generator_type_description.generate_type_hash
+    fast = rosidl_typesupport_fastrtps_c.generate_typesupport_fastrtps_c
+    introspect = rosidl_typesupport_introspection_c.generate_c
+    for generator, action, out, more in (
+        ('rosidl_generator_type_description', describe, made, ()),
+        ('rosidl_generator_c', rosidl_generator_c.generate_c, made, ()),
+        (SUPPORTS[0], fast, made / SUPPORTS[0], ()),
+        (SUPPORTS[1], introspect, made / SUPPORTS[1], ()),
+        ('rosidl_typesupport_c', rosidl_typesupport_c.generate_c, joint, (list(SUPPORTS),)),
+        (
+            'rosidl_generator_py',
+            rosidl_generator_py.generate_py,
+            site,
+            (['rosidl_typesupport_c'],),
+        ),
+    ):
+        file, resource = source / f'{generator}.json', PREFIX / 'share' / generator / 'resource'
+        given = {**common, 'output_dir': str(out), 'template_dir': str(resource)}
+        file.write_text(json.dumps(given))
+        action(str(file), *more)
+        _write_visibility(package, resource, out)
+
+
+def _arguments(package: str, source: Path, made: Path) -> dict[str, Any]:
+    """Return what all generators are told."""
+    names, share = sorted(DEFINITIONS[package]), PREFIX / 'share'
+    return {
+        'package_name': package,
+        'idl_tuples': [f'{source}:msg/{name}.idl' for name in names],
+        'ros_interface_dependencies': [
+            f'{own}:{idl}' for own in NEEDED for idl in (share / own / 'msg').glob('*.idl')
+        ],
+        'ros_interface_files': [str(source / 'msg' / f'{name}.msg') for name in names],
+        'type_description_tuples': [
+            f'msg/{name}.idl:{made / "msg" / name}.json' for name in names
+        ],
+        'include_paths': [f'{own}:{share / own}' for own in NEEDED],
+        'target_dependencies': [],
+    }
+
+
+def _write_visibility(package: str, resource: Path, out: Path) -> None:
+    """Write the header that says which symbols a library shows."""
+    for template in resource.glob('*visibility_control.h.in'):
+        text = template.read_text().replace('@PROJECT_NAME_UPPER@', package.upper())
+        header = out / 'msg' / template.name.removesuffix('.in')
+        header.write_text(text.replace('@PROJECT_NAME@', package))
+
+
+def _compile(package: str, folder: Path, made: Path, site: Path) -> None:
+    """
+    Make a library of the structures, one of each type support, and the Python module.
+
+    The middleware loads a type support by the name of its library; it is there already, for the
+    module needs it.
+    """
+    include = folder / 'include' / package
+    include.mkdir(parents=True)
+    for place in (made / SUPPORTS[0], made / SUPPORTS[1], made / 'rosidl_typesupport_c', made):
+        shutil.copytree(place / 'msg', include / 'msg', dirs_exist_ok=True)
+    support = {name: sorted((made / name).rglob('*.c*')) for name in SUPPORTS}
+    structures = sorted((made / 'msg').rglob('*.c'))
+    link = _Linker(folder, site)
+    base = link(f'lib{package}__rosidl_generator_c.so', structures, [])
+    others = [link(f'lib{package}__{name}.so', support[name], [base]) for name in SUPPORTS]
+    module = f'{package}_s__rosidl_typesupport_c{sysconfig.get_config_var("EXT_SUFFIX")}'
+    sources = [*site.rglob('*_s.c'), site / f'_{package}_s.ep.rosidl_typesupport_c.c']
+    sources += sorted((made / 'rosidl_typesupport_c').rglob('*.cpp'))
+    link(module, sources, [base, *others])
+
+
+class _Linker:
+    """Compiles sources into shared libraries that find each other where they lie."""
+
+    def __init__(self, folder: Path, site: Path) -> None:
+        import numpy as np
+
+        self._folder, self._site = folder, site
+        self._include = [
+            f'-I{folder / "include"}',
+            f'-I{sysconfig.get_path("include")}',
+            f'-I{np.get_include()}',
+            f'-I{PREFIX / "include"}',
+            *(f'-I{place}' for place in (PREFIX / 'include').iterdir()),
+        ]
+        kinds = ('rosidl_generator_c', 'rosidl_generator_py', *SUPPORTS)
+        self._libraries = [
+            f'-L{PREFIX / "lib"}',
+            *(f'-l{own}__{kind}' for own in NEEDED for kind in kinds),
+            *(f'-l{name}' for name in ('rosidl_runtime_c', 'rcutils', 'fastcdr')),
+            *(f'-lrosidl_typesupport_{name}' for name in ('c', 'introspection_c')),
+            *(f'-lrosidl_typesupport_fastrtps_{name}' for name in ('c', 'cpp')),
+        ]
+
+    def __call__(self, name: str, sources: list[Path], needs: list[Path]) -> Path:
+        """Return the library; quick to make matters more than quick code."""
+        out = self._site / name
+        objects = [self._object(source) for source in sources]
+        rpath = f'-Wl,-rpath,$ORIGIN:{PREFIX / "lib"}'
+        soname = f'-Wl,-soname,{name},--no-as-needed'
+        links = [*map(str, (*objects, *needs)), *self._libraries]
+        self._run('g++', '-shared', soname, rpath, '-o', str(out), *links)
+        return out
+
+    def _object(self, source: Path) -> Path:
+        out = self._folder / f'{hashlib.sha256(str(source).encode()).hexdigest()[:12]}.o'
+        compiler = ['gcc'] if source.suffix == '.c' else ['g++', '-std=c++17']
+        self._run(
+            *compiler, '-O0', '-fPIC', '-w', '-c', str(source), '-o', str(out), *self._include
+        )
+        return out
+
+    @staticmethod
+    def _run(*command: str) -> None:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise TwinError(
+                f'the message packages cannot be built: {command[0]} ended with code '
+                f'{done.returncode}: {done.stderr[-800:]}'
+            )

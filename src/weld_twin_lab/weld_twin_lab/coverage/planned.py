@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Plans of a measurement, carried out by the plant: is the arm as sure as the plan said?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.predicting import plausible_arm
+from weld_twin_core.diagnosis.predicting.planned import SPREAD, clear_postures, plan_stations
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.posterior import largest_sigma
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.files.whole_files import write_text
+
+from ..blind.simulator import require_simulator
+from ..plant.plant import run
+from ..plant.plant_recording import Command
+from ..plant.tracker import Tracker
+
+ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb1600')
+COUNTS = (16, 24, 40)
+"""Stations of a plan."""
+NOISE = 3e-5
+"""Of every measured coordinate [m]."""
+TOLERANCE = 2e-4
+"""Of the tool [m]; plans are asked how probably it is kept."""
+UNSEEN = 60
+"""Other postures of the region, at which the corrected arm is judged."""
+FRAMES = [
+    {'effect': 'base_pose', 'xyz': [0.01, -0.02, 0.015], 'rotvec': [0.01, -0.008, 0.02]},
+    {'effect': 'tool_pose', 'xyz': [0.004, 0.003, -0.006], 'rotvec': [0.0, 0.0, 0.0]},
+]
+"""Where instrument and reflector really are: not known to the diagnosis."""
+
+
+def carried_out(seed: int) -> dict[str, Any]:
+    """
+    Return what a plan promised and what an arm, measured by it, keeps.
+
+    Parameters
+    ----------
+    seed : int
+        Decides arm, its errors, the count and the noise.
+
+    """
+    rng = np.random.default_rng(seed)
+    robot = catalog.load(ARMS[seed % len(ARMS)])
+    count = COUNTS[seed // len(ARMS) % len(COUNTS)]
+    plan = plan_stations(robot, count, TOLERANCE, NOISE)
+    flaws = [*FRAMES, *_arm(robot, rng)]
+    measured = _measured(robot, flaws, plan.q, NOISE, rng)
+    found = diagnose(measured, robot, align='base,tool')
+    others = clear_postures(robot, SPREAD)[-UNSEEN:]
+    true = _measured(robot, flaws, others, 0.0, rng)
+    assert true.measured is not None
+    off = true.measured.position - _twin(found, others).position
+    length = np.linalg.norm(off, axis=1)
+    return {
+        'seed': seed,
+        'robot': robot.name,
+        'stations': count,
+        'status': found.status,
+        'promised_sigma_m': float(plan.sigma[-1]),
+        'promised_within': float(plan.within[-1]),
+        'kept_sigma_m': float(largest_sigma(np.einsum('mi,mj->ij', off, off)[None] / len(off))[0]),
+        'kept_within': float((length < TOLERANCE).mean()),
+    }
+
+
+def _twin(found: Any, q: Array) -> Any:
+    model = found.model
+    twin: Twin = model.twin(0)
+    still = _still('others', q)
+    return twin.poses(still, still.joints.t)
+
+
+def _still(name: str, q: Array) -> Recording:
+    return Recording(name, JointMotion(np.arange(float(len(q))), q, static=True))
+
+
+def _arm(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Return every small error that arms of this kind have, each drawn from its usual spread."""
+    out = []
+    for effect in plausible_arm.directions(robot, ()):
+        if effect.of not in ('joint', 'link') or effect.waves is not None:
+            continue
+        size = plausible_arm.widths(robot, [effect]) * rng.standard_normal(effect.vector().size)
+        if effect.name == 'joint_compliance':
+            if robot.mass is None:
+                continue
+            size = np.abs(size)
+        out.append(effect.with_vector(size).to_mapping())
+    return out
+
+
+def _measured(
+    robot: Robot, flaws: list[dict[str, Any]], q: Array, noise: float, rng: np.random.Generator
+) -> Recording:
+    """Return what the plant's instrument sees at stations."""
+    t = 1.0 + np.arange(float(len(q)))
+    tracker = Tracker(sigma=noise, orientation=False)
+    seen = run(robot.to_mapping(), flaws, Command(t, q, static=True), tracker, rng)
+    return Recording('plan', JointMotion(t, q, static=True), Measurements(t, seen.position))
+
+
+def planned(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """
+    Return how plans compare with what came of them.
+
+    Parameters
+    ----------
+    count : int
+    out : Path
+        Keeps a file per plan; those that are there are not made again.
+    tell : callable
+        Told of every plan.
+
+    """
+    require_simulator()
+    out.mkdir(parents=True, exist_ok=True)
+    entries = []
+    for seed in range(count):
+        path = out / f'plan_{seed:03d}.json'
+        if not path.is_file():
+            write_text(path, json.dumps(carried_out(seed), indent=1) + '\n')
+        entries.append(json.loads(path.read_text()))
+        tell(' '.join(f'{key} {value}' for key, value in entries[-1].items()))
+    ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in entries]
+    return {
+        'plans': len(entries),
+        'kept_over_promised_median': float(np.median(ratio)),
+        'kept_over_promised_worst': float(max(ratio)),
+        'promised_within': float(np.mean([e['promised_within'] for e in entries])),
+        'kept_within': float(np.mean([e['kept_within'] for e in entries])),
+    }

@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What happens to an arm in a year: knocks, slips, wear, services, seasons, weeks without a check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_nodes.history import Entry
+
+WEEKS = 52
+"""Of a year of a cell."""
+SEASON = 365.25 / 7.0
+"""Weeks of the seasons."""
+SHOWN = 0.5
+"""Share of its width before the data that a value's standard error must be under, to be drawn: what a
+check cannot show cannot be found."""
+QUIET = 0.25
+"""Share of years in which nothing happens."""
+MISSED = 0.1
+"""Share of weeks without a check, one by one."""
+HOLIDAY = (3, 6)
+"""Weeks without a check in a row, in half of the years."""
+NEW_SET_UP = 1.0 / 13.0
+"""Chance in a week that the tracker stands elsewhere and sees other stations: once a quarter."""
+STEPS = {'tool_pose': (5e-5, 1e-3), 'joint_offset': (5e-5, 1e-3)}
+"""A torch that was knocked [m], a motor or belt that was taken off and put back [rad]."""
+WEAR = {'backlash': (1e-4, 1e-3), 'joint_compliance': (2e-6, 1e-5), 'joint_offset': (1e-4, 1e-3)}
+"""Rise in a year of play [rad], of the give of a gear [rad/(N m)], of a belt that stretches [rad]."""
+SEASONS = {'link_length': (1e-5, 8e-5), 'joint_offset': (3e-5, 3e-4)}
+"""Half the swing of a link in a hall 5 to 10 K warmer [m], of an arm warmer on one side [rad]."""
+
+
+class Event(NamedTuple):
+    """
+    One thing that happens.
+
+    Attributes
+    ----------
+    kind : str
+        'step', 'trend' or 'season'.
+    name : str
+        The coordinate that it moves.
+    begin : int
+        Week from which on.
+    size : float
+        Height of a step, rise of a trend in a week, half the swing of a season.
+    phase : float [rad]
+        Of a season.
+
+    """
+
+    kind: str
+    name: str
+    begin: int
+    size: float
+    phase: float = 0.0
+
+    def columns(self, weeks: Array) -> Array:
+        """Return the shape in time at some weeks, shape (W, 1), of a season (W, 2)."""
+        if self.kind == 'step':
+            return (weeks >= self.begin).astype(float)[:, None]
+        if self.kind == 'trend':
+            return np.maximum(weeks - self.begin, 0.0)[:, None]
+        turn = 2.0 * np.pi * weeks / SEASON
+        return np.column_stack([np.cos(turn), np.sin(turn)])
+
+    def sizes(self) -> Array:
+        """Return by what the columns are multiplied."""
+        if self.kind == 'season':
+            return self.size * np.array([np.cos(self.phase), np.sin(self.phase)])
+        return np.array([self.size])
+
+    def values(self, weeks: Array) -> Array:
+        """Return by how much the coordinate is moved at some weeks, shape (W,)."""
+        return np.asarray(self.columns(weeks) @ self.sizes())
+
+
+@dataclass(frozen=True)
+class Year:
+    """
+    A year of a cell.
+
+    Attributes
+    ----------
+    events : tuple of Event
+    weeks : tuple of int
+        Those with a check.
+    set_ups : tuple of int
+        Number of the tracker's set-up at each check.
+
+    """
+
+    events: tuple[Event, ...]
+    weeks: tuple[int, ...]
+    set_ups: tuple[int, ...]
+
+
+def year(entry: Entry, rng: np.random.Generator) -> Year:
+    """Return a year of a cell whose first check gave an entry."""
+    events: list[Event] = []
+    free = _showing(entry)
+    if rng.random() >= QUIET:
+        for _ in range(int(rng.choice([0, 1, 2], p=[0.35, 0.45, 0.2]))):
+            events += _one('step', STEPS, free, rng, (6, 46))
+        if rng.random() < 0.45:
+            events += _wear(free, rng)
+        if rng.random() < 0.4:
+            events += _one('season', SEASONS, free, rng, (0, 1))
+    weeks = np.flatnonzero(rng.random(WEEKS) >= MISSED)
+    if rng.random() < 0.5:
+        start, length = rng.integers(4, WEEKS - 8), rng.integers(*HOLIDAY, endpoint=True)
+        weeks = weeks[(weeks < start) | (weeks >= start + length)]
+    moved = np.cumsum(rng.random(WEEKS) < NEW_SET_UP)[weeks]
+    return Year(tuple(events), tuple(map(int, weeks)), tuple(map(int, moved)))
+
+
+def _showing(entry: Entry) -> list[str]:
+    """Return the coordinates that the check shows."""
+    std = np.sqrt(np.diag(entry.covariance))
+    return [
+        name
+        for name, error, width in zip(entry.names, std, entry.prior_std, strict=True)
+        if error < SHOWN * width
+    ]
+
+
+def _one(
+    kind: str,
+    sizes: dict[str, tuple[float, float]],
+    free: list[str],
+    rng: np.random.Generator,
+    begins: tuple[int, int],
+) -> list[Event]:
+    """Return one event on a coordinate that has none yet, or none where no such is left."""
+    families = [f for f in sizes if any(_is(f, name) for name in free)]
+    if not families:
+        return []
+    family = families[int(rng.integers(len(families)))]
+    names = [name for name in free if _is(family, name)]
+    name = names[int(rng.integers(len(names)))]
+    free.remove(name)
+    low, high = np.log(sizes[family])
+    size = float(np.exp(rng.uniform(low, high)))
+    sign = 1.0 if family in ('backlash', 'joint_compliance') else float(rng.choice([-1.0, 1.0]))
+    begin = int(rng.integers(*begins))
+    return [Event(kind, name, begin, sign * size, float(rng.uniform(0.0, 2.0 * np.pi)))]
+
+
+def _is(family: str, name: str) -> bool:
+    """Tell whether a coordinate is of a family; of the tool its place, which a knock moves."""
+    if family == 'tool_pose':
+        return name in ('tool_pose 0', 'tool_pose 1', 'tool_pose 2', 'tool.x', 'tool.y', 'tool.z')
+    return name.startswith(f'{family} ')
+
+
+def _wear(free: list[str], rng: np.random.Generator) -> list[Event]:
+    """Return wear, and the service that takes most of it back where there is one; it goes on."""
+    worn = _one('trend', WEAR, free, rng, (0, 26))
+    if not worn:
+        return []
+    event = worn[0]._replace(size=worn[0].size / WEEKS)
+    events = [event]
+    if rng.random() < 0.4:
+        at = int(rng.integers(event.begin + 12, WEEKS - 4))
+        back = -float(rng.uniform(0.6, 1.0)) * event.size * (at - event.begin)
+        events.append(Event('step', event.name, at, back))
+        joint = event.name.split(' ')[1]
+        zero = f'joint_offset {joint} 0'
+        if zero in free:
+            low, high = np.log(STEPS['joint_offset'])
+            size = float(np.exp(rng.uniform(low, high)) * rng.choice([-1.0, 1.0]))
+            events.append(Event('step', zero, at, size))
+            free.remove(zero)
+    return events
+
+
+def moved(events: Sequence[Event], week: int) -> dict[str, float]:
+    """Return by how much each coordinate is moved in a week."""
+    out: dict[str, float] = {}
+    for event in events:
+        value = float(event.values(np.array([float(week)]))[0])
+        out[event.name] = out.get(event.name, 0.0) + value
+    return out
+
+
+CAUSES: dict[str, Callable[[str, float], dict[str, object]]] = {
+    'joint_offset': lambda joint, v: {'effect': 'joint_offset', 'joint': joint, 'offset': v},
+    'link_length': lambda joint, v: {'effect': 'link_length', 'joint': joint, 'da': v},
+    'backlash': lambda joint, v: {'effect': 'backlash', 'joint': joint, 'width': v},
+    'joint_compliance': lambda joint, v: {
+        'effect': 'joint_compliance',
+        'joint': joint,
+        'compliance': v,
+    },
+}
+"""How a coordinate is told to the plant."""
+
+
+def cause(name: str, value: float) -> dict[str, object]:
+    """Return the flaw that a coordinate stands for, as the plant takes it."""
+    if name.startswith('tool'):
+        axis = int(name[-1]) if name[-1].isdigit() else 'xyz'.index(name[-1])
+        xyz = [value if k == axis else 0.0 for k in range(3)]
+        return {'effect': 'tool_pose', 'xyz': xyz, 'rotvec': [0.0, 0.0, 0.0]}
+    family, joint, _ = name.split(' ')
+    return CAUSES[family](joint, value)

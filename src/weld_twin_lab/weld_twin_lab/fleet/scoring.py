@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A year looked at week by week: what was told, held against what happened."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.history import Change, Observation, changes, outlook, reaches
+
+from .life import Event, Year
+
+WEEK = 7.0
+"""Days."""
+TOOL = ('tool_pose', '')
+"""Effect and joint of the tool."""
+ERRORS = 4.0
+"""Standard errors of a change that make it real."""
+GRACE = 3
+"""Recordings after that within which it must be found."""
+FEWEST = 4
+"""Checks before the first look: fewer are no history."""
+NEAR = 4
+"""Weeks by which a date may be off while it is still the same event; whether it is right is counted
+apart."""
+AHEAD = 0.5
+"""Share of the way that wear has gone by the end of the year, after which its limit lies."""
+LAST = ('joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parallelism')
+"""Errors of the last joint's row, which are the same place as the tool."""
+
+
+def score(
+    observations: Sequence[Observation],
+    year: Year,
+    named: Collection[str],
+    likely: Collection[str],
+    joints: Sequence[str],
+    truth: Mapping[str, float],
+) -> dict[str, Any]:
+    """
+    Return what a year of weekly looks came to.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+        Of each check, in the order of time; day 0 is that of week 0.
+    year : Year
+        The truth.
+    named : collection of str
+        Coordinates that a diagnosis has named as causes.
+    likely : collection of str
+        Coordinates that use can change.
+    joints : sequence of str
+        Of the arm, the first joint first.
+    truth : mapping of str to float
+        Values before anything happened.
+
+    Returns
+    -------
+    dict
+        'events', one entry each, and 'false', the alarms for nothing.
+
+    """
+    weeks = np.array(year.weeks, float)
+    due = [_reached(observations, year.events, event, weeks) for event in year.events]
+    found: list[int | None] = [None] * len(year.events)
+    false: list[dict[str, Any]] = []
+    before: set[tuple[str, str]] = set()
+    told: tuple[Change, ...] = ()
+    for k in range(FEWEST, len(observations) + 1):
+        told = changes(observations[:k], named=named, likely=likely)
+        wrong = set()
+        for change in told:
+            hits = [i for i, event in enumerate(year.events) if _same(event, change, joints)]
+            for i in hits:
+                found[i] = k - 1 if found[i] is None else found[i]
+            if not hits:
+                wrong.add((change.name, change.kind))
+        false += [{'look': k - 1, 'name': n, 'kind': kind} for n, kind in wrong - before]
+        before = wrong
+    events = [
+        {
+            **_entry(event, reached, first, told, weeks, joints),
+            'forecast': _forecast(observations, year.events, event, told, truth),
+        }
+        for event, reached, first in zip(year.events, due, found, strict=True)
+    ]
+    return {'looks': len(observations) - FEWEST + 1, 'events': events, 'false': false}
+
+
+def _reached(
+    observations: Sequence[Observation], events: Sequence[Event], one: Event, weeks: Array
+) -> int | None:
+    """
+    Return the first check after which a change has four of its standard errors, None if none.
+
+    Everything else is left free: the arm as it was, and all that happens besides. Written anew,
+    apart from the product's own sums.
+    """
+    names = observations[0].names
+    others = [event for event in events if event is not one]
+    precision = [each.information()[0] for each in observations]
+    prior = np.diag(observations[0].prior_std ** -2.0)
+    for k in range(2, len(observations) + 1):
+        rows = []
+        for event in (*others, one):
+            place = names.index(event.name)
+            columns = event.columns(weeks[:k])
+            rows.append((place, columns))
+        whole = _normal(precision[:k], prior, rows)
+        width = rows[-1][1].shape[1]
+        rest = whole[:-width, :-width] + 1e-12 * np.diag(np.diag(whole[:-width, :-width]) + 1e-300)
+        side = whole[:-width, -width:]
+        left = whole[-width:, -width:] - side.T @ np.linalg.solve(rest, side)
+        size = one.sizes()
+        if size @ left @ size >= ERRORS**2:
+            return k - 1
+    return None
+
+
+def _normal(precision: Sequence[Array], prior: Array, rows: Sequence[tuple[int, Array]]) -> Array:
+    """Return the normal matrix of the first state and of shapes on coordinates."""
+    count = prior.shape[0]
+    wide = [
+        np.concatenate(
+            [np.eye(count)]
+            + [np.eye(count)[:, [place]] * columns[w][None, :] for place, columns in rows],
+            axis=1,
+        )
+        for w in range(len(precision))
+    ]
+    total = sum(x.T @ p @ x for x, p in zip(wide, precision, strict=True))
+    total[:count, :count] += prior
+    return np.asarray(total)
+
+
+def _same(event: Event, change: Change, joints: Sequence[str]) -> bool:
+    """Tell whether a change told may be an event: its coordinate among those told, its date near."""
+    names = {change.name, *change.alike}
+    if not any(_alias(event.name, name, joints) for name in names):
+        return False
+    if event.kind != 'step' or change.kind == 'season':
+        return True
+    first, last = change.between
+    return first - NEAR * WEEK <= event.begin * WEEK <= last + NEAR * WEEK
+
+
+def _alias(one: str, other: str, joints: Sequence[str]) -> bool:
+    """Tell whether two coordinates are the same, or the last joint's row and the tool."""
+    return one == other or {_site(one, joints), _site(other, joints)} == {TOOL}
+
+
+def _entry(
+    event: Event,
+    reached: int | None,
+    found: int | None,
+    told: Sequence[Change],
+    weeks: Array,
+    joints: Sequence[str],
+) -> dict[str, Any]:
+    """Return what became of one event; what and when it was is judged at the end of the year."""
+    mine = [change for change in told if _same(event, change, joints)]
+    return {
+        'kind': event.kind,
+        'name': event.name,
+        'begin': event.begin,
+        'reached': reached,
+        'found': found,
+        'what': any(_site(change.name, joints) == _site(event.name, joints) for change in mine),
+        'in_set': bool(mine),
+        'when': any(_dated(event, change, weeks) for change in mine),
+        'told': [(change.name, change.kind, change.day, len(change.alike)) for change in mine],
+    }
+
+
+def _forecast(
+    observations: Sequence[Observation],
+    events: Sequence[Event],
+    event: Event,
+    told: Sequence[Change],
+    truth: Mapping[str, float],
+) -> dict[str, Any] | None:
+    """
+    Return the weeks foretold until wear has gone half as far again, and those it takes.
+
+    None where no trend of that coordinate was told, or it moves towards zero.
+    """
+    now = outlook(observations, told, event.name)
+    if event.kind != 'trend' or now is None:
+        return None
+    last = observations[-1].day / WEEK
+    moved = sum(e.values(np.array([last]))[0] for e in events if e.name == event.name)
+    value = truth.get(event.name, 0.0) + float(moved)
+    limit = abs(value) + AHEAD * event.size * (last - event.begin) * np.sign(value)
+    if limit <= abs(value):
+        return None
+    weeks = [day / WEEK for day in reaches(limit, now)]
+    true = float((limit - abs(value)) / abs(event.size))
+    return {'weeks': weeks, 'true': true, 'held': bool(weeks[0] <= true <= weeks[2])}
+
+
+def _site(name: str, joints: Sequence[str]) -> tuple[str, str]:
+    """Return effect and joint of a coordinate; the last joint's row is the tool."""
+    if name.startswith('tool'):
+        return TOOL
+    effect, *where, _ = name.split(' ')
+    site = effect, ' '.join(where)
+    return TOOL if effect in LAST and site[1] == joints[-1] else site
+
+
+def _dated(event: Event, change: Change, weeks: Array) -> bool:
+    """
+    Tell whether a date is right within one recording.
+
+    Of a step its first recording; of a trend the interval told must reach the week it began in;
+    a season has none.
+    """
+    if event.kind == 'season':
+        return True
+    after = int(np.searchsorted(weeks, event.begin))
+    days = [float(np.searchsorted(weeks, day / WEEK)) for day in (change.day, *change.between)]
+    if event.kind == 'step' and change.kind == 'step':
+        return abs(days[0] - after) <= 1.0
+    return days[1] - 1.0 <= after <= days[2] + 1.0

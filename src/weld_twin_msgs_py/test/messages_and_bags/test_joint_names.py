@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states under other names, and velocities that are none, as a running node takes them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.assembly.joint_states import JointStates
+from weld_twin_msgs_py.messages.to_messages import bag_messages
+
+ROBOT = load('ur5')
+MAKE = bag_messages()
+S = 1_000_000_000
+THEIRS = tuple(f'A{k}' for k in range(1, 7))
+
+
+def state(k, q, names=ROBOT.joint_names, qd=None):
+    return MAKE.joint_state(k * S // 100 + S, names, np.asarray(q), qd)
+
+
+def test_names_of_the_controller_are_taken_in_any_order():
+    states = JointStates(ROBOT, joint_names=THEIRS)
+    q = np.linspace(0.1, 0.6, 6)
+    mixed = [THEIRS[k] for k in (3, 1, 5, 0, 2, 4)]
+    sample = states.take(state(0, q[[3, 1, 5, 0, 2, 4]], mixed))
+    np.testing.assert_array_equal(sample.q, q)
+    assert states.take(state(1, q)) is None  # the robot's own names are others' joints now
+    assert states.others == 1
+
+
+def test_one_of_two_robots_on_a_topic_is_chosen_by_its_prefix():
+    both = [f'{side}_{name}' for side in ('left', 'right') for name in ROBOT.joint_names]
+    q = np.linspace(-1.0, 1.0, 12)
+    with pytest.raises(DataError, match="prefixes 'left_', 'right_'; say which with joint_prefix"):
+        JointStates(ROBOT).take(state(0, q, both))
+    states = JointStates(ROBOT, joint_names=[f'right_{name}' for name in ROBOT.joint_names])
+    np.testing.assert_array_equal(states.take(state(0, q, both)).q, q[6:])
+
+
+def test_velocities_that_stay_zero_while_a_joint_moves_are_left_out_and_told():
+    states = JointStates(ROBOT, mend=True)
+    known = []
+    for k in range(60):
+        q = np.full(6, 0.1) + [0.0, 0.0011 * k, 0.0, 0.0, 0.0, 0.0]
+        known.append(states.take(state(k, q, qd=np.zeros(6))).qd is not None)
+    assert known == [k < 19 for k in range(60)]
+    assert 'velocities are zero while the joints move' in states.velocity_remark
+    assert states.take(state(60, np.full(6, 0.1), qd=np.ones(6))).qd is not None
+
+
+def test_an_arm_at_rest_has_velocities_of_zero():
+    states = JointStates(ROBOT, mend=True)
+    for k in range(60):
+        hum = 1e-4 * np.sin(k)
+        assert not states.take(state(k, np.full(6, 0.1 + hum), qd=np.zeros(6))).qd.any()
+    moving = np.full(6, 0.1) + 0.03 * np.arange(5)[:, None]
+    for k, q in enumerate(moving):  # goes on with velocities that are told
+        assert states.take(state(60 + k, q, qd=np.ones(6))).qd is not None
+    assert states.velocity_remark == ''
+
+
+def test_a_recording_keeps_the_velocities_it_has():
+    states = JointStates(ROBOT)
+    for k in range(60):
+        sample = states.take(state(k, np.full(6, 0.01 * k), qd=np.zeros(6)))
+        assert sample.qd is not None

@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Logs of controllers and exports of instruments, a sample each of the documented form."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.rotation import quaternion_from_matrix
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.tables import TableOptions, read_two_tables
+
+UR5 = catalog.load('ur5')
+COUNT = 40
+T = 0.04 * np.arange(float(COUNT))
+Q = np.array([0.3, -1.4, 1.2, -1.1, 0.9, 0.4]) + 0.4 * np.sin(
+    np.outer(T, [1.0, 1.3, 0.8, 1.7, 1.1, 0.6]) + np.arange(6.0)
+)
+POSE = forward(UR5, Q)
+POINT = POSE[:, :3, 3]
+QUAT = quaternion_from_matrix(POSE[:, :3, :3])
+
+
+def lines(*columns, sign=','):
+    values = np.column_stack(columns)
+    return '\n'.join(sign.join(f'{v:.7g}' for v in row) for row in values) + '\n'
+
+
+def rtde():
+    """As csv_writer.py of Universal Robots writes what record_configuration.xml asks for."""
+    head = [
+        'timestamp',
+        *(f'target_q_{k}' for k in range(6)),
+        *(f'actual_q_{k}' for k in range(6)),
+    ]
+    head += [*(f'actual_TCP_pose_{k}' for k in range(6)), 'output_int_register_0']
+    other = np.zeros((COUNT, 6))
+    return ' '.join(head) + '\n' + lines(1000.0 + T, other, Q, other, T * 0, sign=' ')
+
+
+def ur_rtde():
+    head = [
+        'timestamp',
+        *(f'actual_q_{k}' for k in range(6)),
+        *(f'actual_qd_{k}' for k in range(6)),
+    ]
+    return ','.join(head) + '\n' + lines(50.0 + T, Q, np.zeros((COUNT, 6)))
+
+
+def egm():
+    """As EGMLogger of abb_libegm writes it, with the columns after the first two groups cut."""
+    head = ['TIMESTAMP', *(f'R_FB_POS_RJ{k}' for k in range(1, 7))]
+    head += [*(f'R_FB_POS_EJ{k}' for k in range(1, 7)), 'R_FB_POS_X', 'R_FB_POS_Y', 'R_FB_POS_Z']
+    other = np.zeros((COUNT, 6))
+    return ','.join(head) + '\n' + lines(7000.0 + 1e3 * T, np.degrees(Q), other, 1e3 * POINT)
+
+
+def motive():
+    """A rigid body and one of its markers, as Motive 2 and 3 export them."""
+    top = 'Format Version,1.23,Take Name,run,Capture Frame Rate,25.000000,Export Frame Rate,'
+    top += (
+        '25.000000,Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global\n\n'
+    )
+    kinds = ['Rigid Body'] * 7 + ['Marker'] * 3
+    names = ['torch'] * 7 + ['loose'] * 3
+    what = ['Rotation'] * 4 + ['Position'] * 6
+    ids = ['506381AA00'] * 7 + ['1'] * 3
+    rows = [',Type,' + ','.join(kinds), ',Name,' + ','.join(names), ',ID,' + ','.join(ids)]
+    rows += [',,' + ','.join(what), 'Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,X,Y,Z']
+    frame = np.arange(float(COUNT))
+    return top + '\n'.join(rows) + '\n' + lines(frame, T, QUAT, 1e3 * POINT, 1e3 * POINT + 9.0)
+
+
+def vicon():
+    rows = ['Trajectories', '25', ',,cell:torch,,,cell:other,,', 'Frame,Sub Frame,X,Y,Z,X,Y,Z']
+    rows += [',,mm,mm,mm,mm,mm,mm']
+    frame = np.arange(1.0, COUNT + 1.0)
+    return '\n'.join(rows) + '\n' + lines(frame, 0 * T, 1e3 * POINT, 1e3 * POINT + 5.0)
+
+
+def qualisys():
+    rows = [f'NO_OF_FRAMES\t{COUNT}', 'NO_OF_CAMERAS\t8', 'NO_OF_MARKERS\t2', 'FREQUENCY\t25']
+    rows += ['NO_OF_ANALOG\t0', 'ANALOG_FREQUENCY\t0', 'DESCRIPTION\t--']
+    rows += ['TIME_STAMP\t2026-11-22, 10:47:36.627\t94247.45402301', 'DATA_INCLUDED\t3D']
+    rows += ['MARKER_NAMES\ttorch\tother']
+    seen = 1e3 * POINT
+    seen[3] = 0.0  # not seen
+    return '\n'.join(rows) + '\n' + lines(1e3 * POINT - 7.0, seen, sign='\t')
+
+
+def spatial_analyzer():
+    """Collection, group, target, x, y, z, with the comments that the export may begin with."""
+    top = '// SA Version: 2024\n// Frame: A::WORLD (mm)\n'
+    rows = [
+        f'A, torch, p{k + 1}, {x:.4f}, {y:.4f}, {z:.4f}' for k, (x, y, z) in enumerate(1e3 * POINT)
+    ]
+    return top + '\n'.join(rows) + '\n'
+
+
+def both(tmp_path, log, seen):
+    for name, text in (('log.csv', log), ('seen.csv', seen)):
+        (tmp_path / name).write_text(text)
+    return tmp_path / 'log.csv', tmp_path / 'seen.csv', UR5
+
+
+@pytest.mark.parametrize('log', [rtde, ur_rtde, egm], ids=lambda f: f.__name__)
+def test_a_log_of_a_controller_is_a_motion(tmp_path, log):
+    recording, said = read_two_tables(
+        *both(tmp_path, log(), vicon()), TableOptions(marker='cell:torch')
+    )
+    assert not recording.joints.static
+    np.testing.assert_allclose(recording.joints.q, Q, atol=1e-6)
+    np.testing.assert_allclose(np.diff(recording.joints.t), 0.04, atol=2e-4)
+    assert any('both clocks are taken to begin' in sentence for sentence in said)
+
+
+@pytest.mark.parametrize(
+    ('seen', 'marker'),
+    [(motive, 'torch'), (vicon, 'cell:torch'), (qualisys, 'other')],
+    ids=lambda v: getattr(v, '__name__', v),
+)
+def test_what_was_tracked_comes_in_metres_at_its_own_stamps(tmp_path, seen, marker):
+    recording, said = read_two_tables(
+        *both(tmp_path, ur_rtde(), seen()), TableOptions(marker=marker)
+    )
+    keep = np.arange(COUNT) != 3 if seen is qualisys else np.ones(COUNT, bool)
+    np.testing.assert_allclose(recording.measured.position, POINT[keep], atol=1e-6)
+    np.testing.assert_allclose(recording.measured.t, T[keep], atol=1e-4)
+    turned = recording.measured.rotation
+    assert (turned is not None) == (seen is motive), said
+    if turned is not None:
+        np.testing.assert_allclose(turned, POSE[:, :3, :3], atol=1e-6)
+
+
+def test_points_without_stamps_are_paired_row_by_row(tmp_path):
+    recording, said = read_two_tables(*both(tmp_path, ur_rtde(), spatial_analyzer()))
+    assert recording.joints.static
+    np.testing.assert_allclose(recording.measured.position, POINT, atol=1e-6)
+    assert 'rows of both files are paired in their order' in said
+
+
+def test_a_clock_that_began_later_is_shifted(tmp_path):
+    recording, _ = read_two_tables(
+        *both(tmp_path, ur_rtde(), vicon()), TableOptions(marker='cell:torch'), 0.4
+    )
+    np.testing.assert_allclose(recording.measured.t[0], 0.4, atol=1e-6)
+    assert recording.measured.t[-1] <= recording.joints.t[-1] + 1e-9
+
+
+@pytest.mark.parametrize(
+    ('log', 'seen', 'options', 'offset', 'words'),
+    [
+        (rtde, vicon, {}, 0.0, '--marker takes one of cell:torch, cell:other'),
+        (rtde, motive, {'marker': 'gun'}, 0.0, "there is no 'gun'; --marker takes one of torch"),
+        (rtde, vicon, {'marker': 'cell:torch'}, 90.0, 'lies within the time of'),
+    ],
+)
+def test_what_is_not_clear_is_told_in_a_sentence(tmp_path, log, seen, options, offset, words):
+    with pytest.raises(DataError, match=re.escape(words)):
+        read_two_tables(*both(tmp_path, log(), seen()), TableOptions(**options), offset)
+
+
+def test_files_that_nothing_brings_together_are_refused(tmp_path):
+    fewer = '\n'.join(spatial_analyzer().splitlines()[:-1]) + '\n'
+    with pytest.raises(DataError, match='nothing says which belong together'):
+        read_two_tables(*both(tmp_path, rtde(), fewer))

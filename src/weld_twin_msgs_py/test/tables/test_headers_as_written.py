@@ -1,0 +1,204 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tables as people and spreadsheets leave them: every one holds the same six stations."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.tables import TableOptions, read_contacts, read_table
+
+UR5 = catalog.load('ur5')
+Q = np.radians(np.random.default_rng(8).uniform(-150.0, 150.0, (12, 6)).round(3))
+POINT = forward(UR5, Q)[:, :3, 3]
+BLOCKS = {'deg': np.degrees(Q), 'rad': Q, 'mm': POINT * 1e3, 'm': POINT}
+
+
+def rows(*kinds, delimiter=';', comma=True, extra=()):
+    """Return the rows of a table as text, blocks side by side and texts in front."""
+    lines = []
+    for k in range(len(Q)):
+        cells = [text(k) for text in extra]
+        cells += [f'{value:.6f}' for kind in kinds for value in BLOCKS[kind][k]]
+        line = delimiter.join(cells)
+        lines.append(line.replace('.', ',') if comma else line)
+    return '\n'.join(lines) + '\n'
+
+
+def numbered(word, *, start=1, joined=' '):
+    return [f'{word}{joined}{k}' for k in range(start, start + 6)]
+
+
+def german():
+    head = [*(f'{name} [°]' for name in numbered('Achse')), *(f'Ist {a} [mm]' for a in 'XYZ')]
+    return 'sep=;\n' + ';'.join(head) + '\n' + rows('deg', 'mm')
+
+
+def both_wanted_and_measured():
+    head = [*numbered('A', joined=''), *(f'{a} Soll (mm)' for a in 'XYZ')]
+    head += [f'{a} Ist (mm)' for a in 'XYZ']
+    lines = rows('deg', 'mm', 'mm').splitlines()
+    wrong = [line.split(';') for line in lines]
+    text = [';'.join([*w[:6], '0,1', '0,2', '0,3', *w[9:]]) for w in wrong]
+    return ';'.join(head) + '\n' + '\n'.join(text) + '\n'
+
+
+def rapid():
+    head = [*numbered('rax', joined='_'), *(f'trans_{a}' for a in 'xyz')]
+    return '\t'.join(head) + '\n' + rows('deg', 'mm', delimiter='\t', comma=False)
+
+
+def with_units_below():
+    head = ['Nr', *numbered('J', joined=''), 'x', 'y', 'z']
+    units = ['', *['deg'] * 6, *['mm'] * 3]
+    body = rows('deg', 'mm', delimiter=',', comma=False, extra=(lambda k: str(k + 1),))
+    return ','.join(head) + '\n' + ','.join(units) + '\n' + body
+
+
+def with_a_title_above():
+    head = [*numbered('Gelenk'), *(f'Messwert {a}' for a in 'XYZ')]
+    title = 'Messprotokoll Zelle 7\nDatum;22.11.2026\n\n'
+    return title + ';'.join(head) + '\n' + rows('deg', 'mm')
+
+
+def with_comments():
+    head = [*numbered('q', start=0, joined=''), 'x', 'y', 'z']
+    body = rows('rad', 'm', delimiter=',', comma=False)
+    return '// made by hand\n# ' + ','.join(head) + '\n% rad and m\n' + body
+
+
+def recorder():
+    head = [*numbered('target_q', start=0, joined='_'), *numbered('actual_q', start=0, joined='_')]
+    head += [*numbered('actual_qd', start=0, joined='_'), 'tracker_x', 'tracker_y', 'tracker_z']
+    lines = rows('rad', 'rad', 'rad', 'm', delimiter=',', comma=False).splitlines()
+    wanted = [','.join(['0'] * 6 + line.split(',')[6:]) for line in lines]
+    return ','.join(head) + '\n' + '\n'.join(wanted) + '\n'
+
+
+def yaskawa():
+    head = [*'SLURBT', 'X mm', 'Y mm', 'Z mm']
+    return ','.join(head) + '\n' + rows('deg', 'mm', delimiter=',', comma=False)
+
+
+CASES = (
+    german,
+    both_wanted_and_measured,
+    rapid,
+    with_units_below,
+    with_a_title_above,
+    with_comments,
+    recorder,
+    yaskawa,
+)
+
+
+@pytest.mark.parametrize('text', CASES, ids=lambda case: case.__name__)
+@pytest.mark.parametrize('coding', ['utf-8', 'utf-8-sig', 'cp1252'])
+def test_a_table_is_read_as_it_is_written(tmp_path, text, coding):
+    path = tmp_path / 'table.csv'
+    path.write_text(text(), encoding=coding)
+    recording, _ = read_table(path, UR5)
+    np.testing.assert_allclose(recording.joints.q, Q, atol=2e-6)
+    np.testing.assert_allclose(recording.measured.position, POINT, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ('names', 'text'),
+    [
+        (['Zeit'], lambda k: f'22.11.2026 08:15:{k:02d},250'),
+        (['Datum', 'Uhrzeit'], lambda k: f'22.11.2026;08:15:{k:02d},250'),
+        (['Datum', 'Zeit'], lambda k: f'2026-11-22;08:15:{k:02d}.250'),
+        (['Timestamp'], lambda k: f'2026-11-22T08:15:{k:02d}.250'),
+        (['Date', 'Time'], lambda k: f'11/22/2026;8:15:{k:02d} AM'),
+        (['Zeit [s]'], lambda k: f'{k},25'),
+    ],
+)
+def test_times_of_day_and_dates_are_stamps(tmp_path, names, text):
+    head = [*names, *numbered('A', joined=''), 'X', 'Y', 'Z']
+    path = tmp_path / 'table.csv'
+    path.write_text(';'.join(head) + '\n' + rows('deg', 'mm', extra=(text,)))
+    recording, said = read_table(path, UR5)
+    np.testing.assert_allclose(np.diff(recording.joints.t), 1.0)
+    dated = len(names) == 2 or ' ' not in names[0]
+    assert (recording.epoch_ns // 10**9 // 86_400 == 20_779) == dated, said
+
+
+def test_signs_offsets_and_a_coupled_joint_are_undone(tmp_path):
+    shown = np.degrees(Q) * [1, -1, 1, 1, -1, 1] - [0, 90, 0, 0, 0, 180] * np.array([1, -1] * 3)
+    shown[:, 2] -= -(shown[:, 1])
+    head = [*numbered('J', joined=''), 'x [mm]', 'y [mm]', 'z [mm]']
+    lines = [
+        ','.join(f'{v:.6f}' for v in [*s, *p]) for s, p in zip(shown, POINT * 1e3, strict=True)
+    ]
+    path = tmp_path / 'table.csv'
+    path.write_text('\n'.join([','.join(head), *lines]) + '\n')
+    # The model's joint 3 is what is shown less joint 2; zeros are moved last.
+    model = shown * [1, -1, 1, 1, -1, 1]
+    model[:, 2] += model[:, 1]
+    offsets = (np.degrees(Q) - model)[0]
+    options = TableOptions(
+        angle_unit='deg',
+        joint_signs=(1, -1, 1, 1, -1, 1),
+        coupled='3+2',
+        joint_offsets=tuple(offsets),
+    )
+    recording, said = read_table(path, UR5, options)
+    np.testing.assert_allclose(recording.joints.q, Q, atol=1e-6)
+    assert 'joints are coupled by 3+2' in said
+
+
+@pytest.mark.parametrize(
+    ('head', 'words'),
+    [
+        (
+            'Achse 1;Achse 2;Achse 3;Achse 4;Achse 5;Kraft;Ist X;Ist Y;Ist Z',
+            'found joints Achse 1, Achse 2, Achse 3, Achse 4, Achse 5, '
+            'besides Kraft, Ist X, Ist Y, Ist Z; --joint-columns decides',
+        ),
+        (
+            'Achse 1;Achse 2;Achse 3;Achse 4;Achse 5;Achse 6;Ist X;Ist Y;Strom',
+            '(found Ist X, Ist Y; missing z; besides the joints there are Strom)',
+        ),
+    ],
+)
+def test_what_was_found_and_what_is_missing_is_listed(tmp_path, head, words):
+    path = tmp_path / 'table.csv'
+    path.write_text(head + '\n' + rows('deg', 'mm'))
+    with pytest.raises(DataError, match=re.escape(words)):
+        read_table(path, UR5)
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        ({'coupled': 'three'}, "--coupled needs two joints such as 3+2 or 3-2, got 'three'"),
+        ({'joint_signs': (1, -1)}, '--joint-signs needs 6 numbers, got 2'),
+    ],
+)
+def test_an_option_that_means_nothing_is_refused(tmp_path, options, words):
+    path = tmp_path / 'table.csv'
+    path.write_text(german())
+    with pytest.raises(DataError, match=re.escape(words)):
+        read_table(path, UR5, TableOptions(**options))
+
+
+def test_positions_that_were_computed_are_told(tmp_path):
+    path = tmp_path / 'table.csv'
+    path.write_text(rapid())
+    said = ' '.join(read_table(path, UR5).assumptions)
+    assert 'these positions were computed, not measured' in said
+    assert 'trans_x may be what the controller computes' in said
+
+
+def test_touches_take_headers_as_written_too(tmp_path):
+    head = [*(f'{name} [°]' for name in numbered('Achse')), 'Kontakt']
+    path = tmp_path / 'touches.csv'
+    path.write_text('sep=;\n' + ';'.join(head) + '\n' + rows('deg').replace('\n', ';Stift\n'))
+    recording, _ = read_contacts(path, UR5)
+    np.testing.assert_allclose(recording.joints.q, Q, atol=2e-6)

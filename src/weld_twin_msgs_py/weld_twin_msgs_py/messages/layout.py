@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Many serialised messages of one layout to columns of numbers and back, none decoded by itself.
+
+A robot that moves sends the same message again and again: frame, names and counts stay, stamp and
+numbers change. Where the first message has been decoded, the others are numbers at known places,
+as long as all that should stay is the same.
+
+References
+----------
+.. [1] OMG, "DDS Interoperability Wire Protocol (DDSI-RTPS)", 2.5, section 10 (plain CDR).
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+
+from .cdr_read import HEADER
+from .from_messages import NANOSECONDS
+
+NUMBERS: Mapping[str, int] = {
+    'geometry_msgs/msg/PoseStamped': 7,
+    'geometry_msgs/msg/PoseWithCovarianceStamped': 43,
+    'geometry_msgs/msg/PointStamped': 3,
+    'geometry_msgs/msg/Vector3Stamped': 3,
+    'geometry_msgs/msg/WrenchStamped': 6,
+    'sensor_msgs/msg/Temperature': 2,
+}
+"""Types that are a header and so many doubles."""
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+_LITTLE_ENDIAN = b'\x00\x01'
+"""How plain CDR with the low byte first begins; all senders in use write it."""
+_STAMP = slice(HEADER, HEADER + 8)
+"""Seconds and nanoseconds."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """
+    Where in the messages of one kind the numbers are, and what is the same in all of them.
+
+    Attributes
+    ----------
+    size : int
+        Bytes of a message.
+    same : tuple of (int, bytes)
+        What every message holds, and from which byte on. Padding is not among it: some senders
+        leave there what was in memory.
+    doubles : tuple of (int, int)
+        Where runs of doubles begin, and how many they are.
+
+    """
+
+    size: int
+    same: tuple[tuple[int, bytes], ...]
+    doubles: tuple[tuple[int, int], ...]
+
+    def columns(self, block: np.ndarray) -> tuple[np.ndarray, list[Array]] | None:
+        """
+        Return stamps [ns], shape (N,), and each run of doubles, shape (N, count).
+
+        Parameters
+        ----------
+        block : array of uint8, shape (N, size)
+            Messages, a row each.
+
+        Returns
+        -------
+        None where a message is of another layout.
+
+        """
+        for at, held in self.same:
+            if (block[:, at : at + len(held)] != np.frombuffer(held, np.uint8)).any():
+                return None
+        stamp = np.ascontiguousarray(block[:, _STAMP])
+        seconds = stamp.view('<i4')[:, 0].astype(np.int64)
+        ns = seconds * NANOSECONDS + stamp.view('<u4')[:, 1]
+        runs = [
+            np.ascontiguousarray(block[:, at : at + 8 * count]).view('<f8')
+            for at, count in self.doubles
+        ]
+        return ns, runs
+
+    def filled(self, data: bytes, ns: np.ndarray, runs: Sequence[Array]) -> np.ndarray:
+        """
+        Return messages like one of this layout, with other stamps and numbers.
+
+        Parameters
+        ----------
+        data : bytes, length size
+            The message to repeat.
+        ns : array of int, shape (N,) [ns]
+        runs : sequence of arrays, shapes (N, count)
+            One for each run of doubles.
+
+        Returns
+        -------
+        array of uint8, shape (N, size)
+
+        """
+        out = np.tile(np.frombuffer(data, np.uint8), (ns.size, 1))
+        seconds, rest = np.divmod(ns, NANOSECONDS)
+        out[:, _STAMP] = np.column_stack([seconds, rest]).astype('<u4').view(np.uint8)
+        for (at, count), run in zip(self.doubles, runs, strict=True):
+            if count:
+                values = np.ascontiguousarray(run, dtype='<f8').reshape(ns.size, count)
+                out[:, at : at + 8 * count] = values.view(np.uint8)
+        return out
+
+
+class _Walk:
+    """Goes through one message that is known to be whole, and notes what lies where."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._at = HEADER + 8
+        self.same = [(0, _LITTLE_ENDIAN)]
+        self.doubles: list[tuple[int, int]] = []
+
+    def count(self) -> int:
+        self._align(4)
+        return int.from_bytes(self._keep(4), 'little')
+
+    def string(self) -> None:
+        self._keep(self.count())
+
+    def numbers(self, count: int) -> None:
+        if count:
+            self._align(8)
+        self.doubles.append((self._at, count))
+        self._at += 8 * count
+
+    def _keep(self, size: int) -> bytes:
+        held = self._data[self._at : self._at + size]
+        self.same.append((self._at, held))
+        self._at += size
+        return held
+
+    def _align(self, size: int) -> None:
+        self._at += -(self._at - HEADER) % size
+
+
+def layout_of(kind: str, data: bytes) -> Layout | None:
+    """
+    Return the layout of a message that can be decoded; None for types and senders without one.
+
+    Parameters
+    ----------
+    kind : str
+    data : bytes
+        The message; one run of doubles follows its header, or, of a joint state, positions,
+        velocities and efforts.
+
+    """
+    if data[:2] != _LITTLE_ENDIAN or (kind != JOINT_STATE and kind not in NUMBERS):
+        return None
+    walk = _Walk(data)
+    walk.string()
+    if kind == JOINT_STATE:
+        for _ in range(walk.count()):
+            walk.string()
+        for _ in range(3):
+            walk.numbers(walk.count())
+    else:
+        walk.numbers(NUMBERS[kind])
+    return Layout(len(data), tuple(walk.same), tuple(walk.doubles))

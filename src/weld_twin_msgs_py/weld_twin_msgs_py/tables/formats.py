@@ -1,0 +1,289 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Logs of controllers and exports of instruments whose form is documented, one small entry each.
+
+An entry says how such a file is told, which line names its columns, how many lines above belong to
+that header, and which of the joined names mean what. What it does not name is left out: a
+controller's own idea of the pose is no measurement. docs/tables.md lists where each form is
+documented.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from weld_twin_core.errors import DataError
+
+_HEAD = 40
+"""Lines at the top in which a format is told and its header found."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """
+    One kind of file.
+
+    Attributes
+    ----------
+    name : str
+        For people.
+    mark : str
+        Pattern that the top of such a file matches, and no other.
+    header : str
+        Pattern of the line that names the columns.
+    names : tuple of (str, str)
+        Pattern of a joined name and what it is called; ``{unit}`` is the file's unit of length.
+        A group ``what`` is the marker or body that a column belongs to.
+    delimiter : str
+        Blank for any white space.
+    above, below : int
+        Lines over the header that belong to it, and lines under it that are no rows.
+    unit : str
+        Pattern with the unit of length as its group; empty where ``names`` say it.
+    rate : str
+        Pattern with the frames per second as its group, where there is no column of times.
+    named_by : str
+        Pattern with a list of names, three columns each, where there is no header.
+    gap : str
+        What stands for a coordinate that was not seen.
+
+    """
+
+    name: str
+    mark: str
+    header: str
+    names: tuple[tuple[str, str], ...]
+    delimiter: str = ','
+    above: int = 0
+    below: int = 0
+    unit: str = ''
+    rate: str = ''
+    named_by: str = ''
+    gap: str = ''
+
+
+class Read(NamedTuple):
+    """Header, rows as text, the line in the file of each, and sentences."""
+
+    header: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    said: list[str]
+
+
+_MOTIVE = r'^(?:Rigid Body|Marker|Rigid Body Marker) (?P<what>.+?)(?: [0-9A-F]{6,}| \d+)?'
+_RTDE = (
+    (r'^timestamp$', 'time [s]'),
+    (r'^actual_q_(\d)$', r'actual_q_\1 [rad]'),
+    (r'^target_q_(\d)$', r'target_q_\1 [rad]'),
+)
+FORMATS: tuple[Format, ...] = (
+    Format('RTDE of Universal Robots', r'\A(?:\S+ )*actual_q_0 ', r'actual_q_0 ', _RTDE, ' '),
+    Format(
+        'EGM of ABB (abb_libegm)',
+        r'\ATIMESTAMP,R_FB_POS_RJ1,',
+        r'^TIMESTAMP,',
+        ((r'^TIMESTAMP$', 'time [ms]'), (r'^R_FB_POS_RJ(\d)$', r'J\1 [deg]')),
+    ),
+    Format(
+        'Motive of OptiTrack',
+        r'\AFormat Version,',
+        r'^Frame,Time',
+        (
+            (r'Time \(Seconds\)$', 'time [s]'),
+            (_MOTIVE + r' Position (?P<axis>[XYZ])$', r'\g<axis> [{unit}]'),
+            (_MOTIVE + r' Rotation (?P<axis>[XYZW])$', r'q\g<axis>'),
+        ),
+        above=4,
+        unit=r'Length Units,(\w+)',
+    ),
+    Format(
+        'Nexus or Tracker of Vicon',
+        r'\A"?Trajectories"?[,;]*\r?\n',
+        r'^Frame[,;]Sub Frame',
+        ((r'^(?P<what>\S+) (?P<axis>[XYZ])$', r'\g<axis> [{unit}]'), (r'^Frame$', 'frame')),
+        above=1,
+        below=1,
+        unit=r'^[,;]+(mm|m)\b',
+        rate=r'\A"?Trajectories"?[,;]*\r?\n(\d+)',
+    ),
+    Format(
+        'QTM of Qualisys',
+        r'\A(?:FILE_VERSION\t.*\n)?NO_OF_FRAMES\t',
+        r'^MARKER_NAMES\t',
+        ((r'^(?P<what>.+) (?P<axis>[XYZ])$', r'\g<axis> [mm]'), (r'^Time$', 'time [s]')),
+        '\t',
+        rate=r'^FREQUENCY\t([\d.]+)',
+        named_by=r'^MARKER_NAMES\t(.*)',
+        gap='0 0 0',
+    ),
+    Format(
+        'list of points (SpatialAnalyzer and others)',
+        r'\A(?:\s*//.*\n)*(?:[^,\n]+,\s*){1,3}[-+\d.eE]+,\s*[-+\d.eE]+,\s*[-+\d.eE]+\s*\n'
+        r'(?:[^,\n]+,\s*){1,3}[-+\d.eE]+,',
+        r'^[^/]',
+        (),
+    ),
+)
+"""The first whose mark is found counts."""
+_UNITS = {'meters': 'm', 'millimeters': 'mm', 'centimeters': 'cm', 'm': 'm', 'mm': 'mm'}
+
+
+def recognised(text: str) -> Format | None:
+    """Return the format of a file by its beginning, None for a table like any other."""
+    top = '\n'.join(text.splitlines()[:_HEAD]) + '\n'
+    for known in FORMATS:
+        if re.search(known.mark, top):
+            return None if not known.names and not _is_list(top) else known
+    return None
+
+
+def _is_list(top: str) -> bool:
+    """Return whether every line ends in three numbers, with names before and none of a header."""
+    rows = [line.split(',') for line in top.splitlines() if line.strip() and line[:2] != '//']
+    return all(
+        len(row) == len(rows[0]) and not _number(row[0]) and all(map(_number, row[-3:]))
+        for row in rows
+    )
+
+
+def read(known: Format, text: str, marker: str | None) -> Read:
+    """
+    Return the columns of a known format that mean something here.
+
+    Parameters
+    ----------
+    known : Format
+    text : str
+    marker : str, optional
+        Marker or body that is meant, where the file has several.
+
+    Raises
+    ------
+    DataError
+        It has several, and none was named.
+
+    """
+    lines = text.splitlines()
+    at = next(k for k, line in enumerate(lines) if re.search(known.header, line))
+    split = [_split(line, known) for line in lines]
+    if not known.names:
+        return _points(known, split, at, marker)
+    header = _names(known, lines, split, at)
+    first = at + 1 + known.below
+    if known.named_by and split[first] and not _number(split[first][0]):
+        header, first = split[first], first + 1  # QTM writes names over the columns if asked to
+    found, said = _meant(known, header, text, marker)
+    rows, numbers = [], []
+    for k in range(first, len(lines)):
+        cells = split[k]
+        if len(cells) >= len(header) and any(cells):
+            rows.append(_seen([cells[i] for i, _ in found], known))
+            numbers.append(k + 1)
+    names = [name for _, name in found]
+    if known.rate and not any(name.startswith('time') for name in names):
+        match = re.search(known.rate, text, re.M)
+        rate = float(match[1]) if match else 1.0
+        rows = [[f'{k / rate:.9g}', *row] for k, row in enumerate(rows)]
+        names = ['time [s]', *names]
+    return Read(names, rows, numbers, said)
+
+
+def _split(line: str, known: Format) -> list[str]:
+    if known.delimiter == ' ':
+        return line.split()
+    sign = ';' if known.delimiter == ',' and ';' in line and ',' not in line else known.delimiter
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=sign), [])]
+
+
+def _names(known: Format, lines: Sequence[str], split: list[list[str]], at: int) -> list[str]:
+    """Return the names of the columns, joined from all lines of the header."""
+    if known.named_by:
+        match = re.search(known.named_by, '\n'.join(lines[:_HEAD]), re.M)
+        markers = [cell for cell in (match[1] if match else '').split('\t') if cell.strip()]
+        return [f'{marker} {axis}' for marker in markers for axis in 'XYZ']
+    count = len(split[at])
+    over = [(row + [''] * count)[:count] for row in split[max(at - known.above, 0) : at]]
+    if known.below:  # a name stands over the first of its columns
+        over = [_filled(row) for row in over]
+    own = list(split[at])
+    return [
+        ' '.join(row[k] for row in [*over, own] if row[k] and row[k] not in ('Type', 'Name', 'ID'))
+        for k in range(count)
+    ]
+
+
+def _filled(row: list[str]) -> list[str]:
+    """Return a row in which an empty cell says what the cell before it does."""
+    out = list[str]()
+    for cell in row:
+        out.append(cell or (out[-1] if out else ''))
+    return out
+
+
+def _meant(
+    known: Format, header: list[str], text: str, marker: str | None
+) -> tuple[list[tuple[int, str]], list[str]]:
+    """Return place and name of the columns that mean something, of one marker alone."""
+    match = re.search(known.unit, text, re.M) if known.unit else None
+    unit = _UNITS.get((match[1] if match else 'mm').lower(), 'mm')
+    plain = list[tuple[int, str]]()
+    owned = dict[str, list[tuple[int, str]]]()
+    for k, name in enumerate(header):
+        for pattern, called in known.names:
+            found = re.search(pattern, name)
+            if found is None:
+                continue
+            new = found.expand(called.replace('{unit}', unit))
+            what = found.groupdict().get('what')
+            (plain if what is None else owned.setdefault(what, [])).append((k, new))
+            break
+    said = [f'read as the {known.name} writes it']
+    if not owned:
+        return plain, said
+    chosen = _one(list(owned), marker)
+    said.append(f'measured is {chosen!r}')
+    return [*(p for p in plain if p[1] != 'frame'), *owned[chosen]], said
+
+
+def _one(names: list[str], marker: str | None) -> str:
+    if marker in names:
+        return str(marker)
+    if marker is None and len(names) == 1:
+        return names[0]
+    asked = 'several things were tracked' if marker is None else f'there is no {marker!r}'
+    raise DataError(f'{asked}; --marker takes one of {", ".join(names)}')
+
+
+def _seen(cells: list[str], known: Format) -> list[str]:
+    """Return a row with a place that was not seen left empty."""
+    if known.gap and [_number(c) and float(c) == 0.0 for c in cells[-3:]] == [True] * 3:
+        return [*cells[:-3], '', '', '']
+    return cells
+
+
+def _points(known: Format, split: list[list[str]], at: int, marker: str | None) -> Read:
+    """Return a list of points: names, then x, y, z; ``marker`` is the group that is meant."""
+    rows, numbers = [], []
+    for k, cells in enumerate(split[at:], start=at + 1):
+        if len(cells) < 4 or cells[0].startswith('//'):
+            continue
+        if marker is None or marker in cells[:-3]:
+            rows.append([' '.join(cells[:-3]), *cells[-3:]])
+            numbers.append(k)
+    if not rows:
+        raise DataError(f'no point belongs to {marker!r}; --marker names a group')
+    return Read(['point', 'x', 'y', 'z'], rows, numbers, [f'read as a {known.name}'])
+
+
+def _number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A log of the joints and a table of the instrument, brought together by time or row by row."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion
+
+from .build import Table, joint_angles, own_epoch, table_of
+from .cells import Cells, read_cells
+from .clock_column import stamps
+from .header import joint_columns, time_columns, unit_of
+from .table_options import TableOptions
+
+STREAM = 0.2
+"""Median step of a log [s] below which it follows the motion, not stations."""
+SINCE_1970 = 1e8
+"""Stamps beyond this [s] are dates; two files with dates share a clock."""
+
+
+def read_two_tables(
+    joints: Path | str,
+    measured: Path | str,
+    robot: Robot,
+    options: TableOptions | None = None,
+    offset: float = 0.0,
+) -> Table:
+    """
+    Read the joints from one file and what was measured from another.
+
+    Parameters
+    ----------
+    joints, measured : Path or str
+        A log of the controller, and an export of the instrument.
+    robot : Robot
+    options : TableOptions, optional
+    offset : float [s]
+        Added to the stamps of the instrument.
+
+    Raises
+    ------
+    DataError
+        A file cannot be read, or nothing says which rows belong together.
+
+    """
+    options = options or TableOptions()
+    log = read_cells(joints, options.delimiter, options.decimal)
+    seen = read_cells(measured, options.delimiter, options.decimal, options.marker)
+    said = [f'{c.path.name}: {text}' for c in (log, seen) for text in c.said]
+    names = joint_columns(log.header, robot, options)
+    q = log.stack(names)
+    times, own = _stamps(log, options, said), _stamps(seen, options, said)
+    if times is None or own is None or not _stream(times):
+        if len(log.rows) != len(seen.rows):
+            raise DataError(
+                f"'{log.path}' has {len(log.rows)} rows and '{seen.path}' {len(seen.rows)}, and "
+                'nothing says which belong together; give both files stamps of a motion, or a row '
+                'for each station'
+            )
+        said.append('rows of both files are paired in their order')
+        return table_of(_joined(log, seen, names, q, own), robot, options, said)
+    dated = min(times[0], own[0]) > SINCE_1970
+    if not dated:
+        times, own = times - times[0], own - own[0]
+        said.append(
+            'both clocks are taken to begin with the first row of their file; --clock-offset '
+            "shifts the instrument's"
+        )
+    return _moving(log, seen, robot, options, said, (names, q, times, own + offset, dated))
+
+
+def _moving(
+    log: Cells,
+    seen: Cells,
+    robot: Robot,
+    options: TableOptions,
+    said: list[str],
+    joined: tuple[tuple[str, ...], Array, Array, Array, bool],
+) -> Table:
+    """Return a motion: what was measured is read as stations first, to find out its units."""
+    names, q, times, own, dated = joined
+    inside = np.flatnonzero((own >= times[0]) & (own <= times[-1]))
+    if not inside.size:
+        raise DataError(
+            f"no row of '{seen.path}' lies within the time of '{log.path}'; --clock-offset shifts "
+            'the clock of the instrument'
+        )
+    at = np.column_stack([np.interp(own[inside], times, column) for column in q.T])
+    kept = replace(
+        seen, rows=[seen.rows[k] for k in inside], lines=[seen.lines[k] for k in inside]
+    )
+    still, said_all = table_of(_joined(log, kept, names, at, own[inside]), robot, options, said)
+    begin = still.epoch_ns * 1e-9
+    with_joints = replace(log, header=[*names], rows=[[repr(float(v)) for v in row] for row in q])
+    whole = joint_angles(
+        replace(with_joints, decimal='.'), robot, names, options, [], unit_of(names[0])
+    )
+    recording = replace(
+        still,
+        joints=JointMotion(times - begin, whole),
+        epoch_ns=still.epoch_ns if dated else own_epoch(log.path),
+        notes=said_all,
+    )
+    return Table(recording, said_all)
+
+
+def _joined(log: Cells, seen: Cells, names: tuple[str, ...], q: Array, t: Array | None) -> Cells:
+    """Return one table of the joints of one file and all but times of the other."""
+    left = [
+        k for k, name in enumerate(seen.header) if name not in (*time_columns(seen.header), *names)
+    ]
+    rows = []
+    for k, (joints, row) in enumerate(zip(q, seen.rows, strict=True)):
+        stamp = [] if t is None else [repr(float(t[k]))]
+        others = [row[i].replace(',', '.') if seen.decimal == ',' else row[i] for i in left]
+        rows.append([*stamp, *(repr(float(v)) for v in joints), *others])
+    header = [*([] if t is None else ['time [s]']), *names, *(seen.header[i] for i in left)]
+    return Cells(log.path, header, rows, seen.lines, '.', [])
+
+
+def _stream(times: Array) -> bool:
+    return times.size > 2 and float(np.median(np.diff(times))) < STREAM
+
+
+def _stamps(cells: Cells, options: TableOptions, said: list[str]) -> Array | None:
+    """Return the stamps of a file, None where it has none that are good for anything."""
+    given = options.time_column if options.time_column in cells.header else None
+    date, clock = (None, given) if given else time_columns(cells.header)
+    t, sentence = stamps(cells, clock, None if clock is None else unit_of(clock), date)
+    said.append(f'{cells.path.name}: {sentence}')
+    return t

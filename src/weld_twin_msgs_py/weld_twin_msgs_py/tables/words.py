@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The words that people and machines put into the headers of tables, English and German."""
+
+from __future__ import annotations
+
+import re
+
+MEASURED = {
+    'measurement', 'measured', 'meas', 'actual', 'act', 'tracker', 'laser', 'real', 'observed',
+    'ist', 'istwert', 'gemessen', 'messung', 'mess', 'messwert', 'current', 'feedback',
+}  # fmt: skip
+"""Before or after an axis: what an instrument saw, or an encoder."""
+TARGET = {
+    't', 'target', 'goal', 'nominal', 'cmd', 'command', 'commanded', 'desired', 'set', 'ref',
+    'soll', 'sollwert', 'vorgabe', 'nenn', 'programmed', 'planned',
+}  # fmt: skip
+DIFFERENCE = {
+    'dif', 'diff', 'difference', 'delta', 'err', 'error', 'dev', 'deviation',
+    'abweichung', 'differenz', 'fehler',
+}  # fmt: skip
+SIGMA = {
+    'std', 'sigma', 'sd', 'stdev', 'stddev', 'uncertainty', 'unsicherheit', 'streuung',
+}  # fmt: skip
+NEUTRAL = {
+    'pos', 'position', 'point', 'punkt', 'coordinate', 'koordinate', 'trans', 'translation', 'tcp',
+    'reflector', 'reflektor', 'smr', 'probe', 'marker', 'ball', 'kugel', 'tool', 'werkzeug',
+}  # fmt: skip
+"""Words that say nothing on who measured."""
+OWN = {'trans', 'tcp', 'robtarget'}
+"""Words under which controllers store the pose that they compute themselves."""
+JOINT = {
+    'joint', 'joints', 'axis', 'theta', 'q', 'j', 'a', 'rax', 'robax', 'ax', 'rj',
+    'achse', 'gelenk', 'winkel', 'angle', 'angles', 'pos', 'position',
+}  # fmt: skip
+"""Words of which one at least goes with the number of a joint, and none that is not here."""
+NAMES_A_JOINT = JOINT - {'angle', 'angles', 'winkel', 'pos', 'position'}
+LETTERS = ('s', 'l', 'u', 'r', 'b', 't')
+"""The joints of six-axis arms of Yaskawa."""
+TURNS = {
+    'rot',
+    'rotation',
+    'orient',
+    'orientation',
+    'orientierung',
+    'euler',
+    'rpy',
+    'angle',
+    'winkel',
+}
+"""With an axis: an angle about it."""
+QUATERNION = {'quat', 'quaternion', 'q'}
+ANGLES = {'roll': 'x', 'pitch': 'y', 'yaw': 'z'}
+KUKA = {'a': 'z', 'b': 'y', 'c': 'x'}
+"""Frames of KUKA: A about z, then B about y, then C about x."""
+FANUC = {'w': 'x', 'p': 'y', 'r': 'z'}
+"""Positions of FANUC: R about z, P about y, W about x."""
+UNITS = {
+    'm': 'm', 'meter': 'm', 'meters': 'm', 'mm': 'mm', 'cm': 'cm',
+    'millimeter': 'mm', 'millimeters': 'mm',
+    'rad': 'rad', 'radian': 'rad', 'radians': 'rad',
+    'deg': 'deg', 'degree': 'deg', 'degrees': 'deg', '\N{DEGREE SIGN}': 'deg', 'grad': 'deg',
+    's': 's', 'sec': 's', 'seconds': 's', 'sekunden': 's', 'ms': 'ms', 'us': 'us', 'ns': 'ns',
+    '\N{DEGREE SIGN}c': 'degC', 'degc': 'degC', 'celsius': 'degC',
+}  # fmt: skip
+"""How units are written, and what this project calls them."""
+TEMPERATURE = re.compile(r'temp')
+DATE = re.compile(r'^(date|datum)\b')
+CLOCK = re.compile(r'time|stamp|zeit|^t$')
+"""With a column of dates beside it: the time of day."""
+
+
+def tokens(name: str) -> list[str]:
+    """Return the words and numbers of a header cell, in lower case; 'istX' is two words."""
+    parted = re.sub(r'(?<=[a-zäöü])(?=[XYZ]\b)', ' ', name)
+    return [t for t in re.split(r'[^0-9a-zäöüß\N{DEGREE SIGN}]+', parted.lower()) if t]

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Write the security policy of the nodes, for SROS2.
+
+Each node may publish, hear, answer and ask what it does, and nothing else. Give the namespace and
+the remaps that the nodes are started with.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = 'weld-twin policy --namespace left --remap joint_states:=/cell/states --out left.xml'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('--namespace', default='', help='namespace of the nodes')
+    parser.add_argument(
+        '--remap',
+        action='append',
+        default=[],
+        metavar='FROM:=TO',
+        help='a name the nodes have and the one they get; may be repeated',
+    )
+    parser.add_argument(
+        '--nodes', nargs='+', default=[], metavar='NODE', help='nodes it is for (default: all)'
+    )
+    parser.add_argument('--out', metavar='FILE', help='file to write (default: print it)')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write or print the policy."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.files.whole_files import write_text
+
+    from ...live.policy import policy
+
+    remaps = {}
+    for text in args.remap:
+        name, mark, to = text.partition(':=')
+        if not (mark and name and to):
+            raise DataError(f"--remap takes FROM:=TO, got '{text}'")
+        remaps[name] = to
+    text = policy(args.namespace, remaps, args.nodes)
+    if args.out is None:
+        print(text, end='')
+        return 0
+    write_text(args.out, text)
+    print(f'{args.out}: policy for {", ".join(args.nodes) or "all nodes"}')
+    return 0

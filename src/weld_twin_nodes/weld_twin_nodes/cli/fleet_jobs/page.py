@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Write a page that ranks the cells of a database, and a page for each cell with its control charts."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..history_jobs import opened
+
+INDEX = 'index.html'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        '--db', required=True, metavar='URL', help='an SQLite file, or postgresql+psycopg://...'
+    )
+    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the pages')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the pages."""
+    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.fleet.cell_page import cell_page
+    from weld_twin_nodes.fleet.ranking_page import ranking_page
+    from weld_twin_nodes.offline.content_hash import digest
+    from weld_twin_nodes.offline.output_directory import new_directory
+
+    def file(cell: str) -> str:
+        return f'cell_{digest(cell)[:16]}.html'
+
+    with opened(args) as database, new_directory(args.out, mark=INDEX) as place:
+        cells = database.cells()
+        for cell in cells:
+            write_text(place / file(cell), cell_page(database, cell, INDEX))
+        write_text(place / INDEX, ranking_page(database, file))
+    print(f'{args.out}/{INDEX}: {len(cells)} cells')
+    return 0

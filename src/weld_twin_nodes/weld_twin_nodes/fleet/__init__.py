@@ -1,0 +1,8 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of many cells, diagnosed side by side into one database."""
+
+from .listed import Listed, read_list
+from .running import run_fleet
+
+__all__ = ['Listed', 'read_list', 'run_fleet']

@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of the history, alike on SQLite and PostgreSQL."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sqlalchemy import MetaData
+
+VERSION = 1
+"""Of the schema; a database of another one is refused."""
+ARRAYS = ('value', 'prior_std', 'covariance', 'tool')
+
+
+def stored(at: datetime) -> datetime:
+    """Return an instant as it is stored: UTC, without saying so."""
+    return at.astimezone(timezone.utc).replace(tzinfo=None)
+
+
+def schema() -> MetaData:
+    """Return the tables."""
+    import sqlalchemy as sql
+
+    tables = sql.MetaData()
+    sql.Table('about', tables, sql.Column('version', sql.Integer, primary_key=True))
+    sql.Table(
+        'cells',
+        tables,
+        sql.Column('id', sql.Integer, primary_key=True),
+        sql.Column('name', sql.String(200), unique=True, nullable=False),
+        sql.Column('robot', sql.String(200), nullable=False),
+        sql.Column('kinematics', sql.String(64), nullable=False),
+    )
+    sql.Table(
+        'verdicts',
+        tables,
+        sql.Column('id', sql.Integer, primary_key=True),
+        sql.Column('cell_id', sql.ForeignKey('cells.id'), nullable=False),
+        sql.Column('at', sql.DateTime, nullable=False),
+        sql.Column('recording', sql.Text, nullable=False),
+        sql.Column('status', sql.String(40), nullable=False),
+        *(
+            sql.Column(name, sql.Float)
+            for name in ('confidence', 'gap_m', 'floor_m', 'unexplained_m')
+        ),
+        sql.Column('effects', sql.JSON, nullable=False),
+        sql.Column('names', sql.JSON, nullable=False),
+        *(sql.Column(name, sql.LargeBinary, nullable=False) for name in ARRAYS),
+        sql.UniqueConstraint('cell_id', 'at'),
+        sql.Index('verdicts_of_a_cell', 'cell_id', 'at'),
+    )
+    _fleet(tables)
+    return tables
+
+
+def _fleet(tables: MetaData) -> None:
+    """Add what a fleet keeps: how each recording went, and what changed on each cell."""
+    import sqlalchemy as sql
+
+    sql.Table(
+        'runs',
+        tables,
+        sql.Column('id', sql.Integer, primary_key=True),
+        sql.Column('key', sql.String(64), unique=True, nullable=False),
+        sql.Column('cell', sql.String(200), nullable=False, index=True),
+        sql.Column('recording', sql.Text, nullable=False),
+        sql.Column('state', sql.String(40), nullable=False),
+        sql.Column('sentence', sql.Text, nullable=False),
+        sql.Column('verdict_id', sql.ForeignKey('verdicts.id')),
+        sql.Column('seconds', sql.Float, nullable=False),
+        sql.Column('memory', sql.BigInteger, nullable=False),
+    )
+    sql.Table(
+        'findings',
+        tables,
+        sql.Column('cell_id', sql.ForeignKey('cells.id'), primary_key=True),
+        sql.Column('newest', sql.Integer, nullable=False),
+        sql.Column('diagnoses', sql.Integer, nullable=False),
+        sql.Column('changes', sql.JSON, nullable=False),
+    )

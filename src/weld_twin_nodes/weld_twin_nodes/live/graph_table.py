@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What each node says, hears, answers and asks: the one table of it.
+
+The security policy and the reference are made from it; a test holds it to what the running nodes
+open. Names without a slash lie in the node's namespace.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from weld_twin_msgs_py.messages import topics as t
+from weld_twin_msgs_py.messages.topics import Topic
+
+_EVERYBODY_SAYS = ('/diagnostics', '/parameter_events', '/rosout')
+_EVERYBODY_HEARS = ('/clock',)
+_EVERYBODY_ANSWERS = tuple(
+    f'~/{name}'
+    for name in (
+        'describe_parameters',
+        'get_parameter_types',
+        'get_parameters',
+        'get_type_description',
+        'list_parameters',
+        'set_parameters',
+        'set_parameters_atomically',
+    )
+)
+COMMON = frozenset({*_EVERYBODY_SAYS, *_EVERYBODY_HEARS, *_EVERYBODY_ANSWERS})
+"""What every node has."""
+_MANAGED_ANSWER = tuple(
+    f'~/{name}'
+    for name in (
+        'change_state',
+        'get_available_states',
+        'get_available_transitions',
+        'get_state',
+        'get_transition_graph',
+    )
+)
+_MANAGED_SAY = ('~/transition_event',)
+
+
+class Spoken(NamedTuple):
+    """Topics and services of a node, sorted, each name once."""
+
+    publishes: tuple[str, ...]
+    hears: tuple[str, ...]
+    answers: tuple[str, ...]
+    asks: tuple[str, ...] = ()
+
+
+def _names(rows: Iterable[Topic | str]) -> set[str]:
+    return {row if isinstance(row, str) else row.relative for row in rows}
+
+
+def _node(
+    says: Iterable[Topic | str],
+    hears: Iterable[Topic | str],
+    answers: Iterable[str] = (),
+    asks: Iterable[str] = (),
+) -> Spoken:
+    return Spoken(
+        tuple(sorted({*_EVERYBODY_SAYS, *_names(says)})),
+        tuple(sorted({*_EVERYBODY_HEARS, *_names(hears)})),
+        tuple(sorted({*_EVERYBODY_ANSWERS, *answers})),
+        tuple(sorted(asks)),
+    )
+
+
+_MODEL = (t.JOINT_STATES, t.TOOL_WRENCH, t.TEMPERATURE, t.ROBOT_DESCRIPTION, *t.FRAMES)
+_MEASURED = (t.MEASURED_POSE, t.MEASURED_POINT, t.ROBOT_DESCRIPTION, *t.FRAMES)
+SPOKEN = {
+    'trajectory_generator': _node(
+        (t.JOINT_STATES, t.PLANNED_TRAJECTORY, t.PLANNED_PATH),
+        (
+            *(t.DEVIATION, t.DIAGNOSTICS, t.JOINT_TRAJECTORY, t.PATH, t.ROBOT_DESCRIPTION),
+            *t.FRAMES,
+        ),
+    ),
+    'error_injector': _node((t.ACTUAL_JOINT_STATES, t.MEASURED_POSE), _MODEL, ('~/reload',)),
+    'forward_kinematics_twin': _node(
+        (t.TWIN_POSE, t.TWIN_COVARIANCE, t.TWIN_BASE), _MODEL, ('~/reload',)
+    ),
+    'deviation_analyzer': _node(
+        (t.DEVIATION, t.DEVIATION_METRICS), (*_MEASURED, t.TWIN_BASE, t.TWIN_POSE)
+    ),
+    'live_diagnosis': _node(
+        (t.DIAGNOSIS, *_MANAGED_SAY), (*_MODEL, *_MEASURED, t.MEASURED_SIGMA), _MANAGED_ANSWER
+    ),
+    'deviation_markers': _node((t.MARKERS,), (*_MEASURED, t.TWIN_BASE, t.DEVIATION)),
+    'contact_marker': _node((t.CONTACT,), (t.JOINT_STATES,), ('~/mark',)),
+    'recorder': _node(
+        _MANAGED_SAY,
+        (*t.TOPICS, *t.AROUND, *t.FRAMES, '/parameter_events'),
+        ('~/counts', *_MANAGED_ANSWER),
+        ('error_injector/get_parameters', 'forward_kinematics_twin/get_parameters'),
+    ),
+}
+"""Everything that a node opens with any of its parameters."""

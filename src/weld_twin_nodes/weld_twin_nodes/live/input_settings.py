@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters by which a node is told what its inputs call things."""
+
+from __future__ import annotations
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.errors import ModelError
+from weld_twin_msgs_py.files.yaml_file import parse_yaml
+
+from .cell_node import CellNode
+from .settings import Setting
+
+JOINT_SETTINGS = (
+    Setting(
+        'joint_prefix',
+        '',
+        "what the joint states put before the robot's joint names; empty: any one prefix is taken "
+        'off and told',
+    ),
+    Setting(
+        'joint_map',
+        '',
+        "what the joint states call joints, as a YAML mapping from the robot's own names, such as "
+        "'{joint_1: A1, joint_2: A2}'; names left out stay",
+    ),
+    Setting(
+        'joint_part',
+        '',
+        "part of a controller's state that is taken; empty: reference for commanded joints, "
+        'feedback where it stands for a measurement',
+    ),
+)
+MEASURED_SETTINGS = (
+    Setting(
+        'measured_frame',
+        '',
+        'frame that was measured, where measurements come as transforms',
+    ),
+)
+
+
+def joint_names(node: CellNode, robot: Robot) -> tuple[str, ...] | None:
+    """
+    Return what the joint states call the joints of a robot; None where nothing is said.
+
+    Raises
+    ------
+    ModelError
+        The map is no mapping of names, names a joint the robot has not, or gives a name twice.
+
+    """
+    prefix, text = node.setting('joint_prefix'), node.setting('joint_map')
+    if not prefix and not text:
+        return None
+    given = parse_yaml(text, 'joint_map') if text else {}
+    if not isinstance(given, dict) or not all(isinstance(v, str) for v in given.values()):
+        raise ModelError(
+            f'joint_map must be a mapping of names such as {{joint_1: A1}}, got {text!r}'
+        )
+    strange = [name for name in given if name not in robot.joint_names]
+    if strange:
+        raise ModelError(
+            f'joint_map names {strange[0]!r}, which is no joint of robot {robot.name!r}: '
+            + ', '.join(robot.joint_names)
+        )
+    names = tuple(prefix + given.get(name, name) for name in robot.joint_names)
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ModelError(f'joint_map calls two joints {twice!r}')
+    return names

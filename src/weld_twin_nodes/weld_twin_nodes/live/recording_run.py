@@ -1,0 +1,258 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One recording: from the first subscription to a bag that says what it lacks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from weld_twin_core import __version__
+from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
+from weld_twin_msgs_py.bags.ends import COMPLETENESS
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.cdr_read import decoder
+from weld_twin_msgs_py.messages.topics import BY_NAME, DIAGNOSTICS, ROBOT_DESCRIPTION, Topic
+
+from .asked_nodes import AskedNodes
+from .cell_node import CellNode
+from .completeness import AT_START, SentBook, Shortfall, shortfall
+from .offered_channel import offered_channel
+from .outputs import Sent
+from .recorded_topic import RecordedTopic
+
+_TEXT = decoder(ROBOT_DESCRIPTION.type)
+LOOK_EVERY = 0.2
+"""Seconds between two looks for new topics."""
+DRAIN_EVERY = 0.05
+"""Seconds between two looks at whether an ending recorder has everything."""
+TOLD_WITHIN = 5.0
+"""
+Seconds an ending recorder waits for the publishers' last counts. Each tells once a second; on a
+crowded machine some seconds late; one that takes longer hangs.
+"""
+ARRIVED_WITHIN = 4.0
+"""
+Seconds without a message after which what is still missing will not come. Fast DDS tells every 3 s
+what it has sent, and a reader that lacks some of it asks for it then.
+"""
+LONGEST = 9.0
+"""Seconds in all; `ros2 launch` kills what has not ended ten seconds after Ctrl-C."""
+
+
+class RecordingRun:
+    """
+    Writes messages as they arrive, unread, until it is ended.
+
+    Parameters
+    ----------
+    node : CellNode
+        The recorder, with its parameters.
+    done : callable
+        Is told when everything is there, or nothing can be written any more.
+    joins : bool
+        It begins at a moment of its own: what was sent before is none of it.
+
+    """
+
+    def __init__(self, node: CellNode, done: Callable[[], None], *, joins: bool = False) -> None:
+        self._node, self._done, self._joins = node, done, joins
+        self.out: str = node.setting('out')
+        self._bag = BackgroundBag(
+            GrowingBag(
+                self.out,
+                storage=node.setting('storage'),
+                split_bytes=int(node.setting('split_size') * 1e6),
+                split_ns=int(node.setting('split_duration') * 1e9),
+                provenance={'version': __version__},
+            ),
+            flush_every=node.setting('flush_every'),
+            most_bytes=int(node.setting('buffer') * 1e6),
+        )
+        self._asked = AskedNodes(node, self._bag.note)
+        self._book = SentBook()
+        self._ending_since: float | None = None
+        self._moved = 0.0
+        self._lacked: dict[str, int] = {}
+        self._concluded = False
+        self._topics: dict[str, RecordedTopic] = {}
+        self._untyped = {
+            node.resolve_topic_name(name): _row(name) for name in node.setting('topics')
+        }
+        self._subscribe()
+        self._health: Any = node.create_subscription(
+            DIAGNOSTICS.message_class(),
+            DIAGNOSTICS.name,
+            self._hear,
+            DIAGNOSTICS.requested.to_rclpy(),
+        )
+        self._timers = [node.every(LOOK_EVERY, self._look)]
+        names = ', '.join([*self._topics, *(f'{name} when it appears' for name in self._untyped)])
+        node.get_logger().info(f'recording into {self.out}: {names}')
+
+    # Taking in -------------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        """Follow what appears on the graph; end when nothing can be written any more."""
+        self._subscribe()
+        for topic in self._topics.values():
+            topic.adapt()
+        self._meet()
+        if self._bag.failure is not None:
+            self._done()
+
+    def _subscribe(self) -> None:
+        """Subscribe to the topics whose type is known by now."""
+        present: dict[str, list[str]] = {}
+        if any(row is None for row in self._untyped.values()):
+            present = dict(self._node.get_topic_names_and_types())
+        for name, row in list(self._untyped.items()):
+            kinds = [row.type] if row is not None else present.get(name, [])
+            if not kinds:
+                continue
+            del self._untyped[name]
+            try:
+                self._topics[name] = RecordedTopic(self._node, name, kinds[0], row, self._write)
+            except ImportError as error:
+                sentence = f'{name} is not recorded: {error}'
+                self._node.get_logger().warning(sentence)
+                self._node.health.lasting[f'type of {name}'] = sentence
+
+    def _write(self, topic: RecordedTopic, data: bytes) -> None:
+        if not topic.announced:
+            topic.announced = True
+            self._bag.announce(offered_channel(topic.name, topic.kind, topic.publishers()))
+        taken = self._bag.put(
+            topic.name, topic.kind, data, self._node.get_clock().now().nanoseconds
+        )
+        if not taken and self._bag.failure is None:
+            self._node.refuse(topic.name, 'the disk does not keep up, messages are dropped')
+        if topic.name.endswith(ROBOT_DESCRIPTION.name) and topic.kind == ROBOT_DESCRIPTION.type:
+            self._asked.describe(_TEXT(data).data)
+
+    def _hear(self, message: Any) -> None:
+        for values in from_messages.diagnostics(message).values():
+            self._book.take(values, time.monotonic())
+
+    def counts(self) -> dict[str, Any]:
+        """Return the messages written by topic, and those dropped."""
+        written, dropped = self._bag.counts()
+        counts = {topic: written.get(topic, 0) for topic in self._topics}
+        return {**counts, 'dropped': dropped}
+
+    # Ending ----------------------------------------------------------------------------------
+
+    def end(self) -> None:
+        """Begin to take in what is under way; it is told when all of it is there."""
+        if self._ending_since is None:
+            self._ending_since = self._moved = time.monotonic()
+            self._timers.append(self._node.every(DRAIN_EVERY, self._complete))
+            self._complete()
+
+    def end_at_once(self) -> None:
+        """Take in what is under way, and come back when it is there; no callback is served."""
+        self.end()
+        while not self._concluded:
+            self._hear_waiting()
+            time.sleep(DRAIN_EVERY)
+            self._complete()
+
+    def _hear_waiting(self) -> None:
+        """Take the health messages that have reached this process and wait for their turn."""
+        handle = self._health.handle
+        with handle:
+            while (taken := handle.take_message(self._health.msg_type, False)) is not None:
+                self._hear(taken[0])
+
+    def _complete(self) -> None:
+        """Conclude once everything that was sent is there, or will not come any more."""
+        if self._concluded or self._ending_since is None:
+            return
+        now = time.monotonic()
+        for topic in self._topics.values():
+            topic.take_waiting()
+        lacking = {name: short.recorded for name, short in self._shortfalls().items()}
+        if lacking != self._lacked:
+            self._lacked, self._moved = lacking, now
+        since = now - self._ending_since
+        untold = self._untold() and since < TOLD_WITHIN
+        coming = lacking and now - self._moved < ARRIVED_WITHIN
+        if not (untold or coming) or since > LONGEST or self._bag.failure is not None:
+            self._conclude()
+            self._done()
+
+    def _untold(self) -> list[str]:
+        """Return the nodes recorded here that have not told what they sent since the end."""
+        there = self._meet()
+        silent = self._book.silent_since(self._ending_since or time.monotonic())
+        return [node for node in silent if node in there]
+
+    def _meet(self) -> set[str]:
+        """Return who publishes what is recorded, and take note of them."""
+        there = {name for topic in self._topics.values() for name in topic.publishing_nodes()}
+        for node in there:
+            self._book.meet(node, time.monotonic())
+        return there
+
+    def _shortfalls(self) -> dict[str, Shortfall]:
+        _, dropped = self._bag.counts()
+        out = {}
+        for name, topic in self._topics.items():
+            count, first, last = topic.taken
+            found = shortfall(
+                self._book.sent(name), Sent(count - dropped.get(name, 0), first, last)
+            )
+            if found is not None and not (self._joins and found.where == AT_START):
+                out[name] = found
+        return out
+
+    def _conclude(self) -> None:
+        """Note what every publisher sent and what is missing of it, and say so."""
+        self._concluded = True
+        lacking = self._shortfalls()
+        told: dict[str, Any] = {}
+        for name, topic in self._topics.items():
+            sent = self._book.sent(name)
+            if name in lacking:
+                told[name] = lacking[name].to_mapping()
+            elif sent is not None and 0 < sent.number <= topic.taken.number:
+                told[name] = {'sent': sent.number, 'recorded': sent.number, 'missing': 0}
+        self._bag.note(COMPLETENESS, told)
+        sentences = [short.sentence(name) for name, short in lacking.items()]
+        sentences += [f'{name}: nobody published this topic' for name in self._untyped]
+        if self._ending_since is not None:
+            sentences += [f'{node} has not told what it sent' for node in self._untold()]
+        for k, sentence in enumerate(sentences):
+            self._node.get_logger().warning(sentence)
+            self._node.health.lasting[f'incomplete {k}'] = sentence
+        if told and not lacking:
+            total = sum(row['sent'] for row in told.values())
+            self._node.get_logger().info(f'all {total:,} messages that were sent are in the bag')
+
+    def close(self) -> None:
+        """
+        Complete the bag and stop listening.
+
+        Raises
+        ------
+        TwinError
+            It could not all be written.
+
+        """
+        for timer in self._timers:
+            self._node.destroy_timer(timer)
+        if not self._concluded:
+            for topic in self._topics.values():
+                topic.take_waiting()
+            self._conclude()
+        self._asked.close()
+        self._node.destroy_subscription(self._health)
+        for topic in self._topics.values():
+            topic.close()
+        self._bag.close()
+
+
+def _row(name: str) -> Topic | None:
+    """Return the row of the table of topics for a name as it was given."""
+    return BY_NAME.get('/' + name.lstrip('/'))

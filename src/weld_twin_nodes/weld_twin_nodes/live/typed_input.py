@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A subscription that takes the type its publishers have, out of those that are understood."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.messages.cdr_read import READERS, decoder
+from weld_twin_msgs_py.messages.topics import JOINT_STATES, Qos, Topic
+
+from . import qos_events
+from .message_classes import message_class
+from .partners import Senders, elsewhere, unheard_publishers
+
+
+class TypedInput:
+    """
+    One input of a node, by a subscription that is made anew when its publishers have another type.
+
+    Parameters
+    ----------
+    node : Node
+    topic : Topic
+    kinds : sequence of str
+        Message types that are understood, the usual one first.
+    wanted : Qos
+    take : callable
+        Takes the type and the bytes of a message.
+    required : bool
+        Whether the node can do nothing without it.
+    remark, lack, unmatched : callable
+        Take a sentence: on the type that is taken, on one that is not installed, and on a partner
+        whose quality of service does not match.
+
+    Attributes
+    ----------
+    kind : str
+        The type that is taken now.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: Topic,
+        kinds: Sequence[str],
+        wanted: Qos,
+        take: Callable[[str, bytes], None],
+        *,
+        required: bool,
+        remark: Callable[[str], None],
+        lack: Callable[[str], None],
+        unmatched: Callable[[str], None],
+    ) -> None:
+        self._node, self._topic, self._kinds = node, topic, tuple(kinds)
+        self._name = node.resolve_topic_name(topic.relative)
+        self._wanted, self._take = wanted, take
+        self._required, self._senders = required, Senders()
+        self._remark, self._lack, self._unmatched = remark, lack, unmatched
+        self.kind = self._kinds[0]
+        self._missing: set[str] = set()
+        self._subscription: Any = None
+        self.adapt()
+        if self._subscription is None:
+            self._subscribe(self.kind)
+
+    def adapt(self) -> None:
+        """Follow the publishers where none is left of the type that is taken."""
+        there = {info.topic_type for info in self._node.get_publishers_info_by_topic(self._name)}
+        kind = next((kind for kind in (self.kind, *self._kinds) if kind in there), self.kind)
+        if kind != self.kind and kind not in self._missing:
+            self._subscribe(kind)
+
+    def unheard(self) -> list[str]:
+        """Return a sentence for every publisher of which nothing arrives, or where one may be."""
+        if self._required and not self._node.count_publishers(self._name):
+            lost = elsewhere(self._node, self._name, self._topic.name, self._kinds)
+            return [lost] if lost else []
+        return unheard_publishers(self._node, self._name, self.kind, self._wanted, self._kinds)
+
+    def switched(self) -> str:
+        """Return in a sentence that somebody else publishes it now, empty where that is not so."""
+        return self._senders.changed(self._node, self._name)
+
+    def close(self) -> None:
+        """Take nothing more."""
+        self._node.destroy_subscription(self._subscription)
+
+    def _subscribe(self, kind: str) -> None:
+        """Take one type; go on with the one before where it is not installed."""
+        try:
+            wanted_class = message_class(kind)
+        except ImportError as error:
+            self._missing.add(kind)
+            self._lack(f'{self._name} carries what cannot be read: {error}')
+            return
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+        if kind != self._kinds[0]:
+            self._remark(f'{self._name} is taken as {kind}')
+        self.kind = kind
+
+        def take(data: bytes) -> None:
+            self._take(kind, data)
+
+        self._subscription = self._node.create_subscription(
+            wanted_class,
+            self._topic.relative,
+            take,
+            self._wanted.to_rclpy(),
+            raw=True,
+            event_callbacks=qos_events.of_subscription(self._name, self._wanted, self._unmatched),
+        )
+
+
+def reader(kind: str) -> Callable[[bytes], Any]:
+    """
+    Return what turns serialised messages of a type into objects.
+
+    Types of standard packages are read here. Others, whose definitions differ from release to
+    release, are read by the package that is installed.
+    """
+    if kind in READERS or kind == JOINT_STATES.type:
+        return decoder(kind)
+    of = message_class(kind)
+
+    def read(data: bytes) -> Any:
+        try:
+            return deserialize_message(bytes(data), of)
+        except Exception as error:  # rclpy raises bare RuntimeError and what numpy raises
+            raise DataError(
+                f'{len(data)} bytes that are no {kind} ({error}); something else publishes there'
+            ) from None
+
+    return read

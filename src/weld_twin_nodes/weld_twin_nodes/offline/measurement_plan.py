@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A first measurement: how many stations, which, and the files to make it with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.predicting.planned import plan_stations
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.joint_file import write_joint_motion
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.programs import Context
+
+from .exporting import SLOW
+
+STATIONS, TABLE = 'stations.yaml', 'measurements.csv'
+"""Files of a plan: the stations as a path file, and a table to write the measurements into."""
+LABELS = {'krl': 'A{}', 'rapid': 'rax_{}', 'fanuc-ls': 'J{}'}
+YASKAWA = 'SLURBT'
+"""What pendants call the joints."""
+MOST = 120
+"""Stations of a plan: more make a model surer by less than one in a hundred each."""
+LEAST = 24
+"""Stations below which a fit names too little of what is there: plans that were carried out with 16
+left up to six times what was promised (docs/first_measurement.md)."""
+SURE = 0.95
+"""Share of the region's postures at which the tool is to be within the tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """
+    A measurement planned for a robot.
+
+    Attributes
+    ----------
+    q : array, shape (N, n) [rad, m]
+        Stations in the order of a short way.
+    minutes : array, shape (M + 1,)
+        That 0, 1, ... stations take.
+    sigma, within : array, shape (M + 1,)
+        As `MeasurementPlan` has them, up to the most that fit into the time.
+    needed : int or None
+        Stations after which the tolerance is kept; None where not even all that fit do.
+
+    """
+
+    q: Array
+    minutes: Array
+    sigma: Array
+    within: Array
+    needed: int | None
+
+
+def planned(
+    robot: Robot,
+    tolerance: float,
+    minutes: float,
+    noise: float,
+    seconds: float,
+    spread: float,
+) -> Planned:
+    """
+    Return the stations that a first measurement needs.
+
+    Parameters
+    ----------
+    robot : Robot
+    tolerance : float [m]
+    minutes : float
+        There is time for.
+    noise : float [m]
+        Of every measured coordinate.
+    seconds : float [s]
+        That one station takes, the way to it apart.
+    spread : float [rad]
+        Half the range of every joint.
+
+    Raises
+    ------
+    DataError
+        There is no time for the fewest stations that can be judged.
+
+    """
+    most = int(min(60.0 * minutes / seconds, MOST))
+    if most >= LEAST:
+        plan = plan_stations(robot, most, tolerance, noise, spread)
+        took = _took(robot, plan.q, seconds)
+        most = int(np.searchsorted(took, minutes, side='right')) - 1
+    if most < LEAST:
+        raise DataError(
+            f'{minutes:g} minutes are enough for {max(most, 0)} stations of {seconds:g} s and the '
+            f'way between them, and {LEAST} are the fewest; give more time or shorter stations'
+        )
+    enough = np.flatnonzero(plan.within[: most + 1] >= SURE)
+    needed = int(max(enough[0], LEAST)) if enough.size else None
+    count = needed or most
+    q = plan.q[:count][_way(robot, plan.q[:count])]
+    return Planned(q, took[: most + 1], plan.sigma[: most + 1], plan.within[: most + 1], needed)
+
+
+def _took(robot: Robot, q: Array, seconds: float) -> Array:
+    """Return the minutes that the first 0, 1, ... stations take, the short way."""
+    out = [0.0]
+    for count in range(1, len(q) + 1):
+        ordered = q[:count][_way(robot, q[:count])]
+        out.append((count * seconds + _travel(robot, np.diff(ordered, axis=0)).sum()) / 60.0)
+    return np.maximum.accumulate(np.array(out))
+
+
+def _travel(robot: Robot, steps: Array) -> Array:
+    """Return the time of joint moves at the share of a first run, shape (..., ) [s]."""
+    return np.asarray((np.abs(steps) / robot.max_velocity).max(axis=-1) / SLOW[0])
+
+
+def _way(robot: Robot, q: Array) -> list[int]:
+    """Return the stations in the order of always the nearest next."""
+    times = _travel(robot, q[:, None] - q[None])
+    order = [0]
+    for _ in range(1, len(q)):
+        times[:, order[-1]] = np.inf
+        order.append(int(times[order[-1]].argmin()))
+    return order
+
+
+def write_plan(folder: Path, context: Context, language: str | None, plan: Planned) -> None:
+    """
+    Write the stations and the table to fill in.
+
+    The table has the joint angles that are asked for, as the pendant shows them; where the arm
+    stands at others, those count.
+
+    Parameters
+    ----------
+    folder : Path
+    context : Context
+        The robot, and how its controller counts.
+    language : str, optional
+        Of the controller, for its names of the joints.
+    plan : Planned
+
+    """
+    robot = context.robot
+    t = plan.minutes[len(plan.q)] * 60.0 / len(plan.q) * np.arange(1.0, len(plan.q) + 1.0)
+    motion = {'static': True, 'joint_names': robot.joint_names, 't': t, 'q': plan.q}
+    write_joint_motion(folder / STATIONS, motion, 'Stations of a first measurement')
+    shown = context.degrees(4)
+    units = np.where(robot.prismatic, 'mm', 'deg')
+    labels = [
+        f'{name} [{unit}]' for name, unit in zip(_labels(robot, language), units, strict=True)
+    ]
+    rows = [','.join(['station', *labels, 'x [mm]', 'y [mm]', 'z [mm]'])]
+    for k, q in enumerate(plan.q, start=1):
+        cells = [f'{value:.4f}' for value in shown.numbers(q, [])]
+        rows.append(','.join([str(k), *cells, '', '', '']))
+    write_text(folder / TABLE, '\n'.join(rows) + '\n')
+
+
+def _labels(robot: Robot, language: str | None) -> list[str]:
+    """Return the names of the joints on the pendant."""
+    if language == 'inform' and robot.n == len(YASKAWA):
+        return list(YASKAWA)
+    label = LABELS.get(language or '')
+    return [label.format(k + 1) for k in range(robot.n)] if label else list(robot.joint_names)

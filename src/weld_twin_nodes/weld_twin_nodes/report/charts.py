@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Charts that a page draws by itself: lines over something, with ticks, hover values, linked cursors.
+
+uPlot draws them; it is embedded, see `uplot/README.md`. A page with charts passes ``charts=True`` to
+`html.document`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+
+from .html import Html, tag
+
+POINTS = 1200
+"""Points of a line at most: two for each pixel of a chart as wide as the page."""
+_DIGITS = 5
+"""Digits kept of a number: a tenth of a pixel in a chart of a thousand."""
+
+
+class Line(NamedTuple):
+    """
+    One line of a chart.
+
+    Attributes
+    ----------
+    name : str
+        As the legend has it.
+    values : array, shape (N,)
+        In the unit of the chart; what is not finite leaves a gap.
+    colour : str
+        A colour of the page's style: 'before', 'after', 'soft', 'good', 'care', 'bad'.
+    dashed : bool
+    points : bool
+        Dots in place of a line.
+
+    """
+
+    name: str
+    values: Array
+    colour: str = 'after'
+    dashed: bool = False
+    points: bool = False
+
+
+class Axis(NamedTuple):
+    """What runs along an axis, and its unit, which may be empty."""
+
+    label: str
+    unit: str = ''
+
+
+def chart(
+    title: str,
+    x: Array,
+    lines: Sequence[Line],
+    axes: tuple[Axis, Axis],
+    *,
+    key: str | None = None,
+    band: tuple[Array, Array] | None = None,
+    dates: bool = False,
+    from_zero: bool = False,
+    height: int = 180,
+) -> Html:
+    """
+    Return a figure of lines over something; a page's script draws it.
+
+    Parameters
+    ----------
+    title : str
+        Shown above; read out instead of the picture.
+    x : array, shape (N,)
+        Ascending; seconds since 1970 where ``dates`` is set.
+    lines : sequence of Line
+    axes : tuple of two Axis
+    key : str, optional
+        Charts of one key have one cursor, and share it with whatever else listens on the page.
+    band : tuple of two arrays, shape (N,), optional
+        Least and most, shaded in the colour of the first line.
+    dates : bool
+    from_zero : bool
+        Whether the axis starts at zero, as sizes do.
+    height : int
+        Of the drawing [px].
+
+    """
+    spec: dict[str, Any] = {
+        'x': plain(x),
+        'axes': [axis._asdict() for axis in axes],
+        'lines': [{**line._asdict(), 'values': plain(line.values)} for line in lines],
+        'band': None if band is None else [plain(side) for side in band],
+        'key': key,
+        'dates': dates,
+        'zero': from_zero,
+        'height': height,
+    }
+    return tag(
+        'figure',
+        tag('figcaption', title),
+        tag('div', class_='plot', role='img', aria_label=title, style=f'min-height:{height}px'),
+        embedded(spec),
+        class_='chart',
+    )
+
+
+def embedded(data: Any, id_: str | None = None) -> Html:
+    """Return JSON in a page that no name in it can end the script element with."""
+    text = json.dumps(data, separators=(',', ':'), allow_nan=False).replace('<', '\\u003c')
+    return tag('script', Html(text), type='application/json', id_=id_)
+
+
+def plain(values: Array) -> list[float | None]:
+    """Return numbers as short as a picture allows; None for what is not finite."""
+    return [
+        float(f'{v:.{_DIGITS}g}') if isfinite(v) else None for v in np.asarray(values).tolist()
+    ]
+
+
+def thinned(rows: Sequence[Array], most: int = POINTS) -> np.ndarray:
+    """
+    Return an index of at most so many samples, the largest of every row among them.
+
+    Parameters
+    ----------
+    rows : sequence of array, shape (N,)
+        What must keep its peaks; at least one.
+    most : int
+
+    """
+    count = rows[0].size
+    if count <= most:
+        return np.arange(count)
+    bins = np.array_split(np.arange(count), max(most // len(rows), 1))
+    kept = {int(b[np.argmax(row[b])]) for b in bins for row in rows}
+    return np.array(sorted(kept | {0, count - 1}))

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The five tutorials as a beginner follows them: from an empty directory to a verdict."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_nodes.cli import main
+
+DOCS = Path(__file__).parents[2] / 'docs'
+PAGES = ('ur', 'kuka', 'abb', 'fanuc', 'yaskawa')
+MINUTES, WORDS_A_MINUTE = 5, 200
+"""What a page may take to read."""
+TURNED = 2.5e-3
+"""How far the third joint of the arm really stands off [rad]."""
+
+
+def commands(page):
+    text = (DOCS / f'first_{page}.md').read_text(encoding='utf-8')
+    return [
+        line
+        for block in re.findall(r'```bash\n(.*?)```', text, re.S)
+        for line in block.split('\n')
+        if line
+    ]
+
+
+def measure(table, robot, third_from_ground):
+    """Fill the table in as a tracker would that stands somewhere, on an arm that is off."""
+    plant = pytest.importorskip('weld_twin_lab.plant.plant', reason='needs MuJoCo')
+    from weld_twin_lab.plant.plant_recording import Command
+    from weld_twin_lab.plant.tracker import Tracker
+
+    with open(table, newline='') as file:
+        head, *rows = csv.reader(file)
+    q = np.radians([[float(cell) for cell in row[1:7]] for row in rows])
+    if third_from_ground:
+        q[:, 2] += q[:, 1]
+    flaws = [
+        {'effect': 'joint_offset', 'joint': robot.joint_names[2], 'offset': TURNED},
+        {'effect': 'base_pose', 'xyz': [1.2, -0.4, 0.3], 'rotvec': [0.02, 0.01, 0.6]},
+        {'effect': 'tool_pose', 'xyz': [0.08, 0.02, 0.15], 'rotvec': [0.0, 0.0, 0.0]},
+    ]
+    t = 1.0 + np.arange(float(len(q)))
+    told = Command(t, q, static=True)
+    noisy = Tracker(sigma=3e-5, orientation=False)
+    seen = plant.run(robot.to_mapping(), flaws, told, noisy, np.random.default_rng(5))
+    with open(table, 'w', newline='') as file:
+        out = csv.writer(file)
+        out.writerow(head)
+        for row, place in zip(rows, seen.position, strict=True):
+            out.writerow([*row[:7], *(f'{1e3 * value:.3f}' for value in place)])
+
+
+@pytest.mark.parametrize('page', PAGES)
+def test_a_beginner_comes_to_a_verdict(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    plan, read, ask = commands(page)
+    robot = catalog.load(re.search(r'--robot (\S+)', plan)[1])
+    assert main(shlex.split(plan)[1:]) == 0, capsys.readouterr().err
+    measure(Path('plan/measurements.csv'), robot, third_from_ground=page == 'fanuc')
+    assert main(shlex.split(read)[1:]) == 0, capsys.readouterr().err
+    assert main(shlex.split(ask)[1:]) == 0, capsys.readouterr().out
+    found = json.loads(Path('found/diagnosis.json').read_text())
+    alike = [site for group in found['verdict']['indistinguishable'] for site in group]
+    named = [(e['effect'], e['joint']) for e in found['verdict']['effects'] + alike]
+    assert ('joint_offset', robot.joint_names[2]) in named, named
+    assert found['shrink']['rms_after_m'] < 2e-4
+
+
+@pytest.mark.parametrize('page', PAGES)
+def test_a_page_is_three_commands_and_five_minutes(page):
+    text = (DOCS / f'first_{page}.md').read_text(encoding='utf-8')
+    assert len(commands(page)) <= 3
+    assert len(text.split()) <= MINUTES * WORDS_A_MINUTE

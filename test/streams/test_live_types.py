@@ -1,0 +1,355 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Running nodes beside trackers and controllers that publish other types, names and frames.
+
+The others live in a participant of their own: real messages of `tf2_msgs` and `control_msgs`.
+"""
+
+from __future__ import annotations
+
+import time
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.errors import TwinError
+from weld_twin_lab.campaigns.building.message_packages import messages_importable
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
+from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+
+pytestmark = pytest.mark.cells
+
+ROBOT = load('ur5')
+NAMES = ROBOT.joint_names
+Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+BEYOND = Q + [0.0, 0.0, 2e-3, 0.0, 0.0, 0.0]
+OFF = np.array([1e-3, 2e-3, -3e-3])
+S = 1_000_000_000
+EXACT = 1e-9
+BEAT = 0.02
+"""Seconds between two measurements."""
+
+
+@pytest.fixture(scope='session', autouse=True)
+def packages():
+    try:
+        with messages_importable():
+            yield
+    except TwinError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def cell(tmp_path):
+    with Cell(tmp_path / 'cell') as cell:
+        yield cell
+
+
+@pytest.fixture
+def other(cell):
+    """A node of somebody else, in a participant of its own."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=cell.domain)
+    node = Node('other', context=context)
+    yield node
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def kind(name):
+    package, message = name.split('/')
+    return getattr(import_module(f'{package}.msg'), message)
+
+
+def publisher(cell, other, name, topic, *, latched=False):
+    """Return a publisher that the cell knows of."""
+    durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+    out = other.create_publisher(kind(name), topic, QoSProfile(depth=10, durability=durability))
+    cell.wait(lambda: cell.node.count_publishers(topic) > 0, topic)
+    return out
+
+
+def placed(T, stamp, frame, child):
+    """Return a TransformStamped."""
+    out = kind('geometry_msgs/TransformStamped')()
+    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp, S)
+    out.header.frame_id, out.child_frame_id = frame, child
+    p, q = out.transform.translation, out.transform.rotation
+    p.x, p.y, p.z = T[:3, 3].tolist()
+    q.x, q.y, q.z, q.w = Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
+    return out
+
+
+def tf(*transforms):
+    return kind('tf2_msgs/TFMessage')(transforms=list(transforms))
+
+
+def pose(T):
+    def make(stamp):
+        out = kind('geometry_msgs/PoseWithCovarianceStamped')()
+        each = placed(T, stamp, 'world', '')
+        out.header = each.header
+        p, where = out.pose.pose.position, each.transform
+        p.x, p.y, p.z = T[:3, 3].tolist()
+        out.pose.pose.orientation = where.rotation
+        return out
+
+    return make
+
+
+def controller(reference, feedback, names=NAMES):
+    def make(stamp):
+        out = kind('control_msgs/JointTrajectoryControllerState')(joint_names=list(names))
+        out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp, S)
+        out.reference.positions, out.feedback.positions = list(reference), list(feedback)
+        return out
+
+    return make
+
+
+def dynamic(q, names=NAMES):
+    def make(stamp):
+        value = kind('control_msgs/InterfaceValue')
+        out = kind('control_msgs/DynamicJointState')(joint_names=list(names))
+        out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp, S)
+        out.interface_values = [
+            value(interface_names=['effort', 'position'], values=[9.0, each]) for each in q
+        ]
+        return out
+
+    return make
+
+
+def shifted():
+    T = forward(ROBOT, Q)
+    T[:3, 3] += OFF
+    return T
+
+
+MEASURED = {
+    'PoseWithCovarianceStamped': (
+        'geometry_msgs/PoseWithCovarianceStamped',
+        lambda: pose(shifted()),
+        {},
+        OFF,
+    ),
+    'TransformStamped': (
+        'geometry_msgs/TransformStamped',
+        lambda: lambda stamp: placed(shifted(), stamp, 'world', 'probe'),
+        {},
+        OFF,
+    ),
+    'TFMessage': (
+        'tf2_msgs/TFMessage',
+        lambda: (
+            lambda stamp: tf(
+                placed(np.eye(4), stamp, 'a', 'b'), placed(shifted(), stamp, 'world', 'probe')
+            )
+        ),
+        {'measured_frame': 'probe'},
+        OFF,
+    ),
+    'JointTrajectoryControllerState': (
+        'control_msgs/JointTrajectoryControllerState',
+        lambda: controller(Q, BEYOND),
+        {},
+        (forward(ROBOT, BEYOND) - forward(ROBOT, Q))[:3, 3],
+    ),
+}
+
+
+@pytest.mark.parametrize('which', MEASURED)
+def test_a_measurement_of_another_type_is_compared(cell, other, which):
+    """UR5 stands in the world as the base does, so both axes are one."""
+    name, make, parameters, expected = MEASURED[which]
+    theirs, make = publisher(cell, other, name, '/tracker'), make()
+    remap = ['--ros-args', '-r', 'measured/tool_pose:=/tracker']
+    cell.add(DeviationAnalyzer, reliable_inputs=True, cli_args=remap, **parameters)
+    deviations, twin = cell.collect('/deviation'), cell.publisher(TWIN_POSE)
+    base, T = cell.publisher(TWIN_BASE), forward(ROBOT, Q)
+    base.publish(cell.messages.pose(S, np.zeros(3), np.eye(3), 'world'))
+    stamp = [S]
+
+    def step():
+        stamp[0] += S // 100
+        twin.publish(cell.messages.pose(stamp[0], T[:3, 3], T[:3, :3], 'world'))
+        theirs.publish(make(stamp[0]))
+        return len(deviations) > 2
+
+    cell.wait(step, 'deviations')
+    np.testing.assert_allclose(from_messages.vector3(deviations.last), expected, atol=EXACT)
+
+
+MIXED = [3, 1, 5, 0, 2, 4]
+JOINTS = {
+    'DynamicJointState in another order': (
+        'control_msgs/DynamicJointState',
+        dynamic,
+        (Q[MIXED], [NAMES[k] for k in MIXED]),
+        {},
+    ),
+    'reference of a controller': (
+        'control_msgs/JointTrajectoryControllerState',
+        controller,
+        (Q, BEYOND),
+        {},
+    ),
+    'feedback of a controller': (
+        'control_msgs/JointTrajectoryControllerState',
+        controller,
+        (BEYOND, Q),
+        {'joint_part': 'feedback'},
+    ),
+    'a map of names behind a prefix': (
+        'control_msgs/DynamicJointState',
+        dynamic,
+        (Q, ['left/A1', *(f'left/{name}' for name in NAMES[1:])]),
+        {'joint_prefix': 'left/', 'joint_map': f'{{{NAMES[0]}: A1}}'},
+    ),
+}
+
+
+@pytest.mark.parametrize('which', JOINTS)
+def test_the_twin_takes_joints_of_another_type_and_under_other_names(cell, other, which):
+    name, make, values, parameters = JOINTS[which]
+    theirs, make = publisher(cell, other, name, '/joint_states'), make(*values)
+    cell.add(ForwardKinematicsTwin, **parameters)
+    poses, stamp = cell.collect(TWIN_POSE.name), [S]
+
+    def step():
+        stamp[0] += S // 100
+        theirs.publish(make(stamp[0]))
+        return len(poses) > 2
+
+    cell.wait(step, 'poses')
+    np.testing.assert_allclose(
+        from_messages.pose(poses.last)[0], forward(ROBOT, Q)[:3, 3], atol=1e-12
+    )
+
+
+def turned(x, angle):
+    T = np.eye(4)
+    T[:3, :3], T[0, 3] = Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix(), x
+    return T
+
+
+T_WORLD_TRACKER = turned(2.0, 0.7)
+
+
+class TrackedCell:
+    """An analyzer in 'world', and a tracker that measures in a frame of its own."""
+
+    def __init__(self, cell, other):
+        self.cell, self.other = cell, other
+        self.fixed = publisher(cell, other, 'tf2_msgs/TFMessage', '/tf_static', latched=True)
+        self.moving = publisher(cell, other, 'tf2_msgs/TFMessage', '/tf')
+        self.tracker = publisher(cell, other, 'geometry_msgs/PointStamped', '/measured/tool_point')
+        cell.add(DeviationAnalyzer, measuring_frame='world')
+        self.health, self.deviations = HealthListener(cell.node), cell.collect('/deviation')
+        self.twin, self.base = cell.publisher(TWIN_POSE), cell.publisher(TWIN_BASE)
+        self.base.publish(cell.messages.pose(S, np.zeros(3), np.eye(3), 'world'))
+        self.stamp, self.due = S, 0.0
+
+    def step(self, frame='tracker'):
+        """Send the pose of the twin, and the same point with OFF as the tracker sees it, on a beat."""
+        if time.monotonic() < self.due:
+            return
+        self.due = time.monotonic() + BEAT
+        self.stamp += round(BEAT * S)
+        T = forward(ROBOT, Q)
+        self.twin.publish(self.cell.messages.pose(self.stamp, T[:3, 3], T[:3, :3], 'world'))
+        out = kind('geometry_msgs/PointStamped')()
+        out.header.stamp.sec, out.header.stamp.nanosec = divmod(self.stamp, S)
+        out.header.frame_id = frame
+        seen = np.linalg.inv(T_WORLD_TRACKER) @ [*(T[:3, 3] + OFF), 1.0]
+        out.point.x, out.point.y, out.point.z = seen[:3].tolist()
+        self.tracker.publish(out)
+
+    def wait_told(self, sentence, also=lambda: None, **options):
+        def told():
+            self.step(**options)
+            also()
+            return any(
+                sentence in text
+                for name, entries in self.health.told.items()
+                if name.startswith('/deviation_analyzer')
+                for level, text in entries
+                if level != 'ok'
+            )
+
+        self.cell.wait(told, f'{sentence!r} to be told')
+
+    def assert_compared(self):
+        self.deviations.messages.clear()
+
+        def step():
+            self.step()
+            return len(self.deviations) > 2
+
+        self.cell.wait(step, 'deviations')
+        np.testing.assert_allclose(from_messages.vector3(self.deviations.last), OFF, atol=EXACT)
+
+
+def test_measurements_are_carried_by_tf_and_what_is_wrong_with_it_is_told(cell, other):
+    tracked = TrackedCell(cell, other)
+    tracked.fixed.publish(tf(placed(T_WORLD_TRACKER, 0, 'world', 'tracker')))
+    tracked.assert_compared()
+    tracked.wait_told(
+        "from 'camera' to 'world' is not known: 'camera' is not in /tf", frame='camera'
+    )
+    loop = tf(placed(np.eye(4), S, 'tracker', 'world'))
+    tracked.wait_told(
+        "makes a loop: 'world' in 'tracker'", also=lambda: tracked.moving.publish(loop)
+    )
+    tracked.assert_compared()
+
+
+def test_a_frame_that_moves_and_then_falls_silent_is_told_and_nothing_is_made_up(cell, other):
+    tracked = TrackedCell(cell, other)
+
+    def moving():
+        before = tracked.stamp
+        tracked.step()
+        if tracked.stamp > before:
+            T = placed(T_WORLD_TRACKER, tracked.stamp, 'world', 'tracker')
+            tracked.moving.publish(tf(T))
+        return len(tracked.deviations) > 2
+
+    cell.wait(moving, 'deviations')
+    np.testing.assert_allclose(from_messages.vector3(tracked.deviations.last), OFF, atol=EXACT)
+    tracked.wait_told("the last transform of 'tracker' in 'world' is ")
+    tracked.deviations.messages.clear()
+    last = tracked.stamp
+    cell.wait(moving, 'deviations after the silence')
+    assert tracked.deviations.stamps[-1] > last
+
+
+def test_the_base_is_taken_from_tf_and_told_when_it_moves(cell, other):
+    fixed = publisher(cell, other, 'tf2_msgs/TFMessage', '/tf_static', latched=True)
+    fixed.publish(tf(placed(turned(1.5, 0.4), 0, 'tracker', 'base_link')))
+    frames = {'measuring_frame': 'tracker', 'base_frame': 'base_link', 'base_from_tf': True}
+    cell.add(ForwardKinematicsTwin, **frames)
+    bases, health = cell.collect(TWIN_BASE.name), HealthListener(cell.node)
+    cell.wait(lambda: len(bases) > 0, 'the base')
+    position, rotation = from_messages.pose(bases.last)
+    np.testing.assert_allclose(position, turned(1.5, 0.4)[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(rotation, turned(1.5, 0.4)[:3, :3], atol=1e-12)
+    fixed.publish(tf(placed(turned(1.504, 0.4), 0, 'tracker', 'base_link')))
+    said = "'base_link' has moved in 'tracker' by 4 mm and 0 degrees since this node started"
+    node = '/forward_kinematics_twin'
+    cell.wait(lambda: any(said in text for _, text in health.told[node]), said)

@@ -40,13 +40,14 @@ ARGUMENTS = {
     'use_sim_time': ('false', 'take the time from /clock'),
     'bag': ('', 'bag to record, if any'),
     'align': ('', 'frames that the live diagnosis fits along: base, tool, or base,tool'),
+    'managed': ('false', 'recorder and live diagnosis wait for the transitions of managed nodes'),
     'live': ('true', 'diagnose while the cell works'),
     'rviz': ('false', 'show the cell in RViz'),
     'config': ('', 'parameter file; empty: config/cell.yaml of this package'),
 }
 MODEL = ('base_frame', 'base_from_tf', 'base_link', 'measuring_frame', 'robot', 'tip_link')
 MEASURED = ('joint_prefix', 'measured_frame')
-FLAGS = ('base_from_tf',)
+FLAGS = ('base_from_tf', 'managed')
 TOPICS = {
     'joint_states': 'joint_topic',
     'measured/tool_point': 'point_topic',
@@ -58,8 +59,8 @@ NODES = {
     'deviation_analyzer': (*MODEL, *MEASURED),
     'deviation_markers': (*MODEL, *MEASURED),
     'forward_kinematics_twin': (*MODEL, 'joint_prefix', 'model'),
-    'live_diagnosis': (*MODEL, *MEASURED, 'align', 'model'),
-    'recorder': (),
+    'live_diagnosis': (*MODEL, *MEASURED, 'align', 'managed', 'model'),
+    'recorder': ('managed',),
 }
 """Nodes, and the arguments each takes as a parameter of the same name."""
 CONDITIONS = {

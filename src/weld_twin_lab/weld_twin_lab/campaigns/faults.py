@@ -10,7 +10,8 @@ afterwards.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,56 +21,92 @@ from weld_twin_msgs_py.files import markdown
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('--only', default='', help='faults whose names contain this')
+    parser.add_argument(
+        '--part',
+        default='1/1',
+        metavar='K/N',
+        help='the K-th of N parts; what the file has of other faults is kept',
+    )
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what each node did under each fault."""
     import tempfile
 
+    from .faulting.fault_list import JOINT_FAULTS, OTHER_FAULTS
+    from .faulting.scenes import SCENES
+
+    everything = (*JOINT_FAULTS, *OTHER_FAULTS, *SCENES)
+    mine = [each for each in _part(everything, args.part) if args.only in each.name]
+    with tempfile.TemporaryDirectory() as folder:
+        made = _on_bench([each for each in mine if each not in SCENES], Path(folder), tell)
+        made['scenes'] = _scenes([each for each in mine if each in SCENES], Path(folder), tell)
+    order = [each.name for each in everything]
+    result = _with_those_before(made, args, order)
+    rows = [*result['faults'], *result['scenes'], *result['bags'].values()]
+    refused = all(row['refused'] for row in result['parameters'])
+    return {'passed': refused and all(row['passed'] for row in rows), **result}
+
+
+def _part(everything: Sequence[Any], part: str) -> Sequence[Any]:
+    """Return the K-th of N parts of a list, told as K/N."""
+    from weld_twin_core.errors import DataError
+
+    k, _, n = part.partition('/')
+    if not (k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
+        raise DataError(f"--part takes K/N, such as 1/4, got '{part}'")
+    ends = [round(i * len(everything) / int(n)) for i in (int(k) - 1, int(k))]
+    return everything[ends[0] : ends[1]]
+
+
+def _with_those_before(
+    made: dict[str, Any], args: argparse.Namespace, order: Sequence[str]
+) -> dict[str, Any]:
+    """Return the rows of this run, and of an earlier one for all else, if it was a part."""
+    out = {**made, 'bags': {f'{args.part} {args.only}'.strip(): made.pop('bag')}}
+    file = Path(args.out)
+    if not file.exists() or (args.part == '1/1' and not args.only):
+        return {**made, 'bags': out['bags']}
+    before = json.loads(file.read_text(encoding='utf-8'))
+    for key in ('faults', 'scenes'):
+        rows = {row['fault']: row for row in (*before.get(key, ()), *made[key])}
+        out[key] = sorted(rows.values(), key=lambda row: order.index(row['fault']))
+    out['parameters'] = made['parameters'] or before['parameters']
+    out['bags'] = {**before.get('bags', {}), **out['bags']}
+    out.pop('bag', None)
+    return out
+
+
+def _on_bench(faults: Sequence[Any], folder: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return what each node of one cell did under each fault, and whether its bag is whole."""
     from weld_twin_nodes.harness import Cell
 
     from .faulting.bad_parameters import abuse
     from .faulting.bench import Bench
-    from .faulting.fault_list import JOINT_FAULTS, OTHER_FAULTS
 
     rows: list[dict[str, Any]] = []
-    scenes: list[dict[str, Any]] = []
-    wanted = [fault for fault in (*JOINT_FAULTS, *OTHER_FAULTS) if args.only in fault.name]
-    parameters: list[dict[str, Any]] = []
-    recorded: dict[str, Any] = {'opens': True, 'messages': 0, 'reason': ''}
-    with tempfile.TemporaryDirectory() as folder:
-        bag = Path(folder) / 'bag'
-        if wanted:
-            with Cell(Path(folder) / 'cell') as cell:
-                bench = Bench(cell, bag)
-                bench.ready()
-                for fault in wanted:
-                    rows.append(_tried(bench, fault))
-                    tell(_line(rows[-1]))
-                parameters = abuse(bench)
-            recorded = _recorded(bag)
-        scenes = _scenes(args.only, Path(folder), tell)
-    passed = all(row['passed'] for row in (*rows, *scenes))
-    return {
-        'passed': passed and recorded['opens'] and all(row['refused'] for row in parameters),
-        'faults': rows,
-        'scenes': scenes,
-        'parameters': parameters,
-        'bag': recorded,
-    }
+    if not faults:
+        return {'faults': rows, 'parameters': [], 'bag': {'passed': True, 'messages': 0}}
+    with Cell(folder / 'cell') as cell:
+        bench = Bench(cell, folder / 'bag')
+        bench.ready()
+        for fault in faults:
+            rows.append(_tried(bench, fault))
+            tell(_line(rows[-1]))
+        parameters = abuse(bench)
+    return {'faults': rows, 'parameters': parameters, 'bag': _recorded(folder / 'bag')}
 
 
-def _scenes(only: str, folder: Path, tell: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Return what was told in each scene whose name contains a text."""
-    from .faulting.scenes import SCENES, play
+def _scenes(
+    scenes: Sequence[Any], folder: Path, tell: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """Return what was told in each scene."""
+    from .faulting.scenes import play
 
     rows = []
-    for k, scene in enumerate(SCENES):
-        if only in scene.name:
-            rows.append(play(scene, folder / f'scene{k}'))
-            tell(
-                f'{"ok  " if rows[-1]["passed"] else "FAIL"} {scene.name}: {_sentences(rows[-1])}'
-            )
+    for k, scene in enumerate(scenes):
+        rows.append(play(scene, folder / f'scene{k}'))
+        tell(f'{"ok  " if rows[-1]["passed"] else "FAIL"} {scene.name}: {_sentences(rows[-1])}')
     return rows
 
 
@@ -113,8 +150,8 @@ def _recorded(bag: Any) -> dict[str, Any]:
             for _ in reader.messages(list(reader.topics)):
                 count += 1
     except TwinError as error:
-        return {'opens': False, 'messages': count, 'reason': str(error)}
-    return {'opens': True, 'messages': count, 'reason': ''}
+        return {'passed': False, 'messages': count, 'reason': str(error)}
+    return {'passed': True, 'messages': count, 'reason': ''}
 
 
 COLUMNS = {
@@ -151,12 +188,13 @@ def table(result: dict[str, Any]) -> str:
         for each in row['told']
         if each['within_s']
     ]
+    messages = sum(bag['messages'] for bag in result['bags'].values())
     refused = sum(row['refused'] for row in result['parameters'])
     return (
         markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows)
         + '\n'
         + markdown.table(('fault', 'done', 'node', 'after [s]', 'what it said', 'passed'), *told)
         + f'\n{refused} of {len(result["parameters"])} absurd parameter values were refused in a '
-        f'sentence. The bag of the whole campaign has {result["bag"]["messages"]:,} messages; all '
-        'of them can be read.\n'
+        f'sentence. The bags of the whole campaign have {messages:,} messages; all of them can be '
+        'read.\n'
     )

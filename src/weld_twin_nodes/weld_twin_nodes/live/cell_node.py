@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
@@ -17,7 +17,7 @@ from rclpy.node import Node
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import TwinError
-from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, CONTROLLER, FedBack, plain_messages
+from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, MEASURED_POSE, VOLATILE, Topic
 
@@ -27,7 +27,7 @@ from .health import Health, Input
 from .outputs import Output
 from .partners import unreached_subscribers
 from .settings import Setting
-from .typed_input import TypedInput, reader
+from .typed_input import Turn, TypedInput, measured_turn, reader
 
 WARN_EVERY = 5.0
 """Seconds between two warnings about the same topic."""
@@ -209,7 +209,7 @@ class CellNode(Node):
         state = self.health.watch(name, required=required, steady=topic.steady)
         kinds = ACCEPTED.get(topic.name, (topic.type,))
         usual, read = kinds[0], {kinds[0]: reader(kinds[0])}
-        turn = self._plain(topic)
+        turn = self._plain_turn(topic)
 
         def guarded(kind: str, data: bytes) -> None:
             state.received += 1
@@ -242,21 +242,14 @@ class CellNode(Node):
         self.health.inputs.clear()
         self.frames = None
 
-    def _plain(self, topic: Topic) -> Callable[[str, Any], Iterable[Any]]:
+    def _plain_turn(self, topic: Topic) -> Turn:
         """Return what turns messages of other types into those that the topic usually has."""
         part = self.setting('measured_frame') if self.has_parameter('measured_frame') else ''
         of_joints = self.setting('joint_part') if self.has_parameter('joint_part') else ''
-        robot, names = self.arm, self.joint_names
         if topic is not MEASURED_POSE:
             return partial(plain_messages, part=of_joints)
-        fed_back = None if robot is None else FedBack(robot, of_joints, names)
-
-        def turn(kind: str, message: Any) -> Iterable[Any]:
-            if kind == CONTROLLER and fed_back is not None:
-                return fed_back(message)
-            return plain_messages(kind, message, part)
-
-        return turn
+        fed_back = FedBack(self.arm, of_joints, self.joint_names) if self.arm else None
+        return measured_turn(part, fed_back)
 
     def _subscribe_to(
         self,
@@ -281,6 +274,8 @@ class CellNode(Node):
             unmatched=self._unmatched_event,
         )
         self._sources.append(source)
+        if required:
+            self.get_logger().info(f'waiting for {self.resolve_topic_name(topic.relative)}')
 
     def refuse(self, source: str, reason: str) -> None:
         """Count a sample that cannot be used, and say why, now and then."""

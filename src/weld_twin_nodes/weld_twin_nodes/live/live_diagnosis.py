@@ -75,6 +75,7 @@ class LiveDiagnosis(ManagedNode):
         self._begun = -float('inf')
         self._seen: int | None = None
         self._speaking = False
+        self._printed = ''
         self._verdict = self.offer(DIAGNOSIS)
         self._measured: MeasuredInputs | None = None
         self._looking: Any = None
@@ -139,6 +140,9 @@ class LiveDiagnosis(ManagedNode):
             self.refuse('window', result)
         elif result is not None and (self._speaking or result.status != 'none'):
             self._speaking = True
+            if result.sentence != self._printed:
+                self._printed = result.sentence
+                self.get_logger().info(result.sentence)
             self.health.fault = result.sentence if result.status == 'unsound' else ''
             self._verdict.publish(
                 self.messages.diagnostics(

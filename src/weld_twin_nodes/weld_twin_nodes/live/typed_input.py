@@ -4,19 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.assembly.foreign_types import CONTROLLER, FedBack, plain_messages
 from weld_twin_msgs_py.messages.cdr_read import READERS, decoder
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, Qos, Topic
 
 from . import qos_events
 from .message_classes import message_class
 from .partners import Senders, elsewhere, unheard_publishers
+
+Turn = Callable[[str, Any], Iterable[Any]]
+"""A type and a message of it, to the messages that it stands for."""
 
 
 class TypedInput:
@@ -117,6 +121,27 @@ class TypedInput:
             raw=True,
             event_callbacks=qos_events.of_subscription(self._name, self._wanted, self._unmatched),
         )
+
+
+def measured_turn(part: str, fed_back: FedBack | None) -> Turn:
+    """
+    Return what turns messages that stand for a measured pose into poses.
+
+    Parameters
+    ----------
+    part : str
+        The frame that was measured, where a message holds several.
+    fed_back : FedBack, optional
+        Turns what a controller feeds back; None where the robot is not known.
+
+    """
+
+    def turn(kind: str, message: Any) -> Iterable[Any]:
+        if kind == CONTROLLER and fed_back is not None:
+            return fed_back(message)
+        return plain_messages(kind, message, part)
+
+    return turn
 
 
 def reader(kind: str) -> Callable[[bytes], Any]:

@@ -219,6 +219,9 @@ class Cause:
     share : float
         Of the squared gap.
     share_ci90 : (float, float)
+    members : tuple of int
+        The effects of the model that stand for it, as `Model.found` counts them; none where
+        nothing that can be carried over stands for it.
 
     """
 
@@ -227,6 +230,7 @@ class Cause:
     name: tuple[tuple[Site, float], ...]
     share: float
     share_ci90: tuple[float, float]
+    members: tuple[int, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.causes``."""
@@ -297,6 +301,28 @@ class Traces:
     after: tuple[Array, ...]
     trusted: tuple[np.ndarray, ...] = ()
     """Which samples are no outliers, bool, shape (M,); empty for all of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contributions:
+    """
+    What every cause adds to the position residual, sample by sample, one entry per recording [m].
+
+    Each stretch is predicted from the others. What is left and all parts add up to the residual
+    of the model without effects, so any combination of causes can be thought away.
+
+    Attributes
+    ----------
+    left : tuple of array, shape (M, 3)
+        With the whole model.
+    parts : tuple of array, shape (K, M, 3)
+        Of every cause in the order of `Diagnosis.causes`; then, if there are any, of the effects
+        that the model holds and no cause stands for.
+
+    """
+
+    left: tuple[Array, ...]
+    parts: tuple[Array, ...]
 
 
 @dataclass(frozen=True)
@@ -453,6 +479,8 @@ class Diagnosis:
     causes: tuple[Cause, ...] = ()
     """What is certain of each cause, largest share of the squared gap first."""
     shares: Shares = Shares(0.0, 0.0)
+    contributions: Contributions | None = None
+    """What every cause adds to the gap; None where the model carries no cause."""
     unsound: tuple[Unsound, ...] = ()
     """Mistakes found in data and set-up; all of them undone unless the status is 'unsound'."""
     changed: tuple[Changed, ...] = ()

@@ -13,8 +13,9 @@ from ..advice.next_step import next_step
 from ..frames.places import NOT_TOLD, not_told
 from ..hypotheses.search import Search
 from ..levels.causes import causes
+from ..levels.contributions import contributions
 from ..levels.curved import Curved
-from ..result import Cause, Diagnosis, Shares, Shrink
+from ..result import Cause, Contributions, Diagnosis, Shares, Shrink
 from ..soundness import Examined
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
@@ -86,11 +87,21 @@ def answer(
         posterior=posterior,
         causes=told,
         shares=shares,
+        contributions=_contributions(unseen, told, verdict, rival),
         unsound=examined.told(found.final.model.found),
         signs=known,
         contacts=contact_spreads(found, unseen),
         **_compared(found, examined),
     )
+
+
+def _contributions(
+    unseen: Unseen, told: tuple[Cause, ...], verdict: Verdict, rival: Curved | None
+) -> Contributions | None:
+    """Return what every cause adds to the gap, where the causes stand for the model carried."""
+    if verdict.status == 'unknown' and rival is not None and rival.unseen is not unseen:
+        return None
+    return contributions(unseen, told)
 
 
 def _trusted(

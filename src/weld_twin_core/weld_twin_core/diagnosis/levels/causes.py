@@ -96,6 +96,7 @@ def causes(
                 float(max(share - STUDENT * error, 0.0)),
                 float(min(share + STUDENT * error, 1.0)),
             ),
+            members=claim.members,
         )
         for claim, share, error in zip(claims, whole, spread, strict=True)
     ]

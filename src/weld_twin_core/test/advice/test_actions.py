@@ -18,7 +18,7 @@ def said(robot, **entry):
     [
         (
             {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 4.2e-4},
-            ['Re-master elbow_joint by -0.420 mrad (-0.0241 deg)'],
+            ['Re-master elbow_joint by -0.0241 deg (-0.420 mrad)'],
         ),
         (
             {'effect': 'link_length', 'joint': 'shoulder_lift_joint', 'da': 6e-4},

@@ -10,10 +10,13 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.result import (
     Candidate,
+    Cause,
     Check,
+    Contributions,
     Diagnosis,
     Found,
     Gap,
+    Shares,
     Shrink,
     Site,
     Traces,
@@ -90,7 +93,11 @@ def diagnosis(status, robot, true, believed, recordings, **changes):
     before, after = rms(lines.before), rms(lines.after)
     sites = [(f'{e.name} of {e.site}' if e.site else e.name) for e in found]
     falls = np.linspace(before, after, len(found) + 1)[1:]
+    told = _causes(found, before, after)
     out = Diagnosis(
+        causes=told,
+        shares=Shares(0.0, (after / before) ** 2),
+        contributions=_contributions(robot, found, recordings, lines) if told else None,
         gap=Gap(before, 0.9 * before, 2.0 * before, 4e-4, 1234, np.sqrt(3) * NOISE),
         where=_where(robot, found, lines, recordings),
         status=status,
@@ -118,6 +125,38 @@ def diagnosis(status, robot, true, believed, recordings, **changes):
         recordings=recordings,
     )
     return replace(out, **changes)
+
+
+def _causes(found, before, after):
+    """Return a cause for each effect; equal shares of what they explain together."""
+    share = (1.0 - (after / before) ** 2) / max(len(found), 1)
+    return tuple(
+        Cause(
+            place=((e.at, 0.95),),
+            dependence=((e.on, 0.96),),
+            name=((Site(e.name, e.site), 0.9),),
+            share=share,
+            share_ci90=(max(share - 0.03, 0.0), min(share + 0.03, 1.0)),
+            members=(k,),
+        )
+        for k, e in enumerate(found)
+    )
+
+
+def _contributions(robot, found, recordings, lines):
+    """Return what the twin loses with each effect; what is left is the residual after."""
+    parts = []
+    for r in recordings:
+        whole = Twin(robot, found).poses(r, r.measured.t).position
+        parts.append(
+            np.array(
+                [
+                    whole - Twin(robot, found[:k] + found[k + 1 :]).poses(r, r.measured.t).position
+                    for k in range(len(found))
+                ]
+            )
+        )
+    return Contributions(lines.after, tuple(parts))
 
 
 def _errors(effect):
@@ -260,6 +299,16 @@ def calibration():
     return diagnosis('identified', robot, true, true, [stations(robot)])
 
 
+def circle():
+    robot = load('kuka_kr6_r900')
+    effects = [
+        {'effect': 'backlash', 'joint': 'joint_a3', 'width': 8e-4},
+        {'effect': 'joint_offset', 'joint': 'joint_a2', 'offset': 3e-4},
+        {'effect': 'servo_lag', 'joint': 'joint_a1', 'time_constant': 4e-3},
+    ]
+    return diagnosis('identified', robot, effects, effects, [moving(robot, 'circle')])
+
+
 def nothing():
     robot = load('franka_panda')
     return diagnosis('none', robot, [], [], [moving(robot, 'circle', 'smooth')])
@@ -270,5 +319,6 @@ ALL = {
     'ambiguous': ambiguous,
     'unknown': unknown,
     'calibration': calibration,
+    'circle': circle,
     'nothing': nothing,
 }

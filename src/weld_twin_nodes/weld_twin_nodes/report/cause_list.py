@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Found, Site
+from weld_twin_core.diagnosis.result import Candidate, Diagnosis
 
 from .family_table import families_table
 from .html import Child, Html, bars, joined, section, table, tag
@@ -18,7 +18,7 @@ _CANDIDATES = 6
 _SLOTS = 6
 """Places of which rivals are listed."""
 _INSTEAD = (
-    'No effect is named. These come nearest; the twin carries the curves shown above in their '
+    'No effect is named. These come nearest; the twin carries the curves on the cards above in their '
     'place.'
 )
 _STAND_IN = (
@@ -47,22 +47,11 @@ def _found(diagnosis: Diagnosis) -> Html | None:
     if diagnosis.families:
         return families_table(diagnosis)
     heads = ['Effect', 'Parameter', 'Value ± standard error']
-    alone = [_alone(diagnosis, found) for found in diagnosis.effects]
-    # With a single effect it is what the whole verdict leaves.
-    told = len(alone) > 1 and any(left is not None for left in alone)
     rows: list[list[Child]] = []
-    for found, left in zip(diagnosis.effects, alone, strict=True):
+    for found in diagnosis.effects:
         for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
-            row: list[Child] = [found_name(found) if k == 0 else '', name, value]
-            rows.append(row + [millimetres(left) if k == 0 else ''] * told)
-    heads += ['Left if only this is mended'] * told
+            rows.append([found_name(found) if k == 0 else '', name.replace('_', ' '), value])
     return joined([tag('h3', 'Effects found'), table(heads, rows, 'effects')])
-
-
-def _alone(diagnosis: Diagnosis, found: Found) -> float | None:
-    """Return the gap [m] left if only one effect were mended, where it is known by itself."""
-    site = Site(found.effect.name, found.effect.site)
-    return dict(diagnosis.shrink.alone).get(str(site))
 
 
 def _candidates(diagnosis: Diagnosis) -> Html | None:

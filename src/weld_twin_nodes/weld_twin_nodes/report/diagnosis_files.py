@@ -23,10 +23,11 @@ from weld_twin_msgs_py.tables import write_touches
 
 from ..offline.exports import write_all
 from ..offline.where_it_holds import where_it_holds
-from .diagnosis_page import report_page
+from .diagnosis_page import Sheet, report_page
 
 RESULT = 'diagnosis.json'
 PAGE = 'report.html'
+PDF = 'report.pdf'
 NEXT = 'next_experiment.yaml'
 """The motion to measure next, where one decides; the trajectory generator runs it."""
 TOUCHES = 'next_touches.csv'
@@ -39,6 +40,7 @@ def write_results(
     diagnosis: Diagnosis,
     inputs: Sequence[InputFile],
     given: GivenUrdf | None = None,
+    sheet: Sheet | None = None,
 ) -> None:
     """
     Write diagnosis.json, the page, the model in every form, and what to measure next.
@@ -53,6 +55,8 @@ def write_results(
         What it was made from.
     given : GivenUrdf, optional
         The URDF that the robot was read from; ``robot.urdf`` then keeps its names.
+    sheet : Sheet, optional
+        What the reader wants of the page.
 
     """
     wanted = diagnosis.next_experiment
@@ -63,7 +67,7 @@ def write_results(
         else:
             write_touches(directory / file, wanted['motion'])
         diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': file})
-    write_text(directory / PAGE, report_page(diagnosis, inputs))
+    write_text(directory / PAGE, report_page(diagnosis, inputs, sheet))
     if diagnosis.status != 'unsound':
         posterior = diagnosis.posterior
         notes = [] if posterior is None else where_it_holds(posterior)

@@ -1,29 +1,62 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The report as one HTML file that needs nothing else: no network, no other file."""
+"""The sheet of a diagnosis: one HTML file that needs nothing else, and prints on a side or two."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.metrics.conformity import Rule
 from weld_twin_msgs_py.files.input_files import InputFile
 
-from .cause_levels import levels_section
+from .acceptance import WORDS, Demand, acceptance_section, largest, rule_data, rule_of
+from .cause_cards import causes_cards
 from .cause_list import causes_section
 from .changed_section import changed_section
 from .charts import embedded
+from .circle_plot import circle_data, circles_section
 from .contact_clouds import contacts_section
+from .controllers import brand_of
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
 from .headline import header, opening
 from .html import Html, document, own_file, tag
-from .seam_view import seam_data, seam_section
+from .joint_names import renamed
+from .quantities import millimetres
+from .seam_view import seam_section
 from .shrinking import shrink_section
+from .switches import page_data
 from .words import STATUS
 
+SCRIPTS = ('sheet.js', 'seam.js', 'polar.js')
 
-def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
+
+@dataclass(frozen=True)
+class Sheet:
+    """
+    What a reader wants of the sheet.
+
+    Attributes
+    ----------
+    demand : Demand
+        Tolerance, and uncertainty of the instrument.
+    joints : mapping from str to str
+        What joints are called on the controller; those not in it keep their name.
+    brand : str, optional
+        Whose controller it is, as `controllers.BRANDS` has it; None and the robot's name tells.
+
+    """
+
+    demand: Demand = field(default_factory=Demand)
+    joints: Mapping[str, str] = field(default_factory=dict)
+    brand: str | None = None
+
+
+def report_page(
+    diagnosis: Diagnosis, inputs: Sequence[InputFile] = (), sheet: Sheet | None = None
+) -> str:
     """
     Return the page.
 
@@ -32,31 +65,59 @@ def report_page(diagnosis: Diagnosis, inputs: Sequence[InputFile] = ()) -> str:
     diagnosis : Diagnosis
     inputs : sequence of InputFile
         What it was made from, as the page lists it.
+    sheet : Sheet, optional
 
     """
-    causes = () if diagnosis.status == 'unsound' else _causes(diagnosis)
+    sheet = sheet or Sheet()
+    rule = rule_of(diagnosis, sheet.demand)
+    sound = diagnosis.status != 'unsound'
     body = tag(
         'main',
         header(diagnosis),
-        opening(diagnosis),
-        *causes,
+        opening(diagnosis, _judged(diagnosis, rule) if sound else None),
+        *(_causes(diagnosis, sheet) if sound else ()),
         checks_section(diagnosis),
-        inputs_section(inputs),
+        _signatures(),
     )
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
-    data = embedded(seam_data(diagnosis), 'data')
-    script = tag('script', own_file('page.js'))
-    return document(title, body, data, script, charts=True)
+    data = {**page_data(diagnosis), 'rule': rule_data(rule), 'circles': circle_data(diagnosis)}
+    named = Html(renamed(body + embedded(data, 'data'), sheet.joints))
+    foot = tag('div', inputs_section(inputs), class_='foot detail')
+    scripts = [tag('script', own_file(name)) for name in SCRIPTS]
+    return document(title, named, foot, charts=True, scripts=scripts)
 
 
-def _causes(diagnosis: Diagnosis) -> tuple[Html | None, ...]:
-    """Return where the gap lies, what causes it, what that brings, and what to measure next."""
+def _causes(diagnosis: Diagnosis, sheet: Sheet) -> tuple[Html | None, ...]:
+    """Return what causes the gap, whether it passes, where it lies, and what to measure next."""
+    brand = sheet.brand or brand_of(diagnosis.model.robot.name)
     return (
+        acceptance_section(diagnosis, sheet.demand),
+        causes_cards(diagnosis, brand),
         seam_section(diagnosis) if diagnosis.contacts is None else contacts_section(diagnosis),
-        levels_section(diagnosis),
+        circles_section(diagnosis),
         where_section(diagnosis),
-        causes_section(diagnosis),
-        changed_section(diagnosis),
-        shrink_section(diagnosis),
         next_section(diagnosis),
+        tag(
+            'div',
+            causes_section(diagnosis),
+            changed_section(diagnosis),
+            shrink_section(diagnosis),
+            class_='detail',
+        ),
     )
+
+
+def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
+    """Return the verdict against the tolerance, where one was given."""
+    if rule.tolerance_m is None or diagnosis.contacts is not None:
+        return None
+    size = largest(diagnosis)[0]
+    verdict = rule.judged(size)
+    told = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
+    return tag('p', f'{told[:1].upper()}{told[1:]}', class_=f'status judged {verdict}')
+
+
+def _signatures() -> Html:
+    """Return the lines to sign on; they are seen in print alone."""
+    lines = [tag('span', text) for text in ('Checked by', 'Date', 'Signature')]
+    return tag('p', *lines, class_='signatures')

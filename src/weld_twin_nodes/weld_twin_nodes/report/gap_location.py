@@ -4,42 +4,102 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from .html import Html, bars, section, tag
+from .html import Html, bars, joined, section, tag
 from .quantities import millimetres, percent, seconds
 from .seam_view import at_rest
-from .words import REGIMES
+from .words import DEPENDENCES, REGIMES, place_name
 
 _VISIBLE = 0.005
 """Share below which a cell of the map stays empty: it would read 0."""
 
 
 def where_section(diagnosis: Diagnosis) -> Html:
-    """Return the map first, then what it sums up to."""
-    where = diagnosis.where
-    parts = [
-        _part('By joint', _joints(diagnosis)),
-        _part(
-            'By regime',
-            bars(
-                [
-                    (REGIMES.get(name, name), share, percent(share))
-                    for name, share in sorted(where.regimes.items(), key=lambda item: -item[1])
-                ]
-            ),
-        ),
-        _part('By direction', _directions(diagnosis)),
-    ]
+    """Return where the causes lie, the same shares as theirs, and the map of each by itself."""
     return section(
         'Where it lies',
-        _map(diagnosis),
-        tag('div', *parts, class_='columns'),
+        tag(
+            'div',
+            _part('By place', bars(_places(diagnosis))),
+            _part('By what it depends on', bars(_dependences(diagnosis))),
+            _part('By direction', _directions(diagnosis)),
+            class_='columns',
+        ),
+        tag('p', _whole(diagnosis), class_='note'),
         _stretches(diagnosis),
+        tag('div', _by_itself(diagnosis), class_='detail'),
         id_='where',
-        lead='How much of the squared gap each joint explains by itself, as a function of what; '
-        'on stretches of the data not used for fitting. Rows and columns overlap, so they need '
-        'not add up.',
+    )
+
+
+def _places(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
+    """Return the shares of the causes by place, then what is left and the noise."""
+    if not diagnosis.causes:
+        return [(name, share, percent(share)) for name, share in diagnosis.where.joints]
+    return _summed([(c.place, c.share, place_name) for c in diagnosis.causes], diagnosis)
+
+
+def _dependences(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
+    if not diagnosis.causes:
+        regimes = sorted(diagnosis.where.regimes.items(), key=lambda item: -item[1])
+        return [(REGIMES.get(name, name), share, percent(share)) for name, share in regimes]
+    words = {**DEPENDENCES, 'constant': 'constant'}
+    return _summed(
+        [(c.dependence, c.share, lambda on: words.get(on, on)) for c in diagnosis.causes],
+        diagnosis,
+    )
+
+
+def _summed(
+    told: Sequence[tuple[Sequence[tuple[str, float]], float, Callable[[str], str]]],
+    diagnosis: Diagnosis,
+) -> list[tuple[str, float, str]]:
+    """Return shares by what is most probable of each cause; with the rest they make a whole."""
+    sums: dict[str, float] = {}
+    for alternatives, share, word in told:
+        name = word(alternatives[0][0]) if alternatives else 'not found'
+        sums[name] = sums.get(name, 0.0) + share
+    rows = sorted(sums.items(), key=lambda item: -item[1])
+    rest = diagnosis.shares
+    rows += [('not explained', rest.unexplained), ('noise', rest.noise)]
+    return [(name, share, percent(share)) for name, share in rows]
+
+
+def _whole(diagnosis: Diagnosis) -> str:
+    """Return why what is found explains less than the whole."""
+    if not diagnosis.causes:
+        return 'Nothing was named, so these are what each joint could explain by itself.'
+    rest = diagnosis.shares
+    told = sum(cause.share for cause in diagnosis.causes)
+    return (
+        f'The causes explain {percent(told)} of the squared gap. {percent(rest.noise)} is noise, '
+        f'which nothing explains, and {percent(rest.unexplained)} is left. So a place can be '
+        'certain and still hold less than the whole.'
+    )
+
+
+def _by_itself(diagnosis: Diagnosis) -> Html | None:
+    picture = _map(diagnosis)
+    if picture is None:
+        return None
+    return joined(
+        [
+            tag('h3', 'Each joint by itself'),
+            tag(
+                'p',
+                'What share of the squared gap each joint could explain alone, as a function of '
+                'what, on stretches not used for fitting. Several can explain the same part, so '
+                'cells need not add up, and the darkest need not be the cause: above, all are '
+                'weighed together.',
+                class_='note',
+            ),
+            picture,
+        ]
     )
 
 
@@ -52,9 +112,13 @@ def _map(diagnosis: Diagnosis) -> Html | None:
     if not where.map_shares:
         return None
     heads = [tag('th', tag('span', name), scope='col') for name in where.map_regressors]
+    heads.append(tag('th', tag('span', 'at the cursor'), scope='col', class_='now'))
     rows = []
-    for name, shares in zip(diagnosis.model.robot.joint_names, where.map_shares, strict=True):
+    robot = diagnosis.model.robot
+    for i, (name, shares) in enumerate(zip(robot.joint_names, where.map_shares, strict=True)):
         cells = [_cell(share) for share in shares]
+        unit = 'mm' if robot.prismatic[i] else '°'
+        cells.append(tag('td', '', data_joint=i, data_unit=unit, class_='now'))
         rows.append(tag('tr', tag('th', name, scope='row'), *cells))
     head = tag('thead', tag('tr', tag('th', 'Joint', scope='col'), *heads))
     return tag(
@@ -70,15 +134,8 @@ def _map(diagnosis: Diagnosis) -> Html | None:
 def _cell(share: float) -> Html:
     strength = min(max(share, 0.0), 1.0)
     class_ = 'strong' if strength > 0.55 else None
-    text = f'{100.0 * share:.0f}' if share >= _VISIBLE else ''
+    text = percent(share) if share >= _VISIBLE else ''
     return tag('td', text, style=f'--share:{strength:.3f}', class_=class_)
-
-
-def _joints(diagnosis: Diagnosis) -> Html:
-    joints = diagnosis.where.joints
-    if diagnosis.effects and not any(share > 0.0 for _, share in joints):
-        return tag('p', 'What was found sits on no joint.', class_='note')
-    return bars([(name, share, percent(share)) for name, share in joints])
 
 
 def _directions(diagnosis: Diagnosis) -> Html:
@@ -101,22 +158,41 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
     if len(path) < 2:
         return None
     largest = max(*(rms for *_, rms in path), 1e-12)
-    cells = [
-        tag(
-            'li',
-            tag('span', f'{1e3 * rms:.2f}', class_='figure'),
-            style=f'--share:{rms / largest:.3f};flex-grow:{max(end - start, 1e-3):.3f}',
-            class_='strong' if rms > 0.55 * largest else None,
-            title=f'{seconds(start)} to {seconds(end)}: {millimetres(rms)}, '
-            f'{percent(share)} of the squared gap',
-        )
-        for start, end, share, rms in path
-    ]
+    strips: list[list[Html]] = [[]]
+    last = path[0][0]
+    for start, end, share, rms in path:
+        if start < last:
+            strips.append([])
+        last = start
+        strips[-1].append(_stretch(diagnosis, len(strips) - 1, (start, end, share, rms), largest))
     return _part(
         'Along the recording',
         tag(
             'div',
-            tag('ol', *cells, class_='strip'),
-            tag('p', 'RMS gap in mm of each stretch, in the order of time.', class_='note'),
+            *(tag('ol', *cells, class_='strip') for cells in strips),
+            tag('p', 'RMS gap of each stretch, and its time.', class_='note'),
         ),
+    )
+
+
+def _stretch(
+    diagnosis: Diagnosis, run: int, told: tuple[float, float, float, float], largest: float
+) -> Html:
+    start, end, share, rms = told
+    stamps = diagnosis.traces.t[run] if run < len(diagnosis.traces.t) else np.zeros(0)
+    zero = float(stamps[0]) if stamps.size else 0.0
+    when = f'{start - zero:.1f} to {seconds(end - zero)}'
+    if at_rest(diagnosis):
+        first, final = np.searchsorted(stamps, [start, end]) + 1
+        when = f'stations {first} to {final}'
+    return tag(
+        'li',
+        tag('span', millimetres(rms), class_='figure'),
+        tag('span', when, class_='when'),
+        style=f'--share:{rms / largest:.3f};flex-grow:{max(end - start, 1e-3):.3f}',
+        class_='strong' if rms > 0.55 * largest else None,
+        title=f'{when}: {millimetres(rms)}, {percent(share)} of the squared gap',
+        data_run=run,
+        data_from=f'{start - zero:.3f}',
+        data_to=f'{end - zero:.3f}',
     )

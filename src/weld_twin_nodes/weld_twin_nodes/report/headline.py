@@ -48,13 +48,14 @@ def recorded_at(recordings: Sequence[Recording]) -> str:
     return f'recorded {when:%Y-%m-%d %H:%M} UTC'
 
 
-def opening(diagnosis: Diagnosis) -> Html:
-    """Return status, verdict, figures and actions."""
+def opening(diagnosis: Diagnosis, judged: Html | None = None) -> Html:
+    """Return status, verdict, how it is judged, figures and actions."""
     first, second = verdict(diagnosis)
     sound = diagnosis.status != 'unsound'
     return tag(
         'section',
         tag('p', STATUS[diagnosis.status], class_=f'status {diagnosis.status}'),
+        judged,
         tag('h1', first),
         tag('p', second, class_='second'),
         _mended(diagnosis),
@@ -128,8 +129,8 @@ def _actions(diagnosis: Diagnosis) -> Html | None:
     if not diagnosis.actions:
         return None
     items = [tag('li', action) for action in worth_doing(diagnosis)]
-    title = 'What to do'
+    title = 'What to do, in this order' if len(items) > 1 else 'What to do'
     if diagnosis.status == 'ambiguous':
         named = listed([found_name(found) for found in diagnosis.effects[:_FEW]])
         title = f'What to do, should it be {named}'
-    return tag('div', tag('h3', title), tag('ul', *items), class_='actions')
+    return tag('div', tag('h3', title), tag('ol', *items), class_='actions')

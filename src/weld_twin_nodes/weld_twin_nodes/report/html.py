@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
@@ -96,7 +96,12 @@ def own_file(name: str) -> Html:
 
 
 def document(
-    title: str, *body: Child, allowed: str = '', style: str = '', charts: bool = False
+    title: str,
+    *body: Child,
+    allowed: str = '',
+    style: str = '',
+    charts: bool = False,
+    scripts: Sequence[Html] = (),
 ) -> str:
     """
     Return a whole page that needs no other file and no network.
@@ -112,6 +117,8 @@ def document(
         CSS after that of all pages.
     charts : bool
         Whether figures of `charts` stand on it; what draws them is then embedded.
+    scripts : sequence of Html
+        Script elements of the page's own, after those of the charts.
 
     """
     if charts:
@@ -120,6 +127,7 @@ def document(
         body += tuple(
             tag('script', own_file(name)) for name in ('uplot/uPlot.iife.min.js', 'charts.js')
         )
+    body += tuple(scripts)
     policy = '; '.join(filter(None, [POLICY, allowed]))
     head = joined(
         [

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from math import floor, isfinite, log10
+from math import floor, isfinite, log10, pi
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,8 @@ UNCHANGED = 0.005
 MISSING = '\N{EN DASH}'
 STAYS = 0.95
 """Ratio of after to before from which a gap counts as staying."""
+DEGREES = 180.0 / pi
+"""Degrees in a radian."""
 _GAP = '\N{NO-BREAK SPACE}'
 
 
@@ -97,7 +99,7 @@ def seconds(value: float) -> str:
 def uncertain(value: float, std: float | None, factor: float = 1.0, unit: str = '') -> str:
     """Return '0.500 ± 0.012 mrad': two digits of the error, the value to the same place."""
     value = factor * value
-    tail = f' {unit}' if unit else ''
+    tail = unit if unit == '°' else f' {unit}' if unit else ''
     if std is None or not isfinite(std) or std <= 0.0:
         return f'{_signed(f"{value:.4g}")}{tail}'
     std = factor * std
@@ -120,11 +122,18 @@ def parameter_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]
 
 def _shown(parameter: Parameter, value: Any, std: Any) -> str:
     factor, unit = display_unit(parameter.name, parameter.unit)
+    if unit == 'mrad':
+        return f'{_listed(value, std, DEGREES, "°")} ({_listed(value, None, factor, unit)})'
+    return _listed(value, std, factor, unit)
+
+
+def _listed(value: Any, std: Any, factor: float, unit: str) -> str:
+    """Return a number or several with their errors, in one unit."""
     if np.ndim(value) == 0:
         return uncertain(float(value), None if np.ndim(std) else std, factor, unit)
     errors = std if np.ndim(std) and len(std) == len(value) else [None] * len(value)
     parts = [uncertain(float(v), e, factor) for v, e in zip(value, errors, strict=True)]
-    return f'{", ".join(parts)} {unit}'.rstrip()
+    return f'{", ".join(parts)}{"" if unit == "°" else " "}{unit}'.rstrip()
 
 
 def _orders(ripple: TransmissionRipple, std: dict[str, Any]) -> list[tuple[str, str]]:
@@ -138,7 +147,8 @@ def _orders(ripple: TransmissionRipple, std: dict[str, Any]) -> list[tuple[str, 
     return [
         (
             f'order {order:g}',
-            f'{uncertain(size, error, 1e3, "mrad")} at {uncertain(phase, turn, 1.0, "rad")}',
+            f'{uncertain(size, error, DEGREES, "°")} ({uncertain(size, None, 1e3, "mrad")}) at '
+            f'{uncertain(phase, turn, DEGREES, "°")}',
         )
         for size, order, phase, error, turn in rows
     ]

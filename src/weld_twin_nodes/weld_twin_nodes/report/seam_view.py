@@ -1,20 +1,18 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The seam in three dimensions, coloured by deviation before and after."""
+"""The seam in space, coloured by deviation, as it is and with what is thought mended."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.result import Diagnosis, Traces
+from weld_twin_core.diagnosis.result import Diagnosis
 
-from .html import Html, section, tag
+from .charts import Axis, Line, chart
+from .html import Html, joined, section, tag
+from .quantities import MISSING, millimetres
+from .switches import along, drawn, parted, static, switches, trusted
 
-_POINTS = 3000
-"""Points on the page, over all recordings; more cannot be told apart on a screen."""
 _LINE = (
     'The thin line is where the twin has the tool, the coloured one where it was measured, its '
     'deviation enlarged.'
@@ -23,67 +21,8 @@ _STATIONS = (
     'Each line goes from where the twin has the tool to a dot where it was measured, its '
     'deviation enlarged.'
 )
-_SHOWN = 0.04
-"""Part of the seam's extent that a large deviation is drawn at."""
-
-
-def seam_data(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return positions and deviations in whole micrometres, and how to show them."""
-    traces = diagnosis.traces
-    each = max(50, _POINTS // max(len(traces.measured), 1))
-    runs = []
-    for k, measured in enumerate(traces.measured):
-        good = trusted(traces, k)
-        before, after = traces.before[k][good], traces.after[k][good]
-        measured = measured[good]
-        kept = thinned(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1), each)
-        static = k < len(diagnosis.recordings) and diagnosis.recordings[k].joints.static
-        runs.append(
-            {
-                'dots': bool(static),
-                'path': _micrometres((measured - before)[kept]),
-                'before': _micrometres(before[kept]),
-                'after': _micrometres(after[kept]),
-            }
-        )
-    top = _large(tuple(part[trusted(traces, k)] for k, part in enumerate(traces.before)))
-    return {'runs': runs, 'top': round(1e6 * top, 1), 'stretch': _stretch(traces.measured, top)}
-
-
-def trusted(traces: Traces, k: int) -> np.ndarray:
-    """Return which samples of a recording to draw: a gross outlier would hide all the others."""
-    if traces.trusted:
-        return traces.trusted[k]
-    return np.ones(traces.t[k].size, dtype=bool)
-
-
-def thinned(before: Array, after: Array, most: int) -> np.ndarray:
-    """Return an index of at most so many samples, the largest deviations among them."""
-    count = before.size
-    if count <= most:
-        return np.arange(count)
-    bins = np.array_split(np.arange(count), most // 2)
-    kept = {int(b[np.argmax(v[b])]) for b in bins for v in (before, after)}
-    return np.array(sorted(kept | {0, count - 1}))
-
-
-def _micrometres(points: Array) -> list[float]:
-    return [round(float(value), 1) for value in (1e6 * points).ravel()]
-
-
-def _large(parts: tuple[Array, ...]) -> float:
-    """Return a deviation [m] that hardly any sample exceeds, never quite nothing."""
-    sizes = [np.linalg.norm(part, axis=1) for part in parts if part.size]
-    return max(float(np.percentile(np.concatenate(sizes), 98)), 1e-6) if sizes else 1e-6
-
-
-def _stretch(measured: tuple[Array, ...], top: float) -> int:
-    """Return how much larger than life deviations are drawn: 1, 2 or 5 times a power of ten."""
-    points = np.concatenate([*measured, np.zeros((0, 3))])
-    extent = float(np.ptp(points, axis=0).max()) if points.size else 1.0
-    wanted = max(_SHOWN * extent / top, 1.0)
-    power = 10 ** int(np.floor(np.log10(wanted)))
-    return int(power * max(step for step in (1, 2, 5) if step * power <= wanted * 1.0001))
+_RECORDINGS = 6
+"""Recordings drawn over time."""
 
 
 def at_rest(diagnosis: Diagnosis) -> bool:
@@ -92,20 +31,83 @@ def at_rest(diagnosis: Diagnosis) -> bool:
 
 
 def seam_section(diagnosis: Diagnosis) -> Html:
-    """Return the two views; the page's script draws them."""
-    after = 'with the effects found' if diagnosis.model.found else 'the same, nothing was found'
+    """Return switches, the two views, and the deviation over time; scripts draw them."""
     stations = at_rest(diagnosis)
-    panels = [
+    changes = bool(switches(diagnosis)) or bool(diagnosis.model.found)
+    return section(
+        'What if' if switches(diagnosis) else ('The stations' if stations else 'The seam'),
+        _switches(diagnosis),
+        _figures() if switches(diagnosis) else None,
+        tag('div', *_panels(diagnosis, changes), class_='panels' if changes else 'panels one'),
+        _controls(),
+        tag('p', class_='instant', id_='instant', role='status'),
+        tag('noscript', tag('p', 'The pictures need scripts switched on.')),
+        _charts(diagnosis),
+        id_='seam',
+        lead=f'{_STATIONS if stations else _LINE} Drag to turn; click it first, then the wheel '
+        'or two fingers zoom.',
+    )
+
+
+def _switches(diagnosis: Diagnosis) -> Html | None:
+    """Return a box to tick for every cause."""
+    found = switches(diagnosis)
+    if not found:
+        return None
+    boxes = [
+        tag('label', tag('input', type='checkbox', data_switch=k, checked=''), ' ', switch.label)
+        for k, switch in enumerate(found)
+    ]
+    buttons = [
+        tag('button', text, type='button', data_all=value)
+        for text, value in (('as it is', 'off'), ('all mended', 'on'))
+    ]
+    return tag(
+        'fieldset',
+        tag('legend', 'Think as mended:'),
+        *boxes,
+        tag('span', *buttons, class_='views'),
+        class_='switches',
+    )
+
+
+def _figures() -> Html:
+    """Return the figures that follow the switches."""
+    cells = (
+        ('Deviation then', 'now-rms', 'RMS, each stretch predicted from the others'),
+        ('Largest', 'now-max', 'of all samples'),
+        ('Left of the gap', 'now-share', 'of its RMS'),
+    )
+    return tag(
+        'dl',
+        *(
+            tag(
+                'div', tag('dt', name), tag('dd', MISSING, id_=key), tag('dd', note, class_='note')
+            )
+            for name, key, note in cells
+        ),
+        class_='figures',
+    )
+
+
+def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:
+    after = (
+        'With what is ticked mended' if switches(diagnosis) else 'With what was found taken off'
+    )
+    told = [('before', 'As it is', 'Seam coloured by deviation as it is')]
+    if changes:
+        told.append(('after', after, 'Seam coloured by deviation with causes mended'))
+    return [
         tag(
             'figure',
             tag('figcaption', title),
             tag('canvas', data_side=side, tabindex='0', role='img', aria_label=label),
         )
-        for side, title, label in (
-            ('before', 'Before: the twin as given', 'Seam coloured by deviation before'),
-            ('after', f'After: {after}', 'Seam coloured by deviation after'),
-        )
+        for side, title, label in told
     ]
+
+
+def _controls() -> Html:
     views = [
         tag('button', name.capitalize(), type='button', data_view=name)
         for name in ('angled', 'top', 'front', 'side')
@@ -117,17 +119,52 @@ def seam_section(diagnosis: Diagnosis) -> Html:
         ' larger ',
         tag('input', type='range', id_='stretch', min='0', max='1', step='0.01'),
     )
-    return section(
-        'The stations' if stations else 'The seam',
-        tag('div', *panels, class_='panels'),
-        tag(
-            'div',
-            tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
-            tag('div', *views, class_='views'),
-            slider,
-            class_='controls',
-        ),
-        tag('noscript', tag('p', 'The picture needs scripts switched on.')),
-        id_='seam',
-        lead=f'{_STATIONS if stations else _LINE} Drag to turn, scroll or pinch to zoom.',
+    return tag(
+        'div',
+        tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
+        tag('div', *views, class_='views'),
+        slider,
+        class_='controls',
     )
+
+
+def _charts(diagnosis: Diagnosis) -> Html:
+    """Return the deviation over time, a chart for each recording."""
+    count = len(diagnosis.traces.t)
+    charts = [_chart(diagnosis, k) for k in range(min(count, _RECORDINGS))]
+    more = count - len(charts)
+    note = tag('p', f'{more} more recordings are not drawn.', class_='note') if more > 0 else None
+    title = 'Deviation by station' if at_rest(diagnosis) else 'Deviation along the recording'
+    return joined([tag('h3', title), *charts, note])
+
+
+def _chart(diagnosis: Diagnosis, k: int) -> Html:
+    index = drawn(diagnosis, k)
+    if not index.size:
+        return tag('p', 'No samples.')
+    left, parts = (item[k] for item in parted(diagnosis))
+    before = left + parts.sum(axis=0) if parts.size else diagnosis.traces.before[k]
+    dots = static(diagnosis, k)
+    lines = [Line('as it is', _size(before[index]), 'before', points=dots)]
+    if switches(diagnosis) or diagnosis.model.found:
+        lines.append(Line('with that mended', _size(left[index]), 'after', points=dots))
+    floor = np.full(index.size, 1e3 * diagnosis.gap.noise_floor_m)
+    lines.append(Line('noise floor', floor, 'soft', dashed=True))
+    axes = (Axis('station') if dots else Axis('time', 's'), Axis('deviation', 'mm'))
+    recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
+    title = recording.name if recording is not None else f'recording {k + 1}'
+    outliers = int((~trusted(diagnosis, k)).sum())
+    if outliers:
+        title += f' ({outliers} outlier{"s"[: outliers > 1]} not drawn)'
+    return chart(title, along(diagnosis, k)[index], lines, axes, key=f'run{k}', from_zero=True)
+
+
+def _size(deviation: np.ndarray) -> np.ndarray:
+    return np.asarray(1e3 * np.linalg.norm(deviation, axis=1))
+
+
+def seen_at(diagnosis: Diagnosis, k: int, sample: int, size: float) -> str:
+    """Return where along a recording a deviation [m] is, in words."""
+    if static(diagnosis, k):
+        return f'{millimetres(size)} at station {sample + 1}'
+    return f'{millimetres(size)} at {along(diagnosis, k)[sample]:.1f} s'

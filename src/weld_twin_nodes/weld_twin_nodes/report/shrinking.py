@@ -4,36 +4,23 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from weld_twin_core.diagnosis.result import Diagnosis
 
 from .cause_list import leftover
-from .charts import Axis, Line, chart, thinned
 from .html import Html, section, tag
 from .quantities import interval, millimetres, milliradians, percent, turns_only
-from .seam_view import at_rest, trusted
 from .words import cause
 
 _STEPS = 12
 """Steps of the waterfall; more are drawn as one."""
-_RECORDINGS = 6
-"""Recordings drawn over time."""
 
 
 def shrink_section(diagnosis: Diagnosis) -> Html:
-    """Return the waterfall and one chart over time per recording."""
-    charts = [_chart(diagnosis, k) for k in range(min(len(diagnosis.traces.t), _RECORDINGS))]
-    more = len(diagnosis.traces.t) - len(charts)
-    note = tag('p', f'{more} more recordings are not drawn.', class_='note') if more > 0 else None
-    title = 'Deviation by station' if at_rest(diagnosis) else 'Deviation over time'
+    """Return the waterfall, how it was judged, and what is left."""
     return section(
         'How far it shrinks',
         _waterfall(diagnosis),
         tag('p', _judged(diagnosis)),
-        tag('h3', title),
-        *charts,
-        note,
         leftover(diagnosis),
         id_='shrink',
         lead='RMS gap as each effect is put into the twin in turn, each stretch of the recordings '
@@ -104,29 +91,3 @@ def _step(label: str, share: float, before: float, rms: float, class_: str = '')
         tag('span', millimetres(rms), class_='figure'),
         class_=class_ or None,
     )
-
-
-def _chart(diagnosis: Diagnosis, k: int) -> Html:
-    """Return |deviation| over time; over the station number where nothing moved."""
-    traces = diagnosis.traces
-    recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
-    static = recording is not None and recording.joints.static
-    good = trusted(traces, k)
-    sizes = [np.linalg.norm(part[good], axis=1) for part in (traces.before[k], traces.after[k])]
-    if sizes[0].size == 0:
-        return tag('p', 'No samples.')
-    x = (np.arange(1.0, good.size + 1.0) if static else traces.t[k])[good]
-    title = recording.name if recording is not None else f'recording {k + 1}'
-    outliers = int((~good).sum())
-    if outliers:
-        title += f' ({outliers} outlier{"s"[: outliers > 1]} not drawn)'
-    kept = thinned(sizes)
-    before, after = (1e3 * size[kept] for size in sizes)
-    floor = np.full(kept.size, 1e3 * diagnosis.gap.noise_floor_m)
-    lines = [
-        Line('before', before, 'before', points=static),
-        Line('after', after, 'after', points=static),
-        Line('noise floor', floor, 'soft', dashed=True),
-    ]
-    axes = (Axis('station') if static else Axis('time', 's'), Axis('deviation', 'mm'))
-    return chart(title, x[kept], lines, axes, key=f'run{k}', from_zero=True)

@@ -54,7 +54,7 @@ STATUS = {
     'unsound': 'Unsound data',
 }
 REGIMES = {
-    'static': 'at rest',
+    'static': 'constant or by angle',
     'reversal': 'at reversals',
     'speed': 'with speed',
     'acceleration': 'with acceleration',
@@ -126,6 +126,17 @@ def cause_words(cause: Cause) -> str:
     if not on or on == ['constant']:
         return f'{where}, and is constant there' if on else where
     return f'{where}, depending on {listed([DEPENDENCES.get(o, o) for o in on])}'
+
+
+def someplace(cause: Cause) -> str:
+    """Return a cause without a name as a heading: where it sits and what it depends on."""
+    where = place_name(cause.place[0][0]) if cause.place else 'a place not found'
+    on = [name for name, p in cause.dependence if p > 0.5][:2]
+    if not on:
+        return f'something at {where}'
+    if on == ['constant']:
+        return f'something constant at {where}'
+    return f'something at {where} that depends on {listed([DEPENDENCES.get(o, o) for o in on])}'
 
 
 def verdict(diagnosis: Diagnosis) -> tuple[str, str]:

@@ -28,8 +28,8 @@ def metres(value: float) -> str:
 
 
 def radians(value: float) -> str:
-    """Return a signed angle [rad] in mrad and degrees."""
-    return f'{number(value * 1e3)} mrad ({number(np.degrees(value))} deg)'
+    """Return a signed angle [rad] in degrees and mrad."""
+    return f'{number(np.degrees(value))} deg ({number(value * 1e3)} mrad)'
 
 
 def frame(step: Array) -> str:

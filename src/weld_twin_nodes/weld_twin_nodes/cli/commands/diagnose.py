@@ -26,8 +26,12 @@ if TYPE_CHECKING:
     from weld_twin_core.recording import Recording
     from weld_twin_msgs_py.files.input_files import InputFile
 
+    from ...report.diagnosis_page import Sheet
+
 LINES = 'WELD_TWIN_PROGRESS'
 """Variable of the environment: 'lines' has every step told as a line on stderr."""
+BRANDS = ('abb', 'fanuc', 'kuka', 'ur', 'yaskawa')
+"""Makers whose controllers the page knows; the page has their names."""
 UNSOUND = 3
 """Exit code where data or set-up are wrong."""
 MEASUREMENTS = 40_000
@@ -44,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_robot(parser)
     _add_setup(parser)
     _add_causes(parser)
+    _add_sheet(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
     add_topics(parser)
 
@@ -98,17 +103,73 @@ def _add_causes(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_sheet(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        '--tolerance',
+        type=float,
+        metavar='MM',
+        help='largest deviation allowed; the page says by ISO 14253-1 whether the robot passes',
+    )
+    parser.add_argument(
+        '--uncertainty',
+        type=float,
+        metavar='MM',
+        help='standard uncertainty of a measured position, from the certificate of the instrument',
+    )
+    parser.add_argument(
+        '--joint-names',
+        default='',
+        metavar='A|J|FILE',
+        help='what joints are called on the page: a prefix (A1, A2, ...), or a YAML file with '
+        'lines "joint: name"',
+    )
+    parser.add_argument(
+        '--controller',
+        choices=BRANDS,
+        help='whose controller it is, if the name of the robot does not tell',
+    )
+    parser.add_argument(
+        '--pdf', action='store_true', help='print the page to report.pdf, to sign; needs Chromium'
+    )
+
+
+def _sheet(args: argparse.Namespace) -> Sheet:
+    """Return what the page is to show; checked before anything is computed."""
+    from ...report.acceptance import Demand
+    from ...report.diagnosis_page import Sheet
+    from ...report.joint_names import joint_labels
+    from ...report.pdf import browser
+
+    if args.pdf:
+        browser()
+    labels = joint_labels(args.joint_names, robot_of(args).joint_names) if args.joint_names else {}
+    sizes = [_metres(getattr(args, name), f'--{name}') for name in ('tolerance', 'uncertainty')]
+    return Sheet(Demand(*sizes), labels, args.controller)
+
+
+def _metres(value: float | None, option: str) -> float | None:
+    from weld_twin_core.errors import ModelError
+
+    if value is not None and not 0.0 < value < 1000.0:
+        raise ModelError(f'{option} {value:g}: give millimetres above 0 and below 1000')
+    return None if value is None else 1e-3 * value
+
+
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write the results, print the verdict."""
     from rich.console import Console
 
     from ...offline.output_directory import new_directory
     from ...report import print_summary
-    from ...report.diagnosis_files import PAGE, RESULT, write_results
+    from ...report.diagnosis_files import PAGE, PDF, RESULT, write_results
+    from ...report.pdf import print_page
 
+    sheet = _sheet(args)
     with new_directory(args.out, mark=RESULT) as place:
         diagnosis = _diagnosis(args)
-        write_results(place, diagnosis, _inputs(args), given_urdf(args))
+        write_results(place, diagnosis, _inputs(args), given_urdf(args), sheet)
+        if args.pdf:
+            print_page(place / PAGE, place / PDF)
     console = Console(highlight=False)
     print_summary(diagnosis, console)
     console.print(f'report: {Path(args.out) / PAGE}', markup=False)

@@ -3,11 +3,12 @@
 // Draws the seam: an orthographic view turned by hand, the same for both pictures.
 'use strict';
 (() => {
-  const data = JSON.parse(document.getElementById('data').textContent);
+  const data = window.sheet.data;
   const canvases = [...document.querySelectorAll('canvas[data-side]')];
   const VIEWS = { angled: [-0.9, 0.55], top: [-Math.PI / 2, Math.PI / 2], front: [-Math.PI / 2, 0], side: [0, 0] };
   const COLOURS = [[58, 110, 190], [34, 160, 140], [226, 168, 20], [214, 74, 40], [150, 10, 70]];
-  const view = { turn: 0, tilt: 0, zoom: 1, stretch: data.stretch };
+  if (!canvases.length) return;
+  const view = { turn: 0, tilt: 0, zoom: 1, stretch: data.stretch, looked: null };
   const middle = centre();
 
   function centre() {
@@ -29,8 +30,8 @@
     const { direction } = projector(1, 1);
     for (const run of data.runs) {
       for (let i = 0; i < run.path.length; i += 3) {
-        const at = run.path.slice(i, i + 3).map((v, k) => v - middle[k] + view.stretch * run.before[i + k]);
-        direction(...at).forEach((v, k) => { view.half[k] = Math.max(view.half[k], Math.abs(v)); });
+        const p = run.path.slice(i, i + 3).map((v, k) => v - middle[k] + view.stretch * run.before[i + k]);
+        direction(...p).forEach((v, k) => { view.half[k] = Math.max(view.half[k], Math.abs(v)); });
       }
     }
   }
@@ -73,7 +74,16 @@
   function draw(canvas) {
     const { pen, width, height } = sized(canvas);
     const project = projector(width, height);
-    for (const run of data.runs) drawRun(pen, project.point, run, run[canvas.dataset.side]);
+    const side = canvas.dataset.side === 'before' ? 'before' : 'now';
+    data.runs.forEach((run, k) => {
+      drawRun(pen, project.point, run, run[side]);
+      if (!run.dots) drawCourse(pen, project.point, run, width);
+      if (view.looked && view.looked.run === k) drawLooked(pen, project.point, run, run[side]);
+    });
+    pen.fillStyle = style('--soft');
+    pen.textAlign = 'left';
+    pen.textBaseline = 'top';
+    pen.fillText(`deviation drawn ${view.stretch} × larger`, 10, 8);
     drawAxes(pen, project.direction, height);
     drawRuler(pen, project.scale, width, height);
   }
@@ -108,6 +118,69 @@
     }
   }
 
+  const at = (run, i) => run.path.slice(3 * i, 3 * i + 3);
+
+  // Start, end and three arrows in the direction of travel.
+  function drawCourse(pen, point, run, width) {
+    const last = run.path.length / 3 - 1;
+    if (last < 8) return;
+    pen.fillStyle = pen.strokeStyle = style('--ink');
+    pen.textBaseline = 'middle';
+    pen.textAlign = 'left';
+    const [start, end] = [point(...at(run, 0)), point(...at(run, last))];
+    const together = Math.hypot(start[0] - end[0], start[1] - end[1]) < 40;
+    const told = together ? [[start, 'start, end']] : [[start, 'start'], [end, 'end']];
+    for (const [[u, v], text] of told) {
+      pen.beginPath();
+      pen.arc(u, v, 3, 0, 7);
+      pen.fill();
+      const left = u > width - 70;
+      pen.textAlign = left ? 'right' : 'left';
+      pen.fillText(text, left ? u - 7 : u + 7, v - 9);
+    }
+    for (const part of [0.2, 0.5, 0.8]) {
+      const i = Math.round(part * last), gap = Math.max(2, Math.round(last / 60));
+      const [a, b] = [point(...at(run, i - gap > 0 ? i - gap : 0)), point(...at(run, Math.min(i + gap, last)))];
+      const turn = Math.atan2(b[1] - a[1], b[0] - a[0]);
+      const tip = point(...at(run, i));
+      pen.beginPath();
+      pen.moveTo(...tip);
+      for (const side of [-0.5, 0.5]) pen.lineTo(tip[0] - 10 * Math.cos(turn + side), tip[1] - 10 * Math.sin(turn + side));
+      pen.fill();
+    }
+  }
+
+  // The instant that the cursor of the charts is at.
+  function drawLooked(pen, point, run, gap) {
+    const i = view.looked.sample, nominal = at(run, i), off = gap.slice(3 * i, 3 * i + 3);
+    const [u, v] = point(...nominal.map((value, k) => value + view.stretch * off[k]));
+    pen.strokeStyle = style('--ink');
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.moveTo(...point(...nominal));
+    pen.lineTo(u, v);
+    pen.stroke();
+    pen.beginPath();
+    pen.arc(u, v, 5, 0, 7);
+    pen.stroke();
+  }
+
+  // Tells the sample next to the pointer, if there is one near.
+  function hovered(canvas, event) {
+    const box = canvas.getBoundingClientRect(), { point } = projector(canvas.clientWidth, canvas.clientHeight);
+    const side = canvas.dataset.side === 'before' ? 'before' : 'now';
+    let best = 18, found = null;
+    data.runs.forEach((run, k) => {
+      for (let i = 0; i < run.path.length / 3; i++) {
+        const p = at(run, i).map((value, j) => value + view.stretch * run[side][3 * i + j]);
+        const [u, v] = point(...p);
+        const far = Math.hypot(u - (event.clientX - box.left), v - (event.clientY - box.top));
+        if (far < best) { best = far; found = { key: `run${k}`, x: run.t[i] }; }
+      }
+    });
+    if (found) document.dispatchEvent(new CustomEvent('instant', { detail: found }));
+  }
+
   function drawDots(pen, nominal, measured, size) {
     nominal.forEach((from, i) => {
       pen.strokeStyle = pen.fillStyle = colour(size[i]);
@@ -123,7 +196,7 @@
   }
 
   function drawAxes(pen, direction, height) {
-    const at = [30, height - 30];
+    const foot = [30, height - 30];
     pen.lineWidth = 1.2;
     pen.fillStyle = pen.strokeStyle = style('--soft');
     pen.textAlign = 'center';
@@ -132,10 +205,10 @@
       const [u, v] = direction(...axis);
       if (Math.hypot(u, v) < 0.15) return;
       pen.beginPath();
-      pen.moveTo(...at);
-      pen.lineTo(at[0] + 18 * u, at[1] + 18 * v);
+      pen.moveTo(...foot);
+      pen.lineTo(foot[0] + 18 * u, foot[1] + 18 * v);
       pen.stroke();
-      pen.fillText(name, at[0] + 25 * u, at[1] + 25 * v);
+      pen.fillText(name, foot[0] + 25 * u, foot[1] + 25 * v);
     });
   }
 
@@ -205,11 +278,12 @@
     };
     canvas.addEventListener('pointerdown', (event) => {
       canvas.setPointerCapture(event.pointerId);
+      canvas.focus({ preventScroll: true });
       fingers.set(event.pointerId, [event.clientX, event.clientY]);
     });
     canvas.addEventListener('pointermove', (event) => {
       const last = fingers.get(event.pointerId);
-      if (!last) return;
+      if (!last) { hovered(canvas, event); return; }
       const before = fingers.size === 2 ? spread() : 0;
       fingers.set(event.pointerId, [event.clientX, event.clientY]);
       if (fingers.size === 1) turned(event.clientX - last[0], event.clientY - last[1]);
@@ -219,6 +293,7 @@
       canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
     }
     canvas.addEventListener('wheel', (event) => {
+      if (document.activeElement !== canvas) return;
       event.preventDefault();
       zoomed(Math.exp(-0.001 * event.deltaY));
     }, { passive: false });
@@ -252,9 +327,9 @@
   redraw();
   new ResizeObserver(later).observe(document.querySelector('.panels'));
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', later);
-  window.addEventListener('beforeprint', () => {
-    document.querySelectorAll('details').forEach((item) => { item.open = true; });
-    redraw();
-  });
+  document.addEventListener('switched', later);
+  document.addEventListener('looked', (event) => { view.looked = event.detail; later(); });
+  document.addEventListener('keydown', (event) => { if (event.key === 'Escape') document.activeElement.blur(); });
+  window.addEventListener('beforeprint', redraw);
   window.addEventListener('afterprint', later);
 })();

@@ -1,0 +1,205 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The sheet in a real browser: switches, cursors, tolerance; readable on a phone, dark, in print."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import diagnoses
+import numpy as np
+import pytest
+
+from weld_twin_core.diagnosis.result import Unsound
+from weld_twin_nodes.cli.commands.diagnose import BRANDS as CHOICES
+from weld_twin_nodes.report import report_page
+from weld_twin_nodes.report.acceptance import Demand
+from weld_twin_nodes.report.controllers import BRANDS, brand_of
+from weld_twin_nodes.report.diagnosis_page import Sheet
+from weld_twin_nodes.report.joint_names import joint_labels, renamed
+
+THREE = diagnoses.circle()
+CLIPPED = """() => [...document.querySelectorAll('main *')].filter((item) => {
+  const box = item.getBoundingClientRect(), style = getComputedStyle(item);
+  if (!box.width || !item.checkVisibility() || style.position === 'absolute') return false;
+  if (item.closest('.scroll, .u-wrap')) return false;
+  return box.right > innerWidth + 1 || (item.scrollWidth > item.clientWidth + 2
+    && style.overflowX === 'hidden' && !item.classList.contains('plot'));
+}).map((item) => item.outerHTML.slice(0, 90))"""
+OVERLAP = """() => {
+  const items = [...document.querySelectorAll('main :is(h1, h2, h3, p, li, dt, dd, td, th, label, button, figcaption)')]
+    .filter((item) => item.checkVisibility() && item.textContent.trim() && !item.closest('.uplot'))
+    .map((item) => [item, item.getBoundingClientRect()]).filter(([, box]) => box.width && box.height);
+  const out = [];
+  items.forEach(([a, p], i) => items.slice(i + 1).forEach(([b, q]) => {
+    if (a.contains(b) || b.contains(a)) return;
+    const w = Math.min(p.right, q.right) - Math.max(p.left, q.left);
+    const h = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
+    if (w > 2 && h > 2) out.push(`${a.textContent.slice(0, 30)} | ${b.textContent.slice(0, 30)}`);
+  }));
+  return out;
+}"""
+EMPTY = """() => [...document.querySelectorAll('canvas')].filter((item) => {
+  if (!item.checkVisibility()) return false;
+  if (!item.width || !item.height) return true;
+  const dots = item.getContext('2d').getImageData(0, 0, item.width, item.height).data;
+  return !dots.some((value) => value);
+}).length"""
+
+
+def unsound():
+    wrong = Unsound(
+        'joints_swapped', ('joint_4', 'joint_6'), 'Joint 4 and joint 6 are swapped.', 'Swap them.'
+    )
+    return replace(diagnoses.nothing(), status='unsound', unsound=(wrong,), causes=())
+
+
+CASES = {**diagnoses.ALL, 'unsound': unsound}
+
+
+def rms(parts):
+    return float(np.sqrt(np.mean(np.concatenate([(p**2).sum(axis=1) for p in parts]))))
+
+
+def millimetres(text):
+    return float(re.search(r'[\d.]+', text)[0])
+
+
+@pytest.fixture
+def page(browser):
+    return browser.open(report_page(THREE))
+
+
+@pytest.mark.parametrize('mended', [(), (0,), (1, 2), (0, 1, 2)])
+def test_the_figures_follow_the_switches_in_any_combination(page, mended):
+    page.get_by_role('button', name='as it is').click()
+    for k in mended:
+        page.locator(f'.switches input[data-switch="{k}"]').check()
+    told = THREE.contributions
+    rest = [k for k in range(3) if k not in mended]
+    expected = rms([told.left[0] + told.parts[0][rest].sum(axis=0)])
+    assert millimetres(page.locator('#now-rms').inner_text()) == pytest.approx(
+        1e3 * expected, abs=6e-4
+    )
+    assert page.locator('.card input:checked').count() == len(mended)
+
+
+def test_seam_chart_and_circle_are_drawn_anew_when_a_cause_is_switched(page):
+    def pictures():
+        places = ('canvas[data-side=after]', '#seam .chart canvas', 'canvas[data-circle]')
+        return [page.locator(place).first.screenshot() for place in places]
+
+    before = pictures()
+    page.locator('.card input').first.uncheck()
+    page.wait_for_timeout(100)
+    assert all(a != b for a, b in zip(before, pictures(), strict=True))
+
+
+def test_one_cursor_serves_chart_seam_map_and_stretches(page):
+    page.locator('#seam .chart .u-over').hover(position={'x': 300, 'y': 40})
+    instant = page.locator('#instant').inner_text()
+    assert re.search(r'[\d.]+ s: [\d.]+ mm as it is, [\d.]+ mm then', instant)
+    angles = page.locator('td[data-joint]').all_inner_texts()
+    assert len(angles) == 6 and all(text.endswith('°') for text in angles)
+    assert page.locator('.strip li.here').count() == 1
+    page.locator('canvas[data-side=before]').scroll_into_view_if_needed()
+    box = page.locator('canvas[data-side=before]').bounding_box()
+    for part in np.linspace(0.2, 0.8, 25):
+        page.mouse.move(box['x'] + part * box['width'], box['y'] + 0.5 * box['height'])
+    assert page.locator('#instant').inner_text() != instant
+
+
+def test_the_wheel_scrolls_the_page_until_the_view_is_clicked(page):
+    view = page.locator('canvas[data-side=before]')
+    view.scroll_into_view_if_needed()
+    view.hover()
+    start = page.evaluate('scrollY')
+    page.mouse.wheel(0, 60)
+    page.wait_for_timeout(150)
+    moved = page.evaluate('scrollY')
+    assert moved > start
+    view.click()
+    page.mouse.wheel(0, 60)
+    page.wait_for_timeout(150)
+    assert page.evaluate('scrollY') == moved
+
+
+def test_a_tolerance_is_asked_for_and_judged_by_the_uncertainty(browser):
+    page = browser.open(report_page(THREE))
+    verdict = page.locator('[data-verdict=as-it-is]')
+    size = millimetres(page.locator('[data-largest=as-it-is]').inner_text())
+    assert verdict.inner_text() == 'no tolerance given'
+    for tolerance, word in ((2 * size, 'passes'), (size, 'cannot be said'), (size / 2, 'fails')):
+        page.locator('#tolerance').fill(f'{tolerance:.4f}')
+        assert verdict.inner_text() == word
+
+
+def test_a_tolerance_given_is_judged_at_the_top_with_the_certificate():
+    size = max(np.linalg.norm(THREE.traces.before[0], axis=1))
+    poor = report_page(THREE, sheet=Sheet(Demand(1.2 * size, 0.3 * size)))
+    good = report_page(THREE, sheet=Sheet(Demand(1.2 * size, 0.01 * size)))
+    assert 'Cannot be said:' in poor and 'from the certificate of the instrument' in poor
+    assert 'Passes:' in good
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_nothing_hinders_reading_light_dark_phone_or_print(name, browser):
+    axe = pytest.importorskip('axe_playwright_python.sync_playwright').Axe()
+    text = report_page(CASES[name]())
+    page = browser.open(text)
+    for width, scheme in ((1100, 'light'), (390, 'dark')):
+        page.set_viewport_size({'width': width, 'height': 900})
+        page.emulate_media(color_scheme=scheme)
+        page.wait_for_timeout(60)
+        for question in (CLIPPED, OVERLAP):
+            assert page.evaluate(question) == [], (name, width)
+        assert page.evaluate(EMPTY) == 0
+        found = axe.run(page).response['violations']
+        serious = [v['id'] for v in found if v['impact'] in ('serious', 'critical')]
+        assert serious == [], [n['html'][:90] for v in found for n in v['nodes']][:4]
+    page.emulate_media(media='print', color_scheme='light')
+    assert page.evaluate(CLIPPED) == []
+    assert browser.console == []
+
+
+@pytest.mark.parametrize('name', ['circle', 'calibration', 'unknown', 'unsound'])
+def test_it_prints_on_one_or_two_sides_to_sign(name, browser):
+    pdf = browser.open(report_page(CASES[name]())).pdf(prefer_css_page_size=True)
+    assert 1 <= len(re.findall(rb'/Type /Page\b', pdf)) <= 2
+
+
+def test_shares_with_the_rest_and_the_noise_make_a_whole():
+    page = report_page(THREE)
+    part = page[page.index('bars wide shares') : page.index('class="cards"')]
+    widths = [float(w) for w in re.findall(r'width:([\d.]+)%', part)]
+    assert len(widths) == 5 and sum(widths) == pytest.approx(100.0, abs=0.05)
+
+
+def test_a_value_is_told_in_degrees_first():
+    assert re.search(r'offset 0\.017\d* ± [\d.]+° \(0\.3\d* mrad\)', report_page(THREE))
+
+
+def test_the_maker_of_the_controller_is_told_by_the_robot_or_by_the_user():
+    assert '$MAMES' in report_page(THREE)
+    assert 'DMR_GRP' in report_page(THREE, sheet=Sheet(brand='fanuc'))
+    assert set(CHOICES) == set(BRANDS)
+    assert brand_of('Motoman MA1440') == 'yaskawa' and brand_of('my_arm') is None
+
+
+def test_joints_are_called_as_on_the_controller(tmp_path):
+    joints = THREE.model.robot.joint_names
+    names = tmp_path / 'names.yaml'
+    names.write_text('joint_a3: E<3>\n')
+    page = report_page(THREE, sheet=Sheet(joints=joint_labels(str(names), joints)))
+    assert 'Backlash of E&lt;3&gt;' in page and 'joint_a3' not in page and 'joint_a2' in page
+    assert joint_labels('A', joints)['joint_a6'] == 'A6'
+    assert (
+        renamed('joint_a1 joint_a10 x/joint_a1', {'joint_a1': 'A1'}) == 'A1 joint_a10 x/joint_a1'
+    )
+
+
+def test_circles_name_the_joints_that_turn_back():
+    page = report_page(THREE)
+    assert 'ISO 230-4' in page and re.search(r'"reversals":\[\["joint_a\d"', page)
+    assert 'ISO 230-4' not in report_page(diagnoses.backlash())

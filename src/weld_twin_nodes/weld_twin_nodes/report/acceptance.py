@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Pass, fail, or 'cannot be said': the deviation against a tolerance, by ISO 14253-1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.errors import TwinError
+from weld_twin_core.metrics.conformity import FAIL, OPEN, PASS, Rule
+from weld_twin_core.metrics.performance import Performance, performance_of
+
+from .html import Html, joined, section, table, tag
+from .performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows
+from .quantities import millimetres
+from .switches import parted, trusted
+
+WORDS = {
+    PASS: 'passes',
+    FAIL: 'fails',
+    OPEN: 'cannot be said',
+    None: 'no tolerance given',
+}
+_ROWS = 6
+"""Poses of ISO 9283 on the page; `weld-twin iso9283` has all."""
+
+
+@dataclass(frozen=True)
+class Demand:
+    """
+    What the reader demands of the robot.
+
+    Attributes
+    ----------
+    tolerance_m : float, optional
+        Largest deviation of the tool point allowed along the seam.
+    uncertainty_m : float, optional
+        Standard uncertainty of a measured position, as the certificate of the instrument has it.
+
+    """
+
+    tolerance_m: float | None = None
+    uncertainty_m: float | None = None
+
+
+def rule_of(diagnosis: Diagnosis, demand: Demand) -> Rule:
+    """Return the decision rule: with the uncertainty given, or the noise where that is larger."""
+    noise = diagnosis.gap.noise_floor_m / np.sqrt(3.0)
+    noise = noise if np.isfinite(noise) else 0.0
+    readings = sum(int(trusted(diagnosis, k).sum()) for k in range(len(diagnosis.traces.t)))
+    return Rule(demand.tolerance_m, max(noise, demand.uncertainty_m or 0.0), max(readings, 1))
+
+
+def largest(diagnosis: Diagnosis) -> tuple[float, float]:
+    """Return the largest deviation as it is, and with all causes mended, [m]."""
+    left, parts = parted(diagnosis)
+    good = [trusted(diagnosis, k) for k in range(len(left))]
+    pairs = [(one + more.sum(axis=0), one) for one, more in zip(left, parts, strict=True)]
+    if not any(parts[k].size for k in range(len(parts))):
+        pairs = list(zip(diagnosis.traces.before, diagnosis.traces.after, strict=True))
+    out = [0.0, 0.0]
+    for pair, kept in zip(pairs, good, strict=True):
+        for i, part in enumerate(pair):
+            sizes = np.linalg.norm(part[kept], axis=1)
+            out[i] = max(out[i], float(sizes.max(initial=0.0)))
+    return out[0], out[1]
+
+
+def rule_data(rule: Rule) -> dict[str, Any]:
+    """Return what the page's script judges by; lengths in mm."""
+    return {
+        'tolerance': None if rule.tolerance_m is None else 1e3 * rule.tolerance_m,
+        'below': 1e3 * rule.to_pass * rule.uncertainty_m,
+        'above': 1e3 * rule.to_fail * rule.uncertainty_m,
+        'words': {str(key): word for key, word in WORDS.items()},
+    }
+
+
+def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
+    """Return the judgement, with a field for a tolerance; None where contacts took its place."""
+    if diagnosis.contacts is not None or not diagnosis.traces.t:
+        return None
+    rule = rule_of(diagnosis, demand)
+    before, after = largest(diagnosis)
+    rows = [_row('as it is', before, rule, 'as-it-is')]
+    if diagnosis.model.found:
+        rows.append(_row('with what is ticked below as mended', after, rule, 'mended'))
+    heads = ('the robot', 'largest deviation', 'verdict')
+    return section(
+        'Does it pass',
+        _field(rule),
+        table(heads, rows, 'acceptance'),
+        tag('p', _rule_words(rule, demand), class_='note'),
+        _standard(diagnosis),
+        id_='acceptance',
+    )
+
+
+def _field(rule: Rule) -> Html:
+    value = None if rule.tolerance_m is None else f'{1e3 * rule.tolerance_m:g}'
+    entry = tag(
+        'input', type='number', id_='tolerance', min='0', step='any', value=value, size='6',
+        inputmode='decimal',
+    )  # fmt: skip
+    return tag('p', tag('label', 'Tolerance of the tool point: ', entry, ' mm'), class_='asked')
+
+
+def _row(name: str, value: float, rule: Rule, key: str) -> tuple[Html | str, ...]:
+    verdict = rule.judged(value)
+    return (
+        name,
+        tag('span', millimetres(value), data_largest=key),
+        tag('span', WORDS[verdict], class_=f'mark {verdict}', data_verdict=key),
+    )
+
+
+def _rule_words(rule: Rule, demand: Demand) -> str:
+    source = 'the noise of these data'
+    if demand.uncertainty_m is not None and demand.uncertainty_m >= rule.uncertainty_m:
+        source = 'the certificate of the instrument'
+    text = (
+        f'ISO 14253-1: it passes where the largest deviation stays below the tolerance by '
+        f'{millimetres(rule.to_pass * rule.uncertainty_m)}, it fails where it is above by '
+        f'{millimetres(rule.to_fail * rule.uncertainty_m)}, being the largest of '
+        f'{rule.readings} readings; in between it cannot be said. The standard uncertainty is '
+        f'{millimetres(rule.uncertainty_m)}, from {source}.'
+    )
+    if demand.uncertainty_m is None:
+        text += ' Noise says nothing of an error that all readings share: give --uncertainty.'
+    return text
+
+
+def _standard(diagnosis: Diagnosis) -> Html | None:
+    """Return the figures of ISO 9283, where the motion was repeated."""
+    found = _repeated(diagnosis)
+    if found is None:
+        text = 'ISO 9283: no pose and no path was repeated, so there are no figures by it.'
+        return tag('p', text, class_='note')
+    tables = []
+    if found.poses:
+        tables.append(table(POSE_HEADS, pose_rows(found)[:_ROWS]))
+    if found.path is not None:
+        tables.append(table(PATH_HEADS, [path_row(found.path)]))
+    return joined([tag('h3', 'ISO 9283'), *tables])
+
+
+def _repeated(diagnosis: Diagnosis) -> Performance | None:
+    model = diagnosis.model
+    for recording, base in zip(diagnosis.recordings, model.bases, strict=False):
+        if recording.measured is None:
+            continue
+        try:
+            return performance_of(recording, model.robot.with_frames(base=base))
+        except TwinError:
+            continue
+    return None

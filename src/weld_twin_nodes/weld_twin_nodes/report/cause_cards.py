@@ -1,0 +1,275 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The causes, largest share of the gap first, each on a card: what, how much, what to do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.diagnosis.advice import actions
+from weld_twin_core.diagnosis.result import Cause, Diagnosis
+from weld_twin_core.effects.effect import Effect
+from weld_twin_core.effects.joint_curve import JointCurve
+
+from .cause_levels import LEVEL_HEADS, level_row, spreads
+from .charts import Axis, Line, chart
+from .controllers import BRANDS, correction
+from .curve_plot import curve_figure
+from .html import Child, Html, joined, section, table, tag
+from .quantities import millimetres, odds, parameter_rows, percent
+from .seam_view import seen_at
+from .switches import MOST, along, cause_name, drawn, squares, static, switches, trusted
+from .words import DEPENDENCES, place_name
+
+_TRIVIAL = 1e-4
+"""Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
+_VALUES = 4
+"""Parameters told on a card; effects.yaml has all."""
+
+
+def causes_cards(diagnosis: Diagnosis, brand: str | None) -> Html | None:
+    """Return the shares of the gap and a card for every cause; None without any."""
+    shown = [k for k, cause in enumerate(diagnosis.causes) if cause.share >= _TRIVIAL][:MOST]
+    if not shown:
+        return None
+    rest = [c for k, c in enumerate(diagnosis.causes) if k not in shown]
+    cards = [_card(diagnosis, k, rank, brand) for rank, k in enumerate(shown, 1)]
+    return section(
+        'What causes it',
+        _shares(diagnosis, shown),
+        tag('div', *cards, class_='cards'),
+        _smaller(rest),
+        id_='cards',
+        lead='Shares are of the squared gap, on data not used for fitting; the interval holds the '
+        'true share with 90 %. All shares, with what is left and the noise, add up to 100 %.',
+    )
+
+
+def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
+    """Return one row for each cause, for what is left and for the noise: a whole of 100 %."""
+    causes, rest = diagnosis.causes, diagnosis.shares
+    rows: list[tuple[str, float, str, str]] = []
+    for rank, k in enumerate(shown, 1):
+        low, high = causes[k].share_ci90
+        told = f'{percent(causes[k].share)} ({_bounds(low, high)})'
+        rows.append((f'{rank}. {cause_name(causes[k])}', causes[k].share, told, 'cause'))
+    smaller = sum(c.share for k, c in enumerate(causes) if k not in shown)
+    if smaller > 0.0:
+        rows.append(('smaller causes', smaller, percent(smaller), 'cause'))
+    rows.append(('not explained', rest.unexplained, percent(rest.unexplained), 'rest'))
+    rows.append(('noise', rest.noise, percent(rest.noise), 'rest'))
+    items = [
+        tag(
+            'li',
+            tag('span', label, class_='label'),
+            tag('span', tag('i', style=f'width:{100.0 * share:.2f}%'), class_='track'),
+            tag('span', text, class_='figure'),
+            class_=kind,
+        )
+        for label, share, text, kind in rows
+    ]
+    return tag('ul', *items, class_='bars wide shares')
+
+
+def _bounds(low: float, high: float) -> str:
+    return f'{100.0 * low:.0f} to {100.0 * high:.0f} %'
+
+
+def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None) -> Html:
+    cause = diagnosis.causes[k]
+    name = cause_name(cause)
+    entries = [
+        ('How sure', _sure(cause)),
+        ('Value', _values(diagnosis, cause)),
+        ('Effect on the seam', _effect(diagnosis, k)),
+        ('If mended', _mended(diagnosis, k)),
+        ('What to do', _action(diagnosis, cause)),
+        *_at_the_controller(diagnosis, cause, brand),
+    ]
+    pairs = [part for head, text in entries if text for part in (tag('dt', head), tag('dd', text))]
+    return tag(
+        'article',
+        tag('h3', tag('span', str(rank), class_='rank'), f'{name[:1].upper()}{name[1:]}'),
+        tag('p', tag('b', percent(cause.share)), ' of the gap', class_='share'),
+        _box(diagnosis, k),
+        _picture(diagnosis, k),
+        tag('dl', *pairs, class_='pairs'),
+        class_='card',
+        id_=f'cause-{rank}',
+    )
+
+
+def _box(diagnosis: Diagnosis, k: int) -> Html | None:
+    """Return the switch that thinks this cause mended."""
+    for at, switch in enumerate(switches(diagnosis)):
+        if switch.members == (k,):
+            box = tag('input', type='checkbox', data_switch=at, checked='')
+            return tag('label', box, ' think as mended', class_='one-switch')
+    return None
+
+
+def _sure(cause: Cause) -> str:
+    place = [(place_name(at), p) for at, p in cause.place]
+    parts = [_list('place', place)]
+    parts.append(_list('depends on', [(DEPENDENCES.get(on, on), p) for on, p in cause.dependence]))
+    named = [(cause_name_of(site), p) for site, p in cause.name if 'curve' not in site.effect]
+    parts.append(_list('name', named) or 'the library has no name for it')
+    return '; '.join(part for part in parts if part) + '.'
+
+
+def cause_name_of(site: object) -> str:
+    """Return the name of a site without its joint, which the place says."""
+    from .words import CAUSES
+
+    effect = str(site.effect)  # type: ignore[attr-defined]
+    return CAUSES.get(effect, effect.replace('_', ' '))
+
+
+def _list(head: str, told: list[tuple[str, float]]) -> str:
+    if not told:
+        return ''
+    return f'{head} {", ".join(f"{name} ({odds(p)})" for name, p in told[:3])}'
+
+
+def _effects(diagnosis: Diagnosis, cause: Cause) -> list[Effect]:
+    found = diagnosis.model.found
+    return [found[m] for m in cause.members if m < len(found)]
+
+
+def _values(diagnosis: Diagnosis, cause: Cause) -> Html | None:
+    errors = {(f.effect.name, f.effect.site): f.std for f in diagnosis.effects}
+    rows: list[Child] = []
+    for effect in _effects(diagnosis, cause):
+        if isinstance(effect, JointCurve) or 'curve' in effect.name:
+            continue
+        for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
+            rows.append(tag('span', f'{name.replace("_", " ")} {value}'))
+    if not rows:
+        return None
+    more = [tag('span', f'and {len(rows) - _VALUES} more')] if len(rows) > _VALUES else []
+    return tag('span', *rows[:_VALUES], *more, class_='lines')
+
+
+def _part(diagnosis: Diagnosis, k: int) -> tuple[int, np.ndarray, np.ndarray] | None:
+    """Return the recording where a cause moves the tool most, its samples and how far [m]."""
+    told = diagnosis.contributions
+    if told is None or diagnosis.contacts is not None or not diagnosis.causes[k].members:
+        return None
+    best: tuple[int, np.ndarray, np.ndarray] | None = None
+    for run, parts in enumerate(told.parts):
+        size = np.linalg.norm(parts[k], axis=1)
+        good = np.flatnonzero(trusted(diagnosis, run))
+        if good.size and (best is None or size[good].max() > best[2].max()):
+            best = run, good, size[good]
+    return best
+
+
+def _effect(diagnosis: Diagnosis, k: int) -> str | None:
+    most = _part(diagnosis, k)
+    if most is None:
+        return None
+    run, good, size = most
+    peak = int(np.argmax(size))
+    text = (
+        f'moves the tool by {millimetres(float(np.sqrt((size**2).mean())))} RMS, at most '
+        f'{seen_at(diagnosis, run, int(good[peak]), float(size[peak]))}'
+    )
+    along_it = _along(diagnosis, k, run, good)
+    return f'{text}{along_it}.'
+
+
+def _along(diagnosis: Diagnosis, k: int, run: int, good: np.ndarray) -> str:
+    """Return how much of it goes along the seam and how much across, in words."""
+    told = diagnosis.contributions
+    if told is None or static(diagnosis, run) or good.size < 3:
+        return ''
+    path = diagnosis.traces.measured[run] - diagnosis.traces.before[run]
+    travel = np.gradient(path, axis=0)
+    length = np.linalg.norm(travel, axis=1, keepdims=True)
+    unit = np.divide(travel, length, out=np.zeros_like(travel), where=length > 1e-9)
+    part = told.parts[run][k]
+    ahead = float((((part * unit).sum(axis=1)[good]) ** 2).mean())
+    whole = max(float((part[good] ** 2).sum(axis=1).mean()), 1e-300)
+    across = np.sqrt(max(whole - ahead, 0.0))
+    return f'; {millimetres(across)} RMS across the seam, {millimetres(np.sqrt(ahead))} along it'
+
+
+def _mended(diagnosis: Diagnosis, k: int) -> str | None:
+    """Return the gap that would be left if only this were mended."""
+    products = np.array(squares(diagnosis))
+    for at, switch in enumerate(switches(diagnosis)):
+        if switch.members == (k,):
+            on = np.ones(products.shape[0])
+            before = np.sqrt(on @ products @ on)
+            on[1 + at] = 0.0
+            left = np.sqrt(max(float(on @ products @ on), 0.0))
+            return f'{millimetres(1e-3 * before)} become {millimetres(1e-3 * left)} RMS.'
+    return None
+
+
+def _action(diagnosis: Diagnosis, cause: Cause) -> Html | str | None:
+    effects = _effects(diagnosis, cause)[:_VALUES]
+    sentences = list(dict.fromkeys(actions(effects, diagnosis.model.robot)))
+    if not sentences:
+        return 'Measure as told under "What to measure next".' if cause.name else None
+    if len(sentences) == 1:
+        return sentences[0]
+    return tag('span', *(tag('span', text) for text in sentences), class_='lines')
+
+
+def _at_the_controller(
+    diagnosis: Diagnosis, cause: Cause, brand: str | None
+) -> list[tuple[str, str | None]]:
+    effects = _effects(diagnosis, cause)
+    if brand is None or not effects:
+        return []
+    return [(f'At the {BRANDS[brand]} controller', correction(effects[0], brand))]
+
+
+def _picture(diagnosis: Diagnosis, k: int) -> Html | None:
+    """Return how far the cause moves the tool along the recording, or its curve."""
+    curve = _curve(diagnosis, diagnosis.causes[k])
+    if curve is not None:
+        return curve
+    most = _part(diagnosis, k)
+    told = diagnosis.contributions
+    if most is None or told is None:
+        return None
+    run = most[0]
+    index = drawn(diagnosis, run)
+    size = 1e3 * np.linalg.norm(told.parts[run][k][index], axis=1)
+    dots = static(diagnosis, run)
+    return chart(
+        'How far it moves the tool',
+        along(diagnosis, run)[index],
+        [Line('moves the tool', size, 'accent', points=dots)],
+        (Axis('station') if dots else Axis('time', 's'), Axis('by', 'mm')),
+        key=f'run{run}',
+        from_zero=True,
+        height=120,
+    )
+
+
+def _curve(diagnosis: Diagnosis, cause: Cause) -> Html | None:
+    told = spreads(diagnosis)
+    found = diagnosis.model.found
+    figures = [
+        curve_figure(effect, told[m])
+        for m in cause.members
+        if m < len(found)
+        and isinstance(effect := found[m], JointCurve)
+        and effect.over != 'constant'
+    ]
+    return joined(figures[:1]) if figures else None
+
+
+def _smaller(rest: list[Cause]) -> Html | None:
+    if not rest:
+        return None
+    rows = [level_row(cause) for cause in rest]
+    return tag(
+        'details',
+        tag('summary', f'{len(rest)} smaller causes'),
+        table(LEVEL_HEADS, rows, 'levels'),
+        class_='detail',
+    )

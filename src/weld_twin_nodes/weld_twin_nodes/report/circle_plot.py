@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Circles as a magnified polar plot, like ISO 230-4 has them, with the reversals of the joints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.metrics.circle import Circle, circle_of
+from weld_twin_core.recording import Recording
+
+from .html import Html, section, tag
+from .quantities import millimetres
+from .switches import along, drawn, parted, static, trusted
+
+_MOST = 3
+"""Circles drawn."""
+_STILL = 0.02
+"""Part of its largest speed below which a joint counts as standing, so that noise turns nothing."""
+
+
+def circles(diagnosis: Diagnosis) -> list[tuple[int, Circle]]:
+    """Return the recordings that go round a circle, with it."""
+    if diagnosis.contacts is not None:
+        return []
+    out = []
+    for k, (measured, before) in enumerate(
+        zip(diagnosis.traces.measured, diagnosis.traces.before, strict=True)
+    ):
+        found = (
+            None if static(diagnosis, k) else circle_of((measured - before)[trusted(diagnosis, k)])
+        )
+        if found is not None:
+            out.append((k, found))
+    return out[:_MOST]
+
+
+def circle_data(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return what the script draws the polar plots from."""
+    out = []
+    for k, circle in circles(diagnosis):
+        index = drawn(diagnosis, k)
+        path = (diagnosis.traces.measured[k] - diagnosis.traces.before[k])[index]
+        out.append(
+            {
+                'run': k,
+                'angle': [round(float(v), 4) for v in circle.angles(path)],
+                'out': [round(float(v), 4) for v in circle.outwards(path).ravel()],
+                'radius': round(1e3 * circle.radius, 3),
+                'reversals': _marks(diagnosis, k, circle),
+            }
+        )
+    return out
+
+
+def _marks(diagnosis: Diagnosis, k: int, circle: Circle) -> list[tuple[str, float]]:
+    """Return the joints that turn back, and at which angle of the circle."""
+    t = diagnosis.traces.t[k]
+    path = diagnosis.traces.measured[k] - diagnosis.traces.before[k]
+    angle = np.unwrap(circle.angles(path))
+    return [
+        (name, round(float(np.interp(when, t, angle)), 4))
+        for name, when in reversals(diagnosis.recordings[k], diagnosis.model.robot.joint_names)
+        if t[0] <= when <= t[-1]
+    ]
+
+
+def reversals(recording: Recording, names: tuple[str, ...]) -> list[tuple[str, float]]:
+    """Return which joint turns back when [s]."""
+    motion, out = recording.joints, []
+    for i, name in enumerate(names):
+        speed = np.gradient(motion.q[:, i], motion.t)
+        moving = np.flatnonzero(np.abs(speed) > _STILL * max(float(np.abs(speed).max()), 1e-9))
+        turned = np.flatnonzero(np.diff(np.sign(speed[moving])) != 0)
+        out += [(name, float(motion.t[moving[j : j + 2]].mean())) for j in turned]
+    return out
+
+
+def circles_section(diagnosis: Diagnosis) -> Html | None:
+    """Return the polar plots; None where nothing went round a circle."""
+    found = circles(diagnosis)
+    if not found:
+        return None
+    figures = [_figure(diagnosis, k, circle) for k, circle in found]
+    return section(
+        'The circle',
+        tag('div', *figures, class_='panels'),
+        id_='circles',
+        lead='Radial deviation of the tool point, magnified, against the commanded circle '
+        '(ISO 230-4). The ticks at the rim are where a joint turns back.',
+    )
+
+
+def _figure(diagnosis: Diagnosis, k: int, circle: Circle) -> Html:
+    path = diagnosis.traces.measured[k] - diagnosis.traces.before[k]
+    left, parts = parted(diagnosis)
+    good = trusted(diagnosis, k)
+    radial = _radial(circle, path, left[k] + parts[k].sum(axis=0))[good]
+    name = diagnosis.recordings[k].name
+    told = (
+        f'{name}: radius {millimetres(circle.radius)}, '
+        f'{along(diagnosis, k)[-1]:.1f} s; as it is from {millimetres(float(radial.min()))} to '
+        f'{millimetres(float(radial.max()))}, so {millimetres(float(np.ptp(radial)))} out of round'
+    )
+    label = f'Polar plot of {name}'
+    return tag(
+        'figure',
+        tag('canvas', data_circle=k, role='img', aria_label=label),
+        tag('figcaption', told),
+    )
+
+
+def _radial(circle: Circle, path: Array, deviation: Array) -> Array:
+    return np.asarray((circle.outwards(path) * deviation).sum(axis=1))

@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a maker's controller takes a correction, in the words of its menus and variables."""
+
+from __future__ import annotations
+
+from weld_twin_core.effects.effect import Effect
+
+BRANDS = {
+    'abb': 'ABB',
+    'fanuc': 'FANUC',
+    'kuka': 'KUKA',
+    'ur': 'UR',
+    'yaskawa': 'Yaskawa',
+}
+"""By the start of a robot's name, as the bundled models and most URDFs have it."""
+_KINDS = {
+    'joint_offset': 'zero',
+    'joint_slip': 'zero',
+    'base_pose': 'base',
+    'setup_step': 'base',
+    'tool_pose': 'tool',
+    'tool_slip': 'tool',
+    'wear': 'tool',
+    'payload': 'load',
+    'link_length': 'model',
+    'link_offset': 'model',
+    'link_twist': 'model',
+    'axis_parallelism': 'model',
+}
+_PROGRAM = 'It takes no such value: correct the points of the program (weld-twin correct-program).'
+_PLACES = {
+    ('kuka', 'zero'): 'Start-up > Master: master the axis again; its zero lies in $MAMES.',
+    ('kuka', 'base'): 'Start-up > Calibrate > Base: change BASE_DATA[n], or $ROBROOT of the cell.',
+    ('kuka', 'tool'): 'Start-up > Calibrate > Tool: change TOOL_DATA[n].',
+    ('kuka', 'load'): 'Start-up > Calibrate > Tool > Payload data: change LOAD_DATA[n].',
+    ('abb', 'zero'): 'Calibration > Calib. parameters: edit the motor calibration offset, which '
+    'counts radians of the motor, or fine-calibrate the axis.',
+    ('abb', 'base'): 'Change wobj.uframe of the work object, or Base Frame in the topic Motion.',
+    ('abb', 'tool'): 'Change tframe of the tooldata.',
+    ('abb', 'load'): 'Change the loaddata, or run LoadIdentify.',
+    ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master; the count lies in '
+    '$DMR_GRP[1].$MASTER_COUN.',
+    ('fanuc', 'base'): 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
+    ('fanuc', 'tool'): 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
+    ('fanuc', 'load'): 'MENU > SYSTEM > Motion: change the payload schedule.',
+    ('yaskawa', 'zero'): 'ROBOT > HOME POSITION: change the absolute data of the axis, in pulses.',
+    ('yaskawa', 'base'): 'ROBOT > USER COORDINATE: teach or change the user frame.',
+    ('yaskawa', 'tool'): 'ROBOT > TOOL: change X, Y, Z, Rx, Ry, Rz of the tool file.',
+    ('yaskawa', 'load'): 'ROBOT > TOOL: change weight and centre of gravity of the tool file.',
+    ('ur', 'zero'): 'Zeros stand as delta_theta in calibration.conf of the controller; a service '
+    'engineer changes them by a new kinematic calibration.',
+    ('ur', 'model'): 'It stands as a delta of the link in calibration.conf of the controller; a '
+    'service engineer changes it by a new kinematic calibration.',
+    ('ur', 'base'): 'Installation > Features: change the feature that the program moves in.',
+    ('ur', 'tool'): 'Installation > General > TCP: change position and orientation.',
+    ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',
+}
+"""Menus as the makers' operating manuals name them; newer releases may move them."""
+
+
+def brand_of(robot: str) -> str | None:
+    """Return the brand whose robots are named like this, None where the name does not tell."""
+    name = robot.lower().replace('motoman', 'yaskawa')
+    return next((brand for brand in BRANDS if name.startswith(brand)), None)
+
+
+def correction(effect: Effect, brand: str | None) -> str | None:
+    """Return where this maker's controller takes the correction; None for an unknown maker."""
+    if brand is None:
+        return None
+    kind = _KINDS.get(effect.name)
+    if kind is None:
+        return _PROGRAM if effect.name in _BY_PROGRAM else None
+    return _PLACES.get((brand, kind), _PROGRAM)
+
+
+_BY_PROGRAM = (
+    'gear_ratio',
+    'transmission_ripple',
+    'joint_coupling',
+    'joint_compliance',
+    'bearing_tilt',
+    'joint_curve',
+    'frame_curve',
+)
+"""Errors of the arm that programs can be corrected for and that controllers have no field for."""

@@ -1,0 +1,130 @@
+// SPDX-FileCopyrightText: weld_twin contributors
+// SPDX-License-Identifier: Apache-2.0
+// What the parts of the sheet share: which causes are thought mended, what that leaves, which
+// instant is looked at, and whether it passes. Parts listen to 'switched' and 'instant'.
+'use strict';
+window.sheet = (() => {
+  const data = JSON.parse(document.getElementById('data').textContent);
+  const mended = data.switches.map(() => true);
+  const all = (selector) => [...document.querySelectorAll(selector)];
+  const put = (id, text) => { const item = document.getElementById(id); if (item) item.textContent = text; };
+  const mm = (value) => `${value.toFixed(Math.abs(value) >= 10 ? 2 : 3)} mm`;
+  for (const run of data.runs) {
+    run.before = run.before || summed(run, () => true);
+    run.now = run.left;
+    run.size = { before: sizes(run.before), now: sizes(run.now) };
+  }
+
+  // The deviation of a run with the parts that are there, in um, x y z after each other.
+  function summed(run, there) {
+    const out = run.left.slice();
+    run.parts.forEach((part, k) => {
+      if (there(k)) part.forEach((value, i) => { out[i] += value; });
+    });
+    return out;
+  }
+
+  function sizes(flat) {
+    const out = [];
+    for (let i = 0; i < flat.length; i += 3) out.push(Math.hypot(flat[i], flat[i + 1], flat[i + 2]) / 1e3);
+    return out;
+  }
+
+  // RMS in mm over all samples, not only those on the page.
+  function rms(there) {
+    const on = [1, ...data.switches.map((_, k) => (there(k) ? 1 : 0))];
+    let sum = 0;
+    data.squares.forEach((row, i) => row.forEach((value, j) => { sum += on[i] * on[j] * value; }));
+    return Math.sqrt(Math.max(sum, 0));
+  }
+
+  const most = (side) => Math.max(0, ...data.runs.flatMap((run) => run.size[side]));
+
+  function judged(largest) {
+    const { tolerance, below, above, words } = data.rule;
+    if (tolerance == null) return ['None', words.None];
+    if (largest + below <= tolerance) return ['pass', words.pass];
+    if (largest - above > tolerance) return ['fail', words.fail];
+    return ['open', words.open];
+  }
+
+  function accept() {
+    const largest = { 'as-it-is': most('before'), mended: most('now') };
+    for (const item of all('[data-largest]')) item.textContent = mm(largest[item.dataset.largest]);
+    for (const item of all('[data-verdict]')) {
+      const [kind, word] = judged(largest[item.dataset.verdict]);
+      item.className = `mark ${kind}`;
+      item.textContent = word;
+    }
+  }
+
+  function switched() {
+    const there = (k) => !mended[k];
+    for (const run of data.runs) {
+      if (run.parts.length) run.now = summed(run, there);
+      run.size.now = sizes(run.now);
+    }
+    for (const box of all('input[data-switch]')) box.checked = mended[Number(box.dataset.switch)];
+    const now = rms(there), before = rms(() => true);
+    put('now-rms', mm(now));
+    put('now-max', mm(most('now')));
+    put('now-share', `${(100 * now / Math.max(before, 1e-12)).toFixed(0)} %`);
+    all('#seam figure.chart').forEach((figure, k) => {
+      if (data.runs[k]) window.charts.update(figure, { 'with that mended': data.runs[k].size.now });
+    });
+    accept();
+    document.dispatchEvent(new CustomEvent('switched'));
+  }
+
+  function instant(event) {
+    const { key, x } = event.detail, k = Number(key.replace('run', ''));
+    const run = data.runs[k];
+    if (!run) return;
+    let i = 0;
+    run.t.forEach((t, j) => { if (Math.abs(t - x) < Math.abs(run.t[i] - x)) i = j; });
+    const where = run.dots ? `station ${run.t[i]}` : `${run.t[i].toFixed(2)} s`;
+    put('instant', `${run.name}, ${where}: ${mm(run.size.before[i])} as it is, ${mm(run.size.now[i])} then`);
+    for (const cell of all('td[data-joint]')) {
+      const q = run.joints[Number(cell.dataset.joint)];
+      cell.textContent = q ? `${q[i].toFixed(1)} ${cell.dataset.unit}` : '';
+    }
+    for (const item of all('.strip li')) {
+      const { run: own, from, to } = item.dataset;
+      const time = run.dots ? i : run.t[i];
+      item.classList.toggle('here', !run.dots && Number(own) === k && time >= Number(from) && time <= Number(to));
+    }
+    document.dispatchEvent(new CustomEvent('looked', { detail: { run: k, sample: i } }));
+  }
+
+  function listen() {
+    for (const box of all('input[data-switch]')) {
+      box.addEventListener('change', () => {
+        mended[Number(box.dataset.switch)] = box.checked;
+        switched();
+      });
+    }
+    for (const button of all('button[data-all]')) {
+      button.addEventListener('click', () => {
+        mended.fill(button.dataset.all === 'on');
+        switched();
+      });
+    }
+    const field = document.getElementById('tolerance');
+    if (field) {
+      field.addEventListener('input', () => {
+        const value = Number(field.value);
+        data.rule.tolerance = field.value !== '' && value > 0 ? value : null;
+        accept();
+      });
+    }
+    document.addEventListener('instant', instant);
+    window.addEventListener('beforeprint', () => {
+      all('details').forEach((item) => { item.open = true; });
+    });
+  }
+
+  if (data.runs.length === 0) return { data };
+  listen();
+  switched();
+  return { data };
+})();

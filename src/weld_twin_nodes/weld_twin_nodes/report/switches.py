@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The causes that a reader can think away, and what the page needs to follow at once."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.result import Cause, Diagnosis
+from weld_twin_core.recording import Recording
+
+from .charts import thinned
+from .words import site_name, someplace
+
+MOST = 8
+"""Causes with a switch of their own; the others share one."""
+OTHERS = 'all smaller ones together'
+_POINTS = 6000
+"""Points of all recordings and lines together: half a megabyte on the page."""
+_CURVES = ('joint_curve', 'frame_curve')
+
+
+class Switch(NamedTuple):
+    """One switch: its name, and the causes (as the contributions count them) that it mends."""
+
+    label: str
+    members: tuple[int, ...]
+
+
+def cause_name(cause: Cause) -> str:
+    """Return a cause as a heading: its name, or its place where the library has no name for it."""
+    named = [site for site, _ in cause.name if site.effect not in _CURVES]
+    if not named:
+        return someplace(cause)
+    likely = [s for s, p in cause.name if s in named and p > 0.5 * cause.name[0][1]] or named[:1]
+    return ' or '.join(site_name(site) for site in likely[:3])
+
+
+def switches(diagnosis: Diagnosis) -> tuple[Switch, ...]:
+    """Return the switches, largest share first; none where no cause can be thought away."""
+    told = diagnosis.contributions
+    if told is None or not told.parts or diagnosis.contacts is not None:
+        return ()
+    count = told.parts[0].shape[0]
+    own = [k for k, cause in enumerate(diagnosis.causes) if cause.members]
+    out = [Switch(cause_name(diagnosis.causes[k]), (k,)) for k in own[:MOST]]
+    rest = tuple(own[MOST:]) + tuple(range(len(diagnosis.causes), count))
+    return (*out, *([Switch(OTHERS, rest)] if rest else []))
+
+
+def parted(diagnosis: Diagnosis) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """
+    Return what is left, (M, 3), and what each switch adds to it, (S, M, 3), for every recording.
+
+    Without switches what is left is the residual after, and nothing is added to it.
+    """
+    traces, told, all_switches = diagnosis.traces, diagnosis.contributions, switches(diagnosis)
+    if told is None or not all_switches:
+        return traces.after, tuple(np.zeros((0, *part.shape)) for part in traces.after)
+    return told.left, tuple(
+        np.array([part[list(switch.members)].sum(axis=0) for switch in all_switches])
+        for part in told.parts
+    )
+
+
+def trusted(diagnosis: Diagnosis, k: int) -> np.ndarray:
+    """Return which samples of a recording to draw: a gross outlier would hide all the others."""
+    traces = diagnosis.traces
+    if traces.trusted:
+        return traces.trusted[k]
+    return np.ones(traces.t[k].size, dtype=bool)
+
+
+def static(diagnosis: Diagnosis, k: int) -> bool:
+    """Tell whether a recording is of stations at rest."""
+    return k < len(diagnosis.recordings) and bool(diagnosis.recordings[k].joints.static)
+
+
+def drawn(diagnosis: Diagnosis, k: int) -> np.ndarray:
+    """Return which samples of a recording the page shows, the largest deviations among them."""
+    left, parts = parted(diagnosis)
+    good = np.flatnonzero(trusted(diagnosis, k))
+    if not good.size:
+        return good
+    each = max(_POINTS // (len(left) * (2 + parts[k].shape[0])), 60)
+    sizes = [np.linalg.norm(v[good], axis=1) for v in (left[k] + parts[k].sum(axis=0), left[k])]
+    return np.asarray(good[thinned(sizes, each)])
+
+
+def along(diagnosis: Diagnosis, k: int) -> Array:
+    """Return the time [s] of every sample along the recording; the number of a station at rest."""
+    t = diagnosis.traces.t[k]
+    return np.arange(1.0, t.size + 1.0) if static(diagnosis, k) else t - t[:1]
+
+
+def squares(diagnosis: Diagnosis) -> list[list[float]]:
+    """
+    Return the mean products [mm^2] of what is left and what each switch adds, over good samples.
+
+    With ones for what is there and zeros for what is mended, v' S v is the mean square deviation:
+    the page has exact figures though it holds few samples.
+    """
+    if diagnosis.contacts is not None:
+        return [[0.0]]
+    left, parts = parted(diagnosis)
+    stacked = [
+        np.concatenate([one[None], more])[:, trusted(diagnosis, k)]
+        for k, (one, more) in enumerate(zip(left, parts, strict=True))
+    ]
+    if not stacked:
+        return [[0.0]]
+    fields = 1e3 * np.concatenate(stacked, axis=1)
+    count = max(fields.shape[1], 1)
+    return [[float(v) for v in row] for row in np.einsum('imc,jmc->ij', fields, fields) / count]
+
+
+def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return what the scripts of the page draw from; lengths in um, angles in degrees."""
+    left, parts = parted(diagnosis)
+    shown = range(0 if diagnosis.contacts is not None else len(left))
+    runs = [_run(diagnosis, k, left[k], parts[k]) for k in shown]
+    top = _large(diagnosis, left, parts)
+    return {
+        'runs': runs,
+        'switches': [switch.label for switch in switches(diagnosis)],
+        'squares': squares(diagnosis),
+        'top': round(1e6 * top, 1),
+        'stretch': _stretch(diagnosis.traces.measured, top),
+        'floor': round(1e3 * diagnosis.gap.noise_floor_m, 5),
+    }
+
+
+def _run(diagnosis: Diagnosis, k: int, left: Array, parts: Array) -> dict[str, Any]:
+    traces, index = diagnosis.traces, drawn(diagnosis, k)
+    recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
+    bare = {} if parts.size else {'before': _micrometres(traces.before[k][index])}
+    return {
+        **bare,
+        'name': recording.name if recording is not None else f'recording {k + 1}',
+        'dots': static(diagnosis, k),
+        't': [round(float(t), 3) for t in along(diagnosis, k)[index]],
+        'path': _micrometres((traces.measured[k] - traces.before[k])[index]),
+        'left': _micrometres(left[index]),
+        'parts': [_micrometres(part[index]) for part in parts],
+        'joints': [] if recording is None else _joints(diagnosis, recording, traces.t[k][index]),
+    }
+
+
+def _joints(diagnosis: Diagnosis, recording: Recording, t: Array) -> list[list[float]]:
+    """Return the joint positions at some times, by joint: degrees, or mm where it slides."""
+    motion, robot = recording.joints, diagnosis.model.robot
+    factors = [1e3 if slides else 180.0 / np.pi for slides in robot.prismatic]
+    return [
+        [round(factor * float(v), 2) for v in np.interp(t, motion.t, motion.q[:, i])]
+        for i, factor in enumerate(factors)
+    ]
+
+
+def _micrometres(points: Array) -> list[float]:
+    return [round(float(value), 1) for value in (1e6 * points).ravel()]
+
+
+def _large(diagnosis: Diagnosis, left: tuple[Array, ...], parts: tuple[Array, ...]) -> float:
+    """Return a deviation [m] that hardly any sample exceeds, never quite nothing."""
+    if diagnosis.contacts is not None:
+        return 1e-6
+    sizes = [
+        np.linalg.norm((one + more.sum(axis=0))[trusted(diagnosis, k)], axis=1)
+        for k, (one, more) in enumerate(zip(left, parts, strict=True))
+    ]
+    every = np.concatenate([np.zeros(0), *sizes])
+    return max(float(np.percentile(every, 98)), 1e-6) if every.size else 1e-6
+
+
+_SHOWN = 0.04
+"""Part of the seam's extent that a large deviation is drawn at."""
+
+
+def _stretch(measured: tuple[Array, ...], top: float) -> int:
+    """Return how much larger than life deviations are drawn: 1, 2 or 5 times a power of ten."""
+    points = np.concatenate([*measured, np.zeros((0, 3))])
+    extent = float(np.ptp(points, axis=0).max()) if points.size else 1.0
+    wanted = max(_SHOWN * extent / top, 1.0)
+    power = 10 ** int(np.floor(np.log10(wanted)))
+    return int(power * max(step for step in (1, 2, 5) if step * power <= wanted * 1.0001))

@@ -17,7 +17,7 @@ from weld_twin_core.metrics.performance import Performance, performance_of
 from .html import Html, joined, section, table, tag
 from .performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows
 from .quantities import millimetres
-from .switches import parted, trusted
+from .switches import as_it_is, parted, trusted
 
 WORDS = {
     PASS: 'passes',
@@ -57,15 +57,11 @@ def rule_of(diagnosis: Diagnosis, demand: Demand) -> Rule:
 
 def largest(diagnosis: Diagnosis) -> tuple[float, float]:
     """Return the largest deviation as it is, and with all causes mended, [m]."""
-    left, parts = parted(diagnosis)
-    good = [trusted(diagnosis, k) for k in range(len(left))]
-    pairs = [(one + more.sum(axis=0), one) for one, more in zip(left, parts, strict=True)]
-    if not any(parts[k].size for k in range(len(parts))):
-        pairs = list(zip(diagnosis.traces.before, diagnosis.traces.after, strict=True))
+    left, _ = parted(diagnosis)
     out = [0.0, 0.0]
-    for pair, kept in zip(pairs, good, strict=True):
-        for i, part in enumerate(pair):
-            sizes = np.linalg.norm(part[kept], axis=1)
+    for k, after in enumerate(left):
+        for i, part in enumerate((as_it_is(diagnosis, k), after)):
+            sizes = np.linalg.norm(part[trusted(diagnosis, k)], axis=1)
             out[i] = max(out[i], float(sizes.max(initial=0.0)))
     return out[0], out[1]
 

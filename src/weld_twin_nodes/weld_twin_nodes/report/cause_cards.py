@@ -23,6 +23,17 @@ from .words import DEPENDENCES, place_name
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
+_WORDS = {
+    'da': 'length off by',
+    'dd': 'offset off by',
+    'dalpha': 'twist off by',
+    'dbeta': 'tilt off by',
+    'width': 'play',
+    'xyz': 'moved by',
+    'rotvec': 'turned by',
+    'offset': 'off by',
+}
+"""Parameters as a fitter says them; the others are words already."""
 _VALUES = 4
 """Parameters told on a card; effects.yaml has all."""
 
@@ -143,7 +154,7 @@ def _values(diagnosis: Diagnosis, cause: Cause) -> Html | None:
         if isinstance(effect, JointCurve) or 'curve' in effect.name:
             continue
         for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
-            rows.append(tag('span', f'{name.replace("_", " ")} {value}'))
+            rows.append(tag('span', f'{_WORDS.get(name, name.replace("_", " "))} {value}'))
     if not rows:
         return None
     more = [tag('span', f'and {len(rows) - _VALUES} more')] if len(rows) > _VALUES else []

@@ -17,10 +17,10 @@ window.charts = (() => {
     return {
       label: line.name,
       stroke: () => colour(line.colour),
-      fill: line.points ? () => colour(line.colour) : undefined,
-      width: line.points ? 0 : 1.5,
+      width: 1.5,
+      paths: line.points ? () => null : undefined,
       dash: line.dashed ? [6, 4] : undefined,
-      points: { show: line.points, size: 5 },
+      points: { show: line.points, size: 5, fill: () => colour(line.colour) },
       value: value(axis),
     };
   }

@@ -15,7 +15,7 @@ from weld_twin_core.recording import Recording
 
 from .html import Html, section, tag
 from .quantities import millimetres
-from .switches import along, drawn, parted, static, trusted
+from .switches import along, as_it_is, drawn, static, trusted
 
 _MOST = 3
 """Circles drawn."""
@@ -57,26 +57,26 @@ def circle_data(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return out
 
 
-def _marks(diagnosis: Diagnosis, k: int, circle: Circle) -> list[tuple[str, float]]:
-    """Return the joints that turn back, and at which angle of the circle."""
+def _marks(diagnosis: Diagnosis, k: int, circle: Circle) -> list[tuple[int, float]]:
+    """Return the joints that turn back, counted from 0, and at which angle of the circle."""
     t = diagnosis.traces.t[k]
     path = diagnosis.traces.measured[k] - diagnosis.traces.before[k]
     angle = np.unwrap(circle.angles(path))
     return [
-        (name, round(float(np.interp(when, t, angle)), 4))
-        for name, when in reversals(diagnosis.recordings[k], diagnosis.model.robot.joint_names)
+        (joint, round(float(np.interp(when, t, angle)), 4))
+        for joint, when in reversals(diagnosis.recordings[k])
         if t[0] <= when <= t[-1]
     ]
 
 
-def reversals(recording: Recording, names: tuple[str, ...]) -> list[tuple[str, float]]:
-    """Return which joint turns back when [s]."""
+def reversals(recording: Recording) -> list[tuple[int, float]]:
+    """Return which joint, counted from 0, turns back when [s]."""
     motion, out = recording.joints, []
-    for i, name in enumerate(names):
+    for i in range(motion.q.shape[1]):
         speed = np.gradient(motion.q[:, i], motion.t)
         moving = np.flatnonzero(np.abs(speed) > _STILL * max(float(np.abs(speed).max()), 1e-9))
         turned = np.flatnonzero(np.diff(np.sign(speed[moving])) != 0)
-        out += [(name, float(motion.t[moving[j : j + 2]].mean())) for j in turned]
+        out += [(i, float(motion.t[moving[j : j + 2]].mean())) for j in turned]
     return out
 
 
@@ -91,15 +91,15 @@ def circles_section(diagnosis: Diagnosis) -> Html | None:
         tag('div', *figures, class_='panels'),
         id_='circles',
         lead='Radial deviation of the tool point, magnified, against the commanded circle '
-        '(ISO 230-4). The ticks at the rim are where a joint turns back.',
+        '(ISO 230-4). The ticks at the rim are where a joint turns back; a number counts joints from '
+        'the base.',
     )
 
 
 def _figure(diagnosis: Diagnosis, k: int, circle: Circle) -> Html:
     path = diagnosis.traces.measured[k] - diagnosis.traces.before[k]
-    left, parts = parted(diagnosis)
     good = trusted(diagnosis, k)
-    radial = _radial(circle, path, left[k] + parts[k].sum(axis=0))[good]
+    radial = _radial(circle, path, as_it_is(diagnosis, k))[good]
     name = diagnosis.recordings[k].name
     told = (
         f'{name}: radius {millimetres(circle.radius)}, '

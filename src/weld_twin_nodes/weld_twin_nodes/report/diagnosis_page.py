@@ -22,7 +22,7 @@ from .controllers import brand_of
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
 from .headline import header, opening
-from .html import Html, document, own_file, tag
+from .html import Html, document, joined, own_file, tag
 from .joint_names import renamed
 from .quantities import millimetres
 from .seam_view import seam_section
@@ -71,20 +71,21 @@ def report_page(
     sheet = sheet or Sheet()
     rule = rule_of(diagnosis, sheet.demand)
     sound = diagnosis.status != 'unsound'
-    body = tag(
-        'main',
-        header(diagnosis),
-        opening(diagnosis, _judged(diagnosis, rule) if sound else None),
-        *(_causes(diagnosis, sheet) if sound else ()),
-        checks_section(diagnosis),
-        _signatures(),
+    body = joined(
+        [
+            header(diagnosis),
+            opening(diagnosis, _judged(diagnosis, rule) if sound else None),
+            *(_causes(diagnosis, sheet) if sound else ()),
+            checks_section(diagnosis),
+            _signatures(),
+        ]
     )
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
     data = {**page_data(diagnosis), 'rule': rule_data(rule), 'circles': circle_data(diagnosis)}
-    named = Html(renamed(body + embedded(data, 'data'), sheet.joints))
-    foot = tag('div', inputs_section(inputs), class_='foot detail')
+    body, told = (Html(renamed(part, sheet.joints)) for part in (body, embedded(data, 'data')))
+    main = tag('main', body, tag('div', inputs_section(inputs), class_='detail'))
     scripts = [tag('script', own_file(name)) for name in SCRIPTS]
-    return document(title, named, foot, charts=True, scripts=scripts)
+    return document(title, main, told, charts=True, scripts=scripts)
 
 
 def _causes(diagnosis: Diagnosis, sheet: Sheet) -> tuple[Html | None, ...]:

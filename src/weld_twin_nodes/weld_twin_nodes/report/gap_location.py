@@ -133,9 +133,8 @@ def _map(diagnosis: Diagnosis) -> Html | None:
 
 def _cell(share: float) -> Html:
     strength = min(max(share, 0.0), 1.0)
-    class_ = 'strong' if strength > 0.55 else None
     text = percent(share) if share >= _VISIBLE else ''
-    return tag('td', text, style=f'--share:{strength:.3f}', class_=class_)
+    return tag('td', text, style=f'--share:{strength:.3f}')
 
 
 def _directions(diagnosis: Diagnosis) -> Html:
@@ -190,7 +189,6 @@ def _stretch(
         tag('span', millimetres(rms), class_='figure'),
         tag('span', when, class_='when'),
         style=f'--share:{rms / largest:.3f};flex-grow:{max(end - start, 1e-3):.3f}',
-        class_='strong' if rms > 0.55 * largest else None,
         title=f'{when}: {millimetres(rms)}, {percent(share)} of the squared gap',
         data_run=run,
         data_from=f'{start - zero:.3f}',

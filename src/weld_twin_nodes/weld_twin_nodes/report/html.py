@@ -63,7 +63,8 @@ def table(heads: Iterable[str], rows: Iterable[Iterable[Child]], class_: str = '
         body.append(tag('tr', tag('th', first, scope='row'), *(tag('td', cell) for cell in rest)))
     top = tag('tr', *(tag('th', head, scope='col') for head in heads))
     whole = tag('table', tag('thead', top), tag('tbody', *body), class_=class_ or None)
-    return tag('div', whole, class_='scroll')
+    # A table that is wider than a phone scrolls, also by the keyboard.
+    return tag('div', whole, class_='scroll', tabindex='0')
 
 
 def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:

@@ -27,7 +27,7 @@
     const pen = canvas.getContext('2d');
     pen.setTransform(ratio, 0, 0, ratio, side * ratio / 2, canvas.clientHeight * ratio / 2);
     pen.font = '12px system-ui, sans-serif';
-    const rim = 0.4 * Math.min(side, canvas.clientHeight), base = 0.66 * rim, span = 0.26 * rim;
+    const rim = 0.38 * Math.min(side, canvas.clientHeight), base = 0.66 * rim, span = 0.26 * rim;
     const before = radial(circle, run.before), now = radial(circle, run.now);
     const unit = step(Math.max(...before.map(Math.abs)));
     const place = (angle, value) => {
@@ -66,7 +66,8 @@
   // Names at the rim, those that would lie on each other joined.
   function marks(pen, circle, rim) {
     const told = [];
-    for (const [name, angle] of circle.reversals) {
+    for (const [joint, angle] of circle.reversals) {
+      const name = data.joints[joint].length > 3 ? String(joint + 1) : data.joints[joint];
       const turn = ((angle % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI);
       const near = told.find((item) => Math.abs(item.turn - turn) < 0.13);
       if (!near) told.push({ turn, names: [name] });

@@ -80,10 +80,6 @@
       if (!run.dots) drawCourse(pen, project.point, run, width);
       if (view.looked && view.looked.run === k) drawLooked(pen, project.point, run, run[side]);
     });
-    pen.fillStyle = style('--soft');
-    pen.textAlign = 'left';
-    pen.textBaseline = 'top';
-    pen.fillText(`deviation drawn ${view.stretch} × larger`, 10, 8);
     drawAxes(pen, project.direction, height);
     drawRuler(pen, project.scale, width, height);
   }
@@ -249,7 +245,7 @@
   function redraw() {
     canvases.forEach(draw);
     drawLegend();
-    document.getElementById('times').textContent = `${view.stretch} ×`;
+    document.querySelectorAll('.times').forEach((item) => { item.textContent = `${view.stretch} ×`; });
   }
 
   let waiting = false;

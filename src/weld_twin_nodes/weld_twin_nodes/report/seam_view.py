@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from .charts import Axis, Line, chart
 from .html import Html, joined, section, tag
 from .quantities import MISSING, millimetres
-from .switches import along, drawn, parted, static, switches, trusted
+from .switches import along, as_it_is, drawn, parted, static, switches, trusted
 
 _LINE = (
     'The thin line is where the twin has the tool, the coloured one where it was measured, its '
@@ -100,7 +100,7 @@ def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:
     return [
         tag(
             'figure',
-            tag('figcaption', title),
+            tag('figcaption', title, ', deviation ', tag('span', class_='times'), ' larger'),
             tag('canvas', data_side=side, tabindex='0', role='img', aria_label=label),
         )
         for side, title, label in told
@@ -115,7 +115,7 @@ def _controls() -> Html:
     slider = tag(
         'label',
         'Deviation drawn ',
-        tag('output', id_='times'),
+        tag('output', id_='times', class_='times'),
         ' larger ',
         tag('input', type='range', id_='stretch', min='0', max='1', step='0.01'),
     )
@@ -142,8 +142,7 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     index = drawn(diagnosis, k)
     if not index.size:
         return tag('p', 'No samples.')
-    left, parts = (item[k] for item in parted(diagnosis))
-    before = left + parts.sum(axis=0) if parts.size else diagnosis.traces.before[k]
+    left, before = parted(diagnosis)[0][k], as_it_is(diagnosis, k)
     dots = static(diagnosis, k)
     lines = [Line('as it is', _size(before[index]), 'before', points=dots)]
     if switches(diagnosis) or diagnosis.model.found:

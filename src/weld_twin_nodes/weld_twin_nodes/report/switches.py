@@ -66,6 +66,12 @@ def parted(diagnosis: Diagnosis) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     )
 
 
+def as_it_is(diagnosis: Diagnosis, k: int) -> Array:
+    """Return the deviation of a recording before anything is mended, (M, 3) [m]."""
+    left, parts = (item[k] for item in parted(diagnosis))
+    return left + parts.sum(axis=0) if parts.size else diagnosis.traces.before[k]
+
+
 def trusted(diagnosis: Diagnosis, k: int) -> np.ndarray:
     """Return which samples of a recording to draw: a gross outlier would hide all the others."""
     traces = diagnosis.traces
@@ -86,7 +92,7 @@ def drawn(diagnosis: Diagnosis, k: int) -> np.ndarray:
     if not good.size:
         return good
     each = max(_POINTS // (len(left) * (2 + parts[k].shape[0])), 60)
-    sizes = [np.linalg.norm(v[good], axis=1) for v in (left[k] + parts[k].sum(axis=0), left[k])]
+    sizes = [np.linalg.norm(v[good], axis=1) for v in (as_it_is(diagnosis, k), left[k])]
     return np.asarray(good[thinned(sizes, each)])
 
 
@@ -122,9 +128,10 @@ def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
     left, parts = parted(diagnosis)
     shown = range(0 if diagnosis.contacts is not None else len(left))
     runs = [_run(diagnosis, k, left[k], parts[k]) for k in shown]
-    top = _large(diagnosis, left, parts)
+    top = _large(diagnosis)
     return {
         'runs': runs,
+        'joints': list(diagnosis.model.robot.joint_names),
         'switches': [switch.label for switch in switches(diagnosis)],
         'squares': squares(diagnosis),
         'top': round(1e6 * top, 1),
@@ -163,13 +170,13 @@ def _micrometres(points: Array) -> list[float]:
     return [round(float(value), 1) for value in (1e6 * points).ravel()]
 
 
-def _large(diagnosis: Diagnosis, left: tuple[Array, ...], parts: tuple[Array, ...]) -> float:
+def _large(diagnosis: Diagnosis) -> float:
     """Return a deviation [m] that hardly any sample exceeds, never quite nothing."""
     if diagnosis.contacts is not None:
         return 1e-6
     sizes = [
-        np.linalg.norm((one + more.sum(axis=0))[trusted(diagnosis, k)], axis=1)
-        for k, (one, more) in enumerate(zip(left, parts, strict=True))
+        np.linalg.norm(as_it_is(diagnosis, k)[trusted(diagnosis, k)], axis=1)
+        for k in range(len(diagnosis.traces.t))
     ]
     every = np.concatenate([np.zeros(0), *sizes])
     return max(float(np.percentile(every, 98)), 1e-6) if every.size else 1e-6

@@ -9,16 +9,22 @@ from collections.abc import Sequence
 from typing import Any
 
 from weld_twin_core import __version__
+from weld_twin_core.effects.registry import REGISTRY
 
-from ..report.html import Html, bars, document, section, table, tag
+from ..report.html import Html, bars, document, joined, section, table, tag
+from ..report.quantities import millimetres
 from .figures import Drawing
+from .fitter_words import Advice, advised, parameter_words, sized, spread_of
 
 _ALLOWED = 'img-src data:'
 _STYLE = """
 figure { margin: 0 0 1.5rem; } figure img { width: 100%; height: auto; background: #fff; }
+.advice th[scope=row] { min-width: 9rem; }
 .claims td:nth-child(4) { font-weight: 600; min-width: 9rem; }
 .claims { font-size: .85rem; } table { margin-bottom: 1rem; }
 """
+_ADVISED = 5
+"""Tolerances to tighten that are told; the others gain less than these."""
 _SHOWN = 12
 """Bars shown; the file has all."""
 
@@ -47,8 +53,12 @@ def study_page(
 def _study(study: dict[str, Any]) -> list[Html]:
     motions = study['motions']
     first = next(iter(motions))
-    found = motions[first]['global']
-    out = [_answer(first, found), _tighten(motions), _stack(motions), _local(motions[first])]
+    out = [
+        _answer(first, motions[first]),
+        _tighten(motions),
+        _stack(motions),
+        _local(motions[first]),
+    ]
     if 'advice' in study:
         out.append(_advice(study['advice']))
     if study.get('recorded'):
@@ -56,18 +66,17 @@ def _study(study: dict[str, Any]) -> list[Html]:
     return out
 
 
-def _answer(motion: str, found: dict[str, Any]) -> Html:
+def _answer(motion: str, study: dict[str, Any]) -> Html:
+    found = study['global']
     indices = found['sobol']['parameter']['d_norm']
     rows = sorted(indices['indices'], key=lambda row: -row['ST'])
-    best = rows[0]
     settled = 'converged' if indices['converged'] else 'not converged yet'
+    first, *others = advised(study['local']['parameters'], _ADVISED)
     return section(
         'Which tolerance to tighten',
-        tag(
-            'p',
-            f'{best["name"]} first: its total index is {_index(best)} on the {motion} motion.',
-            class_='second',
-        ),
+        tag('p', _told(first), class_='second'),
+        _advised([first, *others]),
+        tag('h3', f'What drives the largest deviation, {motion} motion'),
         _bars(rows[:_SHOWN]),
         tag(
             'p',
@@ -84,13 +93,42 @@ def _answer(motion: str, found: dict[str, Any]) -> Html:
     )
 
 
+def _told(advice: Advice) -> str:
+    text = advice.instruction
+    return (
+        f'{text[:1].upper()}{text[1:]} first: to {advice.wanted}, gains '
+        f'{millimetres(advice.gain_m)}.'
+    )
+
+
+def _advised(rows: Sequence[Advice]) -> Html:
+    heads = ('What to do', 'tolerance now', 'to', 'gains', 'deviation then')
+    cells = [
+        [
+            f'{row.instruction[:1].upper()}{row.instruction[1:]}',
+            row.now,
+            row.wanted,
+            millimetres(row.gain_m),
+            f'{millimetres(row.then_m)} RMS',
+        ]
+        for row in rows
+    ]
+    note = (
+        'The gain is in the RMS deviation that is to be expected along the seam, if this tolerance '
+        'alone is kept five times tighter. Tolerances are independent, so their squares add up.'
+    )
+    return joined([table(heads, cells, 'advice'), tag('p', note, class_='note')])
+
+
 def _index(row: dict[str, Any]) -> str:
     return f'{row["ST"]:.3f} ± {row["ST_half"]:.3f}'
 
 
 def _bars(rows: Sequence[dict[str, Any]]) -> Html:
     scale = max(1.0, *(row['ST'] for row in rows))
-    return bars([(row['name'], row['ST'] / scale, _index(row)) for row in rows], 'wide')
+    return bars(
+        [(parameter_words(row['name']), row['ST'] / scale, _index(row)) for row in rows], 'wide'
+    )
 
 
 def _tighten(motions: dict[str, Any]) -> Html:
@@ -114,7 +152,10 @@ def _stack(motions: dict[str, Any]) -> Html:
     parts: list[Html] = []
     for motion, found in motions.items():
         stack = found['global']['stack']
-        heads = ('', *(f'{row["percent"]:.0f} %' for row in stack['percentiles']['max_m']))
+        heads = (
+            'of all runs',
+            *(f'{row["percent"]:.0f} %' for row in stack['percentiles']['max_m']),
+        )
         names = {
             'max_m': 'largest deviation',
             'across_m': 'across the seam',
@@ -126,7 +167,10 @@ def _stack(motions: dict[str, Any]) -> Html:
         ]
         d_norm = [f'{row["value"]:.2e}' for row in stack['percentiles']['d_norm']]
         inside = [['as given', *_inside(stack)]]
-        inside += [[f'{k} halved', *_inside(v)] for k, v in found['global']['halved'].items()]
+        inside += [
+            [f'{k.replace("_", " ")} halved', *_inside(v)]
+            for k, v in found['global']['halved'].items()
+        ]
         limits = stack['tolerance']
         parts += [
             tag('h3', f'{motion}, {stack["runs"]} runs'),
@@ -163,7 +207,7 @@ def _local(motion: dict[str, Any]) -> Html:
     )
     rows = [
         [
-            r['name'],
+            parameter_words(r['name']),
             f'{r["S_analytic_peak_m"]:.4f} m/{r["unit"]}',
             f'{r["S_difference_peak_m"]:.4f}',
             f'{r["disagreement"]:.0e}',
@@ -259,7 +303,9 @@ def _recorded(recorded: dict[str, Any]) -> Html:
         ],
     ]
     return section(
-        'What was recorded', table(('', 'recorded', 'beside the tolerances'), rows), id_='recorded'
+        'What was recorded',
+        table(('what', 'recorded', 'beside the tolerances'), rows),
+        id_='recorded',
     )
 
 
@@ -284,29 +330,61 @@ def _claims(claims: dict[str, Any]) -> Html:
 def _setting(setting: dict[str, Any]) -> Html:
     tolerances = [
         [
-            ' '.join(filter(None, (t['effect'], t.get('joint')))),
-            t['parameter'] + (f'[{t["index"]}]' if 'index' in t else ''),
+            parameter_words(_name_of(t)),
+            sized(spread_of(t), _unit_of(t)),
             t['distribution'],
-            ', '.join(f'{k} {v:g}' for k, v in t.items() if isinstance(v, float)),
         ]
         for t in setting['tolerances']
     ]
-    plain = [[k.replace('_', ' '), _plain(v)] for k, v in setting.items() if k != 'tolerances']
+    plain = [
+        [_ASKED.get(k, k.replace('_', ' ')), _plain(k, v)]
+        for k, v in setting.items()
+        if k != 'tolerances'
+    ]
     return section(
         'What was asked',
-        table(('', ''), plain),
+        table(('asked', 'value'), plain),
+        tag('h3', f'The {len(tolerances)} tolerances'),
+        table(('tolerance', 'size', 'distribution'), tolerances),
         tag(
-            'details',
-            tag('summary', f'{len(tolerances)} tolerances'),
-            table(('effect', 'parameter', 'distribution', 'numbers [SI]'), tolerances),
+            'p',
+            'The size is the standard deviation of a normal distribution, and half the width of '
+            'a uniform one.',
+            class_='note',
         ),
         id_='setting',
     )
 
 
-def _plain(value: Any) -> str:
+def _name_of(tolerance: dict[str, Any]) -> str:
+    parts = [tolerance['effect'], tolerance.get('joint'), tolerance['parameter']]
+    at = f'[{tolerance["index"]}]' if 'index' in tolerance else ''
+    return '.'.join(part for part in parts if part) + at
+
+
+def _unit_of(tolerance: dict[str, Any]) -> str:
+    parameters = REGISTRY[tolerance['effect']].parameters
+    return next(p.unit for p in parameters if p.name == tolerance['parameter'])
+
+
+_ASKED = {
+    'tool': 'tool of the cell, in the flange',
+    'length_m': 'length of the seam',
+    'across_m': 'allowed across the seam',
+    'stickout_m': 'allowed in stick-out',
+}
+_LENGTHS = ('length_m', 'across_m', 'stickout_m')
+
+
+def _plain(key: str, value: Any) -> str:
+    if key in _LENGTHS and isinstance(value, float):
+        return f'{1e3 * value:.4g} mm'
+    if key == 'tool' and isinstance(value, dict):
+        x, y, z = (f'{1e3 * v:.4g}' for v in value['xyz'])
+        turn = ', '.join(f'{v:.4g}' for v in value['quat_xyzw'])
+        return f'({x}, {y}, {z}) mm, quaternion x y z w ({turn})'
     if isinstance(value, dict):
-        return '; '.join(f'{key} {_plain(item)}' for key, item in value.items())
+        return '; '.join(f'{name} {_plain("", item)}' for name, item in value.items())
     if isinstance(value, list):
-        return ', '.join(map(_plain, value)) or 'none'
+        return ', '.join(_plain('', item) for item in value) or 'none'
     return f'{value:.6g}' if isinstance(value, float) else str(value)

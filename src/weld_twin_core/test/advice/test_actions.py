@@ -36,7 +36,7 @@ def said(robot, **entry):
         ),
         (
             {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4, 'form': 'coast'},
-            ['elbow_joint always from one side', 'coasts across 0.500 mrad', 'ahead'],
+            ['elbow_joint always from one side', 'coasts across 0.0286 deg (0.500 mrad)', 'ahead'],
         ),
         ({'effect': 'time_delay', 'delay': 0.0123}, ['Fix the clock', '12.3 ms late']),
         ({'effect': 'time_delay', 'delay': -0.0123}, ['12.3 ms early']),

@@ -148,8 +148,8 @@ def test_the_orders_of_a_ripple_are_told_largest_first():
     )
     rows = parameter_rows(ripple, {'amplitude': [1e-5, 1e-5], 'phase': [0.1, 0.1]})
     assert [(name, plain(text)) for name, text in rows] == [
-        ('order 80', '0.300 ± 0.010 mrad at -1.00 ± 0.10 rad'),
-        ('order 1', '0.100 ± 0.010 mrad at 0.50 ± 0.10 rad'),
+        ('order 80', '0.01719 ± 0.00057° (0.3 mrad) at -57.3 ± 5.7°'),
+        ('order 1', '0.00573 ± 0.00057° (0.1 mrad) at 28.6 ± 5.7°'),
     ]
 
 

@@ -12,10 +12,10 @@ from ..advice import actions
 from ..advice.next_step import next_step
 from ..frames.places import NOT_TOLD, not_told
 from ..hypotheses.search import Search
-from ..levels.causes import causes
+from ..levels.causes import causes, covering
 from ..levels.contributions import contributions
 from ..levels.curved import Curved
-from ..result import Cause, Contributions, Diagnosis, Shares, Shrink
+from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
@@ -85,9 +85,7 @@ def answer(
         families=verdict.families,
         evidence=evidence,
         posterior=posterior,
-        causes=told,
-        shares=shares,
-        contributions=_contributions(unseen, told, verdict, rival),
+        **_parted(unseen, told, shares, verdict, rival),
         unsound=examined.told(found.final.model.found),
         signs=known,
         contacts=contact_spreads(found, unseen),
@@ -95,13 +93,17 @@ def answer(
     )
 
 
-def _contributions(
-    unseen: Unseen, told: tuple[Cause, ...], verdict: Verdict, rival: Curved | None
-) -> Contributions | None:
-    """Return what every cause adds to the gap, where the causes stand for the model carried."""
-    if verdict.status == 'unknown' and rival is not None and rival.unseen is not unseen:
-        return None
-    return contributions(unseen, told)
+def _parted(
+    unseen: Unseen,
+    told: tuple[Cause, ...],
+    shares: Shares,
+    verdict: Verdict,
+    rival: Curved | None,
+) -> dict[str, Any]:
+    """Return causes, shares, and what each cause adds, where the model carried stands for them."""
+    other = verdict.status == 'unknown' and rival is not None and rival.unseen is not unseen
+    added = None if other else contributions(unseen, told)
+    return {'causes': told, 'shares': shares, 'contributions': added}
 
 
 def _trusted(
@@ -122,7 +124,7 @@ def _trusted(
         ),
     )
     verdict, told = trusted(verdict, told, known, usual_trust())
-    return verdict, told, shares, known
+    return verdict, tuple(covering(cause) for cause in told), shares, known
 
 
 def _compared(found: Search, examined: Examined) -> dict[str, Any]:

@@ -11,7 +11,7 @@ what is left they add up to one.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,10 @@ LIKELY = 0.1
 """Weight from which a place or dependence of the free form counts as found."""
 STUDENT = 1.86
 """Student's t for 90 % and the 8 stretches that take turns."""
+
+SHARED = 0.002
+"""Share by which an interval reaches further on each side than its stretches tell: they share the
+noise and the fit. Chosen on 167 causes of sealed cases so that 90 % are covered; of 167 others 88 % are."""
 
 
 Places = list[tuple[Part, tuple[int, ...]]]
@@ -104,6 +108,12 @@ def causes(
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
     rest = max(1.0 - float(whole.sum()) - noise, 0.0)
     return tuple(out), Shares(unexplained=rest, noise=max(noise, 0.0))
+
+
+def covering(cause: Cause) -> Cause:
+    """Return a cause whose interval of the share holds the true share with 90 %."""
+    low, high = cause.share_ci90
+    return replace(cause, share_ci90=(max(low - SHARED, 0.0), min(high + SHARED, 1.0)))
 
 
 def _with_uncarried(

@@ -36,7 +36,8 @@ STUDENT = 1.86
 
 SHARED = 0.002
 """Share by which an interval reaches further on each side than its stretches tell: they share the
-noise and the fit. Chosen on 167 causes of sealed cases so that 90 % are covered; of 167 others 88 % are."""
+noise and the fit. Chosen on 167 causes of sealed cases so that 90 % are covered; of 167 others
+88 % are."""
 
 
 Places = list[tuple[Part, tuple[int, ...]]]

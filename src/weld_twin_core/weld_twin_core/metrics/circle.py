@@ -39,7 +39,7 @@ class Circle:
     def angles(self, points: Array) -> Array:
         """Return the angle [rad] of every point, shape (N,)."""
         u, v = self.axes @ (points - self.centre).T
-        return np.arctan2(v, u)
+        return np.asarray(np.arctan2(v, u))
 
     def outwards(self, points: Array) -> Array:
         """Return the unit vector outwards at every point, shape (N, 3)."""

@@ -21,7 +21,7 @@ from .seam_path import Path
 from .spline import Spline
 from .weave import Weave
 
-_KINDS: dict[str, type[Any]] = {
+SEAMS: dict[str, type[Any]] = {
     'line': Line,
     'arc': Arc,
     'circle': Circle,
@@ -29,6 +29,7 @@ _KINDS: dict[str, type[Any]] = {
     'spline': Spline,
     'points': Spline,
 }
+"""The seams by their ``kind``."""
 
 
 def from_mapping(data: Mapping[str, Any]) -> Path:
@@ -49,10 +50,10 @@ def from_mapping(data: Mapping[str, Any]) -> Path:
     if not isinstance(data, Mapping):
         raise PathError(f'a path must be a mapping of keys, got {type(data).__name__}')
     kind = data.get('kind')
-    if not isinstance(kind, str) or kind not in _KINDS:
-        raise PathError(f"path 'kind' must be one of {', '.join(_KINDS)}, got {kind!r}")
+    if not isinstance(kind, str) or kind not in SEAMS:
+        raise PathError(f"path 'kind' must be one of {', '.join(SEAMS)}, got {kind!r}")
     rest = {str(k): v for k, v in data.items() if k not in ('kind', 'weave', 'torch')}
-    seam: Path = _build(_KINDS[kind], rest, f'path of kind {kind!r}')
+    seam: Path = _build(SEAMS[kind], rest, f'path of kind {kind!r}')
     weave = data.get('weave')
     if weave is None:
         return seam

@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+JSON Schemas of the files that people write: robot, effects, seam, artefact.
+
+Effects and seams are described from the classes that read them, so that a new one is in the
+schema by itself. An editor that takes schemas completes keys and underlines mistakes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from typing import Any
+
+from weld_twin_core.contacts import KINDS as CONTACTS
+from weld_twin_core.effects import REGISTRY, Effect
+from weld_twin_core.effects.plausible import TABLE
+from weld_twin_core.motion.paths import Torch, Weave
+from weld_twin_core.motion.paths.mapping import SEAMS
+from weld_twin_core.motion.paths.torch import HEADINGS
+from weld_twin_core.motion.paths.weave import FORMS
+
+DRAFT = 'http://json-schema.org/draft-07/schema#'
+"""The draft that editors know best."""
+Schema = dict[str, Any]
+NUMBER: Schema = {'type': 'number'}
+TEXT: Schema = {'type': 'string'}
+
+
+def _vector(count: int, what: str = '') -> Schema:
+    out: Schema = {'type': 'array', 'items': NUMBER, 'minItems': count, 'maxItems': count}
+    return out | ({'description': what} if what else {})
+
+
+def _object(keys: Mapping[str, Schema], required: tuple[str, ...] = ()) -> Schema:
+    out: Schema = {'type': 'object', 'properties': dict(keys), 'additionalProperties': False}
+    return out | ({'required': list(required)} if required else {})
+
+
+def _said(schema: Schema, what: str) -> Schema:
+    return {**schema, 'description': what}
+
+
+def _joint() -> Schema:
+    return _object(
+        {
+            'name': TEXT,
+            'type': {'enum': ['revolute', 'prismatic']},
+            'a': _said(NUMBER, 'link length [m]'),
+            'alpha': _said(NUMBER, 'link twist [rad]'),
+            'd': _said(NUMBER, 'link offset [m]'),
+            'theta_offset': _said(NUMBER, 'added to the reading [rad]'),
+            'beta': _said(NUMBER, "Hayati's angle [rad]"),
+            'lower': _said(NUMBER, 'limit [rad or m]'),
+            'upper': _said(NUMBER, 'limit [rad or m]'),
+            'max_velocity': _said(NUMBER, '[rad/s or m/s]'),
+            'max_acceleration': _said(NUMBER, '[rad/s^2 or m/s^2]'),
+        },
+        ('name',),
+    )
+
+
+def _robot() -> Schema:
+    frame = _object(
+        {'xyz': _vector(3, 'position [m]'), 'quat_xyzw': _vector(4, 'orientation, scalar last')}
+    )
+    mass = {'mass': _said(NUMBER, '[kg]'), 'com': _vector(3, 'centre of mass [m]')}
+    limits = _object({'sd': NUMBER, 'low': NUMBER, 'high': NUMBER})
+    effects = {effect for effect, _ in TABLE}
+    return _object(
+        {
+            'name': TEXT,
+            'convention': {'enum': ['standard', 'modified'], 'description': 'kind of DH rows'},
+            'gravity': _vector(3, 'in the world frame [m/s^2]'),
+            'base': _said(frame, 'the base in the world'),
+            'tool': _said(frame, 'the tool at the flange'),
+            'joints': {'type': 'array', 'items': _joint(), 'minItems': 1},
+            'links': {'type': 'array', 'items': _object(mass), 'description': 'one per joint'},
+            'payload': _object(mass),
+            'source': _said(TEXT, 'where the numbers come from'),
+            'plausible': _object(
+                {
+                    effect: _object({p: limits for e, p in TABLE if e == effect})
+                    for effect in sorted(effects)
+                }
+            ),
+        },
+        ('joints',),
+    )
+
+
+def _effects() -> Schema:
+    return {
+        'type': 'array',
+        'items': {'oneOf': [_effect(REGISTRY[name]) for name in sorted(REGISTRY)]},
+    }
+
+
+def _effect(kind: type[Effect]) -> Schema:
+    keys: dict[str, Schema] = {'effect': {'const': kind.name}}
+    declared = {parameter.name: parameter for parameter in kind.parameters}
+    required = ['effect']
+    for item in fields(kind):
+        parameter = declared.get(item.name)
+        if parameter is None:
+            keys[item.name] = _of_type(str(getattr(item.type, '__name__', item.type)))
+        else:
+            one = _bounded(parameter.lower, parameter.upper)
+            many = {'type': 'array', 'items': one}
+            size = {'minItems': parameter.size, 'maxItems': parameter.size}
+            keys[item.name] = {
+                0: {'anyOf': [one, many]},
+                1: one,
+            }.get(parameter.size, many | size)
+            keys[item.name] = _said(keys[item.name], f'[{parameter.unit}]')
+        if item.default is MISSING and item.default_factory is MISSING:
+            required.append(item.name)
+    return _object(keys, tuple(required)) | {'title': kind.name}
+
+
+def _bounded(lower: float, upper: float) -> Schema:
+    out = dict(NUMBER)
+    if lower > -float('inf'):
+        out['minimum'] = lower
+    if upper < float('inf'):
+        out['maximum'] = upper
+    return out
+
+
+def _of_type(annotation: str) -> Schema:
+    """Return the schema of a field that is no parameter, by its annotation."""
+    known: dict[str, Schema] = {
+        'str': TEXT,
+        'float': NUMBER,
+        'Sequence[float]': {'type': 'array', 'items': NUMBER},
+        'Sequence[str]': {'type': 'array', 'items': TEXT},
+        'Array': _vector(3, '[m]'),
+    }
+    return known[annotation.removesuffix(' | None')]
+
+
+def _seam() -> Schema:
+    torch = _object({f.name: _of_type(str(f.type)) for f in fields(Torch)})
+    torch['properties']['heading'] = {'enum': list(HEADINGS)}
+    weave = {f.name: _of_type(str(f.type)) for f in fields(Weave) if f.name != 'seam'}
+    weave['form'] = {'enum': list(FORMS)}
+    extra = {'torch': torch, 'weave': _object(weave, ('amplitude', 'wavelength'))}
+    kinds = []
+    for name, kind in SEAMS.items():
+        keys = {f.name: _of_type(str(f.type)) for f in fields(kind)}
+        if 'points' in keys:
+            keys['points'] = {'type': 'array', 'items': _vector(3, '[m]'), 'minItems': 2}
+        required = [
+            f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING
+        ]
+        own = {'kind': {'const': name}, **keys, **extra}
+        kinds.append(_object(own, ('kind', *required)) | {'title': name})
+    rows = {'type': 'array', 'items': {'type': 'array', 'items': NUMBER}}
+    joints = _object(
+        {
+            'kind': {'const': 'joints'},
+            'stations': _said({'type': 'boolean'}, 'each is measured at rest'),
+            'joint_names': {'type': 'array', 'items': TEXT},
+            't': {'type': 'array', 'items': NUMBER, 'description': '[s]'},
+            'q': _said(rows, 'a row for each time [rad or m]'),
+        },
+        ('kind', 't', 'q'),
+    )
+    return {'oneOf': [*kinds, joints | {'title': 'joints'}]}
+
+
+def _artefact() -> Schema:
+    named = {'enum': list(CONTACTS)}
+    contact = _object({'kind': named, 'radius': _said(NUMBER, 'of a sphere [m]')})
+    tie = _object(
+        {
+            'between': {'type': 'array', 'items': TEXT, 'minItems': 2, 'maxItems': 2},
+            'value': {'type': 'number', 'exclusiveMinimum': 0},
+            'sigma': {'type': 'number', 'exclusiveMinimum': 0},
+        },
+        ('between', 'value'),
+    )
+    ties = {'type': 'array', 'items': tie}
+    each = {'type': 'object', 'additionalProperties': {'anyOf': [named, contact]}}
+    return _object(
+        {
+            'contacts': _said(each, 'what every label of a table of touches is'),
+            'distances': _said(ties, 'known distances [m]'),
+            'angles': _said(ties, 'known angles between planes [rad]'),
+        }
+    )
+
+
+_MADE = {'robot': _robot, 'effects': _effects, 'seam': _seam, 'artefact': _artefact}
+NAMES = tuple(_MADE)
+"""What there are schemas of; an artefact file says what the contacts of a CSV touched."""
+
+
+def schema(name: str) -> Schema:
+    """
+    Return the JSON Schema of a kind of file.
+
+    Parameters
+    ----------
+    name : str
+        One of `NAMES`.
+
+    """
+    return {'$schema': DRAFT, 'title': f'weld_twin {name} file', **_MADE[name]()}

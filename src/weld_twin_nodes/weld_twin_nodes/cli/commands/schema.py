@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Print the JSON Schema of a file that people write, for editors: robot, effects, seam, artefact."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('kind', metavar='KIND', help='robot, effects, seam or artefact')
+    parser.add_argument('--out', metavar='FILE', help='file to write (default: print it)')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write or print the schema."""
+    import json
+
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.files.schemas import NAMES, schema
+    from weld_twin_msgs_py.files.whole_files import write_text
+
+    if args.kind not in NAMES:
+        raise DataError(f'there is no schema {args.kind!r}; there are {", ".join(NAMES)}')
+    text = json.dumps(schema(args.kind), indent=1) + '\n'
+    if args.out is None:
+        print(text, end='')
+    else:
+        write_text(args.out, text)
+    return 0

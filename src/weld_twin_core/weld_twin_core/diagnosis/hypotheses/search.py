@@ -25,6 +25,7 @@ from .selection import (
     consolidated,
     forward,
     implausible,
+    without_misfit,
     without_negligible,
 )
 
@@ -222,6 +223,7 @@ def _chosen(
         if steps and not crowded:
             now = backward(work, now, effective)
             now = without_negligible(work, consolidated(work, now, effective))
+            now = without_misfit(work, now)
         model = now.model
         if crowded or names(model) == before:
             break

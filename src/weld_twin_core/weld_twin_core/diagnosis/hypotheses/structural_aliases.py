@@ -114,9 +114,14 @@ def _constant(kind: type[Effect]) -> bool:
 def _extended(
     found: Search, k: int, slot: tuple[Rival, ...], kinds: Sequence[str], beliefs: Beliefs
 ) -> tuple[Rival, ...]:
-    """Return a slot with the excluded errors that its leader cannot be told from on any motion."""
-    effect, work = found.small.model.found[k], found.work
-    if not _constant(type(effect)):
+    """Return a slot with the excluded errors that its constants are on any motion."""
+    work = found.work
+    constants = [
+        _of(rival.site)
+        for rival in slot
+        if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
+    ]
+    if not constants:
         return slot
     taken = {(e.name, e.site) for e in found.small.model.found}
     rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
@@ -125,7 +130,7 @@ def _extended(
     for other in _candidates(found.baseline.model.robot, kinds, work.problem.align):
         if (other.name, other.site) in taken:
             continue
-        if same_error(found.baseline.model.robot, effect, other):
+        if any(same_error(found.baseline.model.robot, own, other) for own in constants):
             tried = fitted_with(work, rest.model, other)
             nats = nats_in_place(rest, tried, count)
             more.append(Rival(Site(other.name, other.site), nats, tried))
@@ -165,13 +170,18 @@ def _with_constants(
     return weighed([*slot, *more], beliefs.temperature)
 
 
+def _of(site: Site) -> Effect:
+    """Return an effect of no size at a site."""
+    return REGISTRY[site.effect](**({'joint': site.joint} if site.joint is not None else {}))
+
+
 def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> Iterator[Effect]:
     for name in kinds:
         kind = REGISTRY[name]
         if kind.fitted_with in align:
             continue
         for joint in joints_of(kind, robot.joint_names):
-            yield kind(**({'joint': joint} if joint is not None else {}))
+            yield _of(Site(name, joint))
 
 
 def same_error(robot: Robot, one: Effect, other: Effect) -> bool:

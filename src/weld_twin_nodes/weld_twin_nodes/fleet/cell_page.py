@@ -27,6 +27,7 @@ ROWS = 20
 TROUBLES = 10
 """Recordings without a verdict listed, the newest first."""
 MILLI = 1e3
+"""Millimetres of a metre."""
 STYLE = 'a { color: var(--accent); } th[scope=row] { white-space: nowrap; }'
 """What pages of cells have besides: links, and dates and names in one line."""
 

@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The diagnosis in a browser: drop a recording, answer what is asked, read the sheet.
+
+Only this machine reaches the server, unless --host says otherwise; whoever comes from elsewhere then
+needs the token, which is in the address that is printed. Recordings and results stay in --dir, and a
+server that is started again goes on with what waits.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+GIGABYTE = 1_000_000_000
+"""Bytes."""
+TOKEN = 24
+"""Bytes of chance in a token."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        '--dir', default='weld_twin_served', metavar='DIR', help='where uploads and results lie'
+    )
+    parser.add_argument('--port', type=int, default=8765, metavar='N', help='0: any that is free')
+    parser.add_argument(
+        '--host', default='localhost', metavar='HOST', help='0.0.0.0 lets other machines in'
+    )
+    parser.add_argument(
+        '--name',
+        action='append',
+        default=[],
+        metavar='NAME',
+        help='a host name or address that browsers use for this machine; may be given again',
+    )
+    parser.add_argument('--token', default='', help='what visitors need (default: drawn anew)')
+    parser.add_argument('--workers', type=int, default=1, metavar='N', help='side by side')
+    parser.add_argument('--upload', type=float, default=1.0, metavar='GB', help='of one recording')
+    parser.add_argument('--memory', type=float, default=6.0, metavar='GB', help='of one diagnosis')
+    parser.add_argument(
+        '--minutes', type=float, default=15.0, metavar='N', help='of one diagnosis'
+    )
+    parser.add_argument(
+        '--db', default='', metavar='URL', help='history of the plant, shown to everybody'
+    )
+    parser.add_argument('--live', action='store_true', help='show the verdict of running nodes')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until Ctrl-C."""
+    import secrets
+    from pathlib import Path
+
+    from weld_twin_core.errors import DataError
+    from weld_twin_nodes.guarded import Limits
+    from weld_twin_nodes.serve import Settings
+    from weld_twin_nodes.serve.running import serve
+
+    if args.workers < 1 or args.upload <= 0.0 or args.memory < 1.0 or args.minutes <= 0.0:
+        raise DataError(
+            '--workers takes 1 or more, --memory 1 GB or more, the others more than none'
+        )
+    wall = max(round(60.0 * args.minutes), 1)
+    settings = Settings(
+        Path(args.dir),
+        args.host,
+        args.port,
+        tuple(args.name),
+        args.token,
+        args.workers,
+        Limits(memory=round(args.memory * GIGABYTE), cpu_s=wall, wall_s=wall),
+        upload=round(args.upload * GIGABYTE),
+        database=args.db,
+        live=args.live,
+    )
+    if not settings.alone and not settings.token:
+        from dataclasses import replace
+
+        settings = replace(settings, token=secrets.token_urlsafe(TOKEN))
+    serve(settings, lambda address: print(f'open {address}', flush=True))
+    return 0

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The server started, and ended."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from dataclasses import replace
+
+from weld_twin_core.errors import DataError
+
+from .queue import Queue
+from .settings import Settings
+
+CONNECTIONS = 128
+"""Requests at the same time; more are told that the server is busy."""
+IDLE = 5
+"""Seconds after which a connection that says nothing is closed."""
+
+
+def serve(settings: Settings, tell: Callable[[str], None]) -> None:
+    """
+    Serve until it is interrupted.
+
+    Parameters
+    ----------
+    settings : Settings
+    tell : callable
+        Told the address once the server listens.
+
+    Raises
+    ------
+    DataError
+        What it needs is not installed, or the port is taken.
+
+    """
+    try:
+        import uvicorn
+
+        from .app import make_app
+    except ImportError as error:
+        raise DataError(
+            f"the server needs {error.name}; install it with: pip install 'weld-twin[serve]'"
+        ) from None
+    listening = _listening(settings)
+    port = listening.getsockname()[1]
+    settings = replace(settings, port=port)
+    queue = Queue(settings)
+    try:
+        app = make_app(settings, queue, _live(settings))
+        config = uvicorn.Config(
+            app,
+            log_level='warning',
+            access_log=False,
+            server_header=False,
+            limit_concurrency=CONNECTIONS,
+            timeout_keep_alive=IDLE,
+            timeout_graceful_shutdown=IDLE,
+        )
+        name = f'[{settings.host}]' if ':' in settings.host else settings.host
+        token = f'?token={settings.token}' if settings.token else ''
+        tell(f'http://{name}:{port}/{token}')
+        uvicorn.Server(config).run(sockets=[listening])
+    finally:
+        queue.stop()
+        listening.close()
+
+
+def _listening(settings: Settings) -> socket.socket:
+    """Return a socket that listens where it should."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            settings.host, settings.port, type=socket.SOCK_STREAM
+        )[0]
+        made = socket.socket(family, kind, protocol)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind(address)
+        made.listen(CONNECTIONS)
+    except OSError as error:
+        raise DataError(
+            f'nothing can listen at {settings.host} port {settings.port}: {error.strerror}; '
+            'choose another with --port'
+        ) from None
+    return made
+
+
+def _live(settings: Settings) -> Callable[[], dict[str, str] | None]:
+    if not settings.live:
+        return lambda: None
+    from .live_verdict import LiveVerdict
+
+    return LiveVerdict().last

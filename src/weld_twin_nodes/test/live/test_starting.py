@@ -43,6 +43,24 @@ def test_effects_without_quotes_are_refused_with_the_form_that_is_meant():
     assert 'in two kinds of quotes' in result.stderr
 
 
+def test_a_node_that_must_be_secured_and_cannot_does_not_run_open(tmp_path):
+    """Neither without keys nor, where the middleware has no security, with an enclave of them."""
+    locked = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce'}
+    (tmp_path / 'keys/enclaves/empty').mkdir(parents=True)
+    for enclave in ('/nowhere', '/empty'):
+        words = ['--ros-args', '--enclave', enclave]
+        result = subprocess.run(
+            [sys.executable, '-m', MODULES['forward_kinematics_twin'], *words],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            env={**os.environ, **locked, 'ROS_SECURITY_KEYSTORE': str(tmp_path / 'keys')},
+        )
+        assert result.returncode == 2
+        assert 'the node does not run unprotected under ROS_SECURITY_ENABLE' in result.stderr
+        assert 'Traceback' not in result.stderr
+
+
 def test_a_parameter_of_another_node_may_be_in_a_file_for_all(cell, tmp_path):
     process = cell.start('recorder', out=str(tmp_path / 'bag'), robot='ur5', seed=3)
     cell.trigger('/recorder/counts')

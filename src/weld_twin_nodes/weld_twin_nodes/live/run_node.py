@@ -98,7 +98,7 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     node = None
     try:
         _open(args)
-        node = stop.node = make()
+        node = stop.node = _made(make)
         gc.freeze()  # what has been loaded stays; looking through it again is a pause of the node
         spin(node, stop)
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
@@ -121,6 +121,13 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
     return 0 if node is None or node.failure is None else _told(node.failure)
 
 
+SECURITY = 'security'
+"""Word of the errors of rcl and of the middleware that are about keys."""
+UNLOCKED = (
+    'the node does not run unprotected under ROS_SECURITY_ENABLE; give it an enclave of the '
+    'keystore, and a middleware that is built with DDS security'
+)
+"""What to do where a node may run secured only, and cannot."""
 QUOTED = (
     'a list or a mapping is given as text, in two kinds of quotes: '
     '-p \'effects:="[{effect: backlash, joint: elbow_joint, width: 5e-4}]"\''
@@ -142,9 +149,30 @@ def _open(args: list[str] | None) -> None:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's own error of it has no public name
         said = str(error).partition(', at /')[0]
+        if SECURITY in said.lower():
+            raise ModelError(f'{" ".join(said.split())}; {UNLOCKED}') from None
         bracket = re.search(r"'(-p|--param) [^\s:]+:=\s*[\[{]", said)
         hint = 'a parameter is given as -p NAME:=VALUE' if bracket is None else QUOTED
         raise ModelError(f'{said}; {hint}') from None
+
+
+def _made(make: Callable[[], CellNode]) -> CellNode:
+    """
+    Return the node; raise a sentence where the middleware cannot keep it as safe as it must be.
+
+    Raises
+    ------
+    ModelError
+        Security is enforced, and the middleware has none, or not the node's keys.
+
+    """
+    try:
+        return make()
+    except RuntimeError as error:  # rclpy's own error of it has no public name
+        said = ' '.join(str(error).partition(', at /')[0].split())
+        if SECURITY not in said.lower():
+            raise
+        raise ModelError(f'{said}; {UNLOCKED}') from None
 
 
 def _told(error: Exception) -> int:

@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,22 @@ def test_a_node_that_must_be_secured_and_cannot_does_not_run_open(tmp_path):
         assert result.returncode == 2
         assert 'the node does not run unprotected under ROS_SECURITY_ENABLE' in result.stderr
         assert 'Traceback' not in result.stderr
+
+
+@pytest.mark.skipif(find_spec('tf2_msgs') is not None, reason='tf2_msgs is installed here')
+def test_a_base_that_is_to_come_from_tf_needs_its_messages():
+    frames = ('measuring_frame:=world', 'base_frame:=base_link', 'base_from_tf:=true')
+    words = [word for frame in frames for word in ('-p', frame)]
+    result = started('forward_kinematics_twin', '--ros-args', *words)
+    assert result.returncode == 2
+    assert 'base_from_tf cannot be done: /tf is not listened to: ' in result.stderr
+    assert 'install the package tf2_msgs' in result.stderr
+
+
+def test_a_base_from_tf_needs_both_names():
+    result = started('forward_kinematics_twin', '--ros-args', '-p', 'base_from_tf:=true')
+    assert result.returncode == 2
+    assert 'needs the names measuring_frame and base_frame' in result.stderr
 
 
 def test_a_parameter_of_another_node_may_be_in_a_file_for_all(cell, tmp_path):

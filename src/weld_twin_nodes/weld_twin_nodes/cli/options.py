@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 PARTS = {
     'joint': 'JointState, DynamicJointState or JointTrajectoryControllerState (TOPIC:feedback)',
-    'pose': 'PoseStamped, PoseWithCovarianceStamped, TransformStamped or /tf:FRAME',
+    'pose': 'PoseStamped, PoseWithCovarianceStamped, TransformStamped, /tf:FRAME, or a '
+    'JointTrajectoryControllerState, of which the pose of the feedback is taken',
 }
 """What the topics may hold besides the usual; after a colon, the part that is meant."""
 TOPIC_OPTIONS = ('joint', 'pose', 'point', 'wrench', 'temperature')

@@ -28,20 +28,21 @@ def base_on_tf(node: CellNode) -> Array:
     Raises
     ------
     ModelError
-        The two frames have no names, or the node is stopped before they are told.
+        The two frames have no names, `/tf` cannot be read here, or the node is stopped before
+        they are told.
 
     """
     measuring, base = node.setting('measuring_frame'), node.setting('base_frame')
     if not measuring or not base:
         raise ModelError('base_from_tf needs the names measuring_frame and base_frame')
     frames = frames_of(node)
-    why = ['']
+    if frames.lack:
+        raise ModelError(f'base_from_tf cannot be done: {frames.lack}')
 
     def told() -> bool:
         try:
             frames.tree.latest(measuring, base)
         except NoTransform as error:
-            why[0] = str(error)
             node.health.lasting['frames'] = f'waiting for /tf: {error}'
             return False
         return True

@@ -38,11 +38,13 @@ class Frames:
     def __init__(self, node: CellNode) -> None:
         self.tree = TransformTree()
         self.changed: list[Callable[[], None]] = []
-        self._node = node
+        self.lack = ''
+        """Why `/tf` is not listened to; empty where it is."""
         try:
             message_class(TF.type)
         except ImportError as error:
-            node.remark(f'/tf is not listened to: {error}')
+            self.lack = f'/tf is not listened to: {error}'
+            node.remark(self.lack)
             return
         node.listen(TF, partial(self._take, static=False), at_once=True)
         node.listen(TF_STATIC, partial(self._take, static=True), at_once=True)

@@ -9,6 +9,7 @@ import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from scipy.interpolate import CubicHermiteSpline
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.messages import from_messages
@@ -84,6 +85,26 @@ def test_the_robot_description_is_the_model_of_the_twin(shared, run, robot, tmp_
     np.testing.assert_allclose(
         from_messages.pose(poses.last)[0], forward(robot, Q)[:3, 3], rtol=0.0, atol=1e-12
     )
+
+
+def test_another_robot_told_while_the_twin_runs_is_not_taken_and_told(shared, run, tmp_path):
+    texts = {}
+    for name in ('ur5', 'ur10'):
+        write_urdf(tmp_path / f'{name}.urdf', load(name))
+        texts[name] = ROBOT_DESCRIPTION.message_class()(
+            data=(tmp_path / f'{name}.urdf').read_text()
+        )
+    row, topic = ROBOT_DESCRIPTION, '/elsewhere'
+    latched = shared.node.create_publisher(row.message_class(), topic, row.offered.to_rclpy())
+    latched.publish(texts['ur5'])
+    node = run(ForwardKinematicsTwin, robot=topic)
+    health, before = HealthListener(shared.node), node.robot
+    latched.publish(texts['ur10'])
+    said, own = f'another robot is told on {topic} now', '/forward_kinematics_twin'
+    shared.wait(lambda: any(said in text for _, text in health.told[own]), said)
+    assert node.robot is before
+    latched.publish(texts['ur5'])
+    shared.wait(lambda: health.told[own][-1:] == [('ok', 'running')], 'the first robot again')
 
 
 def test_joints_of_two_publishers_make_one_pose(shared, run, robot):

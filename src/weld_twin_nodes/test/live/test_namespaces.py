@@ -192,3 +192,34 @@ def test_a_quality_of_service_that_does_not_match_is_told_of_under_the_remapped_
     sentence = 'reliability: best_effort is offered, reliable asked for'
     cell.wait(lambda: sentence in told(health, 'deviation_analyzer'), 'the mismatch to be told')
     assert '/tracker/pose: /harness does not match' in told(health, 'deviation_analyzer')
+
+
+def test_joint_states_in_another_namespace_are_told_with_what_to_do(cell, tracker):
+    cell.add(ForwardKinematicsTwin)
+    health = HealthListener(cell.node)
+    astray = tracker.create_publisher(JointState, '/left/joint_states', 10)
+    sentence = (
+        '/joint_states has no publisher, but /cell/tracker publishes /left/joint_states: start '
+        'this node in the namespace /left, or remap the topic'
+    )
+    cell.wait(lambda: sentence in told(health, 'forward_kinematics_twin'), 'the other namespace')
+    tracker.destroy_publisher(astray)
+    found = tracker.create_publisher(JointState, '/joint_states', 10)
+    cell.wait(lambda: found.get_subscription_count() > 0, 'the node to listen to it')
+    cell.wait(lambda: cell.node.count_publishers('/joint_states') > 0, 'the publisher')
+    health.clear()
+    own = '/forward_kinematics_twin'
+    cell.wait(lambda: ('ok', 'running') in health.told[own], 'the node to be ok again')
+
+
+def test_another_publisher_that_takes_over_is_told_by_its_name(cell, tracker):
+    before = tracker.create_publisher(JointState, '/joint_states', 10)
+    cell.wait(lambda: cell.node.count_publishers('/joint_states') > 0, 'the first publisher')
+    cell.add(ForwardKinematicsTwin)
+    health = HealthListener(cell.node)
+    own = '/forward_kinematics_twin'
+    cell.wait(lambda: len(health.told[own]) > 1, 'two looks at the first one')
+    cell.node.create_publisher(JointState, '/joint_states', 10)
+    tracker.destroy_publisher(before)
+    sentence = '/joint_states comes from /harness now, it came from /cell/tracker'
+    cell.wait(lambda: sentence in told(health, 'forward_kinematics_twin'), 'the new publisher')

@@ -169,3 +169,49 @@ def test_files_that_nothing_brings_together_are_refused(tmp_path):
     fewer = '\n'.join(spatial_analyzer().splitlines()[:-1]) + '\n'
     with pytest.raises(DataError, match='nothing says which belong together'):
         read_two_tables(*both(tmp_path, rtde(), fewer))
+
+
+def trace_of_kuka(folder, interleaved):
+    """Describe six axes in degrees as a KRC4 does, their values in one file beside."""
+    entry = '#BEGINCHANNELHEADER\n{}\n#ENDCHANNELHEADER\n'
+    text = 'DIAEXTENDED\n\n#BEGINGLOBALHEADER\n  1,DOS\n#ENDGLOBALHEADER\n\n'
+    time = ['200,Zeit', '201,Zeitkanal', '202,sec', '210,IMPLIZIT  ', f'220,{COUNT}']
+    text += entry.format('\n'.join([*time, '240,0.00000', '241,0.04000000']))
+    for k in range(6):
+        first = 1 + k if interleaved else 1 + k * COUNT
+        rows = [f'200,$AXIS_ACT_MEAS[{k + 1}]', '202,\N{DEGREE SIGN}', '210,EXPLIZIT']
+        rows += ['211,run#1.r64', '213,BLOCK', '214,REAL64', f'220,{COUNT}', f'221,{first}']
+        text += entry.format('\n'.join([*rows, '240,0', '241,1.000000e-03']))
+    (folder / 'run.dat').write_text(text, encoding='latin-1')
+    stored = 1e3 * np.degrees(Q)
+    (stored if interleaved else stored.T).astype('<f8').tofile(folder / 'run#1.r64')
+    return folder / 'run.dat'
+
+
+@pytest.mark.parametrize('interleaved', [True, False])
+def test_a_trace_of_kuka_is_read_with_the_values_beside_it(tmp_path, interleaved):
+    _, seen, _ = both(tmp_path, '', vicon())
+    path = trace_of_kuka(tmp_path, interleaved)
+    recording, _ = read_two_tables(path, seen, UR5, TableOptions(marker='cell:torch'))
+    np.testing.assert_allclose(recording.joints.q, Q, atol=1e-9)
+    (tmp_path / 'run#1.r64').unlink()
+    with pytest.raises(DataError, match=r"needs '.*run#1\.r64' beside it; copy all files"):
+        read_two_tables(path, seen, UR5)
+
+
+def test_a_marker_of_a_c3d_file_is_read(tmp_path):
+    c3d = pytest.importorskip('c3d', reason='needs the library for C3D')
+    writer = c3d.Writer(point_rate=25.0, point_units='mm  ')
+    writer.set_point_labels(['torch', 'other'])
+    points = np.zeros((COUNT, 2, 5), dtype=np.float32)
+    points[:, 0, :3], points[:, 1, :3] = 1e3 * POINT, 5.0
+    points[7, 0, 3] = -1.0  # not seen
+    empty = np.zeros((0, 0), dtype=np.float32)
+    writer.add_frames([(frame, empty) for frame in points])
+    with open(tmp_path / 'run.c3d', 'wb') as file:
+        writer.write(file)
+    log, _, _ = both(tmp_path, ur_rtde(), '')
+    recording, _ = read_two_tables(log, tmp_path / 'run.c3d', UR5, TableOptions(marker='torch'))
+    keep = np.arange(COUNT) != 7
+    np.testing.assert_allclose(recording.measured.position, POINT[keep], atol=1e-6)
+    np.testing.assert_allclose(recording.measured.t, T[keep], atol=1e-4)

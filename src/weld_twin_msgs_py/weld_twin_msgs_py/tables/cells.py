@@ -15,7 +15,8 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from .formats import Format, read, recognised
+from .formats import Format, Read, read, recognised
+from .recorded_files import TRACE_MARK, is_c3d, read_c3d, read_trace
 from .words import UNITS
 
 DELIMITERS = (';', '\t', ',')
@@ -130,7 +131,11 @@ def read_cells(
         text = path.read_bytes()
     except OSError as error:
         raise DataError(f"table '{path}' cannot be read: {error.strerror or error}") from None
+    if is_c3d(text):
+        return _as_read(path, read_c3d(path, marker))
     decoded = _decoded(path, text)
+    if decoded.startswith(TRACE_MARK):
+        return _as_read(path, read_trace(path, decoded))
     known = None if delimiter else recognised(decoded)
     if known is not None:
         return _of_known(path, known, decoded, marker)
@@ -152,11 +157,15 @@ def read_cells(
 
 def _of_known(path: Path, known: Format, text: str, marker: str | None) -> Cells:
     try:
-        header, rows, lines, said = read(known, text, marker)
+        return _as_read(path, read(known, text, marker))
     except DataError as error:
         raise DataError(f"table '{path}': {error}") from None
+
+
+def _as_read(path: Path, found: Read) -> Cells:
+    header, rows, lines, said = found
     if not rows:
-        raise DataError(f"table '{path}' has a header of {known.name} and no row under it")
+        raise DataError(f"table '{path}': there is a header and no row under it")
     comma = any(_COMMA_NUMBER.match(cell) for row in rows[:_LOOK] for cell in row)
     return Cells(path, header, rows, lines, ',' if comma else '.', said)
 

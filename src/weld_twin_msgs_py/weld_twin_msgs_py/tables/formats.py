@@ -246,12 +246,21 @@ def _meant(
     said = [f'read as the {known.name} writes it']
     if not owned:
         return plain, said
-    chosen = _one(list(owned), marker)
+    chosen = one_of(list(owned), marker)
     said.append(f'measured is {chosen!r}')
     return [*(p for p in plain if p[1] != 'frame'), *owned[chosen]], said
 
 
-def _one(names: list[str], marker: str | None) -> str:
+def one_of(names: list[str], marker: str | None) -> str:
+    """
+    Return the thing that is meant.
+
+    Raises
+    ------
+    DataError
+        Several were tracked and none was named, or there is none of the name.
+
+    """
     if marker in names:
         return str(marker)
     if marker is None and len(names) == 1:

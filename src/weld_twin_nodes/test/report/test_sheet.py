@@ -207,3 +207,10 @@ def test_circles_name_the_joints_that_turn_back():
     page = report_page(THREE)
     assert 'ISO 230-4' in page and re.search(r'"reversals":\[\[\d,', page)
     assert 'ISO 230-4' not in report_page(diagnoses.backlash())
+
+
+def test_a_card_names_all_that_the_data_cannot_tell_apart():
+    page = report_page(diagnoses.ambiguous())
+    card = page[page.index('class="card"') : page.index('id="seam"')]
+    assert 'Zero offset of joint_a1 or base pose error' in card
+    assert 'must be measured first' in card

@@ -18,8 +18,19 @@ from .curve_plot import curve_figure
 from .html import Child, Html, joined, section, table, tag
 from .quantities import millimetres, odds, parameter_rows, percent
 from .seam_view import seen_at
-from .switches import MOST, along, cause_name, drawn, squares, static, switches, trusted
+from .switches import (
+    MOST,
+    along,
+    alternatives,
+    cause_name,
+    drawn,
+    squares,
+    static,
+    switches,
+    trusted,
+)
 from .words import DEPENDENCES, place_name
+from .words import cause as named
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
@@ -63,7 +74,9 @@ def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     for rank, k in enumerate(shown, 1):
         low, high = causes[k].share_ci90
         told = f'{percent(causes[k].share)} ({_bounds(low, high)})'
-        rows.append((f'{rank}. {cause_name(causes[k])}', causes[k].share, told, 'cause'))
+        rows.append(
+            (f'{rank}. {cause_name(diagnosis, causes[k])}', causes[k].share, told, 'cause')
+        )
     smaller = sum(c.share for k, c in enumerate(causes) if k not in shown)
     if smaller > 0.0:
         rows.append(('smaller causes', smaller, percent(smaller), 'cause'))
@@ -88,7 +101,7 @@ def _bounds(low: float, high: float) -> str:
 
 def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None) -> Html:
     cause = diagnosis.causes[k]
-    name = cause_name(cause)
+    name = cause_name(diagnosis, cause)
     entries = [
         ('How sure', _sure(cause)),
         ('Value', _values(diagnosis, cause)),
@@ -123,17 +136,9 @@ def _sure(cause: Cause) -> str:
     place = [(place_name(at), p) for at, p in cause.place]
     parts = [_list('place', place)]
     parts.append(_list('depends on', [(DEPENDENCES.get(on, on), p) for on, p in cause.dependence]))
-    named = [(cause_name_of(site), p) for site, p in cause.name if 'curve' not in site.effect]
-    parts.append(_list('name', named) or 'the library has no name for it')
+    names = [(named(s.effect, None), p) for s, p in cause.name if 'curve' not in s.effect]
+    parts.append(_list('name', names) or 'the library has no name for it')
     return '; '.join(part for part in parts if part) + '.'
-
-
-def cause_name_of(site: object) -> str:
-    """Return the name of a site without its joint, which the place says."""
-    from .words import CAUSES
-
-    effect = str(site.effect)  # type: ignore[attr-defined]
-    return CAUSES.get(effect, effect.replace('_', ' '))
 
 
 def _list(head: str, told: list[tuple[str, float]]) -> str:
@@ -223,6 +228,12 @@ def _action(diagnosis: Diagnosis, cause: Cause) -> Html | str | None:
     sentences = list(dict.fromkeys(actions(effects, diagnosis.model.robot)))
     if not sentences:
         return 'Measure as told under "What to measure next".' if cause.name else None
+    if alternatives(diagnosis, cause):
+        one = named(effects[0].name, effects[0].site)
+        sentences = [
+            f'Which of them it is must be measured first. Should it be {one}:',
+            *sentences,
+        ]
     if len(sentences) == 1:
         return sentences[0]
     return tag('span', *(tag('span', text) for text in sentences), class_='lines')

@@ -21,15 +21,15 @@ _VISIBLE = 0.005
 
 def where_section(diagnosis: Diagnosis) -> Html:
     """Return where the causes lie, the same shares as theirs, and the map of each by itself."""
-    return section(
-        'Where it lies',
-        tag(
-            'div',
+    parts = [_part('By direction', _directions(diagnosis))]
+    if diagnosis.status != 'none':
+        parts[:0] = [
             _part('By place', bars(_places(diagnosis))),
             _part('By what it depends on', bars(_dependences(diagnosis))),
-            _part('By direction', _directions(diagnosis)),
-            class_='columns',
-        ),
+        ]
+    return section(
+        'Where it lies',
+        tag('div', *parts, class_='columns'),
         tag('p', _whole(diagnosis), class_='note'),
         _stretches(diagnosis),
         tag('div', _by_itself(diagnosis), class_='detail'),
@@ -72,6 +72,8 @@ def _summed(
 
 def _whole(diagnosis: Diagnosis) -> str:
     """Return why what is found explains less than the whole."""
+    if diagnosis.status == 'none':
+        return 'All of it is at the level of the noise, so it lies nowhere in particular.'
     if not diagnosis.causes:
         return 'Nothing was named, so these are what each joint could explain by itself.'
     rest = diagnosis.shares

@@ -36,7 +36,7 @@
     };
     rings(pen, base, span, unit, circle, side, canvas.clientHeight);
     trace(pen, circle, before, place, colour('before'));
-    if (run.now !== run.before) trace(pen, circle, now, place, colour('after'));
+    if (data.found) trace(pen, circle, now, place, colour('after'));
     marks(pen, circle, rim);
   }
 

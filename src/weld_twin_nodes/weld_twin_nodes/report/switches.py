@@ -9,17 +9,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.result import Cause, Diagnosis
+from weld_twin_core.diagnosis.result import Cause, Diagnosis, Site
 from weld_twin_core.recording import Recording
 
 from .charts import thinned
-from .words import site_name, someplace
+from .words import listed, site_name, someplace
 
 MOST = 8
 """Causes with a switch of their own; the others share one."""
 OTHERS = 'all smaller ones together'
 _POINTS = 6000
 """Points of all recordings and lines together: half a megabyte on the page."""
+_NAMED = 3
+"""Names in a heading; more are counted."""
 _CURVES = ('joint_curve', 'frame_curve')
 
 
@@ -30,13 +32,25 @@ class Switch(NamedTuple):
     members: tuple[int, ...]
 
 
-def cause_name(cause: Cause) -> str:
-    """Return a cause as a heading: its name, or its place where the library has no name for it."""
+def cause_name(diagnosis: Diagnosis, cause: Cause) -> str:
+    """Return a cause as a heading: every name it may have, or its place where it has none."""
     named = [site for site, _ in cause.name if site.effect not in _CURVES]
     if not named:
         return someplace(cause)
-    likely = [s for s, p in cause.name if s in named and p > 0.5 * cause.name[0][1]] or named[:1]
-    return ' or '.join(site_name(site) for site in likely[:3])
+    alike = alternatives(diagnosis, cause) or tuple(named[:1])
+    more = [f'{len(alike) - _NAMED} more'] if len(alike) > _NAMED else []
+    return listed([*map(site_name, alike[:_NAMED]), *more], 'or')
+
+
+def alternatives(diagnosis: Diagnosis, cause: Cause) -> tuple[Site, ...]:
+    """Return what these data cannot tell apart, the most probable first; nothing where one is."""
+    found = [effect for k, effect in enumerate(diagnosis.model.found) if k in cause.members]
+    own = {Site(effect.name, effect.site) for effect in found} | {s for s, _ in cause.name[:1]}
+    for group in diagnosis.indistinguishable:
+        if len(group) > 1 and own & set(group):
+            order = dict(cause.name)
+            return tuple(sorted(group, key=lambda site: -order.get(site, 0.0)))
+    return ()
 
 
 def switches(diagnosis: Diagnosis) -> tuple[Switch, ...]:
@@ -46,7 +60,7 @@ def switches(diagnosis: Diagnosis) -> tuple[Switch, ...]:
         return ()
     count = told.parts[0].shape[0]
     own = [k for k, cause in enumerate(diagnosis.causes) if cause.members]
-    out = [Switch(cause_name(diagnosis.causes[k]), (k,)) for k in own[:MOST]]
+    out = [Switch(cause_name(diagnosis, diagnosis.causes[k]), (k,)) for k in own[:MOST]]
     rest = tuple(own[MOST:]) + tuple(range(len(diagnosis.causes), count))
     return (*out, *([Switch(OTHERS, rest)] if rest else []))
 
@@ -132,6 +146,7 @@ def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         'runs': runs,
         'joints': list(diagnosis.model.robot.joint_names),
+        'found': bool(diagnosis.model.found),
         'switches': [switch.label for switch in switches(diagnosis)],
         'squares': squares(diagnosis),
         'top': round(1e6 * top, 1),

@@ -85,7 +85,7 @@ def _measures(measures: Iterable[Measure]) -> Html:
         )
     return section(
         'Measures',
-        table(('', 'value', '95 % interval', 'of', 'goal', ''), rows),
+        table(('measure', 'value', '95 % interval', 'of', 'goal', 'mark'), rows),
         id_='measures',
         lead='Shares have Wilson intervals, other numbers bootstrap intervals. A cause counts as '
         'named when it is in a set of its own in the verdict; a set lists what cannot be '
@@ -131,7 +131,7 @@ def _groups(data: dict[str, Any]) -> Html:
 
 def _group_table(rows: Sequence[dict[str, Any]]) -> Html:
     heads = (
-        '',
+        'group',
         'cases',
         'right',
         'family',
@@ -192,4 +192,4 @@ def _costs(score: Score) -> Html:
             f'{costs["most_memory_mib"]:.0f}',
         ),
     )
-    return section('Cost of a diagnosis', table(('', 'median', 'most'), rows), id_='costs')
+    return section('Cost of a diagnosis', table(('cost', 'median', 'most'), rows), id_='costs')

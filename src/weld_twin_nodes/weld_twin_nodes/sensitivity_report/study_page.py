@@ -19,6 +19,9 @@ from .fitter_words import Advice, advised, parameter_words, sized, spread_of
 _ALLOWED = 'img-src data:'
 _STYLE = """
 figure { margin: 0 0 1.5rem; } figure img { width: 100%; height: auto; background: #fff; }
+@media screen and (prefers-color-scheme: dark) {
+  figure img { filter: invert(.91) hue-rotate(180deg); }
+}
 .advice th[scope=row] { min-width: 9rem; }
 .claims td:nth-child(4) { font-weight: 600; min-width: 9rem; }
 .claims { font-size: .85rem; } table { margin-bottom: 1rem; }

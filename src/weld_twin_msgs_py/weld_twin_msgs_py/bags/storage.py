@@ -16,6 +16,7 @@ from .segment import SUFFIXES
 from .segments import INFORMATION, METADATA
 
 PACKED = '.zstd'
+TABLES = ('.csv', '.tsv', '.txt')
 SIZE_LIMIT = 16_000_000
 """Bytes of metadata.yaml; a bag of a thousand files has some hundred kilobytes."""
 DEPTH_LIMIT = 50
@@ -60,8 +61,9 @@ def look(path: Path) -> Bag:
         raise DataError(f"'{path}' is a ROS 1 bag; convert it with rosbags-convert first")
     if path.is_file():
         if path.suffix not in SUFFIXES:
+            told = '; a table becomes one with weld-twin import' if path.suffix in TABLES else ''
             raise DataError(
-                f"'{path}' is no bag: expected a rosbag2 directory, a .mcap or a .db3 file"
+                f"'{path}' is no bag: expected a rosbag2 directory, a .mcap or a .db3 file{told}"
             )
         custom = _information(path.parent).get('custom_data') or {}
         return Bag([path], custom if isinstance(custom, dict) else {})

@@ -452,5 +452,5 @@ def test_reading_holds_the_numbers_wanted_and_not_the_messages(tmp_path, robot, 
 
 def test_a_table_in_place_of_a_bag_is_told_the_way(tmp_path, robot):
     (tmp_path / 'mine.csv').write_text('a,b\n1,2\n', encoding='utf-8')
-    with pytest.raises(DataError, match='a table becomes one with weld-twin import$'):
+    with pytest.raises(DataError, match=r'a table becomes one with weld-twin import$'):
         read_recording(tmp_path / 'mine.csv', robot)

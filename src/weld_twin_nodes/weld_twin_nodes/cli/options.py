@@ -57,12 +57,19 @@ def given_urdf(args: argparse.Namespace) -> GivenUrdf | None:
 
 def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
     """Return the robot with the effects of a file; say which values no machine has."""
-    from ..offline.told_twin import build_twin, doubts
+    from ..offline.told_twin import build_twin
 
     twin = build_twin(robot, path, implausible=implausible)
+    say_doubts(twin, path)
+    return twin
+
+
+def say_doubts(twin: Twin, path: str) -> None:
+    """Say on stderr which values of a model no machine has."""
+    from ..offline.told_twin import doubts
+
     for doubt in doubts(twin):
         print(f'weld-twin: {path}: {doubt}', file=sys.stderr)
-    return twin
 
 
 def add_topics(parser: argparse.ArgumentParser) -> None:

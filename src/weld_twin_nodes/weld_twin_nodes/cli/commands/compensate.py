@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..options import add_bag_output, add_robot, add_topics, robot_of, topics_of
+from ..options import add_bag_output, add_robot, add_topics, robot_of, say_doubts, topics_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +29,7 @@ def run(args: argparse.Namespace) -> int:
     robot = robot_of(args)
     recording = read_recording(args.bag, robot, topics_of(args))
     made = compensated(robot, args.model, recording)
+    say_doubts(made.model.twin, args.model)
     robot.check_positions(made.result.motion.q)
     write_compensated(args.out, made, recording, storage=args.storage)
     before, after = made.result.rms

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..options import add_bag_output, add_robot, add_topics, robot_of, topics_of
+from ..options import add_bag_output, add_robot, add_topics, robot_of, say_doubts, topics_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
     robot = robot_of(args)
     recording = read_recording(args.bag, robot, topics_of(args))
     model = predictor(robot, args.model, args.bag, recording, args.setup)
+    say_doubts(model.twin, args.model)
     made = {'model': str(args.model)}
     got = write_prediction(args.out, model, recording, storage=args.storage, provenance=made)
     if args.table:

@@ -34,6 +34,7 @@ NOISE = 3e-5
 """Of every measured coordinate [m]."""
 TOLERANCE = 2e-4
 """Of the tool [m]; plans are asked how probably it is kept."""
+RESULTS, PARTS = 'plans.json', 'parts'
 UNSEEN = 60
 """Other postures of the region, at which the corrected arm is judged."""
 FRAMES = [
@@ -121,20 +122,21 @@ def planned(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any
     ----------
     count : int
     out : Path
-        Keeps a file per plan; those that are there are not made again.
+        Gets plans.json, and keeps a file per plan; those that are there are not made again.
     tell : callable
         Told of every plan.
 
     """
     require_simulator()
-    out.mkdir(parents=True, exist_ok=True)
+    (out / PARTS).mkdir(parents=True, exist_ok=True)
     entries = []
     for seed in range(count):
-        path = out / f'plan_{seed:03d}.json'
+        path = out / PARTS / f'plan_{seed:03d}.json'
         if not path.is_file():
             write_text(path, json.dumps(carried_out(seed), indent=1) + '\n')
         entries.append(json.loads(path.read_text()))
         tell(' '.join(f'{key} {value}' for key, value in entries[-1].items()))
+    write_text(out / RESULTS, json.dumps(entries, indent=1) + '\n', overwrite=True)
     ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in entries]
     return {
         'plans': len(entries),

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans of a first measurement, carried out by the plant: is an arm as sure as its plan said?
 
-Writes a file per plan; a run that was interrupted goes on where it stopped.
+Writes plans.json; a run that was interrupted goes on where it stopped.
 """
 
 from __future__ import annotations

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the trial of security calls shown, and the trial itself where it can be made."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+from weld_twin_lab.campaigns.security import verdict
+from weld_twin_lab.cli.lab import proofs
+from weld_twin_nodes.cli.in_process import weld_twin
+
+OPEN = {'heard': 9, 'recorded': [9, 8, 7], 'alive': True}
+LOCKED = {'heard': 0, 'recorded': [9, 0, 0], 'alive': True}
+
+
+def test_security_is_shown_when_strangers_get_through_without_keys_alone():
+    assert verdict({'open': OPEN, 'enforced': LOCKED})
+
+
+@pytest.mark.parametrize(
+    ('way', 'change'),
+    [
+        ('open', {'heard': 0}),  # the trial itself hears nothing
+        ('open', {'recorded': [9, 0, 7]}),
+        ('enforced', {'heard': 1}),
+        ('enforced', {'recorded': [9, 1, 0]}),
+        ('enforced', {'recorded': [9, 0, 1]}),
+        ('enforced', {'recorded': [0, 0, 0]}),
+        ('enforced', {'alive': False}),
+    ],
+)
+def test_anything_else_shows_nothing(way, change):
+    result = {'open': OPEN, 'enforced': LOCKED}
+    assert not verdict({**result, way: {**result[way], **change}})
+
+
+def test_what_could_not_be_tried_is_not_passed():
+    assert not verdict({'open': OPEN, 'reason': 'no keys'})
+
+
+def test_the_lab_has_the_proof():
+    assert 'security' in proofs()
+
+
+@pytest.mark.skipif(
+    shutil.which('ros2') is None, reason='ros2 security is not here: no keys can be made'
+)
+def test_strangers_hear_and_say_nothing_under_enforced_security(tmp_path):
+    code, printed, _ = weld_twin('lab', 'security', '--out', str(tmp_path / 'security.json'))
+    result = json.loads((tmp_path / 'security.json').read_text())
+    if 'security libraries' in result['reason'] or 'unprotected' in result['reason']:
+        pytest.skip(result['reason'])
+    assert code == 0, printed

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The nodes under enforced security: who has no keys, or others, hears and says nothing.
+
+The same is tried without keys first: there a stranger must hear the twin and be recorded, or else
+the trial shows nothing. It needs `ros2 security` and a middleware that is built with DDS security; where
+they are missing, the result says so and does not pass.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from weld_twin_msgs_py.files import markdown
+
+WAYS = ('open', 'enforced')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options: there are none of its own."""
+
+
+def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return what strangers heard and what was recorded of them, without keys and with."""
+    import tempfile
+
+    from weld_twin_core.errors import TwinError
+
+    from .securing.scenario import keystore, played
+
+    result: dict[str, Any] = {'reason': ''}
+    with tempfile.TemporaryDirectory() as folder:
+        for way in WAYS:
+            place = Path(folder) / way
+            place.mkdir()
+            try:
+                keys = keystore(place) if way == 'enforced' else None
+                result[way] = played(place, keys)
+            except TwinError as error:
+                result['reason'] = f'{way}: {error}'
+                break
+            tell(f'{way}: {result[way]}')
+    return {'passed': verdict(result), **result}
+
+
+def verdict(result: dict[str, Any]) -> bool:
+    """Return whether strangers get through without keys, and nobody but the driver with them."""
+    if any(way not in result or not result[way]['alive'] for way in WAYS):
+        return False
+    free, locked = result['open'], result['enforced']
+    shown = free['heard'] > 0 and all(count > 0 for count in free['recorded'])
+    driver, *strangers = locked['recorded']
+    return bool(shown and driver > 0 and locked['heard'] == 0 and not any(strangers))
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return a row without keys and one with them."""
+    head = ('keys', 'a stranger heard', "the driver's", 'without keys', 'with other keys')
+    rows = [(way, result[way]['heard'], *result[way]['recorded']) for way in WAYS if way in result]
+    reason = f'\n{result["reason"]}\n' if result['reason'] else ''
+    return markdown.table(head, *rows) + reason

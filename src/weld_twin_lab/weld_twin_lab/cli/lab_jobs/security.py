@@ -1,0 +1,25 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Run the nodes under enforced security, beside strangers without keys or with others.
+
+Needs `ros2 security` and a middleware that is built with DDS security. Exits with 1 where it could
+not be shown; the file tells why.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+CAMPAIGN = 'security'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('--out', required=True, metavar='FILE', help='JSON file to write')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the campaign of this name."""
+    from ..campaign import run as run_campaign
+
+    return run_campaign(argparse.Namespace(**vars(args), campaign=CAMPAIGN))

@@ -101,10 +101,15 @@ def _reached(
     Everything else is left free: the arm as it was, and all that happens besides. Written anew,
     apart from the product's own sums.
     """
-    names = observations[0].names
-    others = [event for event in events if event is not one]
-    precision = [each.information()[0] for each in observations]
-    prior = np.diag(observations[0].prior_std ** -2.0)
+    names = list(dict.fromkeys(name for each in observations for name in each.names))
+    if one.name not in names:
+        return None
+    others = [event for event in events if event is not one and event.name in names]
+    precision = [_widened(each, names) for each in observations]
+    width = {
+        n: w for each in observations for n, w in zip(each.names, each.prior_std, strict=True)
+    }
+    prior = np.diag([width[name] ** -2.0 for name in names])
     for k in range(2, len(observations) + 1):
         rows = []
         for event in (*others, one):
@@ -120,6 +125,14 @@ def _reached(
         if size @ left @ size >= ERRORS**2:
             return k - 1
     return None
+
+
+def _widened(observation: Observation, names: Sequence[str]) -> Array:
+    """Return what a check says of all coordinates; nothing of those that it does not know."""
+    out = np.zeros((len(names), len(names)))
+    at = [names.index(name) for name in observation.names]
+    out[np.ix_(at, at)] = observation.information()[0]
+    return out
 
 
 def _normal(precision: Sequence[Array], prior: Array, rows: Sequence[tuple[int, Array]]) -> Array:

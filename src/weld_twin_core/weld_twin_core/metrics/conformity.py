@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-from scipy.stats import norm
+from statistics import NormalDist
 
 PASS, FAIL, OPEN = 'pass', 'fail', 'open'
 SURE = 0.95
@@ -36,7 +35,7 @@ class Rule:
     @property
     def to_pass(self) -> float:
         """Return the standard uncertainties that a deviation must stay below the tolerance."""
-        return float(norm.ppf(SURE))
+        return NormalDist().inv_cdf(SURE)
 
     @property
     def to_fail(self) -> float:
@@ -45,7 +44,7 @@ class Rule:
 
         Noise alone makes the largest of many larger, so that it says less than a single one.
         """
-        return float(norm.ppf(SURE ** (1.0 / max(self.readings, 1))))
+        return NormalDist().inv_cdf(SURE ** (1.0 / max(self.readings, 1)))
 
     def judged(self, largest_m: float) -> str | None:
         """

@@ -82,7 +82,7 @@ def _mended(diagnosis: Diagnosis) -> Html | None:
         return None
     items = [tag('li', sentence) for sentence in sentences]
     return tag(
-        'div', tag('h3', 'Mended before the diagnosis'), tag('ul', *items), class_='actions mended'
+        'div', tag('h2', 'Mended before the diagnosis'), tag('ul', *items), class_='actions mended'
     )
 
 
@@ -133,4 +133,4 @@ def _actions(diagnosis: Diagnosis) -> Html | None:
     if diagnosis.status == 'ambiguous':
         named = listed([found_name(found) for found in diagnosis.effects[:_FEW]])
         title = f'What to do, should it be {named}'
-    return tag('div', tag('h3', title), tag('ol', *items), class_='actions')
+    return tag('div', tag('h2', title), tag('ol', *items), class_='actions')

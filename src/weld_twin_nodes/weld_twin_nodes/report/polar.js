@@ -27,7 +27,7 @@
     const pen = canvas.getContext('2d');
     pen.setTransform(ratio, 0, 0, ratio, side * ratio / 2, canvas.clientHeight * ratio / 2);
     pen.font = '12px system-ui, sans-serif';
-    const rim = 0.38 * Math.min(side, canvas.clientHeight), base = 0.66 * rim, span = 0.26 * rim;
+    const rim = 0.36 * Math.min(side, canvas.clientHeight), base = 0.66 * rim, span = 0.26 * rim;
     const before = radial(circle, run.before), now = radial(circle, run.now);
     const unit = step(Math.max(...before.map(Math.abs)));
     const place = (angle, value) => {
@@ -82,7 +82,8 @@
       pen.lineTo(1.02 * rim * c, 1.02 * rim * s);
       pen.stroke();
       pen.textAlign = Math.abs(c) < 0.3 ? 'center' : (c > 0 ? 'left' : 'right');
-      pen.fillText(names.join(', '), 1.08 * rim * c, 1.08 * rim * s);
+      const more = names.length > 3 ? `${names.slice(0, 3).join(', ')} …` : names.join(', ');
+      pen.fillText(more, 1.08 * rim * c, 1.08 * rim * s);
     }
   }
 

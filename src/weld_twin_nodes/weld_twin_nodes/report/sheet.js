@@ -123,8 +123,19 @@ window.sheet = (() => {
     });
   }
 
+  // Begins where it is worst, so that nothing is empty before somebody points.
+  function worst() {
+    let best = { size: -1 };
+    data.runs.forEach((run, k) => run.size.before.forEach((size, i) => {
+      if (size > best.size) best = { size, key: `run${k}`, x: run.t[i] };
+    }));
+    if (best.key) document.dispatchEvent(new CustomEvent('instant', { detail: best }));
+  }
+
   if (data.runs.length === 0) return { data };
+  document.documentElement.classList.add('live');
   listen();
   switched();
+  setTimeout(worst);
   return { data };
 })();

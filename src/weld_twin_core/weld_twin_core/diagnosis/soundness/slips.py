@@ -42,9 +42,9 @@ from .smooth_shapes import smooth_shapes
 
 KNOCKED, JUMPED, SLIPPED = 'instrument_knocked', 'reflector_jumped', 'joint_slipped'
 _OTHERWISE = {
-    KNOCKED: 'A knock at instrument or base',
-    JUMPED: 'A jump of the reflector or the tool',
-    SLIPPED: 'A slip of joint {!r}',
+    KNOCKED: 'a knock at instrument or base',
+    JUMPED: 'a jump of the reflector or the tool',
+    SLIPPED: 'a slip of joint {!r}',
 }
 
 
@@ -87,8 +87,8 @@ class Slip:
             SLIPPED: f'Joint {self.joint!r} slipped',
         }[self.kind]
         out = f'{what} at {at} of {recording.name}: the tool is {length(self.size)} off then.'
-        others = dict.fromkeys(_OTHERWISE[kind].format(*at) for kind, at in self.alike)
-        return f'{out} {" or ".join(others)} would look the same.' if others else out
+        others = ' or '.join(dict.fromkeys(_OTHERWISE[kind].format(*at) for kind, at in self.alike))
+        return f'{out} {others[0].upper()}{others[1:]} would look the same.' if others else out
 
     @property
     def remedy(self) -> str:

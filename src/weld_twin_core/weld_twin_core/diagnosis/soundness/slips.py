@@ -87,7 +87,9 @@ class Slip:
             SLIPPED: f'Joint {self.joint!r} slipped',
         }[self.kind]
         out = f'{what} at {at} of {recording.name}: the tool is {length(self.size)} off then.'
-        others = ' or '.join(dict.fromkeys(_OTHERWISE[kind].format(*at) for kind, at in self.alike))
+        others = ' or '.join(
+            dict.fromkeys(_OTHERWISE[kind].format(*at) for kind, at in self.alike)
+        )
         return f'{out} {others[0].upper()}{others[1:]} would look the same.' if others else out
 
     @property

@@ -137,8 +137,10 @@ def test_what_was_tracked_comes_in_metres_at_its_own_stamps(tmp_path, seen, mark
         np.testing.assert_allclose(turned, POSE[:, :3, :3], atol=1e-6)
 
 
-def test_points_without_stamps_are_paired_row_by_row(tmp_path):
-    recording, said = read_two_tables(*both(tmp_path, ur_rtde(), spatial_analyzer()))
+@pytest.mark.parametrize('sign', [', ', ' ', '\t'])
+def test_points_without_stamps_are_paired_row_by_row(tmp_path, sign):
+    points = spatial_analyzer().replace(', ', sign)
+    recording, said = read_two_tables(*both(tmp_path, ur_rtde(), points))
     assert recording.joints.static
     np.testing.assert_allclose(recording.measured.position, POINT, atol=1e-6)
     assert 'rows of both files are paired in their order' in said
@@ -199,6 +201,7 @@ def test_a_trace_of_kuka_is_read_with_the_values_beside_it(tmp_path, interleaved
         read_two_tables(path, seen, UR5)
 
 
+@pytest.mark.filterwarnings('ignore:No analog data')  # the writer's
 def test_a_marker_of_a_c3d_file_is_read(tmp_path):
     c3d = pytest.importorskip('c3d', reason='needs the library for C3D')
     writer = c3d.Writer(point_rate=25.0, point_units='mm  ')

@@ -77,6 +77,9 @@ class Read(NamedTuple):
 
 
 _MOTIVE = r'^(?:Rigid Body|Marker|Rigid Body Marker) (?P<what>.+?)(?: [0-9A-F]{6,}| \d+)?'
+_LIST = 'list of points (SpatialAnalyzer and others)'
+_REMARKS = r'\A(?:\s*//.*\n)*'
+_NUMBER = r'[-+]?[\d.]+(?:[eE][-+]?\d+)?'
 _RTDE = (
     (r'^timestamp$', 'time [s]'),
     (r'^actual_q_(\d)$', r'actual_q_\1 [rad]'),
@@ -123,11 +126,17 @@ FORMATS: tuple[Format, ...] = (
         gap='0 0 0',
     ),
     Format(
-        'list of points (SpatialAnalyzer and others)',
-        r'\A(?:\s*//.*\n)*(?:[^,\n]+,\s*){1,3}[-+\d.eE]+,\s*[-+\d.eE]+,\s*[-+\d.eE]+\s*\n'
-        r'(?:[^,\n]+,\s*){1,3}[-+\d.eE]+,',
+        _LIST,
+        rf'{_REMARKS}(?:[^,\n]+,\s*){{1,3}}{_NUMBER}(?:,\s*{_NUMBER}){{2}}\s*\n',
         r'^[^/]',
         (),
+    ),
+    Format(
+        _LIST,
+        rf'{_REMARKS}(?:\S+[ \t]+){{1,3}}{_NUMBER}(?:[ \t]+{_NUMBER}){{2}}\s*\n',
+        r'^[^/]',
+        (),
+        ' ',
     ),
 )
 """The first whose mark is found counts."""
@@ -139,13 +148,14 @@ def recognised(text: str) -> Format | None:
     top = '\n'.join(text.splitlines()[:_HEAD]) + '\n'
     for known in FORMATS:
         if re.search(known.mark, top):
-            return None if not known.names and not _is_list(top) else known
+            return known if known.names or _is_list(top, known) else None
     return None
 
 
-def _is_list(top: str) -> bool:
+def _is_list(top: str, known: Format) -> bool:
     """Return whether every line ends in three numbers, with names before and none of a header."""
-    rows = [line.split(',') for line in top.splitlines() if line.strip() and line[:2] != '//']
+    lines = [line for line in top.splitlines() if line.strip() and line[:2] != '//']
+    rows = [_split(line, known) for line in lines]
     return all(
         len(row) == len(rows[0]) and not _number(row[0]) and all(map(_number, row[-3:]))
         for row in rows

@@ -3,6 +3,7 @@
 """From a table of touches to a corrected URDF, as a user without a tracker goes."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -79,3 +80,6 @@ def test_touches_become_a_corrected_urdf(cell, weld_twin):
         0.002, abs=1e-4
     )
     assert 'id="contacts"' in (out / 'report.html').read_text()
+    again = weld_twin('export', out / 'diagnosis.json', *urdf, '--format', 'urdf')
+    names = re.compile(r'<(?:link|joint) name="([^"]+)"')
+    assert set(names.findall(again.out)) == set(names.findall((cell / 'cell.urdf').read_text()))

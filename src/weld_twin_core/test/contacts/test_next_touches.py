@@ -10,8 +10,11 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.reaching import reaching
 from weld_twin_core.contacts import Artefact, Contact, Contacts
 from weld_twin_core.diagnosis.advice.next_touches import next_touches
+from weld_twin_core.diagnosis.advice.touch_design import Design, chosen, scatter
+from weld_twin_core.diagnosis.advice.touch_postures import again
 from weld_twin_core.diagnosis.algebra.problem import Scale
 from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.hypotheses.plain_causes import plain_causes
 
 PLACES = {'low': [0.45, 0.1, 0.2], 'left': [0.1, 0.5, 0.35], 'right': [0.35, -0.35, 0.3]}
 SIGMA = 1e-4
@@ -71,3 +74,26 @@ def test_explanations_that_a_pin_does_not_part_are_parted_by_the_postures_propos
     assert apart['expected_separation_sigma'] > 1.0
     assert alike['expected_separation_sigma'] is None
     assert apart['motion']['q'] != alike['motion']['q']
+
+
+def test_touches_fitted_without_any_rest_are_no_reason_to_fail(robot):
+    problem, model, _ = touched(robot, PLACES, np.random.default_rng(3))
+    exact = Scale(1e-9, 1.0, tuple(np.ones(m) for m in problem.samples))
+    assert len(next_touches(problem, model, (), exact)['motion']['q']) == 12
+
+
+def test_what_is_foreseen_is_what_least_squares_give(robot):
+    """The spread left after some touches against the normal equations of all of them."""
+    problem, model, scale = touched(robot, PLACES, np.random.default_rng(3))
+    effects = plain_causes(robot, problem.features(model)[0].view, ('constant',))
+    design = Design.of(problem, model, effects, scale)
+    touches = [design.touchable(k, recording) for k, recording in again(problem, model)]
+    rows = np.concatenate([each.rows for each in touches])
+    order, after = chosen(design, rows, scatter(touches, design.errors), 5)
+    taken = rows[order].reshape(-1, rows.shape[2])
+
+    expected = np.linalg.inv(np.linalg.inv(design.covariance) + taken.T @ taken)
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(
+        after[-1].covariance / np.outer(size, size), expected / np.outer(size, size), atol=1e-4
+    )

@@ -9,7 +9,7 @@ import weld_twin_core as wt
 from weld_twin_core.contacts import Artefact, Contact, Tie
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording, write_recording
-from weld_twin_msgs_py.tables import read_contacts
+from weld_twin_msgs_py.tables import read_contacts, read_table, write_touches
 
 ENGLISH = 'joint_1,joint_2,joint_3,joint_4,joint_5,joint_6,contact,kind,value,sigma\n'
 GERMAN = 'joint_1;joint_2;joint_3;joint_4;joint_5;joint_6;Kontakt;Art;Wert_mm;Unsicherheit_mm\n'
@@ -69,3 +69,18 @@ def test_contacts_come_back_from_a_bag_as_they_went_in(tmp_path, robot):
     np.testing.assert_allclose(came.joints.q, went.joints.q)
     np.testing.assert_allclose(came.contacts.value, went.contacts.value, rtol=1e-7)
     np.testing.assert_allclose(came.contacts.sigma, went.contacts.sigma, rtol=1e-6)
+
+
+def test_a_table_of_touches_read_as_measurements_is_told_what_it_lacks(tmp_path, robot):
+    path = table(tmp_path, GERMAN + '10,5;20;30;40;50;60;Stab;Länge;305,2;0,02\n')
+    with pytest.raises(DataError, match="the column 'Kontakt'; say what was touched with --cont"):
+        read_table(path, robot)
+
+
+def test_touches_that_are_proposed_are_read_as_they_were_written(tmp_path, robot):
+    q = [[0.1, 0.2, 0.3, 0.4, 0.5, 0.6], [0.2, 0.2, 0.3, 0.4, 0.5, 0.6]]
+    motion = {'joint_names': list(robot.joint_names), 'q': q, 'contact': ['a', 'by "b", left']}
+    write_touches(tmp_path / 'next.csv', motion)
+    found = read_contacts(tmp_path / 'next.csv', robot).recording
+    assert found.contacts.labels == ('a', 'by "b", left')
+    np.testing.assert_allclose(found.joints.q, q)

@@ -21,12 +21,12 @@ from weld_twin_core.recording import JointMotion, Recording
 from ..files.whole_files import write_text
 from .build import Table, joint_angles, own_epoch
 from .cells import Cells, read_cells
-from .header import joint_columns
+from .header import CONTACTS, joint_columns
 from .table_options import TableOptions
 from .unit_guess import METRES
 
 WORDS = {
-    'contact': {'contact', 'contacts', 'label', 'kontakt', 'beruehrung', 'berührung', 'punkt'},
+    'contact': CONTACTS,
     'kind': {'kind', 'type', 'art', 'typ'},
     'value': {'value', 'length', 'distance', 'wert', 'laenge', 'länge', 'abstand'},
     'sigma': {'sigma', 'std', 'uncertainty', 'unsicherheit', 'streuung'},

@@ -48,6 +48,10 @@ class Named:
     unit: str | None = None
 
 
+CONTACTS = {'contact', 'contacts', 'label', 'kontakt', 'beruehrung', 'berührung', 'punkt'}
+"""Names of a column that says what was touched."""
+
+
 @dataclass
 class Columns:
     """The columns by use; an empty tuple is a use nothing serves. ``units`` go by column."""
@@ -212,6 +216,12 @@ def _positions(parts: Sequence[Named], options: TableOptions, out: Columns) -> N
         parts, 'length', DIFFERENCE, 'difference_columns', False
     )
     if not target or not difference:
+        touched = next((p.name for p in parts if p.name.strip().lower() in CONTACTS), None)
+        if touched is not None:
+            raise DataError(
+                f'the table has no measured positions but the column {touched!r}; say what was '
+                'touched with --contacts ARTEFACT.yaml'
+            )
         raise DataError(
             'the table has no columns with measured positions, nor target and difference; '
             f'--position-columns, or --target-columns and --difference-columns, decide{_lacking(parts)}'

@@ -160,16 +160,18 @@ def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> 
     labels = [label for each in touches for label in _labels(each)]
     both = (best.group.before, best.best)
     before, after = (1e3 * each.sigma * each.open(spread) ** 0.5 for each in both)
-    where = 'what was touched'
+    what = f'Touch what was touched in these {len(rows)} postures.'
     if place is not None:
         x, y, z = place
-        where = f'it near ({x:.2f}, {y:.2f}, {z:.2f}) m from the base, where you move it,'
+        what = (
+            f'Move what is touched to about ({x:.2f}, {y:.2f}, {z:.2f}) m from the base, and touch '
+            f'it there near these {len(rows)} postures.'
+        )
     needed = best.needed(spread)
-    enough = '' if needed is None else f' {needed} touches reach nine tenths of what can be had.'
+    enough = '' if needed is None else f' {needed} touches reach nine tenths of what more can.'
     return {
         'kind': 'touches',
-        'sentence': f'Touch {where} in these {len(rows)} postures. Guide the arm by hand, and lift '
-        'it off between two of them.',
+        'sentence': f'{what} Guide the arm by hand, and lift it off between two of them.',
         'reason': f'What the model predicts about here is foreseen to scatter by {after:.2f} mm instead '
         f'of {before:.2f} mm.{enough}',
         'expected_separation_sigma': parted,

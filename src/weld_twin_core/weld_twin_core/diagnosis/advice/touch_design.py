@@ -28,8 +28,13 @@ from ...twin.features import Features
 from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import Model, Problem, Scale
 
-ANYWHERE = 1.0
+ANYWHERE = 0.1
 """Spread [m] of where a contact may be: as good as not known."""
+SLACK = 5e-6
+"""Noise [m] of a touch at the least: a few touches may be fitted without any rest, and no ball rests
+better than that."""
+DETERMINED = 1e-14
+"""Share of the strongest direction below which information is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +73,9 @@ class Design:
         First unknown of every place.
     surfaces : tuple of Places
         Where contacts are.
-    covariance : array, shape (P, P)
+    root : array, shape (P, P)
+        Its product with its transpose is the covariance of the unknowns. Kept instead of it: with
+        errors of micrometres and places that may be anywhere, rounding would make it negative.
 
     """
 
@@ -78,7 +85,12 @@ class Design:
     errors: int
     starts: tuple[int, ...]
     surfaces: tuple[Places, ...]
-    covariance: Array
+    root: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Return the covariance of the unknowns, shape (P, P)."""
+        return np.asarray(self.root @ self.root.T)
 
     @classmethod
     def of(cls, problem: Problem, model: Model, effects: Sequence[Effect], scale: Scale) -> Design:
@@ -98,6 +110,7 @@ class Design:
 
         """
         model, tool = model.with_found(tuple(effects)), 'tool' in problem.align
+        sigma = max(scale.position, SLACK)
         prior = np.concatenate([frame_prior(problem, model)[0], effect_precision(model)])
         freedom = [unknown.freedom for unknown in problem.touched]
         starts = prior.size + np.cumsum([0, *freedom])
@@ -107,7 +120,7 @@ class Design:
             assert recording.contacts is not None
             points = model.twin(k).poses(recording, recording.joints.t).position
             surfaces.append(places(recording.contacts, points))
-            rows = _rows(model, k, recording, surfaces[k], points, tool) / scale.position
+            rows = _rows(model, k, recording, surfaces[k], points, tool) / sigma
             rows = rows * np.sqrt(scale.weights[k])[:, None, None]
             own = np.concatenate([np.arange(prior.size), np.arange(starts[k], starts[k + 1])])
             information[np.ix_(own, own)] += np.einsum('mcp,mcq->pq', rows, rows)
@@ -116,21 +129,20 @@ class Design:
         return cls(
             model,
             tool,
-            scale.position,
+            sigma,
             prior.size,
             tuple(starts[:-1].tolist()),
             tuple(surfaces),
-            _inverse(information),
+            _root(information),
         )
 
     def with_place(self) -> Design:
         """Return the same with one more point somewhere."""
-        size = len(self.covariance)
+        size = len(self.root)
         wider = np.zeros((size + 3, size + 3))
-        wider[:size, :size] = self.covariance
-        wider[size:, size:] = ANYWHERE**2 * np.eye(3)
-        starts = (*self.starts, size)
-        return replace(self, starts=starts, covariance=wider)
+        wider[:size, :size] = self.root
+        wider[size:, size:] = ANYWHERE * np.eye(3)
+        return replace(self, starts=(*self.starts, size), root=wider)
 
     def touchable(self, k: int, recording: Recording) -> Touchable:
         """
@@ -152,7 +164,7 @@ class Design:
         else:
             where = places(recording.contacts, points)
         own = _rows(self.model, twin, recording, where, points, self.tool) / self.sigma
-        rows = np.zeros((len(points), 3, len(self.covariance)))
+        rows = np.zeros((len(points), 3, len(self.root)))
         count, at = own.shape[1], self.starts[k]
         rows[:, :count, : self.errors] = own[..., : self.errors]
         rows[:, :count, at : at + own.shape[2] - self.errors] = own[..., self.errors :]
@@ -160,20 +172,20 @@ class Design:
 
     def after(self, rows: Array) -> Design:
         """Return what is known after one more touch, rows of shape (3, P)."""
-        gain = self.covariance @ rows.T
-        told = np.linalg.solve(np.eye(len(rows)) + rows @ gain, gain.T)
-        return replace(self, covariance=self.covariance - gain @ told)
+        _, size, ways = np.linalg.svd(rows @ self.root, full_matrices=False)
+        less = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
+        return replace(self, root=self.root - (self.root @ ways.T) * less @ ways)
 
     def open(self, weight: Array) -> float:
         """Return how much of what is asked for is not known: the weighed sum of variances."""
-        inner = self.covariance[: self.errors, : self.errors]
-        return float(np.einsum('pq,pq->', weight, inner))
+        own = self.root[: self.errors]
+        return float(np.einsum('pi,pi->', own, weight @ own))
 
     def told(self, rows: Array, weight: Array) -> Array:
         """Return by how much each touch, (N, 3, P), lowers what is `open`, shape (N,)."""
-        gain = rows @ self.covariance
-        seen = np.eye(3) + gain @ np.swapaxes(rows, 1, 2)
-        own = gain[..., : self.errors]
+        half = rows @ self.root
+        seen = np.eye(3) + half @ np.swapaxes(half, 1, 2)
+        own = half @ self.root[: self.errors].T
         wanted = own @ weight @ np.swapaxes(own, 1, 2)
         return np.asarray(np.trace(np.linalg.solve(seen, wanted), axis1=1, axis2=2))
 
@@ -238,7 +250,9 @@ def _rows(
     return np.concatenate([-moved, free], axis=2)
 
 
-def _inverse(information: Array) -> Array:
+def _root(information: Array) -> Array:
+    """Return a root of the inverse of a normal matrix."""
     size = np.sqrt(np.diag(information))
-    unit = np.linalg.inv(information / np.outer(size, size))
-    return np.asarray(unit / np.outer(size, size))
+    strength, ways = np.linalg.eigh(information / np.outer(size, size))
+    strength = np.maximum(strength, DETERMINED * strength[-1])
+    return np.asarray(ways / np.sqrt(strength) / size[:, None])

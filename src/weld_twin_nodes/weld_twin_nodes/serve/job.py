@@ -14,7 +14,7 @@ from typing import Any
 
 from weld_twin_msgs_py.files.whole_files import write_text
 
-FILE, UPLOADS, FOUND, IMPORTED = 'job.json', 'uploads', 'found', 'imported'
+FILE, UPLOADS, FOUND, IMPORTED = 'job.json', 'recording', 'found', 'imported'
 """In a job's folder: its state, what was dropped, what was found, and the bag of a table."""
 WAITING, RUNNING = 'waiting', 'running'
 DONE, UNSOUND, REFUSED, FAILED = 'done', 'unsound', 'refused', 'failed'

@@ -185,7 +185,8 @@ def _result(job: Job) -> tuple[Child, ...]:
         for k, (name, what) in enumerate(FILES)
     ]
     sheet = tag('iframe', src=f'{place}/report.html', title='the sheet', sandbox='allow-scripts')
-    note = tag('p', f'{job.said}; {job.seconds:.0f} s of work', class_='note')
+    said = f'{job.said}; ' if job.said else ''
+    note = tag('p', f'{said}{job.seconds:.0f} s of work', class_='note')
     return section('Verdict', note, sheet, id_='verdict'), section(
         'Files', tag('ul', *links), id_='files'
     )

@@ -21,7 +21,20 @@ from ..guarded import Guarded, Outcome
 from ..history import entry_of
 from ..history.database import Database
 from ..history.runs import Runs
-from .job import DONE, FAILED, FILE, FOUND, IMPORTED, OPEN, REFUSED, RUNNING, UNSOUND, WAITING, Job
+from .job import (
+    DONE,
+    FAILED,
+    FILE,
+    FOUND,
+    IMPORTED,
+    OPEN,
+    REFUSED,
+    RUNNING,
+    UNSOUND,
+    UPLOADS,
+    WAITING,
+    Job,
+)
 from .settings import Settings
 
 STATES = {0: DONE, 2: REFUSED, 3: UNSOUND}
@@ -186,8 +199,8 @@ class Queue:
     def _finish(self, job: Job, done: Outcome) -> None:
         state = STATES.get(done.code, FAILED)
         said = _plain(done.said.removeprefix('weld-twin: '), self.folder(job))
-        if state == DONE and job.asked.cell:
-            said = self._into_history(job)
+        if state == DONE:
+            said = self._into_history(job) if job.asked.cell else ''
         self._set(replace(job, state=state, said=said, seconds=done.seconds))
 
     def _into_history(self, job: Job) -> str:
@@ -212,5 +225,5 @@ class Queue:
 def _plain(text: str, folder: Path) -> str:
     """Return a sentence without the places of this machine."""
     return (
-        text.replace(f'{folder}/uploads/', '').replace(f'{folder}/', '').replace(str(folder), '')
+        text.replace(f'{folder}/{UPLOADS}/', '').replace(f'{folder}/', '').replace(str(folder), '')
     )

@@ -10,7 +10,7 @@ from page_table import page_table
 from sphinx.application import Sphinx
 
 from weld_twin_msgs_py.messages.topics import TOPICS, VOLATILE, Qos
-from weld_twin_nodes.live.cell_node import SHARED, CellNode
+from weld_twin_nodes.live.cell_node import CellNode
 from weld_twin_nodes.live.contact_marker import ContactMarker
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.deviation_markers import DeviationMarkers
@@ -19,7 +19,7 @@ from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 from weld_twin_nodes.live.graph_table import COMMON, SPOKEN, Spoken
 from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
 from weld_twin_nodes.live.recorder import Recorder
-from weld_twin_nodes.live.settings import Setting
+from weld_twin_nodes.live.settings import SHARED, Setting
 from weld_twin_nodes.live.trajectory_generator import TrajectoryGenerator
 
 NODES: dict[str, type[CellNode]] = {

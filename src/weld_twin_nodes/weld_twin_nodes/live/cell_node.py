@@ -26,7 +26,7 @@ from .all_nodes import refuse_unknown
 from .health import Health, Input
 from .outputs import Output
 from .partners import unreached_subscribers
-from .settings import Setting
+from .settings import SHARED, Setting
 from .typed_input import Turn, TypedInput, measured_turn, reader
 
 WARN_EVERY = 5.0
@@ -46,27 +46,6 @@ KNOWN = 2.0
 Seconds for the middleware to match the subscriptions that the graph tells of. Discovery takes
 0.1 s, on a crowded machine a second; one that never matches asks for another quality of service.
 """
-
-SHARED = (
-    Setting(
-        'wait_for_subscribers',
-        0,
-        'take no input before the main outputs have this many subscribers [1]',
-        0,
-        100,
-    ),
-    Setting(
-        'reliable_inputs',
-        False,
-        'request reliable delivery; only for inputs whose publishers offer it',
-    ),
-    Setting(
-        'hardware_id',
-        '',
-        'what the diagnostics call this robot; empty: the namespace and the name of the model',
-    ),
-    Setting('stale_after', 1.0, 'silence after which an input counts as stale [s]', 0.05, 3600.0),
-)
 
 
 class CellNode(Node):
@@ -366,6 +345,8 @@ class CellNode(Node):
         sentence = f'time went back by {-jump.delta.nanoseconds * 1e-9:.3f} s; beginning anew'
         self.get_logger().info(sentence)
         self.health.say(sentence)
+        if self.frames is not None:
+            self.frames.tree.clear()
         self.time_went_back()
 
     def _tell_health(self) -> None:

@@ -52,3 +52,26 @@ class Setting:
             limits = IntegerRange(from_value=int(self.low), to_value=int(self.high), step=1)
             out.integer_range = [limits]
         return out
+
+
+SHARED = (
+    Setting(
+        'wait_for_subscribers',
+        0,
+        'take no input before the main outputs have this many subscribers [1]',
+        0,
+        100,
+    ),
+    Setting(
+        'reliable_inputs',
+        False,
+        'request reliable delivery; only for inputs whose publishers offer it',
+    ),
+    Setting(
+        'hardware_id',
+        '',
+        'what the diagnostics call this robot; empty: the namespace and the name of the model',
+    ),
+    Setting('stale_after', 1.0, 'silence after which an input counts as stale [s]', 0.05, 3600.0),
+)
+"""Parameters that every node has."""

@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.rotation import quaternion_from_matrix
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, ModelError
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.messages.topics import TopicNames
 
@@ -218,6 +218,26 @@ def test_a_prefix_of_all_joints_is_taken_off_and_told(cell, tmp_path):
     recording = read_recording(cell.write(tmp_path), ROBOT)
     np.testing.assert_allclose(recording.joints.q, Q)
     assert "named with the prefix 'left_'" in ' '.join(recording.notes)
+
+
+def test_one_of_two_robots_on_a_topic_is_read_by_its_prefix_and_a_map_of_names(cell, tmp_path):
+    called = dict(zip(ROBOT.joint_names, 'ABCDEF', strict=True))
+    for k in range(N):
+        cell.add(
+            '/joint_states',
+            'sensor_msgs/msg/JointState',
+            k,
+            header=cell.header(k),
+            name=[*(f'left/{name}' for name in 'ABCDEF'), *(f'right/{name}' for name in 'FEDCBA')],
+            position=np.concatenate([Q[k] + 1.0, np.flip(Q[k])]),
+            velocity=np.array([]),
+            effort=np.array([]),
+        )
+    names = TopicNames(joint_prefix='right/', joint_map=tuple(called.items()))
+    recording = read_recording(cell.write(tmp_path), ROBOT, names)
+    np.testing.assert_allclose(recording.joints.q, Q, atol=1e-15)
+    with pytest.raises(ModelError, match="'knee' is given another name, but is no joint of robot"):
+        read_recording(tmp_path / 'bag', ROBOT, TopicNames(joint_map=(('knee', 'A'),)))
 
 
 def test_two_robots_on_one_topic_are_not_mixed(cell, tmp_path):

@@ -12,7 +12,7 @@ import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, ModelError
 
 from ..messages import from_messages
 
@@ -23,6 +23,41 @@ than an arm at rest creeps, and half a second of the slowest seam.
 """
 _SLACK = 1e-6
 """What `Robot.check_positions` allows beyond a limit [rad or m]."""
+
+
+def names_called(
+    robot: Robot, prefix: str = '', called: Mapping[str, str] | None = None
+) -> tuple[str, ...] | None:
+    """
+    Return what joint states call the joints of a robot; None where nothing is said of it.
+
+    Parameters
+    ----------
+    robot : Robot
+    prefix : str
+    called : mapping of str to str, optional
+        Joints of the robot, and what they are called behind the prefix.
+
+    Raises
+    ------
+    ModelError
+        A joint is none of the robot's, or two would be called alike.
+
+    """
+    given = called or {}
+    if not prefix and not given:
+        return None
+    strange = [name for name in given if name not in robot.joint_names]
+    if strange:
+        raise ModelError(
+            f'{strange[0]!r} is given another name, but is no joint of robot {robot.name!r}: '
+            + ', '.join(robot.joint_names)
+        )
+    names = tuple(prefix + given.get(name, name) for name in robot.joint_names)
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ModelError(f'two joints are given the name {twice!r}')
+    return names
 
 
 class JointSample(NamedTuple):

@@ -17,6 +17,7 @@ from weld_twin_core.recording import Recording
 
 from ..assembly import Intake, Role, Samples, assembled
 from ..assembly.foreign_types import CONTROLLER, JOINTS, FedBack, plain_messages, split_topic
+from ..assembly.joint_states import names_called
 from ..messages.topics import (
     JOINT_STATES,
     MEASURED_POINT,
@@ -137,7 +138,7 @@ def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[Ro
     """Return the topics to read; the joint states are a must, the others as they are there."""
     roles = {role: _topic(names, role) for role in Role}
     space = _topic(names, Role.JOINTS).removesuffix(TopicNames().joints)
-    defaults = {*vars(TopicNames()).values(), *vars(TopicNames.within(space)).values()}
+    defaults = {topic for usual in TopicNames.topics() for topic in (usual, f'{space}{usual}')}
     for role, topic in list(roles.items()):
         kind, count = present.get(topic, ('', 0))
         if role is Role.JOINTS and (count == 0 or kind not in TYPES[role]):
@@ -169,19 +170,22 @@ def _read(
     bag: BagReader, names: TopicNames, roles: Mapping[Role, str], robot: Robot
 ) -> tuple[dict[Role, Stream], Intake]:
     """Return the columns of a bag: read by the thousand where all is as usual, else one by one."""
-    streams, intake = _empty(roles, robot)
+    streams, intake = _empty(names, roles, robot)
     one_each = {topic: role for role, topic in roles.items()}
     whole = not any(split_topic(getattr(names, role.value))[1] for role in roles)
     usual = whole and len(one_each) == len(roles)
     if not (usual and fill_regular(bag, one_each, streams, intake)):
-        streams, intake = _empty(roles, robot)
+        streams, intake = _empty(names, roles, robot)
         _fill(bag, names, streams, intake, robot)
     return streams, intake
 
 
-def _empty(roles: Mapping[Role, str], robot: Robot) -> tuple[dict[Role, Stream], Intake]:
+def _empty(
+    names: TopicNames, roles: Mapping[Role, str], robot: Robot
+) -> tuple[dict[Role, Stream], Intake]:
     streams = {role: Stream(topic, Intake.width(role, robot)) for role, topic in roles.items()}
-    return streams, Intake(robot, limits=False)
+    joint_names = names_called(robot, names.joint_prefix, dict(names.joint_map))
+    return streams, Intake(robot, limits=False, joint_names=joint_names)
 
 
 def _fill(
@@ -196,7 +200,8 @@ def _fill(
     roles: dict[str, list[Role]] = {}
     for role, stream in streams.items():
         roles.setdefault(stream.topic, []).append(role)
-    fed_back = FedBack(robot, parts.get(Role.POSE, ''))
+    joint_names = names_called(robot, names.joint_prefix, dict(names.joint_map))
+    fed_back = FedBack(robot, parts.get(Role.POSE, ''), joint_names)
     for topic, kind, _, message in bag.messages(roles):
         for role in roles[topic]:
             stream = streams[role]

@@ -14,7 +14,7 @@ POSE_TYPES = (*_PLAIN_POSES, *POSES)
 """Message types from which measured poses are read."""
 Present = Mapping[str, tuple[str, int]]
 """Type and number of messages of every topic of a bag."""
-_INPUTS = frozenset(vars(TopicNames()).values())
+_INPUTS = frozenset(TopicNames.topics())
 _RESULTS = tuple(name for name in BY_NAME if name not in _INPUTS)
 """What the nodes make themselves: never to be diagnosed as if it were measured."""
 

@@ -12,7 +12,7 @@ worth as much as a new one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 RELIABLE = 'reliable'
@@ -284,9 +284,25 @@ AROUND = (
 BY_NAME = {topic.name: topic for topic in (*TOPICS, *AROUND)}
 
 
+NO_TOPIC = {'topic': False}
+"""Mark of the attributes of `TopicNames` that are none."""
+
+
 @dataclass(frozen=True)
 class TopicNames:
-    """What the inputs are called; a recording made elsewhere has its own names."""
+    """
+    What the inputs are called; a recording made elsewhere has its own names.
+
+    Attributes
+    ----------
+    joints, pose, point, sigma, wrench, temperature, contact : str
+        Topics; a leading slash may be left out.
+    joint_prefix : str
+        What the joint states put before the names of the robot's joints.
+    joint_map : tuple of (str, str)
+        Joints of the robot and what the joint states call them, before the prefix.
+
+    """
 
     joints: str = JOINT_STATES.name
     pose: str = MEASURED_POSE.name
@@ -295,9 +311,18 @@ class TopicNames:
     wrench: str = TOOL_WRENCH.name
     temperature: str = TEMPERATURE.name
     contact: str = CONTACT.name
+    joint_prefix: str = field(default='', metadata=NO_TOPIC)
+    joint_map: tuple[tuple[str, str], ...] = field(default=(), metadata=NO_TOPIC)
+
+    @classmethod
+    def topics(cls) -> tuple[str, ...]:
+        """Return the usual names."""
+        return tuple(str(item.default) for item in fields(cls) if not item.metadata)
 
     def __post_init__(self) -> None:
         for item in fields(self):
+            if item.metadata:
+                continue
             name = getattr(self, item.name)
             object.__setattr__(self, item.name, name if name.startswith('/') else f'/{name}')
 
@@ -305,4 +330,5 @@ class TopicNames:
     def within(cls, namespace: str) -> TopicNames:
         """Return the names of one robot's topics where each robot has a namespace."""
         space = '/' + namespace.strip('/') if namespace.strip('/') else ''
-        return cls(**{item.name: f'{space}{item.default}' for item in fields(cls)})
+        names = {i.name: f'{space}{i.default}' for i in fields(cls) if not i.metadata}
+        return cls(**names)  # type: ignore[arg-type]

@@ -83,18 +83,39 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
     )
     for name in TOPIC_OPTIONS:
         group.add_argument(f'--{name}-topic', metavar='TOPIC', help=PARTS.get(name))
+    group.add_argument(
+        '--joint-prefix',
+        default='',
+        metavar='TEXT',
+        help="what the joint states put before the robot's joint names (default: any one prefix)",
+    )
+    group.add_argument(
+        '--joint-map',
+        nargs='+',
+        default=[],
+        metavar='JOINT=NAME',
+        help='joints of the robot and what the joint states call them, such as joint_1=A1',
+    )
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
     """Return the names of the topics."""
     from dataclasses import replace
 
+    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.messages.topics import TopicNames
 
     given = {name: getattr(args, f'{name}_topic') for name in TOPIC_OPTIONS}
     given['joints'] = given.pop('joint')
     named = {name: value for name, value in given.items() if value}
-    return replace(TopicNames.within(args.namespace), **named)
+    pairs = []
+    for text in args.joint_map:
+        joint, mark, name = text.partition('=')
+        if not (joint and mark and name):
+            raise DataError(f"--joint-map takes JOINT=NAME, got '{text}'")
+        pairs.append((joint, name))
+    names = replace(TopicNames.within(args.namespace), **named)
+    return replace(names, joint_prefix=args.joint_prefix, joint_map=tuple(pairs))
 
 
 def add_bag_output(parser: argparse.ArgumentParser) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError
+from weld_twin_msgs_py.assembly.joint_states import names_called
 from weld_twin_msgs_py.files.yaml_file import parse_yaml
 
 from .cell_node import CellNode
@@ -58,14 +59,4 @@ def joint_names(node: CellNode, robot: Robot) -> tuple[str, ...] | None:
         raise ModelError(
             f'joint_map must be a mapping of names such as {{joint_1: A1}}, got {text!r}'
         )
-    strange = [name for name in given if name not in robot.joint_names]
-    if strange:
-        raise ModelError(
-            f'joint_map names {strange[0]!r}, which is no joint of robot {robot.name!r}: '
-            + ', '.join(robot.joint_names)
-        )
-    names = tuple(prefix + given.get(name, name) for name in robot.joint_names)
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ModelError(f'joint_map calls two joints {twice!r}')
-    return names
+    return names_called(robot, prefix, given)

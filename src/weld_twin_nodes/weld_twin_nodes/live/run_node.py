@@ -149,11 +149,15 @@ def _open(args: list[str] | None) -> None:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's own error of it has no public name
         said = str(error).partition(', at /')[0]
-        if SECURITY in said.lower():
-            raise ModelError(f'{" ".join(said.split())}; {UNLOCKED}') from None
-        bracket = re.search(r"'(-p|--param) [^\s:]+:=\s*[\[{]", said)
-        hint = 'a parameter is given as -p NAME:=VALUE' if bracket is None else QUOTED
-        raise ModelError(f'{said}; {hint}') from None
+        given = re.search(r"'((?:-p|--param|--params-file) .*?)'\. Error", said, re.S)
+        if given is None:
+            raise ModelError(said) from None
+        hint = 'a parameter is given as -p NAME:=VALUE'
+        if given[1].startswith('--params-file'):
+            hint = 'is there such a YAML file?'
+        elif re.search(r':=\s*[\[{]', given[1]):
+            hint = QUOTED
+        raise ModelError(f'ROS cannot read {given[1]}; {hint}') from None
 
 
 def _made(make: Callable[[], CellNode]) -> CellNode:

@@ -127,3 +127,11 @@ def test_what_was_measured_plane_by_plane_is_elsewhere_afterwards():
     first = plane.reshape(-1, 3)
     later = np.concatenate([first + [0.05, 0.02, 0.0], first + [0.3, 0.0, 0.0]])
     np.testing.assert_array_equal(among(first, later), np.arange(72) < 36)
+
+
+def test_a_first_fifth_with_nothing_of_the_rest_among_it_is_judged_outside_alone(table):
+    far = table.measured.position + np.where(np.arange(900) < 180, 0.0, 5.0)[:, None]
+    moved = table.with_measured(Measurements(table.measured.t, far))
+    (split,) = [s for s in splits('ur5', moved) if s.kind == 'first_fifth']
+    assert split.inside is None
+    assert split.outside.measured.t.size == 720

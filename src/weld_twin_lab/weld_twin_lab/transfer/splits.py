@@ -49,8 +49,8 @@ class Split:
     ----------
     name, kind, robot : str
     train : Recording
-    inside : Recording
-        Stations like those fitted on.
+    inside : Recording or None
+        Stations like those fitted on; None where there are none.
     outside : Recording or None
         Stations of the rest of the workspace; None where those fitted on are spread over it.
 
@@ -60,7 +60,7 @@ class Split:
     kind: str
     robot: str
     train: Recording
-    inside: Recording
+    inside: Recording | None
     outside: Recording | None
 
 
@@ -154,7 +154,7 @@ def _split(
         kind,
         robot,
         alone(table, fitted),
-        alone(table, inside),
+        alone(table, inside) if inside.size else None,
         None if outside is None else alone(table, outside),
     )
 

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from weld_twin_core.diagnosis.result import Unsound
+from weld_twin_core.recording import JointMotion
 from weld_twin_nodes.cli.commands.diagnose import BRANDS as CHOICES
 from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.acceptance import Demand
 from weld_twin_nodes.report.controllers import BRANDS, brand_of
 from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.joint_names import joint_labels, renamed
+from weld_twin_nodes.report.quantities import turned
 
 THREE = diagnoses.circle()
 CLIPPED = """() => [...document.querySelectorAll('main *')].filter((item) => {
@@ -214,3 +216,20 @@ def test_a_card_names_all_that_the_data_cannot_tell_apart():
     card = page[page.index('class="card"') : page.index('id="seam"')]
     assert 'Zero offset of joint_a1 or base pose error' in card
     assert 'must be measured first' in card
+
+
+def test_figures_of_iso_9283_stand_where_stations_were_repeated():
+    robot = THREE.model.robot
+    once = diagnoses.stations(robot, 5)
+    again = replace(
+        once, joints=JointMotion(np.arange(20.0), np.tile(once.joints.q, (4, 1)), static=True)
+    )
+    effect = {'effect': 'joint_offset', 'joint': 'joint_a2', 'offset': 5e-4}
+    page = report_page(diagnoses.diagnosis('identified', robot, [effect], [effect], [again]))
+    part = page[page.index('id="acceptance"') : page.index('id="cards"')]
+    assert part.count('scope="row">P') == 5
+    assert 'no pose and no path was repeated' in report_page(THREE)
+
+
+def test_an_angle_is_told_with_two_digits_at_least():
+    assert turned(2.46e-4) == '0.014°' and turned(1e-6) == '0.000057°'

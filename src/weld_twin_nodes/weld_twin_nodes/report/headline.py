@@ -13,7 +13,7 @@ from weld_twin_core.recording import Recording
 from ..offline.where_it_holds import where_it_holds
 from .family_table import worth_doing
 from .html import Html, tag
-from .quantities import interval, millimetres, milliradians, odds, percent, turns_only
+from .quantities import interval, millimetres, milliradians, odds, percent, turned, turns_only
 from .words import STATUS, found_name, listed, mended, verdict
 
 _SURE_OF = {
@@ -100,7 +100,7 @@ def _figures(diagnosis: Diagnosis) -> Html:
     if diagnosis.status in _SURE_OF:
         rows.append(('Confidence', odds(diagnosis.confidence), _SURE_OF[diagnosis.status]))
     if gap.orientation_rms_rad is not None:
-        rows.append(('Orientation', milliradians(gap.orientation_rms_rad), _turned(diagnosis)))
+        rows.append(('Orientation', turned(gap.orientation_rms_rad), _turned(diagnosis)))
     cells = [
         tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
         for name, value, note in rows
@@ -119,10 +119,11 @@ def _left(diagnosis: Diagnosis) -> str:
 
 
 def _turned(diagnosis: Diagnosis) -> str:
-    turned = diagnosis.shrink.orientation_rad
-    if turned is None or not diagnosis.effects:
-        return 'RMS gap'
-    return f'RMS gap; {milliradians(turned[1])} left over'
+    gap, left = diagnosis.gap.orientation_rms_rad, diagnosis.shrink.orientation_rad
+    told = f'RMS gap ({milliradians(gap)})'
+    if left is None or not diagnosis.effects:
+        return told
+    return f'{told}; {turned(left[1])} left over'
 
 
 def _actions(diagnosis: Diagnosis) -> Html | None:

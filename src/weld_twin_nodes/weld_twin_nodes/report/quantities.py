@@ -53,6 +53,13 @@ def milliradians(radians: float | None) -> str:
     return f'{1e3 * radians:.3f}{_GAP}mrad'
 
 
+def turned(radians: float) -> str:
+    """Return an angle as '0.014°', with two digits at least."""
+    value = DEGREES * abs(radians)
+    places = 3 if value >= 0.01 or value == 0.0 else min(1 - floor(log10(value)), 6)
+    return f'{value:.{places}f}°'
+
+
 def percent(share: float) -> str:
     """Return a share as '93 %'; never 0 or 100 for what is only close to it."""
     value = 100.0 * share

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A case in the open form, methods that answer it, and what the answers are worth."""
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_lab.contest.course import commands, run_all
+from weld_twin_lab.contest.entrants import geometry, never_knows, zero_offset
+from weld_twin_lab.contest.open_form import (
+    Answer,
+    read_answer,
+    read_case,
+    write_answer,
+    write_case,
+)
+from weld_twin_lab.contest.scores import Sealed, page, point
+from weld_twin_msgs_py.files.yaml_file import yaml_text
+
+SIZE = 4e-4
+NOISE = 2e-5
+
+
+@pytest.fixture
+def case(tmp_path):
+    """Eighty stations of an arm whose elbow link is longer by `SIZE`, as files."""
+    rng = np.random.default_rng(5)
+    robot = load('ur5')
+    length = np.array(robot.a)
+    length[2] += SIZE
+    real = replace(robot, a=length)
+    recordings = []
+    for name in ('train', 'ask'):
+        q = rng.uniform(-1.5, 1.5, (80, 6))
+        t = np.arange(80.0)
+        seen = forward(real, q)[:, :3, 3] + rng.normal(scale=NOISE, size=(80, 3))
+        recordings.append(Recording(name, JointMotion(t, q, static=True), Measurements(t, seen)))
+    file = tmp_path / 'robot.yaml'
+    file.write_text(yaml_text(robot.to_mapping()), encoding='utf-8')
+    said = {'align': [], 'exclude': [], 'known': ''}
+    write_case(tmp_path / 'cases' / 'one', file, tuple(recordings), said)
+    return tmp_path / 'cases' / 'one', recordings[1].measured.position
+
+
+@pytest.fixture
+def truth(case):
+    folder, positions = case
+    nominal = never_knows.answer(read_case(folder)).predicted
+    return Sealed(
+        {
+            'kind': 'single',
+            'sites': [['link_length', 'elbow_joint']],
+            'alike': [],
+            'floor_m': NOISE * np.sqrt(3.0),
+        },
+        positions,
+        np.ones(80, dtype=bool),
+        float(np.sqrt(((positions - nominal) ** 2).sum(axis=1).mean())),
+    )
+
+
+def test_what_was_measured_on_the_motion_asked_for_is_not_in_the_case(case):
+    folder, positions = case
+    assert read_case(folder).ask.measured is None
+    first = f'{positions[0, 0]:.17g}'
+    assert not any(first in file.read_text() for file in folder.iterdir())
+
+
+def test_geometry_finds_what_geometry_is(case, truth):
+    said = geometry.answer(read_case(case[0]))
+    worth = point(said, truth)
+    assert worth.detected and worth.family and worth.joint and not worth.sure_wrong
+    assert worth.over_floor < 1.3
+    assert worth.belief > 0.5
+
+
+def test_the_scales_are_what_they_are(case, truth):
+    silent = point(never_knows.answer(read_case(case[0])), truth)
+    assert silent.left == pytest.approx(1.0)
+    assert silent.detected and not silent.family and silent.belief == 0.0
+    wrong = point(zero_offset.answer(read_case(case[0])), truth)
+    assert wrong.sure_wrong and not wrong.family
+
+
+def test_names_beyond_three_of_one_cause_do_not_count(case, truth):
+    names = [(effect, 'elbow_joint', 0.2) for effect in ('backlash', 'servo_lag', 'joint_offset')]
+    hidden = (*names, ('link_length', 'elbow_joint', 0.1))
+    predicted = never_knows.answer(read_case(case[0])).predicted
+    assert not point(Answer(predicted, (hidden,)), truth).family
+    assert point(Answer(predicted, (hidden[1:],)), truth).family
+
+
+def test_anybody_can_enter_and_a_failure_is_told(case, truth, tmp_path):
+    folder, _ = case
+    program = tmp_path / 'method.py'
+    program.write_text(
+        'import json, sys\n'
+        'rows = open(sys.argv[1] + "/ask_times.csv").read().split()[1:]\n'
+        'open(sys.argv[2] + "/predicted.csv", "w").write("x,y,z\\n" + "0,0,0\\n" * len(rows))\n'
+        'said = {"causes": [], "unknown": 1.0, "none": 0.0}\n'
+        'json.dump(said, open(sys.argv[2] + "/answer.json", "w"))\n',
+        encoding='utf-8',
+    )
+    entered = [
+        f'mine={sys.executable} {program} {{case}} {{out}}',
+        f'broken={sys.executable} -c 1/0 {{case}} {{out}}',
+    ]
+    methods = commands(['never_knows'], entered)
+    runs = run_all(folder.parent, ['one'], methods, tmp_path / 'out', {'one': 80}, lambda _: None)
+    assert runs['mine']['one'].answer.unknown == 1.0
+    assert runs['broken']['one'].trouble == 'ZeroDivisionError: division by zero'
+    told = page(runs, {'one': truth}, '')
+    assert '| mine | 1 of 1 |' in told and '| broken | 0 of 1 |' in told
+
+
+@pytest.mark.parametrize('text', ['mine', 'mine=run {case}', '=run {case} {out}'])
+def test_a_command_without_its_places_is_refused(text):
+    with pytest.raises(DataError, match='--enter takes NAME=COMMAND'):
+        commands([], [text])
+
+
+def test_an_answer_out_of_form_is_refused(case, tmp_path):
+    predicted = np.zeros((80, 3))
+    write_answer(tmp_path, Answer(predicted, unknown=0.4))
+    assert read_answer(tmp_path, 80).unknown == 0.4
+    with pytest.raises(DataError, match='must have 79 rows'):
+        read_answer(tmp_path, 79)
+    said = json.loads((tmp_path / 'answer.json').read_text())
+    (tmp_path / 'answer.json').write_text(json.dumps({**said, 'none': 1.5}))
+    with pytest.raises(DataError, match='not between 0 and 1'):
+        read_answer(tmp_path, 80)

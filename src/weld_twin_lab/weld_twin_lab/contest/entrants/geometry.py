@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Plain geometric calibration: all DH values by Levenberg and Marquardt, as textbooks have it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import rotation_matrix, transform
+from weld_twin_core.arrays import Array
+
+from ..open_form import Answer, Case
+
+FAMILY = {'a': 'link_length', 'd': 'link_length', 'alpha': 'link_twist', 'theta': 'joint_offset'}
+"""What a library of effects calls an error of each DH value."""
+MOST = 600
+"""Poses that are fitted: more add seconds and hardly any digits."""
+SURE_AT = 4.0
+"""Standard errors from which a value counts as off: one false in some hundred cases of 24."""
+ALL = ('a', 'alpha', 'd', 'theta')
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """
+    What came of a fit.
+
+    Attributes
+    ----------
+    names : tuple of (str, int)
+        DH value and row, or frame and -1.
+    values, errors : array, shape (P,)
+        Corrections, and their standard errors.
+    effect : array, shape (P,) [m]
+        How far each moves the tool, RMS.
+    robot : Robot
+
+    """
+
+    names: tuple[tuple[str, int], ...]
+    values: Array
+    errors: Array
+    effect: Array
+    robot: Robot
+
+
+def answer(case: Case) -> Answer:
+    """Return the values that are off, by how far they move the tool."""
+    return answer_with(case, ALL)
+
+
+def answer_with(case: Case, free: tuple[str, ...]) -> Answer:
+    """Return what a fit of some of the DH values says."""
+    fitted = fit(case, free)
+    moved: dict[tuple[str, str | None], float] = defaultdict(float)
+    for (name, row), value, error, effect in zip(
+        fitted.names, fitted.values, fitted.errors, fitted.effect, strict=True
+    ):
+        if name in FAMILY and abs(value) > SURE_AT * error:
+            moved[FAMILY[name], case.robot.joint_names[row]] += float(effect) ** 2
+    whole = sum(moved.values())
+    causes = tuple(
+        ((*at, share / whole),) for at, share in sorted(moved.items(), key=lambda item: -item[1])
+    )
+    q, _ = case.ask.joints.at(case.times)
+    predicted = forward(fitted.robot, q)[:, :3, 3]
+    return Answer(predicted, causes, none=0.0 if causes else 1.0)
+
+
+def fit(case: Case, free: tuple[str, ...]) -> Fitted:
+    """Return the DH values and frames that fit the measured positions best."""
+    measured = case.train.measured
+    assert measured is not None, 'a case is measured'
+    rows = np.unique(np.linspace(0, measured.t.size - 1, MOST).astype(int))
+    q, _ = case.train.joints.at(measured.t[rows])
+    seen = measured.position[rows]
+    frames = [frame for frame in ('base', 'tool') if frame in case.align]
+    names = tuple((name, row) for name in free for row in range(case.robot.n)) + tuple(
+        (f'{frame}{k}', -1) for frame in frames for k in range(6)
+    )
+
+    def off(values: Array) -> Array:
+        return np.asarray((forward(_moved(case.robot, names, values), q)[:, :3, 3] - seen).ravel())
+
+    # DH values of an arm are degenerate (parallel axes): the method needs a little damping.
+    damped = 1e-3
+    found = least_squares(
+        lambda values: np.append(off(values), damped * values), np.zeros(len(names)), method='lm'
+    )
+    slope = found.jac[: -len(names)]
+    noise = float((found.fun[: -len(names)] ** 2).mean())
+    spread = np.linalg.pinv(found.jac.T @ found.jac) * noise
+    effect = np.sqrt(((slope * found.x) ** 2).sum(axis=0) / len(seen))
+    errors = np.sqrt(np.maximum(np.diag(spread), 1e-30))
+    return Fitted(names, found.x, errors, effect, _moved(case.robot, names, found.x))
+
+
+def _moved(robot: Robot, names: tuple[tuple[str, int], ...], values: Array) -> Robot:
+    """Return a robot with corrections to its DH values and frames."""
+    change: dict[str, Any] = {name: np.array(getattr(robot, name)) for name in ALL}
+    turned = {'base': np.zeros(6), 'tool': np.zeros(6)}
+    for (name, row), value in zip(names, values, strict=True):
+        if row < 0:
+            turned[name[:-1]][int(name[-1])] = value
+        else:
+            change[name][row] += value
+    base, tool = (transform(rotation_matrix(part[3:]), part[:3]) for part in turned.values())
+    return replace(
+        robot,
+        **change,
+        T_world_base=robot.T_world_base @ base,
+        T_flange_tool=robot.T_flange_tool @ tool,
+    )

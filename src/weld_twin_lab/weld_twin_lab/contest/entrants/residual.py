@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What learners learn from: where the nominal arm is off, and how it moves then."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arrays import Array
+from weld_twin_core.recording import JointMotion
+
+from ..open_form import Case
+
+
+def nominal(case: Case, motion: JointMotion, t: Array) -> Array:
+    """Return where the nominal tool is, shape (M, 3) [m]."""
+    q, _ = motion.at(t)
+    return np.asarray(forward(case.robot, q)[:, :3, 3])
+
+
+def off(case: Case) -> Array:
+    """Return measured minus nominal position, shape (M, 3) [m]."""
+    measured = case.train.measured
+    assert measured is not None, 'a case is measured'
+    return np.asarray(measured.position - nominal(case, case.train.joints, measured.t))
+
+
+def features(motion: JointMotion, t: Array) -> Array:
+    """Return sine and cosine of the angles, and, of a motion, velocities and their signs."""
+    q, qd = motion.at(t)
+    columns = [np.sin(q), np.cos(q)]
+    if not motion.static:
+        columns += [qd, np.tanh(qd / max(1e-9, 0.02 * float(np.abs(qd).max(initial=0.0))))]
+    return np.hstack(columns)

@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What answers are worth, by the same rules for all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.files.markdown import table
+from weld_twin_msgs_py.robots import load_robot
+
+from ..blind import layout
+from ..blind.achieved import counted
+from ..blind.ambiguous import Site
+from ..blind.displacement import rms
+from ..blind.judging import CONFIDENT, IN_LIBRARY, answers_of
+from .course import Run
+from .open_form import Answer, Cause, Name
+
+LIKELY = 0.5
+"""Probability from which something is said to be there."""
+NAMES = 3
+"""Names of one cause that count: with more, nothing has been told apart."""
+
+
+@dataclass(frozen=True)
+class Sealed:
+    """The truth of a case, and what was measured when the methods were asked."""
+
+    truth: Mapping[str, Any]
+    positions: Array
+    good: Array
+    nominal_m: float
+
+    @property
+    def named(self) -> bool:
+        """Return whether the library of effects knows the cause."""
+        return self.truth['kind'] in IN_LIBRARY
+
+
+def sealed(cases: Path, truths: Path, name: str, nominal: Array) -> Sealed:
+    """Return the truth of a case; ``nominal`` is what the nominal arm predicts, shape (M, 3)."""
+    truth = layout.read(truths / name / layout.TRUTH)
+    test = read_recording(
+        truths / name / layout.TEST, load_robot(str(cases / name / layout.ROBOT))
+    )
+    assert test.measured is not None, 'a test is measured'
+    good = counted(test, truth['outliers'])
+    positions = test.measured.position
+    return Sealed(truth, positions, good, rms((positions - nominal)[good]))
+
+
+@dataclass(frozen=True)
+class Point:
+    """
+    What one answer was worth; None where the question does not arise.
+
+    Attributes
+    ----------
+    detected, false_alarm, family, joint, sure_wrong : bool or None
+    belief : float or None
+        In the true families, of cases detected.
+    left : float
+        Gap with the prediction over the gap of the nominal arm.
+    over_floor : float
+        Gap with the prediction over what the true causes would leave.
+
+    """
+
+    detected: bool | None
+    false_alarm: bool | None
+    family: bool | None
+    joint: bool | None
+    belief: float | None
+    sure_wrong: bool
+    left: float
+    over_floor: float
+
+
+def point(answer: Answer, case: Sealed) -> Point:
+    """Return what an answer was worth."""
+    truth = case.truth
+    there = answer.none < LIKELY and (bool(answer.causes) or answer.unknown >= LIKELY)
+    something = truth['kind'] != 'none'
+    best = max(answers_of(truth), key=lambda at: _belief(answer, at)) if case.named else []
+    first = {(effect, joint) for effect, joint, _ in _first(answer, len(best))}
+    family = {effect for effect, _ in best} <= {effect for effect, _ in first}
+    joint = {at[1] for at in best} <= {at[1] for at in first}
+    gap = rms((case.positions - answer.predicted)[case.good])
+    return Point(
+        there if something else None,
+        None if something else there,
+        family if case.named else None,
+        joint if case.named else None,
+        _belief(answer, best) if case.named and there else None,
+        _sure_wrong(answer, case),
+        gap / case.nominal_m,
+        gap / float(truth['floor_m']),
+    )
+
+
+def _first(answer: Answer, count: int) -> list[Name]:
+    """Return the names of so many causes, the likeliest, and of each the likeliest names."""
+    ranked = sorted(answer.causes, key=lambda cause: -sum(p for *_, p in cause))
+    return [name for cause in ranked[:count] for name in _likely(cause)]
+
+
+def _likely(cause: Cause) -> list[Name]:
+    return sorted(cause, key=lambda name: -name[2])[:NAMES]
+
+
+def _names(answer: Answer) -> list[Name]:
+    return [name for cause in answer.causes for name in cause]
+
+
+def _belief(answer: Answer, sites: Sequence[Site]) -> float:
+    """Return the mean belief in the families of some causes."""
+    each = [
+        max((p for effect, _, p in _names(answer) if effect == at[0]), default=0.0) for at in sites
+    ]
+    return float(np.mean(each)) if each else 0.0
+
+
+def _sure_wrong(answer: Answer, case: Sealed) -> bool:
+    """Return whether it is sure of a cause that is none, or of nothing where something is."""
+    right = {at for sites in answers_of(case.truth) for at in sites} if case.named else set()
+    sure = [(effect, joint) for effect, joint, p in _names(answer) if p > CONFIDENT]
+    denied = answer.none > CONFIDENT and case.truth['kind'] != 'none'
+    return denied or any(at not in right for at in sure)
+
+
+def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nominal: str) -> str:
+    """
+    Return the table of all methods in Markdown.
+
+    Parameters
+    ----------
+    runs : mapping of method to mapping of case to Run
+    cases : mapping of case to Sealed
+    nominal : str
+        What is said of a method that gave no answer: it is taken for the nominal arm, silent.
+
+    """
+    head = (
+        *('method', 'answers', 'detected', 'false alarms', 'family', 'joint', 'belief (FIA)'),
+        *('sure and wrong', 'gap left, median', 'over the floor, median', 'worse than nominal'),
+        *('processor [s]', 'memory [MB]'),
+    )
+    rows: list[Sequence[object]] = [head]
+    for method, said in runs.items():
+        rows.append((method, *_row(said, cases)))
+    return table(*rows) + f'\n{nominal}\n'
+
+
+def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, Any]:
+    """Return the shares and medians of one method."""
+    points = [point(run.answer, cases[name]) for name, run in runs.items() if run.answer]
+    out: dict[str, Any] = {'cases': len(runs), 'answers': len(points)}
+    for key in ('detected', 'false_alarm', 'family', 'joint', 'belief', 'sure_wrong'):
+        values = [getattr(each, key) for each in points if getattr(each, key) is not None]
+        out[key] = float(np.mean(values)) if values else None
+    left = np.array([each.left for each in points])
+    out['left'] = float(np.median(left)) if points else None
+    out['over_floor'] = float(np.median([p.over_floor for p in points])) if points else None
+    out['worse_than_nominal'] = int((left > 1.0).sum())
+    out['seconds'] = float(np.median([run.seconds for run in runs.values()]))
+    out['memory_bytes'] = float(np.median([run.memory_bytes for run in runs.values()]))
+    return out
+
+
+def _row(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> tuple[object, ...]:
+    found = summary(runs, cases)
+    shares = ('detected', 'false_alarm', 'family', 'joint')
+    return (
+        f'{found["answers"]} of {found["cases"]}',
+        *(_share(found[key]) for key in shares),
+        '-' if found['belief'] is None else f'{found["belief"]:.2f}',
+        _share(found['sure_wrong']),
+        '-' if found['left'] is None else f'{found["left"]:.2f}',
+        '-' if found['over_floor'] is None else f'{found["over_floor"]:.2f}',
+        found['worse_than_nominal'],
+        f'{found["seconds"]:.1f}',
+        f'{found["memory_bytes"] / 1e6:.0f}',
+    )
+
+
+def _share(value: float | None) -> str:
+    return '-' if value is None else f'{100.0 * value:.0f} %'

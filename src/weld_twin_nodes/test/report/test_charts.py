@@ -8,7 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from weld_twin_nodes.report.charts import Axis, Line, chart, thinned
+from weld_twin_nodes.report.charts import Axis, Line, chart, embedded, thinned
 from weld_twin_nodes.report.html import document
 
 UPLOT = files('weld_twin_nodes.report') / 'uplot'
@@ -63,3 +63,8 @@ def test_thinning_keeps_the_peaks_of_every_line():
     rows[0][777], rows[1][40_001] = 9.0, 8.0
     kept = thinned(rows, 1000)
     assert kept.size <= 1002 and {0, 777, 40_001, 49_999} <= set(kept.tolist())
+
+
+def test_what_is_not_finite_is_null_in_a_page():
+    text = embedded({'a': [1.0, float('nan')], 'b': {'c': float('inf')}})
+    assert text.endswith('>{"a":[1.0,null],"b":{"c":null}}</script>')

@@ -112,9 +112,21 @@ def chart(
 
 
 def embedded(data: Any, id_: str | None = None) -> Html:
-    """Return JSON in a page that no name in it can end the script element with."""
-    text = json.dumps(data, separators=(',', ':'), allow_nan=False).replace('<', '\\u003c')
+    """
+    Return JSON in a page that no name in it can end the script element with.
+
+    What is not finite is null: JSON has no other word for it.
+    """
+    text = json.dumps(_finite(data), separators=(',', ':')).replace('<', '\\u003c')
     return tag('script', Html(text), type='application/json', id_=id_)
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not isfinite(data) else data
 
 
 def plain(values: Array) -> list[float | None]:

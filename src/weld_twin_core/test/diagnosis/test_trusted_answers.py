@@ -21,7 +21,7 @@ def taught(sure_from=0.9, **levels):
     return trust_from(
         {
             'card': {},
-            'sure_from': dict.fromkeys(('answer', 'place', 'dependence', 'name'), sure_from),
+            'sure_from': dict.fromkeys((name.replace('_', ' ') for name in levels), sure_from),
             'told_unsure': 0.8,
             'levels': {
                 name.replace('_', ' '): {
@@ -55,6 +55,13 @@ def test_a_sign_says_no_more_beyond_what_was_learned_from():
 def test_a_sign_that_is_missing_counts_as_usual():
     trust = taught(sure_from=0.5, answer_named=(0.4, {'margin': 1.0}))
     assert trust.told('answer', 'named', {}) == pytest.approx(1.0 / (1.0 + math.exp(-0.4)))
+
+
+@pytest.mark.parametrize(('constants', 'share'), [(2.0, 0.75), (0.0, 0.0)])
+def test_a_constant_named_where_joints_rest_is_a_sign_of_its_own(constants, share):
+    trust = taught(sure_from=0.5, answer_named=(0.0, {'constant_at_rest': -1.0}))
+    told = trust.told('answer', 'named', {'constants': constants, 'moving': 0.25})
+    assert told == pytest.approx(1.0 / (1.0 + math.exp((share - 1.0) / 2.0)))
 
 
 def test_few_cases_allow_no_certainty():

@@ -67,8 +67,8 @@ def test_sure_and_wrong_is_bounded_on_cases_never_seen():
 
 def test_too_few_cases_are_told_as_sure_of_nothing():
     content = learned(examples(60, 7), {})
-    assert content['sure_from']['answer'] > 1.0
-    assert content['card']['bounds']['answer']['sure'] == 0.0
+    assert content['sure_from']['answer named'] > 1.0
+    assert content['card']['bounds']['answer named']['sure'] == 0.0
 
 
 def test_the_limit_is_where_so_few_wrong_ones_are_rare():

@@ -10,7 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.trust.model import AS_LOGIT, SCHEMA, Trust, taken, trust_from
+from weld_twin_core.diagnosis.trust.model import (
+    AS_LOGIT,
+    SCHEMA,
+    Trust,
+    taken,
+    trust_from,
+    with_products,
+)
 
 from ..blind.statistics import calibration_error
 from .bound import Bound, bounded
@@ -50,6 +57,15 @@ class Level(NamedTuple):
     unseen: Array
 
 
+class Part(NamedTuple):
+    """Examples of one level: probabilities unseen, what was right, what was told, the bound."""
+
+    unseen: Array
+    right: Array
+    told: Array
+    bound: Bound
+
+
 class Table(NamedTuple):
     """Examples of one level as columns: signs as they enter, what was right, weights, folds."""
 
@@ -72,22 +88,25 @@ def learned(examples: Sequence[Example], card: Mapping[str, Any]) -> dict[str, A
 
     """
     levels: dict[str, Level] = {}
-    parts: dict[str, list[tuple[Array, Array, Array]]] = {}
+    parts: dict[str, Part] = {}
     for name in TERMS:
         own = [e for e in examples if e.level == name]
         if len(own) >= FEWEST:
             levels[name] = _level(own, name)
             told, right = (np.array([getattr(e, key) for e in own]) for key in ('told', 'right'))
-            parts.setdefault(name.split()[0], []).append((levels[name].unseen, right, told))
-    bounds = {level: _bound(pairs) for level, pairs in parts.items()}
+            bound = bounded(levels[name].unseen, right, RISK)
+            parts[name] = Part(levels[name].unseen, right, told, bound)
     return {
         'schema': SCHEMA,
         'card': {
             **card,
-            'bounds': {level: _told(b) for level, b in bounds.items()},
-            'unseen': {level: _unseen_worth(parts[level], b) for level, b in bounds.items()},
+            'bounds': {name: _told(part.bound) for name, part in parts.items()},
+            'unseen': {
+                level: _unseen_worth([p for n, p in parts.items() if n.startswith(f'{level} ')])
+                for level in dict.fromkeys(name.split()[0] for name in parts)
+            },
         },
-        'sure_from': {level: b.sure_from for level, b in bounds.items()},
+        'sure_from': {name: part.bound.sure_from for name, part in parts.items()},
         'told_unsure': TOLD_UNSURE,
         'levels': {name: level.content for name, level in levels.items()},
     }
@@ -98,15 +117,10 @@ def trust_of(examples: Sequence[Example]) -> Trust:
     return trust_from(learned(examples, {}))
 
 
-def _bound(parts: Sequence[tuple[Array, Array, Array]]) -> Bound:
-    probability, right = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-    return bounded(probability, right, RISK)
-
-
-def _unseen_worth(parts: Sequence[tuple[Array, Array, Array]], bound: Bound) -> dict[str, Any]:
+def _unseen_worth(parts: Sequence[Part]) -> dict[str, Any]:
     """Return what beliefs are worth, each by weights that had not seen its case."""
     learned, right, before = (np.concatenate([part[k] for part in parts]) for k in range(3))
-    told = np.where(learned >= bound.sure_from, learned, np.minimum(learned, TOLD_UNSURE))
+    told = np.concatenate([_capped(part) for part in parts])
     return {
         name: {
             'ece': round(
@@ -117,6 +131,13 @@ def _unseen_worth(parts: Sequence[tuple[Array, Array, Array]], bound: Bound) -> 
         }
         for name, p in (('by hand', before), ('learned', learned), ('told', told))
     }
+
+
+def _capped(part: Part) -> Array:
+    """Return what is told: no more than `TOLD_UNSURE` where it is not sure."""
+    return np.where(
+        part.unseen >= part.bound.sure_from, part.unseen, np.minimum(part.unseen, TOLD_UNSURE)
+    )
 
 
 def _told(bound: Bound) -> dict[str, Any]:
@@ -157,7 +178,8 @@ def _level(examples: Sequence[Example], name: str) -> Level:
 
 def _table(examples: Sequence[Example], name: str) -> Table:
     names = list(TERMS[name])
-    values = np.array([[entered(e.signs, sign) for sign in names] for e in examples])
+    signs = [with_products(e.signs) for e in examples]
+    values = np.array([[entered(s, sign) for sign in names] for s in signs])
     cases = [e.case for e in examples]
     counts = {case: cases.count(case) for case in set(cases)}
     places = {case: k for k, case in enumerate(sorted(counts, key=_scattered))}

@@ -37,17 +37,33 @@ def page(result: Mapping[str, Any]) -> str:
 
     """
     taught, tried = result['learned_from'], result['judged_on']
-    bound = taught['bounds']['answer']
+    bounds = {name: b for name, b in taught['bounds'].items() if name.startswith('answer ')}
     intro = (
         f'Learned from {taught["cases"]} cases of seed {_listed(taught["seeds"])}, judged on '
         f'{tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was learned '
-        f'from. {_bound(bound)}'
+        f'from. From where an answer is told as sure:'
     )
     levels = [(name, row) for name, row in result['levels'].items() if row['after']]
     groups = [(name, row) for name, row in result['groups'].items() if row['after']]
     return '\n'.join(
         [
             intro,
+            '',
+            markdown.table(
+                (
+                    'answers',
+                    'cases',
+                    'sure from',
+                    'sure',
+                    'of these wrong',
+                    'at most',
+                    'surely below',
+                ),
+                *(_bound(name.partition(' ')[2], b) for name, b in bounds.items()),
+            ),
+            'Each case was judged by weights that had not seen it. One more such answer is sure and '
+            'wrong with a probability of at most the sixth column; the share is below the last with '
+            '90 % confidence.',
             '',
             markdown.table(HEAD, *(_row(name, row) for name, row in levels)),
             'Answers as a whole:',
@@ -84,16 +100,16 @@ def _unseen(levels: Mapping[str, Any]) -> list[tuple[str, ...]]:
     ]
 
 
-def _bound(bound: Mapping[str, Any]) -> str:
-    if bound['sure_from'] > 1.0:
-        return f'{bound["cases"]} cases are too few for the bound: nothing is told as sure.'
-
+def _bound(name: str, bound: Mapping[str, Any]) -> tuple[str, ...]:
+    never = bound['sure_from'] > 1.0
     return (
-        f'An answer is told as sure from {bound["sure_from"]:.3f} on: of {bound["cases"]} cases, '
-        f'each judged by weights that had not seen it, {100.0 * bound["sure"]:.0f} % were then '
-        f'sure and {bound["wrong"]} of them wrong. One more such case is sure and wrong with a '
-        f'probability of at most {100.0 * bound["expected"]:.2f} %; the share is below '
-        f'{100.0 * bound["most"]:.2f} % with 90 % confidence.'
+        name,
+        str(bound['cases']),
+        'never: too few cases' if never else f'{bound["sure_from"]:.3f}',
+        _percent(bound['sure']),
+        str(bound['wrong']),
+        _percent(bound['expected']),
+        _percent(bound['most']),
     )
 
 

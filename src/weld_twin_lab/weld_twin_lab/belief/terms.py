@@ -10,6 +10,7 @@ starts from what was believed of it before, the first of its signs.
 from __future__ import annotations
 
 _MOTION = {'moving': 1, 'wide': 1, 'rows': 1, 'static': 0, 'orientation': 1, 'aligned': -1}
+_TRAVELLED = {'travel': 1, 'turns': 0, 'samples': 0}
 _LEFT = {
     'left': -1,
     'rise': -1,
@@ -40,8 +41,19 @@ _NAMED = {
     'top_share': 0,
     'curve_gain': -1,
     'curve_sure': -1,
+    'curve_left': -1,
+    'curve_place': 0,
+    'curves': 0,
+    'form_gain': 0,
+    'form_sure': 0,
+    'gap': 0,
+    'slots': 0,
+    'notes': -1,
+    'constant_at_rest': -1,
+    'constant_in_narrow': -1,
     **_LEFT,
     **_MOTION,
+    **_TRAVELLED,
 }
 _CAUSE = {
     'cause_share': 1,
@@ -75,8 +87,12 @@ TERMS: dict[str, dict[str, int]] = {
         'cancel': 1,
         'top_share': 1,
         'weakest': 1,
+        'strongest': 0,
         'margin': 0,
+        'nats': 0,
+        'slots': 0,
         **_MOTION,
+        **_TRAVELLED,
     },
     'answer none': {
         'belief': 1,

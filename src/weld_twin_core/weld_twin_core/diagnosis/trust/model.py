@@ -26,6 +26,14 @@ AS_LOGIT = frozenset({'belief', 'place', 'dependence', 'name', 'leader', 'mass',
 """Signs that are probabilities; their log odds add up, they do not."""
 
 
+PRODUCTS = {
+    'constant_at_rest': ('constants', 'moving'),
+    'constant_in_narrow': ('constants', 'wide'),
+}
+"""Signs that are made of two: a constant was named, times the share of joints that do not move,
+or not widely. What depends on the angle of a joint at rest looks like a constant."""
+
+
 @dataclass(frozen=True)
 class Term:
     """
@@ -109,6 +117,24 @@ def taken(name: str, value: float) -> float:
     return float(np.log(held / (1.0 - held)))
 
 
+def with_products(signs: Mapping[str, float]) -> dict[str, float]:
+    """
+    Return signs with those that are made of two of them.
+
+    Parameters
+    ----------
+    signs : mapping from str to float
+        Where one of the two is missing, so is what they make.
+
+    """
+    made = {
+        name: float(signs[named] > 0.0) * (1.0 - signs[share])
+        for name, (named, share) in PRODUCTS.items()
+        if named in signs and share in signs
+    }
+    return {**signs, **made}
+
+
 @dataclass(frozen=True)
 class Trust:
     """
@@ -117,7 +143,7 @@ class Trust:
     Attributes
     ----------
     sure_from : mapping from str to float
-        By level ('answer', 'place', 'dependence', 'name'): the probability from which on it is
+        By level and group of status, as in 'answer named': the probability from which on it is
         told as sure.
     told_unsure : float
         What an answer below is told as at the most.
@@ -153,8 +179,8 @@ class Trust:
         learned = self.levels.get(f'{level} {group}')
         if learned is None:
             return None
-        probability = learned.probability(signs)
-        sure = probability >= self.sure_from.get(level, 1.0)
+        probability = learned.probability(with_products(signs))
+        sure = probability >= self.sure_from.get(f'{level} {group}', 1.0)
         return probability if sure else min(probability, self.told_unsure)
 
 

@@ -168,3 +168,10 @@ def test_a_measurement_to_make_is_told_in_sentences_without_its_stations():
     assert 'about 20 min' in part
     assert '12 standard deviations' in part
     assert '0.625' not in part
+
+
+def test_unsound_stations_without_a_floor_have_a_page():
+    case = diagnoses.nothing()
+    bare = replace(case.gap, noise_floor_m=float('nan'))
+    page = report_page(replace(case, status='unsound', gap=bare))
+    assert '"floor":null' in page

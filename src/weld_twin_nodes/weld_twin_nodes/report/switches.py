@@ -142,7 +142,7 @@ def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
     left, parts = parted(diagnosis)
     shown = range(0 if diagnosis.contacts is not None else len(left))
     runs = [_run(diagnosis, k, left[k], parts[k]) for k in shown]
-    top = _large(diagnosis)
+    top, floor = _large(diagnosis), diagnosis.gap.noise_floor_m
     return {
         'runs': runs,
         'joints': list(diagnosis.model.robot.joint_names),
@@ -151,7 +151,8 @@ def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
         'squares': squares(diagnosis),
         'top': round(1e6 * top, 1),
         'stretch': _stretch(diagnosis.traces.measured, top),
-        'floor': round(1e3 * diagnosis.gap.noise_floor_m, 5),
+        # Unsound stations have none.
+        'floor': round(1e3 * floor, 5) if np.isfinite(floor) else None,
     }
 
 

@@ -14,9 +14,7 @@ from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_nodes.offline.seam_motion import joint_motion
 
 
-@pytest.fixture(
-    params=[(stations, 'speed_sweep'), (moving, 'bidirectional')], ids=['sweep', 'stations']
-)
+@pytest.fixture(params=[(moving, 'path'), (stations, 'bidirectional')], ids=['path', 'stations'])
 def proposal(request, ur5, tmp_path):
     kind, wanted = request.param
     rng = np.random.default_rng(3)
@@ -33,7 +31,9 @@ def test_the_motion_passes_every_point_within_the_limits_of_the_robot(ur5, propo
     wanted, path = proposal
     motion = joint_motion(ur5, str(path))
     nearest = [np.abs(motion.q - q).max(axis=1).min() for q in np.array(wanted['q'])]
-    assert max(nearest) < (1e-9 if wanted['static'] else 5e-3)
+    # A path is sampled anew: half a step of it lies between.
+    step = np.abs(np.diff(motion.q, axis=0)).max()
+    assert max(nearest) < (1e-9 if wanted['static'] else 0.5 * step + 1e-3)
     rates = np.abs(np.diff(motion.q, axis=0)) / np.diff(motion.t)[:, None]
     assert (rates <= ur5.max_velocity).all()
     slopes = (motion.q[2:] - motion.q[:-2]) / (motion.t[2:] - motion.t[:-2])[:, None]

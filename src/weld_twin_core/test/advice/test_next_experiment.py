@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from measured_cells import asked, moving, recorded, stations
 
+import weld_twin_core as wt
 from weld_twin_core.arm import catalog
-from weld_twin_core.diagnosis.advice import experiment, next_experiment, separation
+from weld_twin_core.diagnosis.advice import Limits, chosen_pieces, experiment, next_experiment
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem, Scale
 from weld_twin_core.effects import effects_from_list
@@ -107,19 +108,17 @@ def test_effects_of_speed_ask_stations_for_motion(ur5):
     late = {'effect': 'time_delay', 'delay': 5e-3}
     lag = {'effect': 'servo_lag', 'joint': 'shoulder_lift_joint', 'time_constant': 5e-3}
     found = proposed(ur5, *at_hand(ur5), late, lag)
-    assert found['kind'] == 'speed_sweep' and not found['motion']['static']
+    assert found['kind'] == 'path' and not found['motion']['static']
 
 
 def test_slow_creeping_against_nothing_asks_for_time(ur5):
-    creep = {'effect': 'drift', 'xyz_rate': [5e-9, 0.0, 0.0]}
+    creep = {'effect': 'drift', 'xyz_rate': [2e-8, 0.0, 0.0]}
     found = proposed(ur5, *at_hand(ur5), creep, BASE)
     assert found['kind'] == 'warm_up'
 
 
-@pytest.mark.parametrize(
-    ('kind', 'wanted'), [(stations, 'speed_sweep'), (moving, 'bidirectional')]
-)
-def test_an_unknown_cause_asks_for_data_of_the_other_kind(ur5, kind, wanted):
+@pytest.mark.parametrize(('kind', 'wanted'), [(stations, 'bidirectional'), (moving, 'path')])
+def test_an_unknown_cause_asks_for_more_than_was_seen(ur5, kind, wanted):
     problem, model = at_hand(ur5, kind)
     found = next_experiment(problem, model, [()], known_scale(problem))
     assert found['kind'] == wanted and found['expected_separation_sigma'] is None
@@ -145,16 +144,16 @@ def test_what_needs_temperature_and_wrench_is_foreseen_with_those_recorded(ur5, 
 
 
 def test_a_measurement_that_cannot_be_foreseen_is_skipped_with_the_reason(ur5, monkeypatch):
-    def ahead(problem, candidate, *rest):
-        if candidate.kind == 'speed_sweep':
+    def planned(problem, model, alternatives, scale, limits, option, now):
+        if option.kind == 'path':
             raise DataError('nothing is known of it')
-        return separation.ahead(problem, candidate, *rest)
+        return chosen_pieces.planned(problem, model, alternatives, scale, limits, option, now)
 
-    monkeypatch.setattr(experiment, 'ahead', ahead)
+    monkeypatch.setattr(experiment, 'planned', planned)
     late = {'effect': 'time_delay', 'delay': 5e-3}
     found = proposed(ur5, *at_hand(ur5, moving), late, OFFSET)
-    assert found['kind'] != 'speed_sweep'
-    assert found['skipped'] == ['speed_sweep: nothing is known of it']
+    assert found['kind'] != 'path'
+    assert found['skipped'] == ['path: nothing is known of it']
 
 
 @pytest.mark.parametrize('name', ['ur5', 'abb_irb120', 'franka_panda'])
@@ -169,9 +168,39 @@ def test_motions_are_plain_numbers_within_the_limits_of_the_robot(name):
         found = proposed(robot, *at_hand(robot), one, other)
         motion = json.loads(json.dumps(found))['motion']
         q = np.array(motion['q'])
-        assert q.shape == (len(motion['t']), robot.n) and len(q) <= 400
+        assert q.shape == (len(motion['t']), robot.n) and len(q) <= 9000
         assert motion['joint_names'] == list(robot.joint_names)
         robot.check_positions(q)
         if not motion['static']:
             rates = np.abs(np.diff(q, axis=0) / np.diff(motion['t'])[:, None])
             assert (rates <= robot.max_velocity).all()
+
+
+def test_minutes_and_a_box_are_kept(ur5):
+    problem, model = at_hand(ur5)
+    low, high = np.array([-0.6, -0.9, 0.05]), np.array([0.9, 0.9, 1.1])
+    limits = Limits(minutes=2.0, set_up=False, box=np.array([low, high]))
+    made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
+    found = next_experiment(problem, model, made, known_scale(problem), limits)
+    assert found['robot_minutes'] <= 2.0 and found['cost'] == found['robot_minutes']
+    tips = wt.forward(ur5, np.array(found['motion']['q']))[:, :3, 3]
+    assert ((tips > low) & (tips < high)).all()
+
+
+def test_a_longer_experiment_says_no_less(ur5):
+    problem, model = at_hand(ur5, size=0.05)
+    made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
+    told = [
+        next_experiment(
+            problem, model, made, known_scale(problem), Limits(minutes=m, set_up=False)
+        )['expected_separation_sigma']
+        for m in (0.5, 1.0, 4.0)
+    ]
+    assert told == sorted(told)
+
+
+def test_nothing_is_asked_without_minutes():
+    with pytest.raises(DataError, match='needs minutes'):
+        Limits(minutes=0.0)
+    with pytest.raises(DataError, match='two corners'):
+        Limits(box=np.zeros((2, 3)))

@@ -23,3 +23,34 @@ def recorded(ur5, name, rests):
 def test_a_joint_that_rests_in_one_of_two_recordings_is_examined_like_the_others(ur5):
     found = wt.diagnose([recorded(ur5, 'free', False), recorded(ur5, 'seam', True)], ur5)
     assert found.status != 'unsound'
+
+
+def test_stations_and_a_path_are_diagnosed_together(ur5):
+    path = recorded(ur5, 'path', False)
+    q = path.joints.q[::5]
+    at_rest = wt.JointMotion(10.0 * np.arange(len(q)), q, static=True)
+    off = wt.effects.JointOffset('elbow_joint', offset=5e-4)
+    real = wt.Twin(ur5, [off]).poses(wt.Recording('stations', at_rest))
+    noise = np.random.default_rng(1).normal(0.0, 3e-5, real.position.shape)
+    stations = wt.Recording('stations', at_rest, wt.Measurements(at_rest.t, real.position + noise))
+    found = wt.diagnose([path, stations], ur5)
+    assert [(e.effect.name, e.effect.site) for e in found.effects] == [
+        ('joint_offset', 'elbow_joint')
+    ]
+
+
+def test_a_staircase_is_found_in_recordings_of_different_travel(ur5):
+    made = []
+    for name, share in (('little', 0.3), ('wide', 1.0)):
+        motion = recorded(ur5, name, False).joints
+        q = motion.q.copy()
+        q[:, 2] = q[0, 2] + share * (q[:, 2] - q[0, 2])
+        motion = wt.JointMotion(motion.t, q)
+        stairs = wt.effects.Quantization('elbow_joint', step=2e-3)
+        real = wt.Twin(ur5, [stairs]).poses(wt.Recording(name, motion))
+        noise = np.random.default_rng(2).normal(0.0, 2e-5, real.position.shape)
+        made.append(wt.Recording(name, motion, wt.Measurements(motion.t, real.position + noise)))
+    found = wt.diagnose(made, ur5)
+    assert [(e.effect.name, e.effect.site) for e in found.effects] == [
+        ('quantization', 'elbow_joint')
+    ]

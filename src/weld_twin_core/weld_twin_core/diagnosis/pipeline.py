@@ -10,6 +10,7 @@ from dataclasses import replace
 from ..arm.robot import Robot
 from ..effects.effect import Effect
 from ..recording import Recording
+from .advice import Limits
 from .algebra.noise_floor import noise_floor
 from .algebra.problem import frames_named
 from .answer.answer import answer
@@ -49,6 +50,7 @@ def diagnose(
     beliefs: Beliefs | None = None,
     apply: bool = False,
     may_change: str | Iterable[str] = (),
+    limits: Limits | None = None,
     progress: Progress = lambda text: None,
 ) -> Diagnosis:
     """
@@ -79,6 +81,8 @@ def diagnose(
         Constant errors that may differ between the recordings, with commas between or in a list:
         'joint_offset,tool_pose,base_pose'. They are fitted along, and ``changed`` says what the
         later recordings have that the first has not.
+    limits : Limits, optional
+        What the next experiment may cost, and where it has to stay.
     progress : callable
         Told in a few words what has been done.
 
@@ -123,7 +127,7 @@ def diagnose(
     if examined.posed is None:
         return refusal(examined)
     exclude = (*exclude, *not_told(examined.posed[0]))
-    return _explained(examined, exclude, holdout, beliefs, progress)
+    return _explained(examined, exclude, holdout, beliefs, limits, progress)
 
 
 def _explained(
@@ -131,6 +135,7 @@ def _explained(
     exclude: Sequence[str],
     holdout: Sequence[Recording],
     beliefs: Beliefs,
+    limits: Limits | None,
     progress: Progress,
 ) -> Diagnosis:
     """Return the diagnosis of recordings that were found sound."""
@@ -166,6 +171,7 @@ def _explained(
         posterior=posterior,
         rival=rival,
         signs=signs,
+        limits=limits,
     )
 
 

@@ -159,10 +159,12 @@ class Friction(MemoryEffect):
     def atoms(self, view: View) -> list[Shift]:
         """Return the even part, and the uneven one where there is any: both are linear."""
         i = view.robot.index(self.joint)
+        parts = range(1 if self._even else 2)
         if view.static:
-            return [{('q', i): np.zeros_like(view.joint(i))}]
+            # As many as in motion, so that stations and paths can be diagnosed together.
+            return [{('q', i): np.zeros_like(view.joint(i))} for _ in parts]
         z = self._bent(view, None)[0]
-        return [{('q', i): -z[..., k, :]} for k in range(1 if self._even else 2)]
+        return [{('q', i): -z[..., k, :]} for k in parts]
 
     def from_atoms(self, coefficients: Array) -> Friction:
         """Return the wind-up of the even part; what the uneven part is of it is the asymmetry."""

@@ -137,7 +137,12 @@ def _tracker(kind: str, rng: np.random.Generator) -> Tracker:
 
 def take(cell: Cell, kind: str, span: float, rng: np.random.Generator) -> Take:
     """Return a motion of a kind in this cell, with what surrounds it."""
-    return Take(_command(cell, motion(kind, cell.robot, span, rng), rng), _seed(rng))
+    return of_motion(cell, motion(kind, cell.robot, span, rng), rng)
+
+
+def of_motion(cell: Cell, moved: Motion, rng: np.random.Generator) -> Take:
+    """Return a given motion in this cell, with what surrounds it."""
+    return Take(_command(cell, moved, rng), _seed(rng))
 
 
 def again(first: Take, rng: np.random.Generator) -> Take:

@@ -11,8 +11,8 @@ from weld_twin_nodes.offline.investigation import (
     question,
     read_state,
     recordings,
-    shortened,
     take_in,
+    weighed,
     write_state,
 )
 from weld_twin_nodes.report.investigation_page import investigation_page
@@ -21,12 +21,14 @@ SPRING = {'effect': 'joint_compliance', 'joint': 'elbow_joint'}
 ZERO = {'effect': 'joint_offset', 'joint': 'elbow_joint'}
 
 
-def stations(count=60, sigma=36.0, cost=15.0):
+def stations(count=12, sigma=36.0, cost=3.0):
     return {
         'kind': 'stations',
         'sentence': f'Measure {count} stations at rest.',
         'reason': 'They would part.',
         'cost': cost,
+        'robot_minutes': cost,
+        'stations': count,
         'expected_separation_sigma': sigma,
         'between': [[SPRING], [ZERO]],
         'motion': {
@@ -38,10 +40,10 @@ def stations(count=60, sigma=36.0, cost=15.0):
     }
 
 
-def found(status='ambiguous', wanted=None, groups=((SPRING, ZERO),)):
+def found(status='ambiguous', wanted=None, groups=((SPRING, ZERO),), confidence=0.95):
     verdict = {
         'status': status,
-        'confidence': 0.6,
+        'confidence': confidence,
         'effects': [SPRING],
         'indistinguishable': [list(group) for group in groups],
     }
@@ -52,20 +54,10 @@ def found(status='ambiguous', wanted=None, groups=((SPRING, ZERO),)):
     }
 
 
-def test_an_experiment_has_no_more_stations_than_its_decision_needs():
-    # 36 sigma with 60 stations; 9 are wanted: (9 / 36)^2 of 60 is less than four, so the fewest.
-    few = shortened(stations())
-    assert few['stations'] == 12 and few['minutes'] == pytest.approx(3.0)
-    assert few['expected_sigma'] == pytest.approx(36.0 * (12 / 60) ** 0.5)
-    assert len(few['motion']['t']) == len(few['motion']['q']) == 12
-    assert few['sentence'] == 'Measure 12 stations at rest.' and 'adds 16' in few['reason']
-    # 12 sigma: (9 / 12)^2 of 60 is 34 stations.
-    assert shortened(stations(sigma=12.0))['stations'] == 34
-    assert shortened(stations(sigma=3.0))['stations'] == 60
-
-
-def test_what_has_to_be_set_up_still_counts_when_stations_are_left_out():
-    assert shortened(stations(cost=30.0))['minutes'] == pytest.approx(15.0 + 3.0)
+def test_what_it_says_before_it_is_made_is_kept():
+    asked = question(found(wanted=stations()), 30.0, [])
+    assert (asked['minutes'], asked['stations'], asked['expected_sigma']) == (3.0, 12, 36.0)
+    assert asked['between'] == [[SPRING], [ZERO]] and asked['decided'] is None
 
 
 @pytest.mark.parametrize(
@@ -73,7 +65,7 @@ def test_what_has_to_be_set_up_still_counts_when_stations_are_left_out():
     [
         (found('identified'), 30.0, 'sure'),
         (found('none'), 30.0, 'sure'),
-        (found('unsound'), 30.0, 'unsound'),
+        (found('unsound', confidence=None), 30.0, 'unsound'),
         (found(wanted=stations()), 2.0, 'budget spent'),
         (found(wanted=stations(sigma=0.5)), 30.0, 'nothing would part them'),
         (found(wanted=None), 30.0, 'nothing would part them'),
@@ -87,7 +79,14 @@ def test_it_ends_with_a_reason(content, left, state):
 def test_data_that_were_widened_in_vain_are_not_widened_again():
     wanted = {**stations(), 'expected_separation_sigma': None, 'between': None}
     assert isinstance(question(found('unknown', wanted), 30.0, []), dict)
-    assert question(found('unknown', wanted), 30.0, ['stations'])[0] == 'nothing would part them'
+    often = ['stations'] * 3
+    assert question(found('unknown', wanted), 30.0, often)[0] == 'nothing would part them'
+
+
+def test_what_is_identified_without_being_sure_is_asked_about():
+    wanted = {**stations(), 'expected_separation_sigma': None, 'between': None}
+    doubtful = found('identified', wanted, confidence=0.8)
+    assert question(doubtful, 30.0, [])['kind'] == 'stations'
 
 
 @pytest.mark.parametrize(
@@ -99,7 +98,7 @@ def test_data_that_were_widened_in_vain_are_not_widened_again():
     ],
 )
 def test_an_experiment_is_judged_by_what_it_said(content, answer):
-    assert decided(shortened(stations()), content) is answer
+    assert decided(question(found(wanted=stations()), 30.0, []), content) is answer
 
 
 def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path):
@@ -117,3 +116,41 @@ def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path):
     bags[0].write_text('another')
     with pytest.raises(DataError, match=r"monday' has changed since"):
         recordings(state)
+
+
+ELSE = {'effect': 'backlash', 'joint': 'wrist_1_joint'}
+
+
+@pytest.mark.parametrize(
+    ('together', 'alone', 'believed', 'closed'),
+    [
+        # Sure and not contradicted.
+        (found('identified', groups=((SPRING,),)), found('unknown', groups=()), 0, True),
+        # What the poor recording hides, the experiments show.
+        (found('unknown', groups=()), found('identified', groups=((SPRING,),)), 1, True),
+        # Two that are sure of different causes are not sure.
+        (
+            found('identified', groups=((SPRING,),)),
+            found('identified', groups=((ELSE,),)),
+            0,
+            False,
+        ),
+        # Neither is sure, and both say the same.
+        (
+            found('identified', groups=((SPRING,),), confidence=0.8),
+            found('identified', groups=((SPRING,),), confidence=0.75),
+            0,
+            True,
+        ),
+        (
+            found('identified', groups=((SPRING,),), confidence=0.8),
+            found('identified', groups=((SPRING,),), confidence=0.5),
+            0,
+            False,
+        ),
+        (found('ambiguous'), found('ambiguous'), 0, False),
+    ],
+)
+def test_experiments_alone_are_heard_beside_all_recordings(together, alone, believed, closed):
+    told, why = weighed(together, alone)
+    assert told is (together, alone)[believed] and bool(why) is closed

@@ -11,27 +11,26 @@ when the recording has come in.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core.diagnosis.advice.experiment import DECIDES, NOTHING
+from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
+from weld_twin_core.diagnosis.advice.next_step import SURE
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_text
 
 STATE, PAGE = 'investigation.json', 'investigation.html'
 SCHEMA = 'weld_twin/investigation/1'
-MARGIN = 1.5
-"""An experiment is made so long that it parts its explanations by this factor more than a decision
-needs: how far they will part is foreseen with the effects as they are believed to be."""
-FEWEST = 12
-"""Stations of an experiment at least: frames and outliers need some."""
-STAY = 15.0
-"""Time [s] that a station takes with the way to it, as experiments are planned."""
-GROUP = {'bidirectional': 4, 'warm_up': 0}
-"""Stations that belong together; 0 where none may be left out."""
+NAMING = ('identified', 'ambiguous')
+"""Verdicts that name causes."""
+AGREED = 0.7
+"""Confidence that two diagnoses of different recordings each need where only both together are sure:
+two that are wrong seldom name the same."""
+ALIKE = 'the causes are known as far as any motion can tell'
+WIDENED = 3
+"""Experiments of one kind without a comparison: more of the same seldom shows anything new."""
 
 State = dict[str, Any]
 
@@ -90,9 +89,9 @@ def write_state(directory: Path, state: State) -> None:
     write_text(directory / STATE, text + '\n', overwrite=True)
 
 
-def recordings(state: State) -> list[str]:
+def recordings(state: State) -> tuple[list[str], list[str]]:
     """
-    Return the recordings so far.
+    Return the recordings that it began with, and those of the experiments so far.
 
     Raises
     ------
@@ -100,15 +99,21 @@ def recordings(state: State) -> list[str]:
         One of them is gone, or has changed since.
 
     """
-    out = []
-    for entry in (item for step in state['rounds'] for item in step['recordings']):
-        if hashed('recording', entry['path']).sha256 != entry['sha256']:
-            raise DataError(f"'{entry['path']}' has changed since the investigation took it in")
-        out.append(str(entry['path']))
-    return out
+    first: list[str] = []
+    later: list[str] = []
+    for k, step in enumerate(state['rounds']):
+        for entry in step['recordings']:
+            if hashed('recording', entry['path']).sha256 != entry['sha256']:
+                raise DataError(
+                    f"'{entry['path']}' has changed since the investigation took it in"
+                )
+            (later if k else first).append(str(entry['path']))
+    return first, later
 
 
-def take_in(state: State, bags: Sequence[str], found: Mapping[str, Any]) -> State:
+def take_in(
+    state: State, bags: Sequence[str], found: Mapping[str, Any], why: str | None = None
+) -> State:
     """
     Return the state after a diagnosis of all recordings so far.
 
@@ -119,6 +124,8 @@ def take_in(state: State, bags: Sequence[str], found: Mapping[str, Any]) -> Stat
         The new recordings.
     found : mapping
         The content of diagnosis.json.
+    why : str, optional
+        Why it closes the question, as `weighed` tells it; left out, this diagnosis alone counts.
 
     """
     rounds = list(state['rounds'])
@@ -131,12 +138,79 @@ def take_in(state: State, bags: Sequence[str], found: Mapping[str, Any]) -> Stat
     step: dict[str, Any] = {'recordings': new, 'believed': believed(found), 'asked': None}
     out = {**state, 'rounds': [*rounds, step], 'spent_min': spent}
     kinds = [r['asked']['kind'] for r in rounds if r.get('asked')]
-    answer = question(found, float(state['budget_min']) - spent, kinds)
+    answer = question(found, float(state['budget_min']) - spent, kinds, why)
     if isinstance(answer, dict):
         step['asked'] = answer
         return out
-    status, why = answer
-    return {**out, 'state': status, 'why': why}
+    status, reason = answer
+    return {**out, 'state': status, 'why': reason}
+
+
+def weighed(
+    together: Mapping[str, Any], alone: Mapping[str, Any] | None = None
+) -> tuple[Mapping[str, Any], str]:
+    """
+    Return which diagnosis to believe, and whether and why it closes the question.
+
+    What poor recordings show is easily misread, and then stands in the way of what better ones
+    show. So the experiments are also diagnosed alone, with the first recordings held out.
+
+    Parameters
+    ----------
+    together : mapping
+        The diagnosis of all recordings.
+    alone : mapping, optional
+        That of the experiments, with the recordings before them held out.
+
+    Returns
+    -------
+    found : mapping
+        The one that is believed.
+    why : str
+        In words why it closes the question; empty where it does not.
+
+    """
+    if alone is None:
+        return together, _closes(together)
+    closed = [_closes(found) for found in (together, alone)]
+    same = _named(together) == _named(alone)
+    sure = [found['verdict']['confidence'] or 0.0 for found in (together, alone)]
+    naming = [found['verdict']['status'] in NAMING for found in (together, alone)]
+    if same and all(naming) and (any(closed) or min(sure) >= AGREED):
+        found, why = (together, closed[0]) if sure[0] >= sure[1] else (alone, closed[1])
+        alike = 'all recordings, and the experiments alone, show the same causes'
+        open_ends = found['verdict']['status'] == 'ambiguous' and not _inseparable(found)
+        return found, '' if open_ends else (why or alike)
+    for k, (found, other) in enumerate(((together, alone), (alone, together))):
+        against = naming[1 - k] and (other['verdict']['confidence'] or 0.0) >= AGREED
+        if closed[k] and not against:
+            return found, closed[k]
+    better = alone if naming[1] and not naming[0] else together
+    return better, ''
+
+
+def _closes(found: Mapping[str, Any]) -> str:
+    """Return why a diagnosis closes the question by itself; empty where it does not."""
+    verdict = found['verdict']
+    if (verdict['confidence'] or 0.0) < SURE:
+        return ''
+    if verdict['status'] == 'identified':
+        return 'the causes are identified'
+    if verdict['status'] == 'none':
+        return 'nothing is left to explain above the noise'
+    return ALIKE if verdict['status'] == 'ambiguous' and _inseparable(found) else ''
+
+
+def _inseparable(found: Mapping[str, Any]) -> bool:
+    """Return whether no motion parts what is left."""
+    wanted = found.get('next_experiment')
+    return wanted is not None and wanted['motion'] is None
+
+
+def _named(found: Mapping[str, Any]) -> list[list[tuple[str, str]]]:
+    """Return the sites of every cause, in an order of their own."""
+    groups = found['verdict'].get('indistinguishable') or []
+    return sorted(sorted((e['effect'], e.get('joint') or '') for e in group) for group in groups)
 
 
 def believed(found: Mapping[str, Any]) -> dict[str, Any]:
@@ -155,7 +229,7 @@ def believed(found: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def question(
-    found: Mapping[str, Any], left: float, asked: Sequence[str]
+    found: Mapping[str, Any], left: float, asked: Sequence[str], why: str | None = None
 ) -> dict[str, Any] | tuple[str, str]:
     """
     Return the next experiment, or why there is none: a word for the state, and a sentence.
@@ -168,11 +242,15 @@ def question(
         Of the budget.
     asked : sequence of str
         Kinds of experiment that were made already.
+    why : str, optional
+        Why the question is closed, as `weighed` tells it; left out, this diagnosis alone counts.
 
     """
-    status = found['verdict']['status']
-    if status in ('identified', 'none', 'unsound'):
-        return _ended(status)
+    if found['verdict']['status'] == 'unsound':
+        return 'unsound', 'data or set-up are wrong; the page of the last round says what'
+    why = _closes(found) if why is None else why
+    if why:
+        return ('nothing would part them' if why == ALIKE else 'sure'), why
     wanted = found.get('next_experiment')
     by_hand = wanted and 'contact' in (wanted.get('motion') or {})
     if not wanted or wanted.get('motion') is None or by_hand:
@@ -184,63 +262,31 @@ def question(
             'nothing would part them',
             f'the best experiment would part them by {sigma:.1f} standard deviations only',
         )
-    if sigma is None and wanted['kind'] in asked:
+    if sigma is None and list(asked).count(wanted['kind']) >= WIDENED:
         return (
             'nothing would part them',
-            'the data were widened once and still no effect of the library explains them',
+            f'the data were widened {WIDENED} times and still nothing is sure',
         )
-    made = shortened(wanted)
-    if made['minutes'] > left:
+    if wanted['cost'] > left:
         return (
             'budget spent',
-            f'the next experiment takes {made["minutes"]:.1f} min and {max(left, 0.0):.1f} are left',
+            f'the next experiment takes {wanted["cost"]:.1f} min and {max(left, 0.0):.1f} are left',
         )
-    return made
+    return _asked(wanted)
 
 
-def _ended(status: str) -> tuple[str, str]:
-    if status == 'unsound':
-        return 'unsound', 'data or set-up are wrong; the page of the last round says what'
-    if status == 'none':
-        return 'sure', 'nothing is left to explain above the noise'
-    return 'sure', 'the causes are identified'
-
-
-def shortened(wanted: Mapping[str, Any]) -> dict[str, Any]:
-    """
-    Return an experiment with no more stations than its decision needs, and its minutes.
-
-    Stations fill the space evenly in their order, so that the first of them do as well; the
-    squares of separations add.
-    """
-    motion, sigma = wanted['motion'], wanted['expected_separation_sigma']
-    count = len(motion['t'])
-    keep = count
-    if motion['static'] and sigma:
-        group = GROUP.get(wanted['kind'], 1)
-        needed = count * (MARGIN * DECIDES / float(sigma)) ** 2
-        if group:
-            keep = min(max(-int(-needed // group) * group, FEWEST), count)
-    stays = STAY if motion['static'] else 0.0
-    whole, part = ((float(motion['t'][k - 1]) + stays) / 60.0 for k in (count, keep))
-    # What the experiment costs beyond its motion, such as another tool, stays.
-    minutes = max(float(wanted['cost']) - whole, 0.0) + part
-    reached = None if sigma is None else float(sigma) * (keep / count) ** 0.5
-    sentence, reason = str(wanted['sentence']), str(wanted['reason'])
-    if keep < count and reached is not None:
-        told = keep // GROUP.get(wanted['kind'], 1)
-        sentence = re.sub(r'\b\d+ stations', f'{told} stations', sentence, count=1)
-        reason += f' With {told} stations it adds {reached:.0f}, which is enough.'
+def _asked(wanted: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an experiment as the state keeps it: what it says before it is made."""
     return {
         'kind': wanted['kind'],
-        'sentence': sentence,
-        'reason': reason,
-        'minutes': round(minutes, 2),
-        'robot_minutes': round(part, 2),
-        'stations': keep if motion['static'] else None,
-        'expected_sigma': reached,
+        'sentence': str(wanted['sentence']),
+        'reason': str(wanted['reason']),
+        'minutes': wanted['cost'],
+        'robot_minutes': wanted['robot_minutes'],
+        'stations': wanted['stations'],
+        'expected_sigma': wanted['expected_separation_sigma'],
         'between': wanted.get('between'),
-        'motion': {**motion, 't': motion['t'][:keep], 'q': motion['q'][:keep]},
+        'motion': wanted['motion'],
         'decided': None,
     }
 
@@ -249,8 +295,8 @@ def decided(asked: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
     """
     Return whether an experiment decided what it said it would.
 
-    It did where at most one of its two explanations is still among those that cannot be told
-    apart; where nothing was compared, where the answer is no longer unknown.
+    It did where causes are named now, or excluded, and at most one of its two explanations is
+    among those that cannot be told apart.
 
     Parameters
     ----------
@@ -261,10 +307,10 @@ def decided(asked: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
 
     """
     verdict = found['verdict']
-    if verdict['status'] in ('identified', 'none'):
-        return True
+    if verdict['status'] not in (*NAMING, 'none'):
+        return False
     if not asked.get('between'):
-        return str(verdict['status']) == 'ambiguous'
+        return True
     groups = [
         {(item['effect'], item.get('joint')) for item in group}
         for group in verdict.get('indistinguishable') or []

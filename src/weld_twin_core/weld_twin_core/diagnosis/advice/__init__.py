@@ -4,5 +4,6 @@
 
 from .actions import actions
 from .experiment import next_experiment
+from .limits import Limits
 
-__all__ = ['actions', 'next_experiment']
+__all__ = ['Limits', 'actions', 'next_experiment']

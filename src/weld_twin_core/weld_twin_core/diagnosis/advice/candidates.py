@@ -1,45 +1,56 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Measurements that could be made next: a motion, what is changed in the cell, the cost."""
+"""Measurements that could be made next: pieces of motion to choose from, and what is changed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ...arm.robot import Robot
 from ...arm.rotation import transform
 from ...arrays import Array
-from ...cubics import hermite, spline_slopes
 from ...recording import JointMotion, Recording, Signal
-from ...sequences import halton
 from ..algebra.problem import Model, Problem
+from .limits import Limits
+from .postures import Room
 
 NAME = 'next measurement'
-STATIONS = 60
-"""Stations of a proposed measurement: a judgement of what somebody is ready to measure."""
+STATIONS = 80
+"""Stations to choose from; more only take time."""
+PATHS = 9
+"""Paths of all joints to choose from: three, each at three speeds."""
+SINGLE = 4
+"""Joints at most that move alone in some paths: those in question."""
+STAY = 15.0
+"""Time [s] that a station takes with the way to it."""
 STEP = 0.02
 """Approach of a station from either side [rad, m]."""
-REACH = 1.3
-"""The recorded range of every joint is widened by this factor, within its limits."""
-LEAST = 0.35
-"""Half the range [rad, m] that is used at least."""
+SOAK = 60.0
+"""Time [s] from station to station while the arm warms up."""
+RISE = 15.0
+"""Warming [K] in an hour: arms do that at work."""
 MASS = 5.0
 """Load [kg] hung on the flange: a judgement; springs show, and most arms can carry it."""
 LONGER = 0.2
 """Length [m] added to the tool: a turn of 0.1 mrad then moves its tip by 0.02 mm more."""
 PRESS = 50.0
 """Force [N] on the tool: a judgement; a hand can press so hard."""
-PASSES = (1.0, 0.5, 0.25)
-"""Speeds of a sweep, as shares of the fastest."""
-FASTEST = 0.5
-"""Share of the joints' velocity limits that a sweep uses."""
-EXTRA = 25.0
-"""Cost [min] of a sweep where so far only stations were measured."""
-RATE = 100.0
-"""Samples per second that a sweep is predicted with."""
+SPEEDS = (1.0, 0.5, 0.25)
+"""Of paths, as shares of the fastest."""
+ANOTHER = 20.0
+"""Time [min] to set up an instrument that follows the tool where so far only stations were
+measured."""
+
+
+class Piece(NamedTuple):
+    """Part of a measurement: which recording, its rows (None: all), and its time [s]."""
+
+    recording: int
+    rows: tuple[int, ...] | None
+    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +61,15 @@ class Candidate:
     Attributes
     ----------
     kind, sentence : str
-    cost : float [min]
-    recording : Recording
-        The motion, with side signals, without measurements.
+        The sentence has ``{count}`` where the number of stations goes.
+    set_up : float [min]
+        What has to be changed in the cell first.
+    recordings : tuple of Recording
+        Motions, with side signals, without measurements.
+    pieces : tuple of Piece
+        What is chosen from.
+    whole : bool
+        Whether none of the pieces may be left out.
     model : Model
         As the cell will be, without found effects; one base.
     new_base, new_tool : bool
@@ -62,108 +79,227 @@ class Candidate:
 
     kind: str
     sentence: str
-    cost: float
-    recording: Recording
+    set_up: float
+    recordings: tuple[Recording, ...]
+    pieces: tuple[Piece, ...]
     model: Model
+    whole: bool = False
     new_base: bool = False
     new_tool: bool = False
 
+    @property
+    def static(self) -> bool:
+        """Return whether the arm is at rest while it is measured."""
+        return self.recordings[0].joints.static
 
-def candidates(problem: Problem, model: Model) -> Iterator[Candidate]:
-    """Yield what could be measured next."""
+
+def candidates(
+    problem: Problem, model: Model, limits: Limits, joints: Sequence[str] = ()
+) -> Iterator[Candidate]:
+    """
+    Yield what could be measured next.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings at hand.
+    model : Model
+    limits : Limits
+    joints : sequence of str
+        Those that causes in question sit on.
+
+    """
     now = replace(model, bases=model.bases[:1], found=())
-    spread = _spread(problem, model.robot, STATIONS)
-    yield from _as_it_is(problem, now, spread)
-    yield from _changed(problem, now, spread[: STATIONS // 3])
-
-
-def _as_it_is(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]:
-    """Yield measurements that leave the cell as it is."""
+    room = Room(problem, model.robot, limits)
+    # Elsewhere than the experiments before.
+    skip = STATIONS * (len(problem.recordings) - 1)
+    spread = room.spread(STATIONS, skip)
     still = all(r.joints.static for r in problem.recordings)
-    yield Candidate(
-        'speed_sweep',
-        'Run one path forth and back at three speeds and record joints and tool all the way.',
-        EXTRA if still else 5.0,
-        _with_sides(problem, sweep(problem, now.robot)),
+    if limits.set_up or not still:
+        yield _path(problem, now, room, spread, joints, ANOTHER if still else 0.0)
+    yield from _at_rest(problem, now, spread)
+    if any(r.wrench is not None for r in problem.recordings):
+        yield _pressed(problem, now, spread)
+    if limits.set_up:
+        yield _warm_up(problem, now, spread)
+        yield from _changed(problem, now, spread)
+
+
+def _path(
+    problem: Problem,
+    now: Model,
+    room: Room,
+    spread: Array,
+    joints: Sequence[str],
+    set_up: float,
+) -> Candidate:
+    """Return ways from home and back: all joints at once, and those in question alone."""
+    motions, at = [], 0
+    for k in range(PATHS):
+        stops = [room.home]
+        while len(stops) < 4 and at < len(spread):
+            if room.way([stops[-1], spread[at]]):
+                stops.append(spread[at])
+            at += 1
+        if len(stops) > 1:
+            # Back the same way: every place is passed in both directions.
+            motions.append(room.travel([*stops, *stops[-2::-1]], SPEEDS[k % 3]))
+    for name in list(dict.fromkeys(joints))[:SINGLE]:
+        motions += [room.travel(_alone(room, now, name), speed) for speed in SPEEDS[::2]]
+    recordings = tuple(with_sides(problem, motion) for motion in motions)
+    pieces = tuple(Piece(k, None, float(m.t[-1])) for k, m in enumerate(motions))
+    return Candidate(
+        'path',
+        'Run the path and record joints and tool all the way.',
+        set_up,
+        recordings,
+        pieces,
         now,
     )
-    yield Candidate(
+
+
+def _alone(room: Room, now: Model, name: str) -> list[Array]:
+    """Return the stops of one joint that moves through its range, as far as it is free."""
+    i = now.robot.index(name)
+    for share in (1.0, 0.5, 0.25, 0.1):
+        ends = [room.home.copy() for _ in range(2)]
+        ends[0][i] += share * (room.high[i] - room.home[i])
+        ends[1][i] += share * (room.low[i] - room.home[i])
+        stops = [room.home, *ends, room.home]
+        if room.way(stops):
+            break
+    return stops
+
+
+def _at_rest(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]:
+    """Yield stations, and stations approached from both sides."""
+    yield _stations(
+        problem,
+        now,
         'stations',
-        f'Measure {len(spread)} stations at rest, spread over a wider part of the workspace.',
-        15.0,
-        _stations(problem, spread),
-        now,
+        'Measure {count} stations at rest, spread over a wider part of the workspace.',
+        spread,
     )
-    both = spread[: len(spread) // 4]
-    yield Candidate(
+    few = spread[: len(spread) // 4]
+    approach = np.array([[-STEP], [0.0], [STEP], [0.0]])
+    both = np.repeat(few, 4, axis=0) + np.tile(approach, (len(few), 1))
+    yield _stations(
+        problem,
+        now,
         'bidirectional',
-        f'Measure {len(both)} stations at rest, each approached from both sides of every joint.',
-        20.0,
-        _stations(problem, _both_sides(both)),
-        now,
+        'Measure {count} stations at rest, each approached from both sides of every joint.',
+        np.asarray(both),
+        group=4,
     )
-    again = np.concatenate([spread[:5]] * (len(spread) // 5))
-    yield Candidate(
+
+
+def _stations(
+    problem: Problem,
+    now: Model,
+    kind: str,
+    sentence: str,
+    q: Array,
+    group: int = 1,
+    set_up: float = 0.0,
+) -> Candidate:
+    recording = at_rest(problem, q)
+    pieces = tuple(
+        Piece(0, tuple(range(k, k + group)), STAY * group) for k in range(0, len(q), group)
+    )
+    return Candidate(kind, sentence, set_up, (recording,), pieces, now)
+
+
+def _warm_up(problem: Problem, now: Model, spread: Array) -> Candidate:
+    again = np.concatenate([spread[:5]] * 12)
+    recording = at_rest(problem, again, SOAK, RISE)
+    return Candidate(
         'warm_up',
         'Measure five stations again and again for an hour while the arm warms up.',
-        60.0,
-        _stations(problem, again, 60.0, rise=15.0),
+        0.0,
+        (recording,),
+        (Piece(0, tuple(range(len(again))), SOAK * len(again)),),
         now,
+        whole=True,
     )
 
 
-def _changed(problem: Problem, now: Model, few: Array) -> Iterator[Candidate]:
+def _pressed(problem: Problem, now: Model, spread: Array) -> Candidate:
+    words = f'while the tool is pressed with {PRESS:g} N along x, y and z in turn.'
+    made = _stations(
+        problem, now, 'press', 'Measure {count} stations ' + words, spread, 3, set_up=5.0
+    )
+    force = np.zeros((len(spread), 6))
+    force[np.arange(len(force)), np.arange(len(force)) % 3] = PRESS
+    recording = made.recordings[0]
+    pushed = replace(recording, wrench=Signal(recording.joints.t, force), wrench_frame='base')
+    whole = tuple(piece for piece in made.pieces if piece.rows and piece.rows[-1] < len(spread))
+    return replace(made, recordings=(pushed,), pieces=whole)
+
+
+def _changed(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]:
     """Yield the same stations with something changed in the cell."""
-    robot, recording = now.robot, _stations(problem, few)
-    words = f'Measure {len(few)} stations'
-    if any(r.wrench is not None for r in problem.recordings):
-        yield Candidate(
-            'press',
-            f'{words} while the tool is pressed with {PRESS:g} N along x, y and z in turn.',
-            25.0,
-            _pressed(recording),
-            now,
-        )
+    robot = now.robot
+    words = 'Measure {count} stations'
     heavy = replace(robot, payload_mass=robot.payload_mass + MASS)
-    yield Candidate(
+    made = _stations(
+        problem,
+        replace(now, robot=heavy),
         'payload_swap',
         f'{words} with {MASS:g} kg more on the flange, entered as payload.',
-        30.0,
-        recording,
-        replace(now, robot=heavy),
+        spread,
+        set_up=20.0,
     )
+    yield made
     longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
-    yield Candidate(
-        'longer_tool',
-        f'{words} with a tool {LONGER * 1e3:g} mm longer.',
-        40.0,
-        recording,
-        replace(now, robot=robot.with_frames(tool=longer)),
+    yield replace(
+        made,
+        kind='longer_tool',
+        sentence=f'{words} with a tool {LONGER * 1e3:g} mm longer.',
+        set_up=30.0,
+        model=replace(now, robot=robot.with_frames(tool=longer)),
         new_tool=True,
     )
     base = transform(np.eye(3), np.array([1.5, 0.5, 0.0])) @ now.bases[0]
-    yield Candidate(
-        'moved_instrument',
-        f'Move the instrument by 1.5 m. {words}.',
-        45.0,
-        recording,
-        replace(now, bases=(base,)),
+    yield replace(
+        made,
+        kind='moved_instrument',
+        sentence=f'Move the instrument by 1.5 m. {words}.',
+        set_up=35.0,
+        model=replace(now, bases=(base,)),
         new_base=True,
     )
 
 
-def _stations(problem: Problem, q: Array, seconds: float = 15.0, rise: float = 0.0) -> Recording:
-    """Return stations every so many seconds, while it grows warmer by a rise [K]."""
+def at_rest(problem: Problem, q: Array, seconds: float = STAY, rise: float = 0.0) -> Recording:
+    """
+    Return stations every so many seconds, while it grows warmer.
+
+    Parameters
+    ----------
+    problem : Problem
+    q : array, shape (N, n) [rad, m]
+    seconds : float
+    rise : float [K]
+
+    """
     t = seconds * np.arange(len(q), dtype=np.float64)
-    recording = _with_sides(problem, JointMotion(t, q, static=True))
+    recording = with_sides(problem, JointMotion(t, q, static=True))
     if recording.temperature is None:
         return recording
     ramp = recording.temperature.value[0] + np.linspace(0.0, rise, t.size)
     return replace(recording, temperature=Signal(t, ramp))
 
 
-def _with_sides(problem: Problem, joints: JointMotion) -> Recording:
-    """Return a recording of a motion, as warm and as loaded as those at hand were on average."""
+def with_sides(problem: Problem, joints: JointMotion) -> Recording:
+    """
+    Return a recording of a motion, as warm and as loaded as those at hand were on average.
+
+    Parameters
+    ----------
+    problem : Problem
+    joints : JointMotion
+
+    """
     ends = joints.t[[0, -1]]
     warm = [r.temperature.value.mean() for r in problem.recordings if r.temperature is not None]
     load = [
@@ -176,69 +312,3 @@ def _with_sides(problem: Problem, joints: JointMotion) -> Recording:
         return Recording(NAME, joints, temperature=heat)
     wrench = Signal(ends, np.stack([load[0][0]] * 2))
     return Recording(NAME, joints, wrench=wrench, wrench_frame=load[0][1], temperature=heat)
-
-
-def widened(problem: Problem, robot: Robot) -> tuple[Array, Array]:
-    """
-    Return the least and the most of every joint that a proposal uses, shape (n,) each.
-
-    The recorded range, a little wider, within the limits.
-
-    Parameters
-    ----------
-    problem : Problem
-    robot : Robot
-
-    """
-    q = np.concatenate([r.joints.q for r in problem.recordings])
-    middle = 0.5 * (q.min(axis=0) + q.max(axis=0))
-    half = np.maximum(REACH * 0.5 * np.ptp(q, axis=0), LEAST)
-    inset = np.where(np.isfinite(robot.upper - robot.lower), STEP, 0.0)
-    low = np.maximum(middle - half, robot.lower + inset)
-    high = np.maximum(np.minimum(middle + half, robot.upper - inset), low)
-    return np.asarray(low), np.asarray(high)
-
-
-def _spread(problem: Problem, robot: Robot, count: int) -> Array:
-    """Return stations that fill the range evenly, shape (count, n)."""
-    low, high = widened(problem, robot)
-    unit = halton(robot.n, count)
-    return np.asarray(low + unit * (high - low))
-
-
-def _both_sides(stations: Array) -> Array:
-    """Return every station after a step up to it and after a step down to it."""
-    approach = np.array([[-STEP], [0.0], [STEP], [0.0]])
-    return np.asarray(np.repeat(stations, 4, axis=0) + np.tile(approach, (len(stations), 1)))
-
-
-def sweep(problem: Problem, robot: Robot) -> JointMotion:
-    """Return one path forth and back at three speeds, from rest to rest."""
-    low, high = widened(problem, robot)
-    turn = np.linspace(0.0, 1.0, 7)
-    joint = np.arange(robot.n)
-    phase = turn[:, None] * (1 + joint % 3) + joint / 7.0
-    waves = np.sin(2.0 * np.pi * phase)
-    knots = 0.5 * (low + high) + 0.25 * (high - low) * waves
-    slopes = spline_slopes(turn, knots)
-    fine = hermite(turn, knots, slopes, np.linspace(0.0, 1.0, 500))[1]
-    finite = np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)
-    # s = (1 - cos)/2 is pi/2 times faster than its mean.
-    fastest = 0.5 * np.pi * float((np.abs(fine) / finite).max()) / FASTEST
-    shares, times, start = [], [], 0.0
-    for speed in PASSES:
-        span = 2.0 * fastest / speed
-        t = np.arange(0.0, span, 1.0 / RATE)
-        shares.append(0.5 * (1.0 - np.cos(2.0 * np.pi * t / span)))
-        times.append(start + t)
-        start += t[-1] + 1.0 / RATE
-    return JointMotion(
-        np.concatenate(times), hermite(turn, knots, slopes, np.concatenate(shares))[0]
-    )
-
-
-def _pressed(recording: Recording) -> Recording:
-    t = recording.joints.t
-    force = np.zeros((t.size, 6))
-    force[np.arange(t.size), np.arange(t.size) % 3] = PRESS
-    return replace(recording, wrench=Signal(t, force), wrench_frame='base')

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,21 +16,27 @@ from ...errors import TwinError
 from ...recording import JointMotion
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate, candidates
+from .chosen_pieces import Plan, planned, widening
 from .inseparable import way
-from .separation import ahead, at_hand, separations
+from .limits import Limits
+from .separation import at_hand
 
-DECIDES = 6.0
-"""Standard deviations from which a measurement decides between two explanations."""
-NOTHING = 1.0
-"""Standard deviations below which it says nothing."""
 WORTH = 0.8
 """A cheaper measurement is taken when it decides this share of what the best one does."""
-SAMPLES = 400
-"""Samples of a candidate that are computed; neighbours of a moving arm say the same."""
+NEAR = 0.5
+"""Minutes within which measurements take equally long."""
+PACE = 0.1
+"""Time [s] between the samples of a path as it is written: a spline through them is the path."""
 
 
 def next_experiment(
-    problem: Problem, model: Model, alternatives: Sequence[tuple[Effect, ...]], scale: Scale
+    problem: Problem,
+    model: Model,
+    alternatives: Sequence[tuple[Effect, ...]],
+    scale: Scale,
+    limits: Limits | None = None,
+    *,
+    closed: bool = True,
 ) -> dict[str, Any] | None:
     """
     Return the measurement to make next, as plain numbers and strings.
@@ -42,83 +48,92 @@ def next_experiment(
     alternatives : sequence of tuple of Effect
         Explanations that fit alike. With fewer than two there is nothing to decide between, and
         what widens the data most is proposed.
+    limits : Limits, optional
+        What it may cost, and where it has to stay.
+    closed : bool
+        Whether one of the alternatives is believed to be true. Where no motion parts them, this
+        is then said; otherwise the data are widened.
 
     Returns
     -------
     dict or None
         'kind', 'sentence', 'reason', 'expected_separation_sigma' (None where nothing is compared),
-        'cost' [min], 'between' (the two explanations it parts, each a list of effect and joint;
-        None where nothing is compared) and 'motion': 'static', 'joint_names', 't' [s] and 'q'
-        [rad, m]; 'motion' is None when no motion decides. 'skipped' says which measurements could
-        not be foreseen. None when none could.
+        'cost' [min] and, of that, 'robot_minutes', 'stations' (None of a path), 'between' (the two
+        explanations it parts, each a list of effect and joint; None where nothing is compared) and
+        'motion': 'static', 'joint_names', 't' [s] and 'q' [rad, m]; 'motion' is None when no
+        motion decides. 'skipped' says which measurements could not be foreseen. None when none
+        could.
 
     """
-    options = list(candidates(problem, model))
+    limits = limits or Limits()
+    joints = [e.site for effects in alternatives for e in effects if e.site]
+    asked = [joint for joint in dict.fromkeys(joints) if joints.count(joint) < len(alternatives)]
+    options = list(candidates(problem, model, limits, asked))
     if len(alternatives) < 2:
-        return _entry(_widening(problem, options), _UNKNOWN, None, model)
+        return _entry(widening(problem, options, limits), _UNKNOWN, model)
+    plans, skipped = _plans(problem, model, alternatives, scale, limits, options)
+    if not plans:
+        return None
+    best = max(plan.score for plan in plans)
+    if best == 0.0:
+        if closed:
+            told: dict[str, Any] = _outside(alternatives[0], alternatives[1])
+        else:
+            told = _entry(widening(problem, options, limits), _ALIKE, model)
+    else:
+        good = [plan for plan in plans if plan.score >= WORTH * best]
+        if not all(r.joints.static for r in problem.recordings):
+            # An instrument that follows the tool learns more in a minute than at four stations.
+            good = [plan for plan in good if not plan.candidate.static] or good
+        least = min(plan.minutes for plan in good)
+        # Half a minute is no reason to learn less.
+        near = [plan for plan in good if plan.minutes <= least + NEAR]
+        told = _told(max(near, key=lambda plan: plan.apart), alternatives, model)
+    return told | {'skipped': skipped} if skipped else told
+
+
+def _plans(
+    problem: Problem,
+    model: Model,
+    alternatives: Sequence[tuple[Effect, ...]],
+    scale: Scale,
+    limits: Limits,
+    options: Sequence[Candidate],
+) -> tuple[list[Plan], list[str]]:
+    """Return the best of every kind of measurement, and what could not be foreseen."""
     now = at_hand(problem, model, alternatives, scale)
-    before = separations(now, None)
-    tried, tables, skipped = [], [], []
+    plans, skipped = [], []
     for option in options:
         try:
-            both = separations(now, ahead(problem, option, alternatives, scale))
+            plan = planned(problem, model, alternatives, scale, limits, option, now)
         except TwinError as error:
             # Data of another kind may lack what an explanation needs; the others still count.
             skipped.append(f'{option.kind}: {error}')
             continue
-        tried.append(option)
-        tables.append(np.sqrt(np.maximum(both**2 - before**2, 0.0)))
-    chosen = _chosen(alternatives, model, tried, tables, before) if tried else None
-    return chosen | {'skipped': skipped} if chosen and skipped else chosen
-
-
-def _chosen(
-    alternatives: Sequence[tuple[Effect, ...]],
-    model: Model,
-    options: Sequence[Candidate],
-    tables: Sequence[Array],
-    before: Array,
-) -> dict[str, Any]:
-    """Return the cheapest measurement that decides nearly as much as the best one."""
-    pairs = list(combinations(range(len(alternatives)), 2))
-    scores = np.array(
-        [sum(min(table[p], DECIDES) for p in pairs if table[p] > NOTHING) for table in tables]
-    )
-    if scores.max() == 0.0:
-        return _outside(alternatives[0], alternatives[1])
-    enough = np.flatnonzero(scores >= WORTH * scores.max())
-    best = min(enough.tolist(), key=lambda k: float(options[k].cost))
-    pair = max(pairs, key=lambda p: tables[best][p])
-    return _entry(
-        options[best],
-        _reason(alternatives, pair, before, tables[best]),
-        float(tables[best][pair]),
-        model,
-        _sides(alternatives[pair[0]], alternatives[pair[1]]),
-    )
+        if plan is not None:
+            plans.append(plan)
+    return plans, skipped
 
 
 _UNKNOWN = (
     'No effect of the library explains what is left; data of another kind show whether it '
     'depends on pose, direction or speed.'
 )
+_ALIKE = (
+    'The explanations at hand move the tool alike, and none of them is sure: data from elsewhere '
+    'show whether they hold.'
+)
 
 
-def _widening(problem: Problem, options: Sequence[Candidate]) -> Candidate:
-    """Return the kind of measurement that the data at hand lack."""
-    static = all(r.joints.static for r in problem.recordings)
-    wanted = 'speed_sweep' if static else 'bidirectional'
-    return next(option for option in options if option.kind == wanted)
-
-
-def _reason(
-    alternatives: Sequence[tuple[Effect, ...]], pair: tuple[int, int], before: Array, after: Array
-) -> str:
-    first, second = _differing(alternatives[pair[0]], alternatives[pair[1]])
-    return (
-        f'The data at hand hold {first} and {second} {before[pair]:.1f} standard deviations '
-        f'apart; this would add {after[pair]:.0f}.'
+def _told(plan: Plan, alternatives: Sequence[tuple[Effect, ...]], model: Model) -> dict[str, Any]:
+    assert plan.pair is not None
+    one, other = (alternatives[k] for k in plan.pair)
+    first, second = _differing(one, other)
+    reason = (
+        f'The data at hand hold {first} and {second} {plan.before:.1f} standard deviations '
+        f'apart; this would add {plan.after:.0f}.'
     )
+    return _entry(plan, reason, model, _sides(one, other))
 
 
 def _outside(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> dict[str, Any]:
@@ -129,6 +144,8 @@ def _outside(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> dict[str,
         'kind': 'outside',
         'motion': None,
         'cost': None,
+        'robot_minutes': None,
+        'stations': None,
         'between': _sides(first, second),
         'expected_separation_sigma': 0.0,
         'sentence': f'No motion tells {one} from {other}: {way(sorted(families))}.',
@@ -163,30 +180,38 @@ def _named(effects: Sequence[Effect]) -> str:
 
 
 def _entry(
-    option: Candidate,
+    plan: Plan,
     reason: str,
-    separation: float | None,
     model: Model,
     between: list[list[dict[str, str | None]]] | None = None,
 ) -> dict[str, Any]:
+    option = plan.candidate
+    joints = plan.motion()
+    sentence = option.sentence.format(count=len(plan.chosen) if joints.static else 0)
     return {
         'kind': option.kind,
-        'sentence': f'{option.sentence} Check the motion for collisions first.',
+        'sentence': f'{sentence} Check the motion for collisions first.',
         'reason': reason,
-        'expected_separation_sigma': separation,
-        'cost': option.cost,
+        'expected_separation_sigma': plan.after,
+        'cost': round(plan.minutes, 2),
+        'robot_minutes': round(plan.robot_minutes, 2),
+        'stations': len(joints.t) if joints.static else None,
         'between': between,
-        'motion': _motion(option.recording.joints, model.robot.joint_names),
+        'motion': _motion(joints, model.robot.joint_names),
     }
 
 
 def _motion(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
-    index = np.arange(joints.t.size)
-    if index.size > SAMPLES:
-        index = np.linspace(0, index.size - 1, SAMPLES).round().astype(int)
+    if not joints.static:
+        joints = _paced(joints)
     return {
         'static': joints.static,
         'joint_names': list(names),
-        't': joints.t[index].round(6).tolist(),
-        'q': joints.q[index].round(7).tolist(),
+        't': joints.t.round(6).tolist(),
+        'q': joints.q.round(7).tolist(),
     }
+
+
+def _paced(joints: JointMotion) -> JointMotion:
+    t: Array = np.linspace(0.0, joints.t[-1], int(np.ceil(joints.t[-1] / PACE)) + 1)
+    return replace(joints, t=t, q=joints.at(t)[0], qd=None)

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How far apart two explanations would be on a measurement not made yet.
+How far apart two explanations would be on measurements not made yet.
 
 T-optimality [1]_: one explanation is taken as true, the other fits both the data at hand and the
-new ones as well as it can; what it cannot fit separates them. Frames are fitted anew.
+new ones as well as it can; what it cannot fit separates them. Frames are fitted anew. All that is
+needed of a piece of motion is the normal matrix of the rival's columns and of the difference; the
+matrices of pieces add up, so that pieces can be chosen one by one.
 
 References
 ----------
@@ -24,19 +26,21 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...recording import Measurements, Recording
 from ..algebra.fit import design, with_weights
+from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate
 
 ROWS = 1200
 """Rows of the data at hand that take part."""
-SAMPLES = 400
-"""Samples of a candidate that are computed; neighbours of a moving arm say the same."""
-INDEPENDENT = 0.1
-"""Share of the samples of a moving arm that count: neighbours say the same."""
-LOOSE = 1e-9
-"""Share of the largest column below which a column is rounding."""
+SAMPLES = 120
+"""Samples of a path that are computed; neighbours of a moving arm say the same."""
+EVERY = 0.15
+"""Time [s] after which a moving arm says something new: in it the arm moves by centimetres."""
+LOOSE = 1e-10
+"""Added to the diagonal of a normal matrix, as a share of it: what is less is rounding."""
 
 Alternative = tuple[Effect, ...]
+Pair = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +50,128 @@ class Side:
     predicted: list[Array]
     columns: list[Array]
     names: list[list[str]]
+    rows: int
+    """Scalar rows per sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Normals:
+    """
+    For every pair (true, rival) with the first explanation what the data at hand and each piece say.
+
+    Attributes
+    ----------
+    now : dict
+        Normal matrix of the rival's columns and, last, the difference, shape (P, P).
+    pieces : dict
+        The same of every piece, shape (K, P, P).
+
+    """
+
+    now: dict[Pair, Array]
+    pieces: dict[Pair, Array]
+
+    def before(self) -> dict[Pair, float]:
+        """Return by how many standard deviations the data at hand part every pair."""
+        return {pair: float(_left(matrix[None])[0]) for pair, matrix in self.now.items()}
+
+    def added(self, chosen: Sequence[int], more: Sequence[int]) -> dict[Pair, Array]:
+        """
+        Return by how many standard deviations pairs part with further pieces, shape (len(more),).
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Pieces that are in already.
+        more : sequence of int
+            Pieces of which each is tried beside them.
+
+        """
+        out = {}
+        for pair, now in self.now.items():
+            base = now + self.pieces[pair][list(chosen)].sum(axis=0)
+            out[pair] = _left(base + self.pieces[pair][list(more)])
+        return out
+
+
+def _left(matrices: Array) -> Array:
+    """Return what columns leave of the last one, its length, shape (K,)."""
+    size = np.sqrt(np.maximum(np.diagonal(matrices, axis1=1, axis2=2), 1e-300))
+    scaled = matrices / size[:, :, None] / size[:, None, :]
+    columns, cross = scaled[:, :-1, :-1], scaled[:, :-1, -1:]
+    held = columns + LOOSE * np.eye(columns.shape[1])
+    taken = (cross * np.linalg.solve(held, cross)).sum(axis=(1, 2))
+    return np.asarray(size[:, -1] * np.sqrt(np.maximum(1.0 - taken, 0.0)))
+
+
+def normals(
+    problem: Problem,
+    model: Model,
+    alternatives: Sequence[Alternative],
+    scale: Scale,
+    candidate: Candidate,
+    now: Side,
+) -> Normals:
+    """
+    Return what a candidate's pieces say of every pair of alternatives, beside the data at hand.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recordings to explain, and the frames that are fitted along.
+    model : Model
+        What is believed so far; everything is taken about it.
+    alternatives : sequence of Alternative
+        The explanations to tell apart.
+    scale : Scale
+        The noise that residuals are measured in, and the weight of every sample.
+    candidate : Candidate
+    now : Side
+        As `at_hand` returned it.
+
+    """
+    ahead = [
+        _ahead(problem, candidate, recording, alternatives, scale)
+        for recording in candidate.recordings
+    ]
+    out = Normals({}, {})
+    # The first is believed most: what parts it from each other decides.
+    others = range(1, len(alternatives))
+    for true, rival in [pair for k in others for pair in ((0, k), (k, 0))]:
+        names = sorted({n for side in (now, *ahead) for n in side.names[rival]})
+        held = _held(model.with_found(alternatives[rival]), names)
+        out.now[true, rival] = np.diag(held) + _normal(_stacked(now, true, rival, names))
+        stacks = [_stacked(side, true, rival, names) for side in ahead]
+        matrices = []
+        for piece in candidate.pieces:
+            stack, side = stacks[piece.recording], ahead[piece.recording]
+            if piece.rows is not None:
+                at = np.add.outer(np.array(piece.rows) * side.rows, np.arange(side.rows))
+                stack = stack[:, at.ravel()]
+            matrices.append(_normal(stack))
+        out.pieces[true, rival] = np.array(matrices)
+    return out
+
+
+def _normal(stack: Array) -> Array:
+    return np.asarray(stack @ stack.T)
+
+
+def _held(model: Model, names: Sequence[str]) -> Array:
+    """Return the prior precision of every column by name; none of frames, none of the difference."""
+    precision = effect_precision(model)
+    own = [f'{k}.{j}' for k, e in enumerate(model.found) for j in range(e.coordinates().size)]
+    by_name = dict(zip(own, precision.tolist(), strict=True))
+    return np.array([*(by_name.get(name, 0.0) for name in names), 0.0])
+
+
+def _stacked(side: Side, true: int, rival: int, names: list[str]) -> Array:
+    """Return the rival's columns in the order of the names and, last, the difference."""
+    columns = side.columns[rival]
+    out = np.zeros((len(names) + 1, columns.shape[1]))
+    out[[names.index(name) for name in side.names[rival]]] = columns
+    out[-1] = side.predicted[true] - side.predicted[rival]
+    return out
 
 
 def at_hand(
@@ -70,74 +196,31 @@ def at_hand(
     return _side(few, model, alternatives, with_weights(scale, few), '')
 
 
-def ahead(
-    problem: Problem, candidate: Candidate, alternatives: Sequence[Alternative], scale: Scale
+def _ahead(
+    problem: Problem,
+    candidate: Candidate,
+    recording: Recording,
+    alternatives: Sequence[Alternative],
+    scale: Scale,
 ) -> Side:
-    """
-    Return what the alternatives say of a candidate measurement.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    candidate : Candidate
-        A measurement that could be made.
-    alternatives : sequence of Alternative
-        The explanations to tell apart.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-
-    """
-    recording = _measured(candidate, points=max(problem.rows) == 3)
+    """Return what the alternatives say of one recording of a candidate."""
+    made = _measured(candidate.model, recording, points=max(problem.rows) == 3)
     align = set(problem.align)
     align |= {'base'} if candidate.new_base else set()
     align |= {'tool'} if candidate.new_tool else set()
-    next_problem = Problem((recording,), frozenset(align))
+    further = Problem((made,), frozenset(align))
     mark = ' new' if candidate.new_tool else ''
-    side = _side(
-        next_problem, candidate.model, alternatives, with_weights(scale, next_problem), mark
+    side = _side(further, candidate.model, alternatives, with_weights(scale, further), mark)
+    if recording.joints.static:
+        return side
+    assert made.measured is not None
+    told = float(np.ptp(recording.joints.t)) / EVERY / made.measured.t.size
+    share = float(np.sqrt(min(told, 1.0)))
+    return replace(
+        side,
+        predicted=[p * share for p in side.predicted],
+        columns=[c * share for c in side.columns],
     )
-    share = 1.0 if recording.joints.static else np.sqrt(INDEPENDENT)
-    return Side([p * share for p in side.predicted], [c * share for c in side.columns], side.names)
-
-
-def separations(now: Side, after: Side | None) -> Array:
-    """
-    Return by how many standard deviations alternatives differ, pair by pair, shape (A, A).
-
-    The mean over which of the two is true: where one contains the other, as play that may be
-    zero, only the truth of the larger one shows.
-
-    after left out: on the data at hand alone.
-    """
-    count = len(now.predicted)
-    out = np.zeros((count, count))
-    for i in range(count):
-        for j in range(count):
-            if i != j:
-                out[i, j] = _left(now, after, i, j)
-    return np.asarray(0.5 * (out + out.T))
-
-
-def _left(now: Side, after: Side | None, true: int, rival: int) -> float:
-    """Return what the rival cannot fit of the true one, in standard deviations."""
-    sides = [now] if after is None else [now, after]
-    gap = np.concatenate([side.predicted[true] - side.predicted[rival] for side in sides])
-    names = sorted({name for side in sides for name in side.names[rival]})
-    blocks = [_placed(side.columns[rival], side.names[rival], names) for side in sides]
-    columns = np.concatenate(blocks, axis=1)
-    size = np.linalg.norm(columns, axis=1)
-    live = size > LOOSE * max(size.max(initial=0.0), 1e-300)
-    if live.any():
-        basis, _ = np.linalg.qr((columns[live] / size[live, None]).T)
-        gap = gap - basis @ (basis.T @ gap)
-    return float(np.linalg.norm(gap))
-
-
-def _placed(columns: Array, names: list[str], wanted: list[str]) -> Array:
-    out = np.zeros((len(wanted), columns.shape[1]))
-    out[[wanted.index(name) for name in names]] = columns
-    return out
 
 
 def _side(
@@ -151,7 +234,7 @@ def _side(
         block, labels = design(problem, twin, scale)
         columns.append(block)
         names.append([_label(label, problem, mark) for label in labels])
-    return Side(predicted, columns, names)
+    return Side(predicted, columns, names, max(problem.rows))
 
 
 def _label(label: str, problem: Problem, mark: str) -> str:
@@ -161,12 +244,11 @@ def _label(label: str, problem: Problem, mark: str) -> str:
     return label + mark if label.startswith('tool') else label
 
 
-def _measured(candidate: Candidate, *, points: bool) -> Recording:
+def _measured(model: Model, recording: Recording, *, points: bool) -> Recording:
     """Return the recording with measurements of an arm without any effect, to compare with."""
-    recording = candidate.recording
     t = recording.joints.t
     if not recording.joints.static:
         t = t[np.linspace(0, t.size - 1, min(SAMPLES, t.size)).round().astype(int)]
-    poses = candidate.model.twin(0).poses(recording, t)
+    poses = model.twin(0).poses(recording, t)
     seen = Measurements(t, poses.position, None if points else poses.rotation)
     return replace(recording, measured=seen)

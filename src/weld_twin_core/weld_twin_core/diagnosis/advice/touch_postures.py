@@ -17,7 +17,7 @@ from ...contacts import Artefact, Contact, Contacts
 from ...recording import JointMotion, Measurements, Recording
 from ...sequences import halton
 from ..algebra.problem import Model, Problem
-from .candidates import widened
+from .postures import widened
 
 TRIED = 160
 """Postures that are started from at every place; a third of them reach it within the limits."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...twin.posterior import Posterior
-from ..advice import actions
+from ..advice import Limits, actions
 from ..advice.next_step import next_step
 from ..frames.places import NOT_TOLD, not_told
 from ..hypotheses.search import Search
@@ -41,6 +41,7 @@ def answer(
     posterior: Posterior,
     signs: Mapping[str, float],
     rival: Curved | None = None,
+    limits: Limits | None = None,
 ) -> Diagnosis:
     """
     Return the diagnosis.
@@ -61,6 +62,8 @@ def answer(
         Of the answer: what says how far it can be trusted.
     rival : Curved or None
         What explains the gap without a formula.
+    limits : Limits, optional
+        What the next experiment may cost, and where it has to stay.
 
     """
     verdict, told, shares, known = _trusted(found, unseen, evidence, verdict, signs, rival)
@@ -76,7 +79,7 @@ def answer(
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,
         unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, rival),
-        next_experiment=next_step(found, verdict),
+        next_experiment=next_step(found, verdict, limits),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         model=found.final.model,
         traces=traces(found),

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ...effects.effect import Effect, Stage
+from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
 from ...twin.resampling import Picker
 from ..algebra.fit import design
@@ -165,16 +165,20 @@ class _Looker:
         joint = self.features[0].twin.robot.index(str(effect.site))
         residuals = self.problem.by_sample(self.residual)
         bases = self.problem.by_sample(self.basis)
-        found: list[Effect] = []
+        memory = effect.stage in MEMORY
+        views = [maker.joint_view if memory else maker.view for maker in self.features]
+        trials = [effect.starts(view, zoom) for view in views]
+        told = next((own for own in trials if own is not None), None)
+        if told is None:
+            return None
+        # The first recording that can says which instances; the others say what they do there.
+        found = told[0]
         pull, mass, shared = (np.zeros(()) for _ in range(3))
-        for k, maker in enumerate(self.features):
-            view = maker.joint_view if effect.stage in MEMORY else maker.view
-            # The first recording says which instances; the others say what they do there.
-            trials = effect.starts(view, zoom)
-            if trials is None:
-                return None
-            found, moved = trials
-            if effect.stage in MEMORY:
+        for k, (maker, view) in enumerate(zip(self.features, views, strict=True)):
+            own = trials[k]
+            same = own is not None and _same(own[0], found)
+            moved = own[1] if own is not None and same else _moved(found, view, joint)
+            if memory:
                 moved = Picker(maker.recording.joints, maker.run.view.t).pick(moved)
             column = self._white(maker, joint, k)
             pull = pull + moved @ (column * residuals[k]).sum(axis=1)
@@ -189,6 +193,19 @@ class _Looker:
         unit[3:] = 1.0 / self.scale.orientation
         column = self.problem.seen(k, maker.column(('q', joint))).T
         return np.asarray(column * unit * np.sqrt(self.scale.weights[k])[:, None])
+
+
+def _same(one: list[Effect], other: list[Effect]) -> bool:
+    """Return whether two lists hold the same instances."""
+    return len(one) == len(other) and all(
+        np.array_equal(a.vector(), b.vector()) for a, b in zip(one, other, strict=True)
+    )
+
+
+def _moved(effects: list[Effect], view: View, joint: int) -> Array:
+    """Return what each instance does to the joint, shape (D, N)."""
+    each = [effect.displace(view) for effect in effects]
+    return np.stack([np.broadcast_to(shift['q', joint], view.t.shape) for shift in each])
 
 
 def _sized(effects: list[Effect], pull: Array, mass: Array) -> Profile:

@@ -124,13 +124,28 @@ def _column_group(
     highs = max(float(m.run.view.q[:, i].max()) for m in features)
     if highs - lows < 1e-4:
         return None
-    parts = []
-    for k, maker in enumerate(features):
-        values = regressors(maker, i, lows, highs)  # type: ignore[operator]
-        if values.size == 0:
-            return None
-        parts.append(problem.seen(k, maker.column(('q', i)))[None] * values[:, None, :])
+    each = [regressors(maker, i, lows, highs) for maker in features]  # type: ignore[operator]
+    if any(values.size == 0 for values in each):
+        return None
+    parts = [
+        problem.seen(k, maker.column(('q', i)))[None] * values[:, None, :]
+        for k, (maker, values) in enumerate(zip(features, _alike_in_number(each), strict=True))
+    ]
     return _unit(problem.whitened(parts, scale))
+
+
+def _alike_in_number(each: list[Array]) -> list[Array]:
+    """Return as many rows for stations as for paths: of the motion they show its side alone."""
+    most = max(len(values) for values in each)
+    out = []
+    for values in each:
+        if len(values) < most:
+            padded = np.zeros((most, values.shape[1]))
+            padded[SIDE] = values[0]
+            out.append(padded)
+        else:
+            out.append(values)
+    return out
 
 
 def _pose_group(
@@ -156,6 +171,10 @@ def _unit(columns: Array) -> Array:
     size = np.sqrt((columns**2).mean(axis=1, keepdims=True))
     live = size[:, 0] > 1e-12
     return np.asarray(columns[live] / size[live])
+
+
+SIDE = 2
+"""Row of `_motion` that holds the direction."""
 
 
 def _bumps(x: Array, low: float, high: float, count: int = KNOTS) -> Array:

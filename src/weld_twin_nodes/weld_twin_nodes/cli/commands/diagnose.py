@@ -23,6 +23,7 @@ from ..options import add_robot, add_topics, given_urdf, robot_of, topics_of, tw
 
 if TYPE_CHECKING:
     from weld_twin_core.diagnosis import Diagnosis
+    from weld_twin_core.diagnosis.advice import Limits
     from weld_twin_core.recording import Recording
     from weld_twin_msgs_py.files.input_files import InputFile
 
@@ -71,6 +72,19 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
         '--apply',
         action='store_true',
         help='if data or set-up are wrong and one correction explains it, make it and go on',
+    )
+    parser.add_argument(
+        '--experiment-minutes',
+        type=float,
+        metavar='MIN',
+        help='of robot motion that the next experiment may take (default: 60)',
+    )
+    parser.add_argument(
+        '--cell-box',
+        default='',
+        metavar='NUMBERS',
+        help='x,y,z of the lower and of the upper corner [m], in the measuring frame: the arm stays '
+        'between them in the next experiment',
     )
 
 
@@ -208,8 +222,28 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             holdout=_bounded(recordings[count:]),
             apply=args.apply,
             may_change=changing,
+            limits=_limits(args),
             progress=tell,
         )
+
+
+def _limits(args: argparse.Namespace) -> Limits:
+    """Return what the next experiment may cost, and where it has to stay."""
+    import numpy as np
+
+    from weld_twin_core.diagnosis.advice import Limits
+    from weld_twin_core.errors import DataError
+
+    given = {} if args.experiment_minutes is None else {'minutes': args.experiment_minutes}
+    if not args.cell_box:
+        return Limits(**given)
+    try:
+        numbers = [float(part) for part in args.cell_box.split(',')]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 6:
+        raise DataError(f"--cell-box takes six numbers with commas, got '{args.cell_box}'")
+    return Limits(**given, box=np.array(numbers).reshape(2, 3))
 
 
 def _described(recording: Recording, artefact: str | None) -> Recording:

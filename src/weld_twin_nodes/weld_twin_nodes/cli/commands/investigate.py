@@ -12,12 +12,15 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ..options import add_robot
 
 EXPERIMENT = 'experiment.yaml'
+LEAST = 0.5
+"""Minutes that an experiment is planned with where hardly any are left; it is then not asked for."""
 BUDGET = 60.0
 """Minutes of experiments, with what has to be set up for them, unless told: one visit to a cell."""
 
@@ -32,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--align', default='', metavar='FRAMES', help='as for diagnose')
     parser.add_argument('--effects-known', default='', metavar='FILE', help='as for diagnose')
+    parser.add_argument('--cell-box', default='', metavar='NUMBERS', help='as for diagnose')
     parser.add_argument(
         '--controller',
         default='',
@@ -71,6 +75,7 @@ def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
     if not 0.0 <= budget < 1e6:
         raise DataError(f'--budget must be minutes, got {budget}')
     words = [('--align', args.align), ('--effects-known', args.effects_known)]
+    words += [('--cell-box', args.cell_box)]
     words += [('--base-link', args.base_link), ('--tip-link', args.tip_link)]
     options = [part for word, value in words if value for part in (word, value)]
     return begin(args.robot, options, budget)
@@ -99,17 +104,21 @@ def _continued(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
 
 def _round(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> int:
     """Diagnose everything so far, and ask or end."""
+    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.files.whole_files import write_text
 
-    from ...offline.investigation import PAGE, recordings, take_in, write_state
-    from ...report.diagnosis_files import RESULT
+    from ...offline.investigation import PAGE, recordings, take_in, weighed, write_state
     from ...report.investigation_page import headline, investigation_page
 
-    bags = [*recordings(state), *args.bags]
+    first, later = recordings(state)
     place = directory / f'round-{len(state["rounds"])}'
-    _diagnosed(bags, state, place)
-    found = json.loads((place / RESULT).read_text(encoding='utf-8'))
-    state = take_in(state, args.bags, found)
+    found = _diagnosed([*first, *later, *args.bags], [], state, place)
+    alone = None
+    if first:
+        beside = place.with_name(f'{place.name}-experiments')
+        with suppress(DataError):  # too few to be diagnosed by themselves
+            alone = _diagnosed([*later, *args.bags], first, state, beside)
+    state = take_in(state, args.bags, *weighed(found, alone))
     asked = state['rounds'][-1]['asked']
     if asked is not None:
         _write_experiment(args, place, state, asked)
@@ -123,14 +132,22 @@ def _round(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> 
     return 0
 
 
-def _diagnosed(bags: list[str], state: dict[str, Any], place: Path) -> None:
-    """Run the diagnosis as its own command does."""
+def _diagnosed(
+    bags: list[str], held_out: list[str], state: dict[str, Any], place: Path
+) -> dict[str, Any]:
+    """Run the diagnosis as its own command does; return the content of diagnosis.json."""
+    from ...report.diagnosis_files import RESULT
     from . import diagnose
 
     parser = argparse.ArgumentParser()
     diagnose.add_arguments(parser)
+    left = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
     words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
+    words += ['--experiment-minutes', f'{left:g}']
+    words += [word for bag in held_out for word in ('--holdout', bag)]
     diagnose.run(parser.parse_args(words))
+    found: dict[str, Any] = json.loads((place / RESULT).read_text(encoding='utf-8'))
+    return found
 
 
 def _write_experiment(

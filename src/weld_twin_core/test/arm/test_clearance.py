@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Postures in which an arm hits itself or its floor are told from those in which it does not."""
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.clearance import body, clearances, free
+
+UPRIGHT = np.array([0.0, -1.4, 1.4, -1.6, -1.5, 0.0])
+FOLDED = np.array([0.0, -1.4, 3.0, 0.0, 0.0, 0.0])
+DOWN = np.array([0.0, 0.5, 0.2, -1.6, -1.5, 0.0])
+
+
+def test_a_folded_arm_hits_itself_and_a_usual_posture_does_not(ur5):
+    seen = UPRIGHT[None]
+    assert free(ur5, UPRIGHT[None], seen).tolist() == [True]
+    assert free(ur5, FOLDED[None], seen).tolist() == [False]
+
+
+def test_an_upright_arm_stays_above_its_foot_and_within_a_box(ur5):
+    seen = UPRIGHT[None]
+    assert not free(ur5, DOWN[None], seen)[0]
+    everything = np.array([[-3.0] * 3, [3.0] * 3])
+    assert free(ur5, DOWN[None], seen, everything)[0]
+    assert not free(ur5, UPRIGHT[None], seen, np.array([[-0.1] * 3, [0.1] * 3]))[0]
+
+
+def test_where_the_arm_was_is_no_collision(ur5):
+    assert free(ur5, FOLDED[None], FOLDED[None])[0]
+
+
+def test_links_are_as_far_apart_as_points_on_them_are(ur5):
+    shape = body(ur5, np.array([UPRIGHT, FOLDED]))
+    share = np.linspace(0.0, 1.0, 200)[:, None]
+    nearest = []
+    for k in range(2):
+        lines = [a + share * (b - a) for a, b in zip(shape.start[k], shape.end[k], strict=True)]
+        gaps = [
+            np.linalg.norm(lines[i][:, None] - lines[j][None], axis=2).min()
+            - shape.radius[i]
+            - shape.radius[j]
+            for i in range(len(lines))
+            for j in range(i + 1, len(lines))
+            if abs(shape.link[i] - shape.link[j]) >= 2
+        ]
+        nearest.append(min(gaps))
+    np.testing.assert_allclose(clearances(shape).min(axis=1), nearest, atol=0.05)
+
+
+@pytest.mark.parametrize('name', catalog.names())
+def test_the_line_from_base_to_tool_is_the_arm_of_every_bundled_robot(name):
+    robot = catalog.load(name)
+    q = np.clip(0.3 * np.ones(robot.n), robot.lower, robot.upper)
+    shape = body(robot, q)
+    np.testing.assert_allclose(shape.start[1:], shape.end[:-1], atol=2e-3)
+    assert (shape.radius > 0.0).all() and set(shape.link) <= set(range(robot.n + 1))

@@ -1,0 +1,219 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which pieces of a measurement to make: each adds most to the decision, until it is safe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...recording import JointMotion
+from ..algebra.problem import Model, Problem, Scale
+from .candidates import STAY, Candidate
+from .limits import Limits
+from .separation import Normals, Pair, Side, normals
+
+DECIDES = 6.0
+"""Standard deviations from which a measurement decides between two explanations."""
+NOTHING = 3.0
+"""Standard deviations below which it changes no verdict."""
+MARGIN = 1.5
+"""An experiment is made so long that it parts its explanations by this factor more than a decision
+needs: how far they will part is foreseen with the effects as they are believed to be."""
+LEAST = 75.0
+"""Time [s] of an experiment at least: what nobody thought of shows only where there is room for it."""
+GAIN = 0.05
+"""A further piece has to add this share to the decision."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """
+    A measurement with the pieces chosen, in order.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    chosen : tuple of int
+    score : float
+        Sum over the pairs of what it adds, in standard deviations, no more than decides.
+    apart : float
+        The same without that bound.
+    pair : tuple of int, optional
+        The two explanations that it parts most.
+    before, after : float
+        How far the data at hand part those two, and what is added.
+
+    """
+
+    candidate: Candidate
+    chosen: tuple[int, ...]
+    score: float = 0.0
+    apart: float = 0.0
+    pair: Pair | None = None
+    before: float = 0.0
+    after: float | None = None
+
+    @property
+    def robot_minutes(self) -> float:
+        """Return how long the arm moves [min]."""
+        return sum(self.candidate.pieces[k].seconds for k in self.chosen) / 60.0
+
+    @property
+    def minutes(self) -> float:
+        """Return how long it takes with what has to be set up [min]."""
+        return self.candidate.set_up + self.robot_minutes
+
+    def motion(self) -> JointMotion:
+        """Return the pieces one after the other."""
+        pieces = [self.candidate.pieces[k] for k in self.chosen]
+        if self.candidate.static:
+            joints = self.candidate.recordings[0].joints
+            rows = [row for piece in pieces for row in piece.rows or ()]
+            step = joints.t[1] - joints.t[0] if joints.t.size > 1 else STAY
+            t: Array = float(step) * np.arange(len(rows), dtype=np.float64)
+            return JointMotion(t, joints.q[rows], static=True)
+        times: list[Array] = []
+        places: list[Array] = []
+        start = 0.0
+        for piece in pieces:
+            joints = self.candidate.recordings[piece.recording].joints
+            first = 1 if times else 0
+            times.append(start + joints.t[first:])
+            places.append(joints.q[first:])
+            start += float(joints.t[-1])
+        return JointMotion(np.concatenate(times), np.concatenate(places))
+
+
+def planned(
+    problem: Problem,
+    model: Model,
+    alternatives: Sequence[tuple[Effect, ...]],
+    scale: Scale,
+    limits: Limits,
+    option: Candidate,
+    now: Side,
+) -> Plan | None:
+    """
+    Return the best pieces of a measurement; None where none of them fits into the minutes.
+
+    Parameters
+    ----------
+    problem, model, alternatives, scale
+        As `separation.normals` takes them.
+    limits : Limits
+    option : Candidate
+    now : Side
+        What the alternatives say of the data at hand.
+
+    """
+    if option.whole:
+        least = sum(piece.seconds for piece in option.pieces)
+        if least > 60.0 * limits.minutes:
+            return None
+    told = normals(problem, model, alternatives, scale, option, now)
+    before = told.before()
+    chosen: list[int] = []
+    gains: dict[Pair, float] = {}
+    score = 0.0
+    while True:
+        spent = sum(option.pieces[k].seconds for k in chosen)
+        more = _open(option, chosen, 60.0 * limits.minutes - spent)
+        if not more or (spent >= LEAST and _enough(gains)):
+            break
+        pick, found, gained = _next(told, before, chosen, more, option)
+        if spent >= LEAST and gained < (1.0 + GAIN) * score:
+            break
+        chosen.append(pick)
+        gains, score = found, max(score, gained)
+    if not chosen:
+        return None
+    return _plan(option, chosen, score, before, gains)
+
+
+def _plan(
+    option: Candidate,
+    chosen: Sequence[int],
+    score: float,
+    before: Mapping[Pair, float],
+    gains: Mapping[Pair, float],
+) -> Plan:
+    best = max(gains, key=lambda pair: gains[pair])
+    apart = sum(gain for gain in gains.values() if gain > NOTHING)
+    return Plan(option, tuple(chosen), score, apart, best, _mean(before, best), gains[best])
+
+
+def _open(option: Candidate, chosen: Sequence[int], left: float) -> list[int]:
+    """Return the pieces that are not in yet and fit into the seconds left."""
+    return [
+        k for k, piece in enumerate(option.pieces) if k not in chosen and piece.seconds <= left
+    ]
+
+
+def _next(
+    told: Normals,
+    before: Mapping[Pair, float],
+    chosen: Sequence[int],
+    more: Sequence[int],
+    option: Candidate,
+) -> tuple[int, dict[Pair, float], float]:
+    """Return the piece that adds most for its time, what pairs gain with it, and the score."""
+    after = told.added(chosen, more)
+    table: dict[Pair, Array] = {}
+    for one, other in sorted({(min(pair), max(pair)) for pair in after}):
+        # The mean over which of the two is true: where one contains the other, as play that may be
+        # zero, only the truth of the larger one shows.
+        ways = [
+            np.sqrt(np.maximum(after[pair] ** 2 - before[pair] ** 2, 0.0))
+            for pair in ((one, other), (other, one))
+        ]
+        table[one, other] = 0.5 * (ways[0] + ways[1])
+    scores = np.zeros(len(more))
+    for values in table.values():
+        scores += np.where(values > NOTHING, np.minimum(values, MARGIN * DECIDES), 0.0)
+    # While nothing shows yet, what comes nearest to it.
+    nearest = sum((values for values in table.values()), np.zeros(len(more)))
+    seconds = np.array([option.pieces[k].seconds for k in more])
+    worth = scores + 1e-3 * nearest - 1e-6 * seconds
+    best = int(np.argmax(worth))
+    return more[best], {pair: float(v[best]) for pair, v in table.items()}, float(scores[best])
+
+
+def _enough(gains: Mapping[Pair, float]) -> bool:
+    """Return whether every pair that shows at all is parted safely."""
+    shown = [gain for gain in gains.values() if gain > NOTHING]
+    return bool(shown) and min(shown) >= MARGIN * DECIDES
+
+
+def _mean(before: Mapping[Pair, float], pair: Pair) -> float:
+    return 0.5 * (before[pair] + before[pair[1], pair[0]])
+
+
+def widening(problem: Problem, options: Sequence[Candidate], limits: Limits) -> Plan:
+    """
+    Return a measurement that shows more of the arm than the data at hand, whatever is in doubt.
+
+    Parameters
+    ----------
+    problem : Problem
+    options : sequence of Candidate
+    limits : Limits
+
+    """
+    still = all(r.joints.static for r in problem.recordings)
+    wanted = ('bidirectional', 'stations') if still else ('path',)
+    for kind in wanted:
+        option = next(option for option in options if option.kind == kind)
+        chosen: list[int] = []
+        spent = 0.0
+        for k, piece in enumerate(option.pieces):
+            if spent < 2.0 * LEAST and spent + piece.seconds <= 60.0 * limits.minutes:
+                chosen.append(k)
+                spent += piece.seconds
+        if chosen:
+            return Plan(option, tuple(chosen))
+    return Plan(option, (0,))

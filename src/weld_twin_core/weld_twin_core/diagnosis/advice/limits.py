@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What an experiment may cost, and where it has to stay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array
+from ...errors import DataError
+
+USUAL_MINUTES = 60.0
+"""Of robot motion that an experiment takes at most, unless told: an arm warms up in an hour."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """
+    What an experiment may cost, and where it has to stay.
+
+    Attributes
+    ----------
+    minutes : float [min]
+        Of robot motion at most.
+    set_up : bool
+        Whether something in the cell may be changed for it: another tool, a moved instrument.
+    box : array, shape (2, 3), optional [m]
+        Corners in the measuring frame that the arm stays between.
+
+    Raises
+    ------
+    DataError
+        The minutes are not positive, or a box has no room.
+
+    """
+
+    minutes: float = USUAL_MINUTES
+    set_up: bool = True
+    box: Array | None = None
+
+    def __post_init__(self) -> None:
+        if not self.minutes > 0.0:
+            raise DataError(f'an experiment needs minutes, got {self.minutes:g}')
+        if self.box is None:
+            return
+        box = np.array(self.box, dtype=float)
+        if box.shape != (2, 3) or not (box[0] < box[1]).all():
+            raise DataError('the box of the cell is two corners, the lower one first, in metres')
+        object.__setattr__(self, 'box', box)

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Postures that an experiment may use, and ways between them: within limits, and free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from ...arm.clearance import free
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...recording import JointMotion
+from ...sequences import halton
+from ..algebra.problem import Problem
+from .limits import Limits
+
+WIDE = 1.2
+"""Half the range [rad, m] about the recorded middle that every joint may use, within its limits: the
+instrument still sees the tool, and the arm does not turn over."""
+INSET = 0.02
+"""Distance to a joint's limits [rad, m]; an approach from either side has room in it."""
+DRAWN = 12
+"""Postures drawn for each that is wanted, before fewer have to do."""
+CHECKED = 8
+"""Places of a way between two postures that are checked."""
+FASTEST = 0.5
+"""Share of the joints' velocity limits that an experiment uses at most."""
+GENTLE = 0.5
+"""Share of the joints' acceleration limits."""
+RATE = 100.0
+"""Samples per second that a path is predicted with."""
+
+
+class Room:
+    """
+    Where an arm may go in an experiment.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was recorded: the arm has been there.
+    robot : Robot
+    limits : Limits
+
+    Attributes
+    ----------
+    home : array, shape (n,) [rad, m]
+        The recorded posture in the middle of all.
+    low, high : array, shape (n,) [rad, m]
+
+    """
+
+    def __init__(self, problem: Problem, robot: Robot, limits: Limits) -> None:
+        q = np.concatenate([r.joints.q for r in problem.recordings])
+        self._robot, self._limits = robot, limits
+        self._seen = q[np.linspace(0, len(q) - 1, min(len(q), 50)).round().astype(int)]
+        middle = np.median(problem.recordings[0].joints.q, axis=0)
+        self.home = q[int(np.argmin(np.abs(q - middle).sum(axis=1)))]
+        inset = np.where(np.isfinite(robot.upper - robot.lower), INSET, 0.0)
+        self.low = np.maximum(np.minimum(self.home - WIDE, q.min(axis=0)), robot.lower + inset)
+        self.high = np.minimum(np.maximum(self.home + WIDE, q.max(axis=0)), robot.upper - inset)
+        self.low = np.minimum(self.low, self.home)
+        self.high = np.maximum(self.high, self.home)
+
+    def free(self, q: Array) -> Array:
+        """Return which postures, shape (N, n), are free, shape (N,), bool."""
+        return free(self._robot, q, self._seen, self._limits.box)
+
+    def spread(self, count: int, skip: int = 0) -> Array:
+        """
+        Return postures that fill the range evenly, as many as are free, shape (count, n).
+
+        Parameters
+        ----------
+        count : int
+        skip : int
+            Of the sequence, so that later experiments go elsewhere.
+
+        """
+        unit = halton(self._robot.n, skip + DRAWN * count)[skip:]
+        q = self.low + unit * (self.high - self.low)
+        kept = q[np.flatnonzero(self.free(q))[:count]]
+        if len(kept) >= min(count, 4):
+            return np.asarray(kept)
+        # Hardly anything is free: stay near to where the arm was.
+        return np.asarray(self.home + 0.2 * (q[:count] - self.home))
+
+    def way(self, stops: Sequence[Array]) -> bool:
+        """Return whether the straight ways of the joints from stop to stop are free."""
+        share = np.linspace(0.0, 1.0, CHECKED + 1)[:, None]
+        ways = [a + share * (b - a) for a, b in pairwise(stops)]
+        return bool(self.free(np.concatenate(ways)).all())
+
+    def travel(self, stops: Sequence[Array], speed: float) -> JointMotion:
+        """
+        Return the motion from stop to stop, at rest at each.
+
+        Parameters
+        ----------
+        stops : sequence of array, shape (n,) [rad, m]
+        speed : float
+            Share of the fastest that an experiment may.
+
+        """
+        robot = self._robot
+        fast = FASTEST * speed * np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)
+        hard = GENTLE * np.where(np.isfinite(robot.max_acceleration), robot.max_acceleration, 5.0)
+        pieces = [np.asarray(stops[0])[None]]
+        for start, end in pairwise(stops):
+            way = np.abs(end - start)
+            # A cosine is pi/2 times faster than its mean, and hardest at its ends.
+            span = max(
+                float((0.5 * np.pi * way / fast).max()),
+                float(np.pi * np.sqrt(0.5 * way / hard).max()),
+                4.0 / RATE,
+            )
+            count = int(np.ceil(span * RATE))
+            s = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, count + 1) / count))
+            pieces.append(start + s[:, None] * (end - start))
+        q = np.concatenate(pieces)
+        return JointMotion(np.arange(len(q)) / RATE, q)
+
+
+REACH = 1.3
+"""The recorded range of every joint is widened by this factor, within its limits, for touches."""
+LEAST = 0.35
+"""Half the range [rad, m] that touches use at least."""
+
+
+def widened(problem: Problem, robot: Robot) -> tuple[Array, Array]:
+    """
+    Return the least and the most of every joint that a touch uses, shape (n,) each.
+
+    The recorded range, a little wider, within the limits.
+
+    Parameters
+    ----------
+    problem : Problem
+    robot : Robot
+
+    """
+    q = np.concatenate([r.joints.q for r in problem.recordings])
+    middle = 0.5 * (q.min(axis=0) + q.max(axis=0))
+    half = np.maximum(REACH * 0.5 * np.ptp(q, axis=0), LEAST)
+    inset = np.where(np.isfinite(robot.upper - robot.lower), INSET, 0.0)
+    low = np.maximum(middle - half, robot.lower + inset)
+    high = np.maximum(np.minimum(middle + half, robot.upper - inset), low)
+    return np.asarray(low), np.asarray(high)

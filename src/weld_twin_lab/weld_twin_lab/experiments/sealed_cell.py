@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A cell whose causes are sealed: it records what it is asked for, and is opened at the end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects.effect import Effect
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import Recording
+from weld_twin_nodes.report.diagnosis_files import diagnosis_text
+
+from ..blind.blind_cell import as_recording, of_motion, record
+from ..blind.cause_sizes import site
+from ..blind.deck import Lot
+from ..blind.judging import Judged, judge
+from ..blind.making import Case, draw_case
+from ..blind.poor_motion import WAYS
+from ..blind.recorded_motion import RATE, Motion
+from ..blind.seal import text_digest
+
+STAY = 15.0
+"""A station with the way to it [s], as experiments are planned."""
+
+
+class SealedCell:
+    """
+    One cell with causes at work that only `opened` tells.
+
+    Parameters
+    ----------
+    lot : Lot
+        What the case is to be.
+    seed, number : int
+        Decide everything random in it.
+
+    Attributes
+    ----------
+    name : str
+    robot : Robot
+        As whoever diagnoses knows it.
+    still : bool
+        Whether the instrument measures at rest alone.
+    poor : str
+        How the first recording is poor.
+    seal : str
+        The hash of the truth, published before anything is diagnosed.
+
+    """
+
+    def __init__(self, lot: Lot, seed: int, number: int) -> None:
+        rng = np.random.default_rng([seed, number])
+        self.name = f'{seed}-{number:04d}'
+        # Few stations are poor; of a path there is no few.
+        self.poor = str(rng.choice([w for w in WAYS if w != 'few' or lot.motion == 'stations']))
+        self._case: Case = draw_case(lot, rng, poor=self.poor)
+        self._salt = int(rng.integers(2**62))
+        self.robot: Robot = self._case.cell.robot
+        self.still = self._case.lot.motion == 'stations'
+
+    @property
+    def seal(self) -> str:
+        """Return the hash of the truth and a salt."""
+        return text_digest(json.dumps([self._salt, self._case.causes], default=float))
+
+    @cached_property
+    def _known(self) -> tuple[Effect, ...]:
+        return tuple(effects_from_list(list(self._case.cell.known), self.robot))
+
+    def first(self) -> Recording:
+        """Return the poor recording that everything begins with."""
+        return as_recording('first', record(self._case.cell, self._case.causes, self._case.train))
+
+    def made(self, name: str, motion: Motion, seed: int) -> Recording:
+        """Return the recording of a motion; the seed decides noise and surroundings."""
+        rng = np.random.default_rng([seed, *name.encode()])
+        taken = of_motion(self._case.cell, motion, rng)
+        return as_recording(name, record(self._case.cell, self._case.causes, taken))
+
+    def diagnosed(self, recordings: list[Recording], **options: Any) -> dict[str, Any]:
+        """Return the content of diagnosis.json."""
+        found = diagnose(
+            recordings, self.robot, align=self._case.cell.align, known=self._known, **options
+        )
+        return dict(json.loads(diagnosis_text(found, ())))
+
+    def opened(self) -> dict[str, Any]:
+        """Return the truth."""
+        case = self._case
+        return {
+            'name': self.name,
+            'kind': case.lot.kind,
+            'robot': case.lot.robot,
+            'motion': case.lot.motion,
+            'causes': case.causes,
+            'sites': [list(site(cause)) for cause in case.causes],
+            'alike': case.alike,
+            'ratios': case.ratios,
+        }
+
+    def judged(self, found: Mapping[str, Any]) -> Judged:
+        """Return what a diagnosis is worth."""
+        return judge(self.opened(), found)
+
+
+def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:
+    """
+    Return a motion as it stands in an experiment, as the controller runs it.
+
+    Parameters
+    ----------
+    asked : mapping
+        'static', 'joint_names', 't' [s], 'q' [rad or m].
+    robot : Robot
+
+    Raises
+    ------
+    DataError
+        It names other joints than the robot's.
+
+    """
+    if list(asked['joint_names']) != list(robot.joint_names):
+        raise DataError(f'the experiment is not for {robot.name}')
+    t, q = np.array(asked['t'], dtype=float), np.array(asked['q'], dtype=float)
+    if asked['static']:
+        return Motion(t - t[0], q, static=True)
+    even = np.arange(0.0, t[-1] - t[0], 1.0 / RATE)
+    return Motion(even, np.asarray(CubicSpline(t - t[0], q)(even)))
+
+
+def stations(q: Array) -> Motion:
+    """Return stations one after the other."""
+    return Motion(STAY * np.arange(len(q), dtype=float), q, static=True)

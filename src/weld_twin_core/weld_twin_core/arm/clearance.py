@@ -25,6 +25,9 @@ TORCH = 0.03
 """Radius of what hangs on the flange [m]: a torch is about 60 mm thick."""
 SHORT = 1e-3
 """Shorter lines [m] are no link."""
+ALIKE = 1e-3
+"""Distance [m] by which two postures may differ and be as near: links that cannot move against each
+other differ by rounding."""
 PLACES = 5
 """Places along each of two lines between which their distance is looked at."""
 
@@ -117,7 +120,7 @@ def free(robot: Robot, q: Array, seen: Array, box: Array | None = None) -> Array
     """
     known, asked = body(robot, seen), body(robot, q)
     usual = clearances(known).min(axis=0)
-    good = (clearances(asked) >= np.minimum(usual, 0.0)).all(axis=-1)
+    good = (clearances(asked) >= np.minimum(usual, 0.0) - ALIKE).all(axis=-1)
     ends = np.concatenate([asked.start[:, asked.link > 0], asked.end], axis=1)
     if box is not None:
         return np.asarray(good & ((ends >= box[0]) & (ends <= box[1])).all(axis=(1, 2)))

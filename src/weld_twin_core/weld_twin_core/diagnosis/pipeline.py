@@ -162,16 +162,7 @@ def _explained(
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
     return answer(
-        found=found,
-        unseen=unseen,
-        evidence=evidence,
-        verdict=verdict,
-        shrink=shrink,
-        examined=examined,
-        posterior=posterior,
-        rival=rival,
-        signs=signs,
-        limits=limits,
+        found, unseen, evidence, verdict, shrink, examined, posterior, signs, rival, limits
     )
 
 

@@ -81,20 +81,6 @@ def page(result: dict[str, Any]) -> str:
         )
         for way in WAYS
     ]
-    rows = [
-        (
-            case['name'],
-            case['truth']['robot'],
-            f'{case["truth"]["motion"]}, {case["poor"]}',
-            ' + '.join(' of '.join(filter(None, s)) for s in case['truth']['sites']),
-            _told(case['first']),
-            ', '.join(f'{s["kind"]} {s["robot_minutes"]:.1f} min' for s in case['rounds']),
-            _told(case['loop']),
-            case['end'],
-            *(_told(case[way]) for way in WAYS[1:]),
-        )
-        for case in cases
-    ]
     heads = (
         'cell',
         'robot',
@@ -112,9 +98,24 @@ def page(result: dict[str, Any]) -> str:
             '',
             *(f'- {key}: {told[key]}' for key in told if not isinstance(told[key], dict)),
             '',
-            markdown.table(heads, *rows),
+            markdown.table(heads, *(_row(case) for case in cases)),
             '',
         ]
+    )
+
+
+def _row(case: Case) -> tuple[str, ...]:
+    truth = case['truth']
+    return (
+        str(case['name']),
+        str(truth['robot']),
+        f'{truth["motion"]}, {case["poor"]}',
+        ' + '.join(' of '.join(filter(None, site)) for site in truth['sites']),
+        _told(case['first']),
+        ', '.join(f'{s["kind"]} {s["robot_minutes"]:.1f} min' for s in case['rounds']),
+        _told(case['loop']),
+        str(case['end']),
+        *(_told(case[way]) for way in WAYS[1:]),
     )
 
 

@@ -89,7 +89,6 @@ def answer(
         evidence=evidence,
         posterior=posterior,
         **_parted(unseen, told, shares, verdict, rival),
-        unsound=examined.told(found.final.model.found),
         signs=known,
         contacts=contact_spreads(found, unseen),
         **_compared(found, examined),
@@ -137,4 +136,5 @@ def _compared(found: Search, examined: Examined) -> dict[str, Any]:
         'checks': (*examined.checks, *untold_check(found, named)),
         'changed': changed(found, named),
         'may_change': named,
+        'unsound': examined.told(found.final.model.found),
     }

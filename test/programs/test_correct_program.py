@@ -85,6 +85,15 @@ def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
         assert (tmp_path / 'out' / name).read_bytes() == (MADE / name).read_bytes()
 
 
+def test_a_job_in_pulses_is_refused_without_their_size(tmp_path):
+    said = weld_twin(
+        *('correct-program', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
+        *('--out', tmp_path / 'out'),
+    )
+    assert said.code == 2 and '--pulses-per-degree' in said.err
+    assert said.err.count('\n') == 1 and not (tmp_path / 'out').exists()
+
+
 @pytest.mark.parametrize('language', CELLS)
 def test_the_real_tool_goes_where_the_program_meant(language, tmp_path):
     name, files, reader, near = CELLS[language]

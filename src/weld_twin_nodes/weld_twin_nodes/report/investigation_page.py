@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from weld_twin_core.diagnosis.result import Site
+
 from .html import Html, document, section, table, tag
-from .words import cause
+from .words import cause, in_words
 
 
 def investigation_page(state: Mapping[str, Any]) -> str:
@@ -79,7 +81,7 @@ def _round(number: int, step: Mapping[str, Any]) -> Html:
         f'Round {number}',
         tag('h3', 'Believed'),
         _believed(step['believed']),
-        *_asked(step['asked']),
+        *_asked(step),
         id_=f'round-{number}',
         lead=f'With {names}.',
     )
@@ -101,7 +103,8 @@ def _believed(belief: Mapping[str, Any]) -> Html:
     return tag('div', *parts, table(('hypothesis', 'probability'), rows) if rows else None)
 
 
-def _asked(asked: Mapping[str, Any] | None) -> Sequence[Html]:
+def _asked(step: Mapping[str, Any]) -> Sequence[Html]:
+    asked = step['asked']
     if not asked:
         return []
     sigma = asked['expected_sigma']
@@ -115,8 +118,15 @@ def _asked(asked: Mapping[str, Any] | None) -> Sequence[Html]:
         rows.append(('expected to part them by', f'{sigma:.0f} standard deviations'))
     answers = {None: 'not back yet', True: 'it decided that', False: 'it did not decide that'}
     rows.append(('came back', answers[asked['decided']]))
-    text = tag('p', f'{asked["sentence"]} {asked["reason"]}')
+    text = tag('p', _told(asked['sentence'], step), ' ', _told(asked['reason'], step))
     return [tag('h3', 'Asked'), text, table(('', ''), rows)]
+
+
+def _told(text: str, step: Mapping[str, Any]) -> str:
+    """Return a sentence with causes as people say them."""
+    items = [item for side in step['asked']['between'] or () for item in side]
+    items += step['believed']['candidates']
+    return in_words(text, {Site(item['effect'], item.get('joint')) for item in items})
 
 
 def _name(item: Mapping[str, Any]) -> str:

@@ -45,6 +45,8 @@ _WORDS = {
     'offset': 'off by',
 }
 """Parameters as a fitter says them; the others are words already."""
+_NARROW = 0.02
+"""Width of an interval below which whole per cents would make its ends the same."""
 _VALUES = 4
 """Parameters told on a card; effects.yaml has all."""
 
@@ -96,7 +98,9 @@ def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
 
 
 def _bounds(low: float, high: float) -> str:
-    return f'{100.0 * low:.0f} to {100.0 * high:.0f} %'
+    """Return the ends of an interval in %, with a decimal where it is narrow."""
+    places = 1 if high - low < _NARROW else 0
+    return f'{100.0 * low:.{places}f} to {100.0 * high:.{places}f} %'
 
 
 def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None) -> Html:

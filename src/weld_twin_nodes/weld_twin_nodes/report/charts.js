@@ -10,7 +10,7 @@ window.charts = (() => {
   let told = false;
 
   function value(axis) {
-    return (chart, v) => (v == null ? '–' : `${Number(v.toPrecision(4))} ${axis.unit}`.trim());
+    return (chart, v) => (v == null ? '–' : `${Number(v.toPrecision(3))} ${axis.unit}`.trim());
   }
 
   function series(line, axis) {

@@ -156,24 +156,35 @@ def _directions(diagnosis: Diagnosis) -> Html:
 
 def _stretches(diagnosis: Diagnosis) -> Html | None:
     path = diagnosis.where.path
-    if len(path) < 2:
+    # Contacts have a table of their own, and no time.
+    if len(path) < 2 or diagnosis.contacts is not None:
         return None
     largest = max(*(rms for *_, rms in path), 1e-12)
-    strips: list[list[Html]] = [[]]
-    last = path[0][0]
-    for start, end, share, rms in path:
-        if start < last:
-            strips.append([])
-        last = start
-        strips[-1].append(_stretch(diagnosis, len(strips) - 1, (start, end, share, rms), largest))
+    strips: dict[int, list[Html]] = {}
+    run, last = 0, path[0][0]
+    for told in path:
+        run, last = _run_of(diagnosis, told, run, last), told[0]
+        strips.setdefault(run, []).append(_stretch(diagnosis, run, told, largest))
     return _part(
         'Along the recording',
         tag(
             'div',
-            *(tag('ol', *cells, class_='strip') for cells in strips),
+            *(tag('ol', *cells, class_='strip') for cells in strips.values()),
             tag('p', 'RMS gap of each stretch, and its time.', class_='note'),
         ),
     )
+
+
+def _run_of(
+    diagnosis: Diagnosis, told: tuple[float, float, float, float], run: int, last: float
+) -> int:
+    """Return the recording of a stretch, which follows one of a recording that began before."""
+    start, end = told[:2]
+    stamps = diagnosis.traces.t
+    for k in range(run + (start < last), len(stamps)):
+        if stamps[k].size and stamps[k][0] <= start and end <= stamps[k][-1]:
+            return k
+    return run
 
 
 def _stretch(

@@ -9,8 +9,8 @@ window.charts = (() => {
   const drawn = [];
   let told = false;
 
-  function value(axis) {
-    return (chart, v) => (v == null ? '–' : `${Number(v.toPrecision(3))} ${axis.unit}`.trim());
+  function value(axis, digits) {
+    return (chart, v) => (v == null ? '–' : `${Number(v.toPrecision(digits))} ${axis.unit}`.trim());
   }
 
   function series(line, axis) {
@@ -21,7 +21,7 @@ window.charts = (() => {
       paths: line.points ? () => null : undefined,
       dash: line.dashed ? [6, 4] : undefined,
       points: { show: line.points, size: 5, fill: () => colour(line.colour) },
-      value: value(axis),
+      value: value(axis, 4),
     };
   }
 
@@ -68,7 +68,7 @@ window.charts = (() => {
     const spec = JSON.parse(figure.querySelector('script').textContent);
     const place = figure.querySelector('.plot');
     const lines = [
-      { label: spec.axes[0].label, value: spec.dates ? undefined : value(spec.axes[0]) },
+      { label: spec.axes[0].label, value: spec.dates ? undefined : value(spec.axes[0], 6) },
       ...spec.lines.map((line) => series(line, spec.axes[1])),
     ];
     const data = [spec.x, ...spec.lines.map((line) => line.values)];

@@ -160,7 +160,7 @@ class JointStates:
 
     def _only_zeros(self, q: Array, qd: Array) -> bool:
         """Return whether velocities stay zero while joints move, as some drivers have them."""
-        if qd.any():
+        if qd[0] != 0.0 or qd.any():
             self._resting, self._zeros = None, False
         elif self._resting is None:
             self._resting = q

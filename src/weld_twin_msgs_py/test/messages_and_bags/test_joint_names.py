@@ -41,6 +41,17 @@ def test_one_of_two_robots_on_a_topic_is_chosen_by_its_prefix():
     np.testing.assert_array_equal(states.take(state(0, q, both)).q, q[6:])
 
 
+def test_joints_of_another_robot_are_passed_over_once_the_names_are_known():
+    """A prefix is taken off names that were never seen without it."""
+    states, q = JointStates(ROBOT), np.full(6, 0.1)
+    assert states.take(state(0, q)) is not None
+    for k in range(1, 5):
+        assert states.take(state(k, q, [f'other_{name}' for name in ROBOT.joint_names])) is None
+    assert states.others == 4
+    assert states.remark == ''
+    assert states.take(state(5, q)) is not None
+
+
 def test_velocities_that_stay_zero_while_a_joint_moves_are_left_out_and_told():
     states = JointStates(ROBOT, mend=True)
     known = []

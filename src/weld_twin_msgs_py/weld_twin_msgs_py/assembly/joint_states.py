@@ -215,8 +215,8 @@ class JointStates:
             There are several prefixes: those of several robots.
 
         """
-        if self._given:
-            return False
+        if self._given or self._usual is not None or self._spread:
+            return False  # the names are known: these are the joints of another robot
         prefixes = set.intersection(
             *(
                 {each.removesuffix(own) for each in names if each.endswith(own)}

@@ -52,6 +52,14 @@ def test_joints_of_another_robot_are_passed_over_once_the_names_are_known():
     assert states.take(state(5, q)) is not None
 
 
+def test_our_own_joints_count_though_another_robots_came_first():
+    states, q = JointStates(ROBOT, mend=True), np.full(6, 0.1)
+    assert states.take(state(0, q, [f'left_{name}' for name in ROBOT.joint_names])) is not None
+    np.testing.assert_array_equal(states.take(state(1, q + 0.1)).q, q + 0.1)
+    assert states.take(state(2, q, [f'left_{name}' for name in ROBOT.joint_names])) is None
+    assert 'what came with a prefix before was of another robot' in states.remark
+
+
 def test_velocities_that_stay_zero_while_a_joint_moves_are_left_out_and_told():
     states = JointStates(ROBOT, mend=True)
     known = []

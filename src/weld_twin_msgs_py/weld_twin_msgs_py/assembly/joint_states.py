@@ -193,7 +193,7 @@ class JointStates:
         if not present:
             if not message.name:
                 raise Missing('the joint state names no joint')
-            if not self._take_prefix(message.name):
+            if not (self._take_own_names(message) or self._take_prefix(message.name)):
                 self.others += 1
                 return None
             present = self._names
@@ -204,6 +204,24 @@ class JointStates:
         self._usual = message.name
         self._index = [list(message.name).index(name) for name in self._names]
         return JointSample(stamp, q, from_messages.joint_velocities(message, self._names))
+
+    def _take_own_names(self, message: Any) -> bool:
+        """
+        Go back to the robot's own names where they come after all, in a running node.
+
+        What had a prefix was another robot's then.
+        """
+        own = self._robot.joint_names
+        if not self._mend or self._given or self._names == own:
+            return False
+        if from_messages.joints_present(message, own) != own:
+            return False
+        self._names, self._usual = own, None
+        self.remark = (
+            'the joints come under their own names now; what came with a prefix before was '
+            'of another robot'
+        )
+        return True
 
     def _take_prefix(self, names: Sequence[str]) -> bool:
         """

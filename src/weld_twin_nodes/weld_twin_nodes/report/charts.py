@@ -108,6 +108,7 @@ def chart(
         tag('div', class_='plot', role='img', aria_label=title, style=f'min-height:{height}px'),
         embedded(spec),
         class_='chart',
+        data_key=key,
     )
 
 

@@ -40,7 +40,7 @@ def seam_section(diagnosis: Diagnosis) -> Html:
         _figures() if switches(diagnosis) else None,
         tag('div', *_panels(diagnosis, changes), class_='panels' if changes else 'panels one'),
         _controls(),
-        tag('p', class_='instant', id_='instant', role='status'),
+        tag('p', class_='instant', id_='instant'),
         tag('noscript', tag('p', 'The pictures need scripts switched on.')),
         _charts(diagnosis),
         id_='seam',

@@ -69,9 +69,10 @@ window.sheet = (() => {
     put('now-rms', mm(now));
     put('now-max', mm(most('now')));
     put('now-share', `${(100 * now / Math.max(before, 1e-12)).toFixed(0)} %`);
-    all('#seam figure.chart').forEach((figure, k) => {
-      if (data.runs[k]) window.charts.update(figure, { 'with that mended': data.runs[k].size.now });
-    });
+    for (const figure of all('#seam figure.chart')) {
+      const run = data.runs[Number(figure.dataset.key.replace('run', ''))];
+      window.charts.update(figure, { 'with that mended': run.size.now });
+    }
     accept();
     document.dispatchEvent(new CustomEvent('switched'));
   }

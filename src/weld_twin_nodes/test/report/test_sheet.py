@@ -11,7 +11,7 @@ import diagnoses
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.result import Unsound
+from weld_twin_core.diagnosis.result import Traces, Unsound
 from weld_twin_core.recording import JointMotion
 from weld_twin_nodes.cli.commands.diagnose import BRANDS as CHOICES
 from weld_twin_nodes.report import report_page
@@ -58,7 +58,16 @@ def unsound():
     wrong = Unsound(
         'joints_swapped', ('joint_4', 'joint_6'), 'Joint 4 and joint 6 are swapped.', 'Swap them.'
     )
-    return replace(diagnoses.nothing(), status='unsound', unsound=(wrong,), causes=())
+    nan = float('nan')
+    none = diagnoses.nothing()
+    return replace(
+        none,
+        status='unsound',
+        unsound=(wrong,),
+        causes=(),
+        gap=replace(none.gap, rms_m=nan, mean_m=nan, max_m=nan, noise_floor_m=nan),
+        traces=Traces((), (), (), ()),
+    )
 
 
 CASES = {**diagnoses.ALL, 'unsound': unsound}

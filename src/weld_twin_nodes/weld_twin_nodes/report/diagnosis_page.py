@@ -81,9 +81,12 @@ def report_page(
         ]
     )
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
+    foot = tag('div', inputs_section(inputs), class_='detail')
+    main = tag('main', Html(renamed(body, sheet.joints)), foot)
+    if not sound:
+        return document(title, main)
     data = {**page_data(diagnosis), 'rule': rule_data(rule), 'circles': circle_data(diagnosis)}
-    body, told = (Html(renamed(part, sheet.joints)) for part in (body, embedded(data, 'data')))
-    main = tag('main', body, tag('div', inputs_section(inputs), class_='detail'))
+    told = Html(renamed(embedded(data, 'data'), sheet.joints))
     scripts = [tag('script', own_file(name)) for name in SCRIPTS]
     return document(title, main, told, charts=True, scripts=scripts)
 

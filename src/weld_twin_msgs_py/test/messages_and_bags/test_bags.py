@@ -454,3 +454,8 @@ def test_a_table_in_place_of_a_bag_is_told_the_way(tmp_path, robot):
     (tmp_path / 'mine.csv').write_text('a,b\n1,2\n', encoding='utf-8')
     with pytest.raises(DataError, match=r'a table becomes one with weld-twin import$'):
         read_recording(tmp_path / 'mine.csv', robot)
+
+
+def test_a_directory_may_be_called_a_bag(tmp_path, robot, recording):
+    write_recording(tmp_path / 'mine.bag', recording, robot)
+    assert_same(read_recording(tmp_path / 'mine.bag', robot), recording)

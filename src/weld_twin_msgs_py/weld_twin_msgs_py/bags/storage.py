@@ -57,7 +57,7 @@ def look(path: Path) -> Bag:
 
     """
     refuse_unfinished(path)
-    if path.suffix == '.bag':
+    if path.suffix == '.bag' and not path.is_dir():
         raise DataError(f"'{path}' is a ROS 1 bag; convert it with rosbags-convert first")
     if path.is_file():
         if path.suffix not in SUFFIXES:

@@ -218,3 +218,26 @@ def test_a_marker_of_a_c3d_file_is_read(tmp_path):
     keep = np.arange(COUNT) != 7
     np.testing.assert_allclose(recording.measured.position, POINT[keep], atol=1e-6)
     np.testing.assert_allclose(recording.measured.t, T[keep], atol=1e-4)
+
+
+def test_a_file_cut_off_before_its_header_is_told(tmp_path):
+    cut = vicon().replace('Frame,Sub Frame', 'Frame Sub Frame')
+    with pytest.raises(DataError, match='the names of columns are gone'):
+        read_two_tables(*both(tmp_path, ur_rtde(), cut))
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'words'),
+    [
+        ('241,0.04000000', '241,often', 'has an entry that is no number'),
+        (f'220,{COUNT}', '220,999999999999', 'says that a channel has 999999999999 values'),
+        ('214,REAL64', '214,INT12', 'values of type INT12 are not read'),
+        ('221,3', '221,17', 'stores its channels in a way that is not known'),
+    ],
+)
+def test_a_trace_that_is_broken_is_told(tmp_path, old, new, words):
+    path = trace_of_kuka(tmp_path, True)
+    path.write_text(path.read_text('latin-1').replace(old, new, 1), encoding='latin-1')
+    _, seen, _ = both(tmp_path, '', vicon())
+    with pytest.raises(DataError, match=words):
+        read_two_tables(path, seen, UR5)

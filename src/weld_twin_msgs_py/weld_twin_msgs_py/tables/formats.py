@@ -180,13 +180,17 @@ def read(known: Format, text: str, marker: str | None) -> Read:
 
     """
     lines = text.splitlines()
-    at = next(k for k, line in enumerate(lines) if re.search(known.header, line))
+    at = next((k for k, line in enumerate(lines) if re.search(known.header, line)), -1)
+    if at < 0:
+        raise DataError(
+            f'it begins as the {known.name} writes it, and the names of columns are gone'
+        )
     split = [_split(line, known) for line in lines]
     if not known.names:
         return _points(known, split, at, marker)
     header = _names(known, lines, split, at)
     first = at + 1 + known.below
-    if known.named_by and split[first] and not _number(split[first][0]):
+    if known.named_by and first < len(split) and split[first] and not _number(split[first][0]):
         header, first = split[first], first + 1  # QTM writes names over the columns if asked to
     found, said = _meant(known, header, text, marker)
     rows, numbers = [], []

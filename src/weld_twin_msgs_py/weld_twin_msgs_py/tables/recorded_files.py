@@ -24,6 +24,8 @@ C3D_MARK = b'\x50'
 """The second byte of every C3D file."""
 TRACE_MARK = 'DIAEXTENDED'
 """The first line of a trace."""
+MOST = 50_000_000
+"""Values of a channel: fourteen hours at 1 kHz; more is a digit too many."""
 NAME, KIND, UNIT, FILE, STORED, TYPE = '200', '210', '202', '211', '213', '214'
 COUNT, FIRST, BEGIN, STEP = '220', '221', '240', '241'
 """Entries of a channel in the header of DIAdem: number of values, place of the first one counted
@@ -87,7 +89,12 @@ def read_trace(path: Path, text: str) -> Read:
     for channel in found:
         unit = channel.get(UNIT, '')
         names.append(f'{channel.get(NAME, "?")} [{unit}]' if unit else channel.get(NAME, '?'))
-        columns.append(_values(path, channel, found))
+        try:
+            columns.append(_values(path, channel, found))
+        except (ValueError, OverflowError):
+            raise DataError(
+                f"trace '{path}': channel {names[-1]!r} has an entry that is no number"
+            ) from None
     if not columns:
         raise DataError(f"trace '{path}' describes no channel")
     count = len(columns[0])
@@ -100,6 +107,8 @@ def read_trace(path: Path, text: str) -> Read:
 def _values(path: Path, channel: Mapping[str, str], all_: Sequence[Mapping[str, str]]) -> Array:
     """Return the values of a channel, a time counted up or numbers from a file."""
     count = int(channel.get(COUNT, '0'))
+    if not 0 <= count <= MOST:
+        raise DataError(f"trace '{path}' says that a channel has {count} values")
     begin, step = float(channel.get(BEGIN, '0')), float(channel.get(STEP, '1'))
     if channel.get(KIND, '').startswith('IMPLI'):
         return np.asarray(begin + step * np.arange(count))

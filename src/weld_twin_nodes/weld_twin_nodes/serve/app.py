@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import shutil
 from collections.abc import Callable, Mapping
@@ -30,6 +31,10 @@ from .uploads import asked_of, save
 
 FIELDS = 20
 """Fields of a form at most, besides its files."""
+UPLOADING = 4
+"""Uploads read at the same time, which bounds what lies half read on the disk; others wait."""
+SANDBOX = 'sandbox allow-scripts allow-downloads allow-modals'
+"""A sheet draws itself and prints; it is kept off the pages around it, cookies included."""
 FIELD = 4096
 """Bytes of a field at most."""
 Said = Callable[[], Mapping[str, str] | None]
@@ -73,6 +78,7 @@ def make_app(settings: Settings, queue: Queue, live: Said = lambda: None) -> Acc
 class _Site:
     def __init__(self, settings: Settings, queue: Queue, live: Said) -> None:
         self._settings, self._queue, self._live = settings, queue, live
+        self._uploads = asyncio.Semaphore(UPLOADING)
 
     def start(self) -> Response:
         return HTMLResponse(pages.start_page(live=self._settings.live))
@@ -83,9 +89,12 @@ class _Site:
         job = Job.new(user, (), Asked(''))
         folder = self._queue.folder(job)
         try:
-            async with request.form(
-                max_files=self._settings.files, max_fields=FIELDS, max_part_size=FIELD
-            ) as form:
+            async with (
+                self._uploads,
+                request.form(
+                    max_files=self._settings.files, max_fields=FIELDS, max_part_size=FIELD
+                ) as form,
+            ):
                 uploads = [f for f in form.getlist('files') if isinstance(f, UploadFile)]
                 names = await save(uploads, folder / UPLOADS, self._settings.files)
                 job = replace(job, names=names, asked=asked_of(form, names))
@@ -118,7 +127,7 @@ class _Site:
         file = self._queue.folder(self._job(request, key)) / FOUND / name
         if name not in dict(pages.FILES) or not file.is_file():
             raise HTTPException(404)
-        return FileResponse(file)
+        return FileResponse(file, headers={'content-security-policy': SANDBOX})
 
     async def history(self, request: Request, cell: str = '') -> Response:
         file = self._queue.user_folder(request.scope['user']) / HISTORY

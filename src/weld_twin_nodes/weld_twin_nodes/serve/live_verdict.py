@@ -27,10 +27,11 @@ class LiveVerdict:
         self._last: dict[str, str] | None = None
         self._context = rclpy.Context()
         rclpy.init(context=self._context)
-        node = rclpy.create_node('weld_twin_serve', context=self._context)
-        node.create_subscription(DiagnosticArray, DIAGNOSIS.name, self._take, 10)
+        # The executor does not keep it alive.
+        self._node = rclpy.create_node('weld_twin_serve', context=self._context)
+        self._node.create_subscription(DiagnosticArray, DIAGNOSIS.name, self._take, 10)
         executor = SingleThreadedExecutor(context=self._context)
-        executor.add_node(node)
+        executor.add_node(self._node)
         threading.Thread(target=executor.spin, daemon=True).start()
 
     def _take(self, message: Any) -> None:

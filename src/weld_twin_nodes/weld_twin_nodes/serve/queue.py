@@ -88,10 +88,8 @@ class Queue:
         return self._place / job.key
 
     def user_folder(self, user: str) -> Path:
-        """Return the folder of a user, made where it is not there."""
-        place = self._settings.directory / 'users' / user
-        place.mkdir(parents=True, exist_ok=True)
-        return place
+        """Return the folder of a user; it is there once something was kept in it."""
+        return self._settings.directory / 'users' / user
 
     def check_room(self, user: str) -> None:
         """
@@ -153,9 +151,12 @@ class Queue:
             self._news.notify()
 
     def _forget(self, user: str) -> None:
-        """Take away the oldest finished jobs of a user beyond what is kept."""
-        finished = [job for job in self.of(user) if job.state not in OPEN]
-        for job in finished[self._settings.kept :]:
+        """Take away the oldest finished jobs beyond what is kept, of a user and of all."""
+        with self._news:
+            every = sorted(self._jobs.values(), key=lambda job: -job.since)
+        finished = [job for job in every if job.state not in OPEN]
+        mine = [job for job in finished if job.user == user]
+        for job in {*mine[self._settings.kept :], *finished[self._settings.kept_of_all :]}:
             with self._news:
                 del self._jobs[job.key]
             shutil.rmtree(self.folder(job), ignore_errors=True)
@@ -211,7 +212,9 @@ class Queue:
                 datetime.fromisoformat(asked.at).replace(tzinfo=timezone.utc) if asked.at else None
             )
             entry = entry_of(self.folder(job) / FOUND, at)
-            database = Database(str(self.user_folder(job.user) / HISTORY))
+            place = self.user_folder(job.user)
+            place.mkdir(parents=True, exist_ok=True)
+            database = Database(str(place / HISTORY))
             try:
                 new = database.add(asked.cell, entry)
                 Runs(database).look(asked.cell)

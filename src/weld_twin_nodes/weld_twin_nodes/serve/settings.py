@@ -39,8 +39,8 @@ class Settings:
         Files of one upload.
     own, waiting : int
         Recordings that may wait, of one user and of all.
-    kept : int
-        Recordings kept of one user; the oldest that are finished go first.
+    kept, kept_of_all : int
+        Recordings kept, of one user and of all; the oldest that are finished go first.
     database : str
         History of the plant that everybody may read; empty for none.
     live : bool
@@ -60,6 +60,7 @@ class Settings:
     own: int = 10
     waiting: int = 100
     kept: int = 50
+    kept_of_all: int = 1000
     database: str = ''
     live: bool = False
 

@@ -20,10 +20,11 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.contacts import spreads
-from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.advice.next_touches import next_touches
-from weld_twin_core.diagnosis.algebra.problem import Model, Scale
+from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.hypotheses.plain_causes import plain_causes
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.whole_files import write_text
 
@@ -127,9 +128,20 @@ def _taken(pool: dict[str, Array], count: int) -> tuple[Array, list[str]]:
 
 
 def _left(cell: _Cell, recording: Recording) -> tuple[float, float]:
-    """Return the spread that is left where nothing was used, and the nominal one [m]."""
-    _, nominal = aligned(recording, cell.robot, '', ())
-    return cell.left(diagnose(recording, cell.robot).model), cell.left(nominal)
+    """
+    Return the spread that is left where nothing was used, and the nominal one [m].
+
+    All constant errors and springs are fitted, as large as machines have them: what postures tell
+    is asked, and not what a search makes of it.
+    """
+    problem, nominal = aligned(recording, cell.robot, '', ())
+    view = problem.features(nominal)[0].view
+    plain = nominal.with_found(tuple(plain_causes(cell.robot, view, ('constant', 'load'))))
+    return cell.left(fit(problem, plain, _scale(problem)).model), cell.left(nominal)
+
+
+def _scale(problem: Problem) -> Scale:
+    return Scale(SLACK, 1.0, tuple(np.ones(m) for m in problem.samples))
 
 
 def _proposed(
@@ -140,8 +152,7 @@ def _proposed(
     for _ in range(ASKED):
         recording = cell.touched(q, labels, rng)
         problem, model = aligned(recording, cell.robot, '', ())
-        scale = Scale(SLACK, 1.0, tuple(np.ones(m) for m in problem.samples))
-        wanted = next_touches(problem, model, (), scale, elsewhere=False)
+        wanted = next_touches(problem, model, (), _scale(problem), elsewhere=False)
         if wanted is None:
             return
         q = np.concatenate([q, np.array(wanted['motion']['q'])])

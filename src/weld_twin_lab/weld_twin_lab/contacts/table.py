@@ -13,6 +13,15 @@ HEADER = (
     '| arm | places | spread before [mm] | after, each place left out [mm] | per axis [mm] | '
     'worst place [mm] | sockets [mm] | status | one place only: better or flagged | time [s] |'
 )
+EACH = (
+    '| arm | place left out | before [mm] | after [mm] | per axis [mm] | sockets [mm] | '
+    'foretold from the others [mm] | status |'
+)
+TITLE = """# Three arms without an instrument
+
+Mean distance of the predicted ball from the middle of its socket, each place left out in turn;
+[how it was done](../../contacts.md#what-it-reached).
+"""
 
 
 def summary(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -49,7 +58,7 @@ def summary(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def table(entries: Sequence[dict[str, Any]]) -> str:
     """Return the table in Markdown."""
-    lines = [HEADER, '|' + '---|' * HEADER.count(' | ') + '---|']
+    lines = [TITLE, HEADER, '|' + '---|' * HEADER.count(' | ') + '---|']
     for row in summary(entries):
         near, far = min(row['distances_m']) * 1e3, max(row['distances_m']) * 1e3
         status = ', '.join(
@@ -68,4 +77,16 @@ def table(entries: Sequence[dict[str, Any]]) -> str:
             f'{row["seconds"]:.1f}',
         ]
         lines.append('| ' + ' | '.join(cells) + ' |')
+    lines += ['', EACH, '|' + '---|' * EACH.count(' | ') + '---|']
+    for entry in entries:
+        if entry['kind'] == 'without':
+            row = entry['judged'][0]
+            sizes = (row['before_m'], row['after_m'], row['each_axis_m'])
+            cells = [entry['arm'], row['place'], *(f'{size * 1e3:.3f}' for size in sizes)]
+            told = entry['told_held_out_m']
+            cells += [
+                f'{row["distance_m"] * 1e3:.2f}',
+                '-' if told is None else f'{told * 1e3:.3f}',
+            ]
+            lines.append('| ' + ' | '.join([*cells, entry['status']]) + ' |')
     return '\n'.join(lines) + '\n'

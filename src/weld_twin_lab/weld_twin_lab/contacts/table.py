@@ -17,7 +17,7 @@ EACH = (
     '| arm | place left out | before [mm] | after [mm] | per axis [mm] | sockets [mm] | '
     'foretold from the others [mm] | status |'
 )
-TITLE = """# Three arms without an instrument
+TITLE = """# Arms without an instrument
 
 Mean distance of the predicted ball from the middle of its socket, each place left out in turn;
 [how it was done](../../contacts.md#what-it-reached).

@@ -141,7 +141,12 @@ def table(result: dict[str, Any]) -> str:
     def ms(row: dict[str, float]) -> str:
         return f'{row["p50_us"] / 1e3:.2f} / {row["p99_us"] / 1e3:.2f}'
 
-    head = 'Hz', 'relay p50 / p99', 'raw relay', 'twin', 'twin / relay', 'twin on /tf / relay'
+    def ratio(row: dict[str, float]) -> str:
+        return f'{row["p50_us"]:.2f} / {row["p99_us"]:.2f}'
+
+    on_tf = all('ratio_tf' in row for row in result['rates'])
+    head: tuple[str, ...] = 'Hz', 'relay p50 / p99', 'raw relay', 'twin', 'twin / relay'
+    head += ('twin on /tf / relay',) if on_tf else ()
     return markdown.table(
         (*head, 'CPU relay / twin', 'ratio'),
         *(
@@ -150,8 +155,8 @@ def table(result: dict[str, Any]) -> str:
                 ms(row['relay']),
                 ms(row['raw_relay']),
                 ms(row['twin']),
-                f'{row["ratio"]["p50_us"]:.2f} / {row["ratio"]["p99_us"]:.2f}',
-                f'{row["ratio_tf"]["p50_us"]:.2f} / {row["ratio_tf"]["p99_us"]:.2f}',
+                ratio(row['ratio']),
+                *([ratio(row['ratio_tf'])] if on_tf else []),
                 f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}',
                 f'{row["ratio"]["cpu_us"]:.2f}',
             )

@@ -58,7 +58,13 @@ def verdict(result: dict[str, Any]) -> bool:
 
 def table(result: dict[str, Any]) -> str:
     """Return a row without keys and one with them."""
-    head = ('keys', 'a stranger heard', "the driver's", 'without keys', 'with other keys')
-    rows = [(way, result[way]['heard'], *result[way]['recorded']) for way in WAYS if way in result]
+    head = (
+        *('keys', 'all nodes ran', 'poses a stranger heard', 'joint states of the driver'),
+        *('of one without keys', 'of one with other keys'),
+    )
+    rows = [
+        (way, 'yes' if made['alive'] else 'no', made['heard'], *made['recorded'])
+        for way, made in ((way, result[way]) for way in WAYS if way in result)
+    ]
     reason = f'\n{result["reason"]}\n' if result['reason'] else ''
     return markdown.table(head, *rows) + reason

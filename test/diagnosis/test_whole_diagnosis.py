@@ -14,7 +14,7 @@ SINGLE = {
     'joint_compliance': dict(joint='shoulder_lift_joint', compliance=1.2e-5),
     'servo_lag': dict(joint='elbow_joint', time_constant=8e-3),
     'transmission_ripple': dict(joint='shoulder_lift_joint', amplitude=3e-4, order=20, phase=0.7),
-    'joint_offset': dict(joint='elbow_joint', offset=6e-4),
+    'joint_offset': dict(joint='elbow_joint', offset=-6e-4),  # away from where the load pulls
     'time_delay': dict(delay=6e-3),
     'tool_pose': dict(xyz=(4e-4, -3e-4, 2e-4), rotvec=(6e-4, 0.0, -8e-4)),
 }

@@ -28,6 +28,7 @@ MODULES = {
     'pin': 'pinocchio',
     'SALib': 'SALib',
     'roboticstoolbox-python': 'roboticstoolbox',
+    'scikit-learn': 'sklearn',
 }
 """Modules of the distributions that are called otherwise."""
 ROS = {

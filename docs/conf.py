@@ -31,7 +31,7 @@ include_patterns = [
     'docs/results/contacts/contacts.md',
     'docs/results/coverage/coverage.md',
     'docs/results/gate/gate.md',
-    'docs/results/history/pages.md',
+    'docs/results/history/*.md',
     'docs/results/sensitivity/README.md',
     'docs/results/transfer/after.md',
     'docs/results/transfer/before.md',

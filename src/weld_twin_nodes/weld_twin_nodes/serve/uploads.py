@@ -15,7 +15,7 @@ from weld_twin_core.errors import DataError
 
 from .job import TABLES, Asked
 
-BAGS = ('.mcap', '.db3', '.bag')
+BAGS = ('.mcap', '.db3', '.bag', '.zstd')
 OTHERS = ('.yaml', '.yml', '.urdf', '.xml')
 """Suffixes of what may be dropped besides a table: a bag's files, and robot files."""
 PLAIN = re.compile(r'[A-Za-z0-9][A-Za-z0-9._ -]{0,120}')

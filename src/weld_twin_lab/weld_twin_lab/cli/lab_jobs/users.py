@@ -93,9 +93,10 @@ def _malicious(root: str, place: Path) -> dict[str, str]:
         folder = place / f'harm{number}'
         folder.mkdir()
         made = make(folder)
-        files = sorted(f for f in made.iterdir() if f.is_file()) if made.is_dir() else [made]
-        visitor = Visitor(root)
-        out[name] = _dropped(visitor, files)
+        found = sorted(made.iterdir()) if made.is_dir() else [made]
+        files = [file for file in found if file.is_file()]
+        # A device is no file, and no browser sends it.
+        out[name] = _dropped(Visitor(root), files) if files else 'refused by the browser'
     return out
 
 

@@ -45,6 +45,8 @@ class Plan:
         The same without that bound.
     pair : tuple of int, optional
         The two explanations that it parts most.
+    decided : bool
+        Whether the data at hand part all explanations already.
     before, after : float
         How far the data at hand part those two, and what is added.
 
@@ -57,6 +59,7 @@ class Plan:
     pair: Pair | None = None
     before: float = 0.0
     after: float | None = None
+    decided: bool = False
 
     @property
     def robot_minutes(self) -> float:
@@ -144,7 +147,9 @@ def _plan(
 ) -> Plan:
     best = max(gains, key=lambda pair: gains[pair])
     apart = sum(gain for gain in gains.values() if gain > NOTHING)
-    return Plan(option, tuple(chosen), score, apart, best, _mean(before, best), gains[best])
+    known = _mean(before, best)
+    decided = known >= MARGIN * DECIDES
+    return Plan(option, tuple(chosen), score, apart, best, known, gains[best], decided)
 
 
 def _open(option: Candidate, chosen: Sequence[int], left: float) -> list[int]:
@@ -164,7 +169,10 @@ def _next(
     """Return the piece that adds most for its time, what pairs gain with it, and the score."""
     after = told.added(chosen, more)
     table: dict[Pair, Array] = {}
-    for one, other in sorted({(min(pair), max(pair)) for pair in after}):
+    pairs = sorted({(min(pair), max(pair)) for pair in after})
+    undecided = [pair for pair in pairs if _mean(before, pair) < MARGIN * DECIDES]
+    # What the data at hand decide already is no question, unless nothing else is left.
+    for one, other in undecided or pairs:
         # The mean over which of the two is true: where one contains the other, as play that may be
         # zero, only the truth of the larger one shows.
         ways = [

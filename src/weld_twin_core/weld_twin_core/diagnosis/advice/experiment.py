@@ -75,9 +75,12 @@ def next_experiment(
     if not plans:
         return None
     best = max(plan.score for plan in plans)
-    if best == 0.0:
-        if closed:
-            told: dict[str, Any] = _outside(alternatives[0], alternatives[1])
+    decided = not closed and all(plan.decided for plan in plans)
+    if best == 0.0 or decided:
+        if decided:
+            told: dict[str, Any] = _entry(widening(problem, options, limits), _DECIDED, model)
+        elif closed:
+            told = _outside(alternatives[0], alternatives[1])
         else:
             told = _entry(widening(problem, options, limits), _ALIKE, model)
     else:
@@ -118,6 +121,10 @@ def _plans(
 _UNKNOWN = (
     'No effect of the library explains what is left; data of another kind show whether it '
     'depends on pose, direction or speed.'
+)
+_DECIDED = (
+    'What is believed is parted from what else it could be, but answers from recordings like these '
+    'are often wrong: data from elsewhere show whether it holds.'
 )
 _ALIKE = (
     'The explanations at hand move the tool alike, and none of them is sure: data from elsewhere '

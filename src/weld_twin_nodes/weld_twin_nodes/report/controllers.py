@@ -56,7 +56,7 @@ _PLACES = {
     ('ur', 'tool'): 'Installation > General > TCP: change position and orientation.',
     ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',
 }
-"""Menus as the makers' operating manuals name them; newer releases may move them."""
+"""Menus as they are usually called; they were not held against manuals, and releases move them."""
 
 
 def brand_of(robot: str) -> str | None:

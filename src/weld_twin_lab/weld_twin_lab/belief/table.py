@@ -36,34 +36,11 @@ def page(result: Mapping[str, Any]) -> str:
         As `study.judged` gives it.
 
     """
-    taught, tried = result['learned_from'], result['judged_on']
-    bounds = {name: b for name, b in taught['bounds'].items() if name.startswith('answer ')}
-    intro = (
-        f'Learned from {taught["cases"]} cases of seed {_listed(taught["seeds"])}, judged on '
-        f'{tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was learned '
-        f'from. From where an answer is told as sure:'
-    )
     levels = [(name, row) for name, row in result['levels'].items() if row['after']]
     groups = [(name, row) for name, row in result['groups'].items() if row['after']]
     return '\n'.join(
         [
-            intro,
-            '',
-            markdown.table(
-                (
-                    'answers',
-                    'cases',
-                    'sure from',
-                    'sure',
-                    'of these wrong',
-                    'at most',
-                    'surely below',
-                ),
-                *(_bound(name.partition(' ')[2], b) for name, b in bounds.items()),
-            ),
-            'Each case was judged by weights that had not seen it. One more such answer is sure and '
-            'wrong with a probability of at most the sixth column; the share is below the last with '
-            '90 % confidence.',
+            *_bounds(result['learned_from'], result['judged_on']),
             '',
             markdown.table(HEAD, *(_row(name, row) for name, row in levels)),
             'Answers as a whole:',
@@ -73,7 +50,7 @@ def page(result: Mapping[str, Any]) -> str:
             '',
             markdown.table(
                 ('statements on', 'belief', 'calibration error', 'sure and wrong', 'sure'),
-                *_unseen(taught['unseen']),
+                *_unseen(result['learned_from']['unseen']),
             ),
             'Beside the goals:',
             '',
@@ -84,6 +61,24 @@ def page(result: Mapping[str, Any]) -> str:
             *_failures(result['wrong_and_sure']),
         ]
     )
+
+
+def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
+    """Return what was learned from, and from where an answer is told as sure."""
+    bounds = {name: b for name, b in taught['bounds'].items() if name.startswith('answer ')}
+    return [
+        f'Learned from {taught["cases"]} cases of seed {_listed(taught["seeds"])}, judged on '
+        f'{tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was learned '
+        f'from. From where an answer is told as sure:',
+        '',
+        markdown.table(
+            ('answers', 'cases', 'sure from', 'sure', 'of these wrong', 'at most', 'surely below'),
+            *(_bound(name.partition(' ')[2], b) for name, b in bounds.items()),
+        ),
+        'Each case was judged by weights that had not seen it. One more such answer is sure and '
+        'wrong with a probability of at most the sixth column; the share is below the last with '
+        '90 % confidence.',
+    ]
 
 
 def _unseen(levels: Mapping[str, Any]) -> list[tuple[str, ...]]:

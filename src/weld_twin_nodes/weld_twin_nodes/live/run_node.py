@@ -151,7 +151,8 @@ def _open(args: list[str] | None) -> None:
         said = str(error).partition(', at /')[0]
         given = re.search(r"'((?:-p|--param|--params-file) .*?)'\. Error", said, re.S)
         if given is None:
-            raise ModelError(said) from None
+            safe = f'; {UNLOCKED}' if SECURITY in said.lower() else ''
+            raise ModelError(f'{" ".join(said.split()).rstrip(".")}{safe}') from None
         hint = 'a parameter is given as -p NAME:=VALUE'
         if given[1].startswith('--params-file'):
             hint = 'is there such a YAML file?'

@@ -29,6 +29,10 @@ LONGEST = 1 << 20
 """Bytes of an answer's line; a longer one is a command gone mad."""
 
 
+_CRASHES = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT)
+"""How compiled code ends that was refused memory and did not look whether it got it."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """
@@ -165,6 +169,11 @@ class Guarded:
         said = str(found.get('said', ''))
         if ended == -signal.SIGXCPU or (ended == -signal.SIGKILL and not said):
             said = f'it took more than {self._limits.cpu_s} s of computing'
+        if -ended in _CRASHES and not said:
+            said = (
+                f'its process crashed ({signal.Signals(-ended).name}), as when it needs more memory '
+                f'than {self._limits.memory / 1e9:g} GB'
+            )
         return Outcome(-1, said or f'its process ended with {ended}', seconds)
 
     def _ask(self, asked: dict[str, Any]) -> None:

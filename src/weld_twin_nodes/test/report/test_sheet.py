@@ -19,7 +19,8 @@ from weld_twin_nodes.report.acceptance import Demand
 from weld_twin_nodes.report.controllers import BRANDS, brand_of
 from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.joint_names import joint_labels, renamed
-from weld_twin_nodes.report.quantities import turned
+from weld_twin_nodes.report.quantities import turned, with_ends
+from weld_twin_nodes.report.switches import page_data
 
 THREE = diagnoses.circle()
 CLIPPED = """() => [...document.querySelectorAll('main *')].filter((item) => {
@@ -148,6 +149,48 @@ def test_a_tolerance_is_asked_for_and_judged_by_the_uncertainty(browser):
     for tolerance, word in ((2 * size, 'passes'), (size, 'cannot be said'), (size / 2, 'fails')):
         page.locator('#tolerance').fill(f'{tolerance:.4f}')
         assert verdict.inner_text() == word
+
+
+def test_the_mark_at_the_top_follows_the_tolerance_field(browser):
+    page = browser.open(report_page(THREE))
+    top, table = page.locator('#verdict .judged'), page.locator('[data-verdict=as-it-is]')
+    size = millimetres(page.locator('[data-largest=as-it-is]').inner_text())
+    assert not top.is_visible()
+    for tolerance in (2 * size, size, size / 2):
+        page.locator('#tolerance').fill(f'{tolerance:.4f}')
+        assert top.inner_text().lower().startswith(f'{table.inner_text()}: {size:.3f} mm of ')
+        assert top.inner_text().endswith('as it is, on the seam recorded')
+    page.locator('#tolerance').fill('')
+    assert not top.is_visible()
+
+
+def test_the_worst_instant_is_ringed_when_the_page_opens(page):
+    def picture():
+        page.wait_for_timeout(150)
+        return page.locator('canvas[data-side=before]').screenshot()
+
+    first = picture()
+    run = page_data(THREE)['runs'][0]
+    parts = np.array([run['left'], *run['parts']]).sum(axis=0).reshape(-1, 3)
+    sizes = np.linalg.norm(parts, axis=1)
+    look = """(sample) => document.dispatchEvent(
+      new CustomEvent('looked', { detail: { run: 0, sample } }))"""
+    page.evaluate(look, int(np.argmin(sizes)))
+    assert picture() != first
+    page.evaluate(look, int(np.argmax(sizes)))
+    assert picture() == first
+
+
+def test_no_interval_excludes_its_own_figure():
+    assert with_ends(0.066, 0.062, 0.069) == (
+        '6.6\N{NO-BREAK SPACE}%',
+        '6.2 to 6.9\N{NO-BREAK SPACE}%',
+    )
+    for share in np.linspace(0.001, 0.999, 400):
+        for half in (1e-4, 4e-3, 9e-3, 0.011, 0.04):
+            value, ends = with_ends(share, max(share - half, 0.0), min(share + half, 1.0))
+            low, high = map(float, re.findall(r'[\d.]+', ends))
+            assert low <= millimetres(value) <= high
 
 
 def test_a_tolerance_given_is_judged_at_the_top_with_the_certificate():

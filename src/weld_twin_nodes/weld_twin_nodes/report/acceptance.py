@@ -17,6 +17,7 @@ from weld_twin_core.metrics.performance import Performance, performance_of
 from .html import Html, joined, section, table, tag
 from .performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows
 from .quantities import millimetres
+from .seam_view import at_rest
 from .switches import as_it_is, parted, trusted
 
 WORDS = {
@@ -64,6 +65,11 @@ def largest(diagnosis: Diagnosis) -> tuple[float, float]:
             sizes = np.linalg.norm(part[trusted(diagnosis, k)], axis=1)
             out[i] = max(out[i], float(sizes.max(initial=0.0)))
     return out[0], out[1]
+
+
+def on_what(diagnosis: Diagnosis) -> str:
+    """Return what a verdict on the tolerance holds for: nothing else was looked at."""
+    return f'{"at the stations" if at_rest(diagnosis) else "on the seam"} recorded'
 
 
 def rule_data(rule: Rule) -> dict[str, Any]:

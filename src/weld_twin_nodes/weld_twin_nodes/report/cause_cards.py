@@ -16,7 +16,7 @@ from .charts import Axis, Line, chart
 from .controllers import BRANDS, correction
 from .curve_plot import curve_figure
 from .html import Child, Html, joined, section, table, tag
-from .quantities import millimetres, odds, parameter_rows, percent
+from .quantities import millimetres, odds, parameter_rows, percent, with_ends
 from .seam_view import seen_at
 from .switches import (
     MOST,
@@ -45,8 +45,6 @@ _WORDS = {
     'offset': 'off by',
 }
 """Parameters as a fitter says them; the others are words already."""
-_NARROW = 0.02
-"""Width of an interval below which whole per cents would make its ends the same."""
 _VALUES = 4
 """Parameters told on a card; effects.yaml has all."""
 
@@ -74,8 +72,8 @@ def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     causes, rest = diagnosis.causes, diagnosis.shares
     rows: list[tuple[str, float, str, str]] = []
     for rank, k in enumerate(shown, 1):
-        low, high = causes[k].share_ci90
-        told = f'{percent(causes[k].share)} ({_bounds(low, high)})'
+        value, ends = with_ends(causes[k].share, *causes[k].share_ci90)
+        told = f'{value} ({ends})'
         rows.append(
             (f'{rank}. {cause_name(diagnosis, causes[k])}', causes[k].share, told, 'cause')
         )
@@ -97,12 +95,6 @@ def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     return tag('ul', *items, class_='bars wide shares')
 
 
-def _bounds(low: float, high: float) -> str:
-    """Return the ends of an interval in %, with a decimal where it is narrow."""
-    places = 1 if high - low < _NARROW else 0
-    return f'{100.0 * low:.{places}f} to {100.0 * high:.{places}f} %'
-
-
 def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None) -> Html:
     cause = diagnosis.causes[k]
     name = cause_name(diagnosis, cause)
@@ -118,7 +110,12 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None) -> Html:
     return tag(
         'article',
         tag('h3', tag('span', str(rank), class_='rank'), f'{name[:1].upper()}{name[1:]}'),
-        tag('p', tag('b', percent(cause.share)), ' of the gap', class_='share'),
+        tag(
+            'p',
+            tag('b', with_ends(cause.share, *cause.share_ci90)[0]),
+            ' of the gap',
+            class_='share',
+        ),
         _box(diagnosis, k),
         _picture(diagnosis, k),
         tag('dl', *pairs, class_='pairs'),

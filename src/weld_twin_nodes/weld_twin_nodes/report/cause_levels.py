@@ -8,7 +8,7 @@ import numpy as np
 
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Site
 
-from .quantities import odds, percent
+from .quantities import odds, with_ends
 from .words import DEPENDENCES, place_name, site_name
 
 _CURVES = ('joint_curve', 'frame_curve')
@@ -17,9 +17,9 @@ LEVEL_HEADS = ('Share of the gap', 'Where', 'Depends on', 'Name')
 
 def level_row(cause: Cause) -> list[str]:
     """Return share, place, dependence and name of a cause, each with its odds."""
-    low, high = cause.share_ci90
+    value, ends = with_ends(cause.share, *cause.share_ci90)
     return [
-        f'{percent(cause.share)} ({percent(low)} to {percent(high)})',
+        f'{value} ({ends})',
         _alternatives([(place_name(at), p) for at, p in cause.place]),
         _alternatives([(DEPENDENCES.get(on, on), p) for on, p in cause.dependence]),
         _names(cause),

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_msgs_py.files.input_files import InputFile
 
-from .acceptance import WORDS, Demand, acceptance_section, largest, rule_data, rule_of
+from .acceptance import WORDS, Demand, acceptance_section, largest, on_what, rule_data, rule_of
 from .cause_cards import causes_cards
 from .cause_list import causes_section
 from .changed_section import changed_section
@@ -112,13 +112,20 @@ def _causes(diagnosis: Diagnosis, sheet: Sheet) -> tuple[Html | None, ...]:
 
 
 def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
-    """Return the verdict against the tolerance, where one was given."""
-    if rule.tolerance_m is None or diagnosis.contacts is not None:
+    """Return the verdict on the tolerance; it stays hidden until one is given, here or there."""
+    if diagnosis.contacts is not None or not diagnosis.traces.t:
         return None
     size = largest(diagnosis)[0]
     verdict = rule.judged(size)
     told = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
-    return tag('p', f'{told[:1].upper()}{told[1:]}', class_=f'status judged {verdict}')
+    where = f'as it is, {on_what(diagnosis)}'
+    return tag(
+        'p',
+        f'{told[:1].upper()}{told[1:]}, {where}',
+        class_=f'status judged {verdict}',
+        hidden='' if rule.tolerance_m is None else None,
+        data_top=where,
+    )
 
 
 def _signatures() -> Html:

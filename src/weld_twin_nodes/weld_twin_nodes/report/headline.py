@@ -13,7 +13,7 @@ from weld_twin_core.recording import Recording
 from ..offline.where_it_holds import where_it_holds
 from .family_table import worth_doing
 from .html import Html, tag
-from .quantities import interval, millimetres, milliradians, odds, percent, turned, turns_only
+from .quantities import left_of, millimetres, milliradians, odds, turned, turns_only
 from .words import STATUS, found_name, listed, mended, verdict
 
 _SURE_OF = {
@@ -115,7 +115,8 @@ def _left(diagnosis: Diagnosis) -> str:
     if turns_only(diagnosis):
         return 'on unseen data; what was found turns the tool'
     with_what = '' if diagnosis.effects else ', with what fits best'
-    return f'{percent(shrink.ratio)} of it on unseen data{with_what} ({interval(shrink)})'
+    value, interval = left_of(shrink)
+    return f'{value} of it on unseen data{with_what} ({interval})'
 
 
 def _turned(diagnosis: Diagnosis) -> str:

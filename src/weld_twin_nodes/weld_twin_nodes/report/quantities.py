@@ -31,6 +31,10 @@ UNCHANGED = 0.005
 MISSING = '\N{EN DASH}'
 STAYS = 0.95
 """Ratio of after to before from which a gap counts as staying."""
+_NARROW = 0.02
+"""Width of an interval below which whole per cents would make its ends the same."""
+_SMALL = 0.1
+"""Share below which whole per cents have only one digit."""
 DEGREES = 180.0 / pi
 """Degrees in a radian."""
 _GAP = '\N{NO-BREAK SPACE}'
@@ -60,14 +64,20 @@ def turned(radians: float) -> str:
     return f'{value:.{places}f}°'
 
 
-def percent(share: float) -> str:
+def percent(share: float, places: int = 0) -> str:
     """Return a share as '93 %'; never 0 or 100 for what is only close to it."""
-    value = 100.0 * share
-    if 0.0 < value < 0.5:
-        return f'<{_GAP}1{_GAP}%'
-    if 99.5 < value < 100.0:
-        return f'>{_GAP}99{_GAP}%'
-    return f'{value:.0f}{_GAP}%'
+    value, step = 100.0 * share, 10.0**-places
+    if 0.0 < value < 0.5 * step:
+        return f'<{_GAP}{step:.{places}f}{_GAP}%'
+    if 100.0 - 0.5 * step < value < 100.0:
+        return f'>{_GAP}{100.0 - step:.{places}f}{_GAP}%'
+    return f'{value:.{places}f}{_GAP}%'
+
+
+def with_ends(share: float, low: float, high: float) -> tuple[str, str]:
+    """Return a share and the ends of its interval to the same place, '6.6 %' and '6.2 to 6.9 %'."""
+    places = 1 if high < _SMALL or high - low < _NARROW else 0
+    return percent(share, places), f'{100.0 * low:.{places}f} to {100.0 * high:.{places}f}{_GAP}%'
 
 
 def change(shrink: float) -> str:
@@ -77,11 +87,10 @@ def change(shrink: float) -> str:
     return f'{percent(abs(shrink))} {"less" if shrink > 0.0 else "more"}'
 
 
-def interval(shrink: Shrink) -> str:
-    """Return how sure the ratio of after to before is."""
-    low, high = (100.0 * bound for bound in shrink.ci95)
-    places = 1 if high < 10.0 else 0
-    return f'95{_GAP}% interval {low:.{places}f} to {high:.{places}f}{_GAP}%'
+def left_of(shrink: Shrink) -> tuple[str, str]:
+    """Return the ratio of after to before, and how sure it is."""
+    value, ends = with_ends(shrink.ratio, *shrink.ci95)
+    return value, f'95{_GAP}% interval {ends}'
 
 
 def turns_only(diagnosis: Diagnosis) -> bool:

@@ -151,13 +151,13 @@
     const i = view.looked.sample, nominal = at(run, i), off = gap.slice(3 * i, 3 * i + 3);
     const [u, v] = point(...nominal.map((value, k) => value + view.stretch * off[k]));
     pen.strokeStyle = style('--ink');
-    pen.lineWidth = 1.5;
+    pen.lineWidth = 2;
     pen.beginPath();
     pen.moveTo(...point(...nominal));
     pen.lineTo(u, v);
     pen.stroke();
     pen.beginPath();
-    pen.arc(u, v, 5, 0, 7);
+    pen.arc(u, v, 7, 0, 7);
     pen.stroke();
   }
 

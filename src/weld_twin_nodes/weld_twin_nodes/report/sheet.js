@@ -56,6 +56,14 @@ window.sheet = (() => {
       item.className = `mark ${kind}`;
       item.textContent = word;
     }
+    for (const item of all('[data-top]')) {
+      const [kind, word] = judged(largest['as-it-is']), { tolerance } = data.rule;
+      item.className = `status judged ${kind}`;
+      item.hidden = tolerance == null;
+      if (tolerance == null) continue;
+      const told = `${word}: ${mm(largest['as-it-is'])} of ${mm(tolerance)} allowed, ${item.dataset.top}`;
+      item.textContent = told[0].toUpperCase() + told.slice(1);
+    }
   }
 
   function switched() {
@@ -137,6 +145,7 @@ window.sheet = (() => {
   document.documentElement.classList.add('live');
   listen();
   switched();
-  setTimeout(worst);
+  // Not before the scripts that follow this one listen.
+  document.addEventListener('DOMContentLoaded', worst);
   return { data };
 })();

@@ -8,7 +8,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .cause_list import leftover
 from .html import Html, section, tag
-from .quantities import interval, millimetres, milliradians, percent, turns_only
+from .quantities import left_of, millimetres, milliradians, turns_only
 from .words import cause
 
 _STEPS = 12
@@ -63,7 +63,8 @@ def _judged(diagnosis: Diagnosis) -> str:
     if shrink.orientation_rad is not None and turns_only(diagnosis):
         before, after = map(milliradians, shrink.orientation_rad)
         return f'The position gap stays; the orientation gap of {before} shrinks to {after}.'
-    left = f'{percent(shrink.ratio)} of the gap is left ({interval(shrink)})'
+    value, interval = left_of(shrink)
+    left = f'{value} of the gap is left ({interval})'
     if not _apart(diagnosis):
         return f'Judged by {shrink.held_out}, {left}.'
     return (

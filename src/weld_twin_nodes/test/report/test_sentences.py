@@ -182,8 +182,10 @@ def test_what_only_turns_the_tool_is_told_in_angles():
         told.shrink, ratio=1.0, rms_after_m=told.shrink.rms_before_m, orientation_rad=(2e-3, 5e-5)
     )
     first, second = map(plain, verdict(replace(told, shrink=shrink)))
-    assert first.startswith('The orientation gap of 0.400 mrad comes from tool pose error')
-    assert '2.000 mrad shrinks to 0.050 mrad' in second
+    assert first.startswith(
+        'The orientation gap of 0.023° (0.400 mrad) comes from tool pose error'
+    )
+    assert '0.115° (2.000 mrad) shrinks to 0.0029° (0.050 mrad)' in second
     assert 'stays as it is' in second
 
 

@@ -257,6 +257,31 @@ def test_joints_are_called_as_on_the_controller(tmp_path):
     )
 
 
+def test_a_card_says_that_nothing_is_to_be_entered_and_how_far_a_joint_trails():
+    text = report_page(THREE)
+    assert 'matter of the drive&#x27;s gains and feed-forward' in text
+    speed = max(np.abs(np.gradient(r.joints.q[:, 0], r.joints.t)).max() for r in THREE.recordings)
+    trail = float(re.search(r'joint_a1 trails by ([\d.]+)°', text)[1])
+    assert trail == pytest.approx(np.degrees(4e-3 * speed), rel=0.03)
+
+
+def test_what_is_left_with_one_mended_is_judged_on_its_card(page):
+    size = float(page.locator('#cause-3 [data-alone]').get_attribute('data-alone'))
+    page.get_by_role('button', name='all mended').click()
+    for k in (0, 1):
+        page.locator(f'.switches input[data-switch="{k}"]').uncheck()
+    assert millimetres(page.locator('#now-max').inner_text()) == pytest.approx(size, abs=1e-3)
+    page.locator('#tolerance').fill(f'{2 * size:.4f}')
+    assert page.locator('#cause-3 [data-alone]').inner_text() == ': passes'
+
+
+def test_what_was_not_considered_is_named_in_words():
+    names = {'friction': 'the joint hardly moves (joint_a4)', 'loaded_play': 'no wrench'}
+    text = report_page(replace(THREE, absent=names))
+    assert 'friction of joint_a4</th><td>the joint hardly moves<' in text
+    assert 'play under load</th><td>no wrench<' in text and 'loaded_play' not in text
+
+
 def test_circles_name_the_joints_that_turn_back():
     page = report_page(THREE)
     assert 'ISO 230-4' in page and re.search(r'"reversals":\[\[\d,', page)

@@ -96,7 +96,7 @@ def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
         'Does it pass',
         _field(rule),
         table(heads, rows, 'acceptance'),
-        tag('p', _rule_words(rule, demand), class_='note'),
+        tag('p', _rule_words(diagnosis, rule, demand), class_='note'),
         _standard(diagnosis),
         id_='acceptance',
     )
@@ -120,7 +120,7 @@ def _row(name: str, value: float, rule: Rule, key: str) -> tuple[Html | str, ...
     )
 
 
-def _rule_words(rule: Rule, demand: Demand) -> str:
+def _rule_words(diagnosis: Diagnosis, rule: Rule, demand: Demand) -> str:
     source = 'the noise of these data'
     if demand.uncertainty_m is not None and demand.uncertainty_m >= rule.uncertainty_m:
         source = 'the certificate of the instrument'
@@ -131,8 +131,12 @@ def _rule_words(rule: Rule, demand: Demand) -> str:
         f'{rule.readings} readings; in between it cannot be said. The standard uncertainty is '
         f'{millimetres(rule.uncertainty_m)}, from {source}.'
     )
+    text += f' It is judged {on_what(diagnosis)}, and nowhere else.'
     if demand.uncertainty_m is None:
-        text += ' Noise says nothing of an error that all readings share: give --uncertainty.'
+        text += (
+            ' Noise says nothing of an error that all readings share: that stands in the '
+            'certificate of the instrument, which was not given.'
+        )
     return text
 
 

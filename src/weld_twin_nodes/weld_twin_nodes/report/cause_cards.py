@@ -10,18 +10,22 @@ from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.result import Cause, Diagnosis
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.joint_curve import JointCurve
+from weld_twin_core.effects.servo_lag import ServoLag
+from weld_twin_core.metrics.conformity import Rule
 
+from .acceptance import WORDS
 from .cause_levels import LEVEL_HEADS, level_row, spreads
 from .charts import Axis, Line, chart
 from .controllers import BRANDS, correction
 from .curve_plot import curve_figure
 from .html import Child, Html, joined, section, table, tag
-from .quantities import millimetres, odds, parameter_rows, percent, with_ends
+from .quantities import DEGREES, millimetres, odds, parameter_rows, percent, turned, with_ends
 from .seam_view import seen_at
 from .switches import (
     MOST,
     along,
     alternatives,
+    as_it_is,
     cause_name,
     drawn,
     squares,
@@ -49,13 +53,13 @@ _VALUES = 4
 """Parameters told on a card; effects.yaml has all."""
 
 
-def causes_cards(diagnosis: Diagnosis, brand: str | None) -> Html | None:
+def causes_cards(diagnosis: Diagnosis, brand: str | None, rule: Rule) -> Html | None:
     """Return the shares of the gap and a card for every cause; None without any."""
     shown = [k for k, cause in enumerate(diagnosis.causes) if cause.share >= _TRIVIAL][:MOST]
     if not shown:
         return None
     rest = [c for k, c in enumerate(diagnosis.causes) if k not in shown]
-    cards = [_card(diagnosis, k, rank, brand) for rank, k in enumerate(shown, 1)]
+    cards = [_card(diagnosis, k, rank, brand, rule) for rank, k in enumerate(shown, 1)]
     return section(
         'What causes it',
         _shares(diagnosis, shown),
@@ -95,14 +99,14 @@ def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     return tag('ul', *items, class_='bars wide shares')
 
 
-def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None) -> Html:
+def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule) -> Html:
     cause = diagnosis.causes[k]
     name = cause_name(diagnosis, cause)
     entries = [
         ('How sure', _sure(cause)),
         ('Value', _values(diagnosis, cause)),
         ('Effect on the seam', _effect(diagnosis, k)),
-        ('If mended', _mended(diagnosis, k)),
+        ('If mended', _mended(diagnosis, k, rule)),
         ('What to do', _action(diagnosis, cause)),
         *_at_the_controller(diagnosis, cause, brand),
     ]
@@ -161,10 +165,26 @@ def _values(diagnosis: Diagnosis, cause: Cause) -> Html | None:
             continue
         for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
             rows.append(tag('span', f'{_WORDS.get(name, name.replace("_", " "))} {value}'))
+        if isinstance(effect, ServoLag):
+            rows.append(tag('span', _trail(diagnosis, effect)))
     if not rows:
         return None
     more = [tag('span', f'and {len(rows) - _VALUES} more')] if len(rows) > _VALUES else []
     return tag('span', *rows[:_VALUES], *more, class_='lines')
+
+
+def _trail(diagnosis: Diagnosis, lag: ServoLag) -> str:
+    """Return how far a joint trails its command where the recordings move it fastest."""
+    robot = diagnosis.model.robot
+    i = robot.index(lag.joint)
+    speeds = [np.abs(r.joints.velocity[:, i]).max() for r in diagnosis.recordings]
+    fastest = float(max(speeds, default=0.0))
+    trail = fastest * float(lag.time_constant)
+    if robot.prismatic[i]:
+        return (
+            f'{lag.joint} trails by {millimetres(trail)} at its fastest ({1e3 * fastest:.0f} mm/s)'
+        )
+    return f'{lag.joint} trails by {turned(trail)} at its fastest ({DEGREES * fastest:.0f} °/s)'
 
 
 def _part(diagnosis: Diagnosis, k: int) -> tuple[int, np.ndarray, np.ndarray] | None:
@@ -211,8 +231,8 @@ def _along(diagnosis: Diagnosis, k: int, run: int, good: np.ndarray) -> str:
     return f'; {millimetres(across)} RMS across the seam, {millimetres(np.sqrt(ahead))} along it'
 
 
-def _mended(diagnosis: Diagnosis, k: int) -> str | None:
-    """Return the gap that would be left if only this were mended."""
+def _mended(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:
+    """Return the gap that would be left if only this were mended, and whether that passes."""
     products = np.array(squares(diagnosis))
     for at, switch in enumerate(switches(diagnosis)):
         if switch.members == (k,):
@@ -220,8 +240,30 @@ def _mended(diagnosis: Diagnosis, k: int) -> str | None:
             before = np.sqrt(on @ products @ on)
             on[1 + at] = 0.0
             left = np.sqrt(max(float(on @ products @ on), 0.0))
-            return f'{millimetres(1e-3 * before)} become {millimetres(1e-3 * left)} RMS.'
+            most = _most_without(diagnosis, k)
+            verdict = rule.judged(most)
+            word = '' if verdict is None else f': {WORDS[verdict]}'
+            return joined(
+                [
+                    f'{millimetres(1e-3 * before)} become {millimetres(1e-3 * left)} RMS, '
+                    f'{millimetres(most)} at most',
+                    tag('span', word, class_=f'mark {verdict}', data_alone=f'{1e3 * most:.6f}'),
+                    '.',
+                ]
+            )
     return None
+
+
+def _most_without(diagnosis: Diagnosis, k: int) -> float:
+    """Return the largest deviation [m] without one cause, all others as they are."""
+    told = diagnosis.contributions
+    if told is None:
+        return 0.0
+    rests = [
+        (as_it_is(diagnosis, run) - parts[k])[trusted(diagnosis, run)]
+        for run, parts in enumerate(told.parts)
+    ]
+    return max((float(np.linalg.norm(r, axis=1).max(initial=0.0)) for r in rests), default=0.0)
 
 
 def _action(diagnosis: Diagnosis, cause: Cause) -> Html | str | None:
@@ -244,9 +286,10 @@ def _at_the_controller(
     diagnosis: Diagnosis, cause: Cause, brand: str | None
 ) -> list[tuple[str, str | None]]:
     effects = _effects(diagnosis, cause)
-    if brand is None or not effects:
-        return []
-    return [(f'At the {BRANDS[brand]} controller', correction(effects[0], brand))]
+    head = 'At the controller' if brand is None else f'At the {BRANDS[brand]} controller'
+    if not effects:
+        return [(head, 'Nothing can be entered before the cause is known.')]
+    return [(head, correction(effects[0], brand))]
 
 
 def _picture(diagnosis: Diagnosis, k: int) -> Html | None:

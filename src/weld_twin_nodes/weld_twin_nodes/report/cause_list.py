@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Candidate, Diagnosis
 from .family_table import families_table
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, change, millimetres, odds, parameter_rows
-from .words import carries_curves, found_name, in_words, listed, site_name
+from .words import carries_curves, cause, found_name, in_words, listed, site_name
 
 _CANDIDATES = 6
 """Hypotheses shown for a cause."""
@@ -126,12 +126,21 @@ def _sets(diagnosis: Diagnosis) -> Html | None:
 def _absent(diagnosis: Diagnosis) -> Html | None:
     if not diagnosis.absent:
         return None
-    rows = sorted(diagnosis.absent.items())
+    rows = [_left_out(*item, diagnosis) for item in sorted(diagnosis.absent.items())]
     return tag(
         'details',
         tag('summary', f'Not considered, and why ({len(rows)})'),
         table(('Effect', 'Why'), rows),
     )
+
+
+def _left_out(effect: str, why: str, diagnosis: Diagnosis) -> tuple[str, str]:
+    """Return an effect by its name in words, with the joint that the reason ends with."""
+    reason, _, last = why.rpartition(' (')
+    joint = last.rstrip(')')
+    if joint in diagnosis.model.robot.joint_names:
+        return cause(effect, joint), reason
+    return cause(effect, None), why
 
 
 def leftover(diagnosis: Diagnosis) -> Html:

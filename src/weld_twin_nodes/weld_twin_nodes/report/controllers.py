@@ -66,13 +66,17 @@ def brand_of(robot: str) -> str | None:
 
 
 def correction(effect: Effect, brand: str | None) -> str | None:
-    """Return where this maker's controller takes the correction; None for an unknown maker."""
+    """
+    Return where this maker's controller takes the correction, or why there is nothing to enter.
+
+    None where there is something to enter and the maker is not known.
+    """
+    kind = _KINDS.get(effect.name)
+    if kind is None and effect.name not in _BY_PROGRAM:
+        return f'Nothing to enter: {_MATTERS.get(effect.name, _OWN)}.'
     if brand is None:
         return None
-    kind = _KINDS.get(effect.name)
-    if kind is None:
-        return _PROGRAM if effect.name in _BY_PROGRAM else None
-    return _PLACES.get((brand, kind), _PROGRAM)
+    return _PROGRAM if kind is None else _PLACES.get((brand, kind), _PROGRAM)
 
 
 _BY_PROGRAM = (
@@ -85,3 +89,23 @@ _BY_PROGRAM = (
     'frame_curve',
 )
 """Errors of the arm that programs can be corrected for and that controllers have no field for."""
+_GEAR = "a matter of the joint's gear"
+_RECORDING = 'the robot is not at fault, but how it was recorded'
+_MATTERS = {
+    'backlash': _GEAR,
+    'hysteresis': _GEAR,
+    'loaded_play': _GEAR,
+    'friction': "a matter of the joint's gear, bearings and grease",
+    'servo_lag': "a matter of the drive's gains and feed-forward",
+    'vibration': 'a matter of how the motion is planned, and of stiffness',
+    'quantization': 'a matter of the encoder',
+    'cartesian_compliance': 'a matter of stiffness and of the force at the tool',
+    'thermal_growth': 'a matter of warming up, or of the temperature in the cell',
+    'drift': 'a matter of what the frame stands on, or of the temperature',
+    'setup_settling': 'a matter of how the set-up is held',
+    'time_delay': f'{_RECORDING}: its clocks',
+    'measurement_scale': f'{_RECORDING}: the scale of the instrument',
+    'instrument_knock': f'{_RECORDING}: the instrument or the base was knocked',
+}
+"""What a cause is a matter of where a controller has nothing to enter for it."""
+_OWN = 'no field of a controller is known for it'

@@ -75,7 +75,7 @@ def report_page(
         [
             header(diagnosis),
             opening(diagnosis, _judged(diagnosis, rule) if sound else None),
-            *(_causes(diagnosis, sheet) if sound else ()),
+            *(_causes(diagnosis, sheet, rule) if sound else ()),
             checks_section(diagnosis),
             _signatures(),
         ]
@@ -91,12 +91,12 @@ def report_page(
     return document(title, main, told, charts=True, scripts=scripts)
 
 
-def _causes(diagnosis: Diagnosis, sheet: Sheet) -> tuple[Html | None, ...]:
+def _causes(diagnosis: Diagnosis, sheet: Sheet, rule: Rule) -> tuple[Html | None, ...]:
     """Return what causes the gap, whether it passes, where it lies, and what to measure next."""
     brand = sheet.brand or brand_of(diagnosis.model.robot.name)
     return (
         acceptance_section(diagnosis, sheet.demand),
-        causes_cards(diagnosis, brand),
+        causes_cards(diagnosis, brand, rule),
         seam_section(diagnosis) if diagnosis.contacts is None else contacts_section(diagnosis),
         circles_section(diagnosis),
         where_section(diagnosis),

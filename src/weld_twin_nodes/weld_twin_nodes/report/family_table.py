@@ -12,7 +12,7 @@ from weld_twin_core.diagnosis.result import Diagnosis, Family
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 
 from .html import Html, joined, table, tag
-from .quantities import millimetres
+from .quantities import millimetres, turned
 from .words import cause
 
 _LARGEST = 3
@@ -76,8 +76,10 @@ def ripple_rows(diagnosis: Diagnosis) -> list[list[str]]:
     return [
         [
             r.joint,
-            f'{1e6 * r.rms:.0f} µrad',
-            ', '.join(f'{order:g} ({1e6 * size:.0f} µrad)' for order, size in r.lines),
+            f'{turned(r.rms)} ({1e6 * r.rms:.0f} µrad)',
+            ', '.join(
+                f'{order:g} ({turned(size)}, {1e6 * size:.0f} µrad)' for order, size in r.lines
+            ),
         ]
         for r in ripples(diagnosis)
         if r.rms > 0.0

@@ -117,7 +117,9 @@ def inputs_section(inputs: Sequence[InputFile]) -> Html:
     ]
     return section(
         'Made from',
-        table(('Use', 'Path', 'SHA-256'), rows, 'inputs'),
+        table(('Use', 'Path', 'SHA-256'), rows, 'inputs')
+        if rows
+        else tag('p', 'No files: the recordings were handed over by a program, not read.'),
         tag('p', f'weld_twin {__version__}', class_='note'),
         id_='inputs',
     )

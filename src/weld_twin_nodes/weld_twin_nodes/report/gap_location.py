@@ -122,7 +122,10 @@ def _map(diagnosis: Diagnosis) -> Html | None:
         unit = 'mm' if robot.prismatic[i] else '°'
         cells.append(tag('td', '', data_joint=i, data_unit=unit, class_='now'))
         rows.append(tag('tr', tag('th', name, scope='row'), *cells))
-    head = tag('thead', tag('tr', tag('th', 'Joint', scope='col'), *heads))
+    head = tag(
+        'thead',
+        tag('tr', tag('th', 'Joint', tag('span', ' [%]', class_='narrow'), scope='col'), *heads),
+    )
     return tag(
         'div',
         tag('table', head, tag('tbody', *rows), class_='map'),
@@ -135,8 +138,9 @@ def _map(diagnosis: Diagnosis) -> Html | None:
 
 def _cell(share: float) -> Html:
     strength = min(max(share, 0.0), 1.0)
-    text = percent(share) if share >= _VISIBLE else ''
-    return tag('td', text, style=f'--share:{strength:.3f}')
+    number, gap, unit = percent(share).rpartition('\N{NO-BREAK SPACE}')
+    text = (number, tag('span', gap, unit, class_='unit')) if share >= _VISIBLE else ()
+    return tag('td', *text, style=f'--share:{strength:.3f}')
 
 
 def _directions(diagnosis: Diagnosis) -> Html:

@@ -60,19 +60,24 @@ def opening(diagnosis: Diagnosis, judged: Html | None = None) -> Html:
         tag('p', second, class_='second'),
         _mended(diagnosis),
         _figures(diagnosis) if sound else None,
-        _holds(diagnosis) if sound else None,
+        _holds(diagnosis, judged) if sound else None,
         _actions(diagnosis) if sound else None,
         id_='verdict',
     )
 
 
-def _holds(diagnosis: Diagnosis) -> Html | None:
+def _holds(diagnosis: Diagnosis, judged: Html | None) -> Html | None:
     """Return how far the corrected robot can be relied on, and what the data left open."""
     if diagnosis.posterior is None:
         return None
     first, *rest = where_it_holds(diagnosis.posterior)[:-1]
     kind = 'note left-open' if rest else 'note'
-    return tag('p', ' '.join([first, *rest]), class_=kind)
+    apart = (
+        'A verdict on the tolerance is about what was recorded, not about the reach.'
+        if judged is not None
+        else ''
+    )
+    return tag('p', ' '.join(filter(None, [first, apart, *rest])), class_=kind)
 
 
 def _mended(diagnosis: Diagnosis) -> Html | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from weld_twin_core.metrics.performance import PathTest, Performance, PoseTest
 
-from .quantities import MISSING, millimetres
+from .quantities import MISSING, millimetres, turned
 
 POSE_HEADS = (
     'pose',
@@ -18,8 +18,8 @@ POSE_HEADS = (
     'cycles',
     'AP [mm]',
     'RP [mm]',
-    'AP [mrad]',
-    'RP [mrad]',
+    'AP [° (mrad)]',
+    'RP [° (mrad)]',
     'vAP [mm]',
     'drift [mm]',
 )
@@ -46,7 +46,9 @@ def pose_rows(found: Performance) -> list[tuple[str, ...]]:
 def _pose_row(name: str, pose: PoseTest) -> tuple[str, ...]:
     f = pose.performance
     where = ', '.join(f'{1e3 * value:.0f}' for value in pose.command)
-    turns = (None if turn is None else np.linalg.norm(turn) for turn in (f.ap_rad, f.rp_rad))
+    turns = (
+        None if turn is None else float(np.linalg.norm(turn)) for turn in (f.ap_rad, f.rp_rad)
+    )
     drifted = MISSING
     if pose.drift is not None:
         drifted = f'{_thousandth(pose.drift.dap_m)} / {_thousandth(pose.drift.drp_m)}'
@@ -54,13 +56,15 @@ def _pose_row(name: str, pose: PoseTest) -> tuple[str, ...]:
         name,
         where,
         str(f.cycles),
-        *(_thousandth(value) for value in (f.ap_m, f.rp_m, *turns, pose.variation_m)),
+        *map(_thousandth, (f.ap_m, f.rp_m)),
+        *(MISSING if turn is None else f'{turned(turn)} ({1e3 * turn:.3f})' for turn in turns),
+        _thousandth(pose.variation_m),
         drifted,
     )
 
 
 def _thousandth(value: Any) -> str:
-    """Return metres in mm or radians in mrad, without the unit, which the head has."""
+    """Return metres in mm, without the unit, which the head has."""
     return MISSING if value is None else f'{1e3 * value:.3f}'
 
 

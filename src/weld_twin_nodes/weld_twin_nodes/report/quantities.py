@@ -64,6 +64,13 @@ def turned(radians: float) -> str:
     return f'{value:.{places}f}°'
 
 
+def both_angles(radians: float | None) -> str:
+    """Return an angle as '0.023° (0.400 mrad)'."""
+    if radians is None or not isfinite(radians):
+        return MISSING
+    return f'{turned(radians)} ({milliradians(radians)})'
+
+
 def percent(share: float, places: int = 0) -> str:
     """Return a share as '93 %'; never 0 or 100 for what is only close to it."""
     value, step = 100.0 * share, 10.0**-places

@@ -75,9 +75,11 @@
     const { pen, width, height } = sized(canvas);
     const project = projector(width, height);
     const side = canvas.dataset.side === 'before' ? 'before' : 'now';
+    // Where the axes and the ruler stand, and then the words too.
+    const taken = [[0, height - 64, 64, height], [0.7 * width - 14, height - 38, width, height]];
     data.runs.forEach((run, k) => {
       drawRun(pen, project.point, run, run[side]);
-      if (!run.dots) drawCourse(pen, project.point, run, width);
+      if (!run.dots) drawCourse(pen, project.point, run, { width, height, taken });
       if (view.looked && view.looked.run === k) drawLooked(pen, project.point, run, run[side]);
     });
     drawAxes(pen, project.direction, height);
@@ -116,8 +118,20 @@
 
   const at = (run, i) => run.path.slice(3 * i, 3 * i + 3);
 
+  // Writes a word beside a point, where nothing else stands.
+  function write(pen, [u, v], text, { width, height, taken }) {
+    const long = pen.measureText(text).width;
+    const box = (dx, dy) => [u + dx, v + dy - 7, u + dx + long, v + dy + 7];
+    const free = ([left, top, right, bottom]) => left >= 0 && top >= 0 && right <= width && bottom <= height
+      && taken.every(([a, b, c, d]) => right < a || left > c || bottom < b || top > d);
+    const places = [-9, 12, -26, 28, -44, -62].flatMap((dy) => [[7, dy], [-7 - long, dy]]);
+    const [dx, dy] = places.find((place) => free(box(...place))) || places[0];
+    taken.push(box(dx, dy));
+    pen.fillText(text, u + dx, v + dy);
+  }
+
   // Start, end and three arrows in the direction of travel.
-  function drawCourse(pen, point, run, width) {
+  function drawCourse(pen, point, run, sheet) {
     const last = run.path.length / 3 - 1;
     if (last < 8) return;
     pen.fillStyle = pen.strokeStyle = style('--ink');
@@ -130,9 +144,7 @@
       pen.beginPath();
       pen.arc(u, v, 3, 0, 7);
       pen.fill();
-      const left = u > width - 70;
-      pen.textAlign = left ? 'right' : 'left';
-      pen.fillText(text, left ? u - 7 : u + 7, v - 9);
+      write(pen, [u, v], text, sheet);
     }
     for (const part of [0.2, 0.5, 0.8]) {
       const i = Math.round(part * last), gap = Math.max(2, Math.round(last / 60));

@@ -39,7 +39,7 @@ def seam_section(diagnosis: Diagnosis) -> Html:
         _switches(diagnosis),
         _figures() if switches(diagnosis) else None,
         tag('div', *_panels(diagnosis, changes), class_='panels' if changes else 'panels one'),
-        _controls(),
+        _controls(stations),
         tag('p', class_='instant', id_='instant'),
         tag('noscript', tag('p', 'The pictures need scripts switched on.')),
         _charts(diagnosis),
@@ -107,7 +107,7 @@ def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:
     ]
 
 
-def _controls() -> Html:
+def _controls(stations: bool) -> Html:
     views = [
         tag('button', name.capitalize(), type='button', data_view=name)
         for name in ('angled', 'top', 'front', 'side')
@@ -119,11 +119,13 @@ def _controls() -> Html:
         ' larger ',
         tag('input', type='range', id_='stretch', min='0', max='1', step='0.01'),
     )
+    signs = '○ the instant looked at'
     return tag(
         'div',
         tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
         tag('div', *views, class_='views'),
         slider,
+        tag('span', signs if stations else f'▲ direction of travel   {signs}', class_='signs'),
         class_='controls',
     )
 

@@ -56,6 +56,11 @@ window.sheet = (() => {
       item.className = `mark ${kind}`;
       item.textContent = word;
     }
+    for (const item of all('[data-alone]')) {
+      const [kind, word] = judged(Number(item.dataset.alone));
+      item.className = `mark ${kind}`;
+      item.textContent = data.rule.tolerance == null ? '' : `: ${word}`;
+    }
     for (const item of all('[data-top]')) {
       const [kind, word] = judged(largest['as-it-is']), { tolerance } = data.rule;
       item.className = `status judged ${kind}`;

@@ -8,7 +8,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .cause_list import leftover
 from .html import Html, section, tag
-from .quantities import left_of, millimetres, milliradians, turns_only
+from .quantities import both_angles, left_of, millimetres, turns_only
 from .words import cause
 
 _STEPS = 12
@@ -61,7 +61,7 @@ def _judged(diagnosis: Diagnosis) -> str:
     if not diagnosis.model.found:
         return f'No effect is in the twin, so nothing shrinks; judged on {shrink.held_out}.'
     if shrink.orientation_rad is not None and turns_only(diagnosis):
-        before, after = map(milliradians, shrink.orientation_rad)
+        before, after = map(both_angles, shrink.orientation_rad)
         return f'The position gap stays; the orientation gap of {before} shrinks to {after}.'
     value, interval = left_of(shrink)
     left = f'{value} of the gap is left ({interval})'

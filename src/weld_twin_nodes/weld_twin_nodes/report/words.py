@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
 
-from .quantities import millimetres, milliradians, odds, percent, turns_only
+from .quantities import both_angles, millimetres, odds, percent, turns_only
 
 CAUSES = {
     'joint_offset': 'zero offset',
@@ -279,7 +279,7 @@ def _size(diagnosis: Diagnosis) -> str:
     """Return what the effects found account for: the gap in position, or in orientation."""
     turn = diagnosis.gap.orientation_rms_rad
     if turn is not None and turns_only(diagnosis):
-        return f'orientation gap of {milliradians(turn)}'
+        return f'orientation gap of {both_angles(turn)}'
     return f'gap of {millimetres(diagnosis.gap.rms_m)}'
 
 
@@ -288,7 +288,7 @@ def _gain(diagnosis: Diagnosis, start: str = '') -> str:
     what = 'it' if len(diagnosis.effects) == 1 else 'them'
     opening = f'{start}, with {what} in the twin' if start else f'With {what} in the twin'
     if shrink.orientation_rad is not None and turns_only(diagnosis):
-        before, after = map(milliradians, shrink.orientation_rad)
+        before, after = map(both_angles, shrink.orientation_rad)
         return (
             f'{opening}, {before} shrinks to {after} on data not used for fitting; the position '
             f'gap, {millimetres(shrink.rms_after_m)} at a noise floor of '

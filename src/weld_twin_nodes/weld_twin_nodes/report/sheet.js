@@ -79,9 +79,10 @@ window.sheet = (() => {
     }
     for (const box of all('input[data-switch]')) box.checked = mended[Number(box.dataset.switch)];
     const now = rms(there), before = rms(() => true);
+    const share = 100 * now / Math.max(before, 1e-12);
     put('now-rms', mm(now));
     put('now-max', mm(most('now')));
-    put('now-share', `${(100 * now / Math.max(before, 1e-12)).toFixed(0)} %`);
+    put('now-share', `${share.toFixed(share < 10 ? 1 : 0)} %`);
     for (const figure of all('#seam figure.chart')) {
       const run = data.runs[Number(figure.dataset.key.replace('run', ''))];
       window.charts.update(figure, { 'with that mended': run.size.now });

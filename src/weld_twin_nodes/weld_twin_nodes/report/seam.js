@@ -76,13 +76,14 @@
     const project = projector(width, height);
     const side = canvas.dataset.side === 'before' ? 'before' : 'now';
     // Where the axes and the ruler stand, and then the words too.
-    const taken = [[0, height - 64, 64, height], [0.7 * width - 14, height - 38, width, height]];
+    const foot = footing(project.point, width, height), told = [];
+    const taken = [[-34, -34, 34, 34].map((v, k) => foot[k % 2] + v), [0.7 * width - 14, height - 38, width, height]];
     data.runs.forEach((run, k) => {
       drawRun(pen, project.point, run, run[side]);
-      if (!run.dots) drawCourse(pen, project.point, run, { width, height, taken });
+      if (!run.dots) drawCourse(pen, project.point, run, { width, height, taken, told });
       if (view.looked && view.looked.run === k) drawLooked(pen, project.point, run, run[side]);
     });
-    drawAxes(pen, project.direction, height);
+    drawAxes(pen, project.direction, foot);
     drawRuler(pen, project.scale, width, height);
   }
 
@@ -119,7 +120,10 @@
   const at = (run, i) => run.path.slice(3 * i, 3 * i + 3);
 
   // Writes a word beside a point, where nothing else stands.
-  function write(pen, [u, v], text, { width, height, taken }) {
+  function write(pen, [u, v], text, { width, height, taken, told }) {
+    // Several recordings of one seam start at one place: one word does.
+    if (told.some(([a, b, word]) => word === text && Math.hypot(a - u, b - v) < 12)) return;
+    told.push([u, v, text]);
     const long = pen.measureText(text).width;
     const box = (dx, dy) => [u + dx, v + dy - 7, u + dx + long, v + dy + 7];
     const free = ([left, top, right, bottom]) => left >= 0 && top >= 0 && right <= width && bottom <= height
@@ -203,8 +207,23 @@
     });
   }
 
-  function drawAxes(pen, direction, height) {
-    const foot = [30, height - 30];
+  // The corner for the axes that the seam leaves free.
+  function footing(point, width, height) {
+    const corners = [[34, height - 34], [34, 34], [width - 34, 34]];
+    const near = corners.map(([u, v]) => {
+      let count = 0;
+      for (const run of data.runs) {
+        for (let i = 0; i < run.path.length / 3; i++) {
+          const [x, y] = point(...at(run, i));
+          if (Math.abs(x - u) < 40 && Math.abs(y - v) < 40) count++;
+        }
+      }
+      return count;
+    });
+    return corners[near.indexOf(Math.min(...near))];
+  }
+
+  function drawAxes(pen, direction, foot) {
     pen.lineWidth = 1.2;
     pen.fillStyle = pen.strokeStyle = style('--soft');
     pen.textAlign = 'center';

@@ -77,10 +77,11 @@
     const side = canvas.dataset.side === 'before' ? 'before' : 'now';
     // Where the axes and the ruler stand, and then the words too.
     const foot = footing(project.point, width, height), told = [];
+    const line = data.runs.flatMap((run) => run.t.map((_, i) => project.point(...at(run, i))));
     const taken = [[-34, -34, 34, 34].map((v, k) => foot[k % 2] + v), [0.7 * width - 14, height - 38, width, height]];
     data.runs.forEach((run, k) => {
       drawRun(pen, project.point, run, run[side]);
-      if (!run.dots) drawCourse(pen, project.point, run, { width, height, taken, told });
+      if (!run.dots) drawCourse(pen, project.point, run, { width, height, taken, told, line });
       if (view.looked && view.looked.run === k) drawLooked(pen, project.point, run, run[side]);
     });
     drawAxes(pen, project.direction, foot);
@@ -120,7 +121,7 @@
   const at = (run, i) => run.path.slice(3 * i, 3 * i + 3);
 
   // Writes a word beside a point, where nothing else stands.
-  function write(pen, [u, v], text, { width, height, taken, told }) {
+  function write(pen, [u, v], text, { width, height, taken, told, line }) {
     // Several recordings of one seam start at one place: one word does.
     if (told.some(([a, b, word]) => word === text && Math.hypot(a - u, b - v) < 12)) return;
     told.push([u, v, text]);
@@ -129,7 +130,10 @@
     const free = ([left, top, right, bottom]) => left >= 0 && top >= 0 && right <= width && bottom <= height
       && taken.every(([a, b, c, d]) => right < a || left > c || bottom < b || top > d);
     const places = [-9, 12, -26, 28, -44, -62].flatMap((dy) => [[7, dy], [-7 - long, dy]]);
-    const [dx, dy] = places.find((place) => free(box(...place))) || places[0];
+    const under = ([left, top, right, bottom]) => line.filter(([x, y]) => x > left - 3 && x < right + 3
+      && y > top - 3 && y < bottom + 3).length;
+    const open = places.filter((place) => free(box(...place))).map((place) => [under(box(...place)), place]);
+    const [, [dx, dy]] = open.reduce((a, b) => (b[0] < a[0] ? b : a), open[0] || [0, places[0]]);
     taken.push(box(dx, dy));
     pen.fillText(text, u + dx, v + dy);
   }

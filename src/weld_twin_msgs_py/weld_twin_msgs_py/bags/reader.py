@@ -219,7 +219,7 @@ def clear_errors(path: Path) -> Iterator[None]:
     """Turn whatever a damaged byte makes the storage libraries raise into one sentence."""
     try:
         yield
-    except TwinError:
+    except (TwinError, MemoryError):  # too little memory is no damage
         raise
     except PermissionError:
         raise DataError(f"bag '{path}' cannot be read: permission denied") from None

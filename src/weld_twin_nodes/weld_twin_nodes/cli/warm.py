@@ -101,6 +101,11 @@ def _in_a_fork(asked: dict[str, Any], out: int) -> int | None:
     return None if gone else os.waitstatus_to_exitcode(status)
 
 
+_TOO_MUCH = 'it needs more memory than is allowed'
+_NO_ROOM = ('failed to map segment', 'Cannot allocate memory')
+"""What the system says where a library or an array has no room."""
+
+
 def _run(asked: dict[str, Any], out: int) -> NoReturn:
     """Run the command within its bounds, answer with its exit code, and end."""
     resource.setrlimit(resource.RLIMIT_AS, (asked['memory'],) * 2)
@@ -118,9 +123,10 @@ def _run(asked: dict[str, Any], out: int) -> NoReturn:
     except SystemExit as stop:
         code = stop.code if isinstance(stop.code, int) else 1
     except MemoryError:
-        told.last = 'it needs more memory than is allowed'
+        told.last = _TOO_MUCH
     except BaseException as error:
-        told.last = f'{type(error).__name__}: {error}'
+        short = any(sign in str(error) for sign in _NO_ROOM)
+        told.last = _TOO_MUCH if short else f'{type(error).__name__}: {error}'
     used = resource.getrusage(resource.RUSAGE_SELF)
     answer(
         out,

@@ -219,8 +219,13 @@ def clear_errors(path: Path) -> Iterator[None]:
     """Turn whatever a damaged byte makes the storage libraries raise into one sentence."""
     try:
         yield
-    except (TwinError, MemoryError):  # too little memory is no damage
+    except TwinError:
         raise
+    except MemoryError:
+        raise DataError(
+            f"bag '{path}' needs more memory to be read than there is; where it is damaged, as by a "
+            f"size that nothing has, 'weld-twin recover {path}' takes what is whole of it"
+        ) from None
     except PermissionError:
         raise DataError(f"bag '{path}' cannot be read: permission denied") from None
     except Exception as error:  # a flipped bit surfaces as anything from KeyError to ZstdError

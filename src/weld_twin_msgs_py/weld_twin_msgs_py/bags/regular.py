@@ -116,8 +116,6 @@ def fill_regular(
                 return False
             for topic, block in blocks(reader, wanted):
                 topics[topic].take(block, bag, intake)
-    except MemoryError:
-        raise
     except Exception:  # whatever is wrong with the bag, the other reader has the sentence for it
         return False
     return all(len(streams[role]) == bag.topics[topic][1] for topic, role in roles.items())

@@ -260,6 +260,8 @@ MOTION = ('/joint_states', '/actual/joint_states', '/measured/tool_pose', '/twin
 """Topics with one message for every sample of the motion."""
 SUBSCRIBERS = dict(zip(MOTION, (3, 1, 2, 2), strict=True))
 """The recorder, and the nodes that take each of them in."""
+BY_HAND = 2.0
+"""Seconds that a person needs at least for the next command; publishers meet listeners meanwhile."""
 
 
 @pytest.mark.parametrize('way', ['launched', 'by hand'])
@@ -275,6 +277,7 @@ def test_a_cell_is_recorded_from_the_first_to_the_last_message(cell, tmp_path, w
             own = {**own, 'wait_for_subscribers': count + 1, 'reliable_inputs': True}
         elif own:  # by hand the motion is started last, when the other nodes are there
             cell.wait(lambda: all(map(heard, SUBSCRIBERS)), 'the nodes that listen')
+            time.sleep(BY_HAND)
         cell.start(name, **own)
     generator = cell.processes[-1]
     cell.wait(lambda: generator.code is not None, 'the motion to end', limit=120.0)

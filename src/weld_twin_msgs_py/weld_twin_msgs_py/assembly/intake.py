@@ -20,6 +20,9 @@ from .frame_names import MeasuringFrame, WrenchFrame
 from .joint_states import JointSample, JointStates
 from .stamp_order import Forward
 
+UNIT = 0.009
+"""By how much the length of a quaternion may differ from one without a closer look."""
+
 
 class Role(Enum):
     """What the messages of a topic tell."""
@@ -167,7 +170,7 @@ def _pose_row(message: Any) -> Array:
     p, q = inner.position, inner.orientation
     sigma = None if inner is message.pose else from_messages.position_sigma(message)
     row = [p.x, p.y, p.z, q.x, q.y, q.z, q.w, nan if sigma is None else sigma]
-    if not (isfinite(sum(row[:3])) and abs(hypot(*row[3:7]) - 1.0) < 0.009):
+    if not (isfinite(sum(row[:3])) and abs(hypot(*row[3:7]) - 1.0) < UNIT):
         from_messages.pose(message)  # has the sentence, and the bound
     return np.array(row)
 

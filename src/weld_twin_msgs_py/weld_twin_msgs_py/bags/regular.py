@@ -19,17 +19,12 @@ import numpy as np
 from weld_twin_core.arrays import Array
 
 from ..assembly import Intake, Role
+from ..assembly.intake import UNIT
+from ..messages.from_messages import COLDEST, HOTTEST, VARIANCES
 from ..messages.layout import Layout, layout_of
 from .blocks import Unusual, blocks
 from .columns import LEFT_OUT, Stream
 from .reader import BagReader
-
-_UNIT = 0.009
-"""By how much the length of a quaternion may differ from one, as the intake takes it unasked."""
-_VARIANCES = (0, 7, 14)
-"""Where a covariance of six has those of the position."""
-_COLDEST, _HOTTEST = -273.15, 200.0
-"""Temperatures that are taken unasked [degC]."""
 
 
 class _Topic:
@@ -136,7 +131,7 @@ def _joint_rows(runs: list[Array], index: list[int]) -> Array:
 
 def _pose_rows(values: Array) -> Array:
     pose = _finite(values[:, :7])
-    if (np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1.0) >= _UNIT).any():
+    if (np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1.0) >= UNIT).any():
         raise Unusual
     return np.column_stack([pose, _sigma(values[:, 7:])])
 
@@ -145,7 +140,7 @@ def _sigma(covariance: Array) -> Array:
     """Return the deviation of positions; NaN without a covariance, or where it is left at zero."""
     if not covariance.size:
         return np.full(covariance.shape[0], np.nan)
-    variances = _finite(covariance[:, _VARIANCES])
+    variances = _finite(covariance[:, VARIANCES])
     if (variances < 0.0).any():
         raise Unusual
     return np.where(variances.any(axis=1), np.sqrt(variances.mean(axis=1)), np.nan)
@@ -153,7 +148,7 @@ def _sigma(covariance: Array) -> Array:
 
 def _temperature_rows(values: Array) -> Array:
     degrees = _finite(values[:, :1])
-    if (degrees < _COLDEST).any() or (degrees > _HOTTEST).any():
+    if (degrees < COLDEST).any() or (degrees > HOTTEST).any():
         raise Unusual
     return degrees
 

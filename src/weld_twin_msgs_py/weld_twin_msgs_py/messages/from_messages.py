@@ -23,6 +23,10 @@ from weld_twin_core.recording import JointMotion
 
 NANOSECONDS = 1_000_000_000
 """In a second."""
+COLDEST, HOTTEST = -273.15, 200.0
+"""Temperatures that can be meant [degC]; above, it must be kelvin."""
+VARIANCES = (0, 7, 14)
+"""Where the covariance of a pose has the variances of its position."""
 
 
 class Unstamped(DataError):
@@ -202,9 +206,9 @@ def temperature(message: Any) -> float:
 
     """
     value = float(message.temperature)
-    if not isfinite(value) or value < -273.15:
+    if not isfinite(value) or value < COLDEST:
         raise DataError(f'the temperature is {value} degC, which is no temperature')
-    if value > 200.0:
+    if value > HOTTEST:
         raise DataError(
             f'the temperature is {value:.6g} degC, which looks like kelvin; publish degC as '
             'sensor_msgs/Temperature defines'
@@ -224,7 +228,7 @@ def position_sigma(message: Any) -> float | None:
         A variance is negative or not finite.
 
     """
-    diagonal = readonly(np.asarray(message.pose.covariance)[[0, 7, 14]], (3,), 'covariance')
+    diagonal = readonly(np.asarray(message.pose.covariance)[list(VARIANCES)], (3,), 'covariance')
     if (diagonal < 0.0).any():
         raise DataError('the covariance of the pose has a negative variance')
     return float(np.sqrt(diagonal.mean())) if diagonal.any() else None

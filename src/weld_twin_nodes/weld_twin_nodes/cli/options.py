@@ -118,6 +118,19 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
     return replace(names, joint_prefix=args.joint_prefix, joint_map=tuple(pairs))
 
 
+def add_pool(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say where tasks run."""
+    parser.add_argument(
+        '--workers', type=int, default=0, metavar='N', help='processes (default: all cores)'
+    )
+    parser.add_argument(
+        '--scheduler',
+        default='',
+        metavar='ADDRESS',
+        help='Dask cluster to run on instead; it must see the same directories',
+    )
+
+
 def add_bag_output(parser: argparse.ArgumentParser) -> None:
     """Add the options of a command that writes a bag."""
     parser.add_argument(

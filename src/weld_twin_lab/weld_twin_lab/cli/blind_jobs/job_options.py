@@ -10,21 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from weld_twin_nodes.cli.options import add_pool as add_pool
+
 if TYPE_CHECKING:
     from weld_twin_nodes.offline.task_pool import Runner
-
-
-def add_pool(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say where tasks run."""
-    parser.add_argument(
-        '--workers', type=int, default=0, metavar='N', help='processes (default: all cores)'
-    )
-    parser.add_argument(
-        '--scheduler',
-        default='',
-        metavar='ADDRESS',
-        help='Dask cluster to run on instead; it must see the same directories',
-    )
 
 
 @contextmanager

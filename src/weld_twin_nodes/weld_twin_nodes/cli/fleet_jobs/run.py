@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..history_jobs import opened
+from ..options import add_pool
 
 if TYPE_CHECKING:
     from weld_twin_nodes.fleet.running import Tell
@@ -35,15 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--db', required=True, metavar='URL', help='an SQLite file, or postgresql+psycopg://...'
     )
-    parser.add_argument(
-        '--workers', type=int, default=0, metavar='N', help='processes (default: all cores)'
-    )
-    parser.add_argument(
-        '--scheduler',
-        default='',
-        metavar='ADDRESS',
-        help='Dask cluster to run on instead; it must see the same directories',
-    )
+    add_pool(parser)
     parser.add_argument(
         '--keep', metavar='DIR', help='also keep the page and the model of every recording there'
     )

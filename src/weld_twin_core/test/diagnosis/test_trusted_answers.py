@@ -52,6 +52,22 @@ def test_a_sign_says_no_more_beyond_what_was_learned_from():
     assert far == edge
 
 
+@pytest.mark.parametrize(
+    ('gap', 'bias', 'told'),
+    [(4.9, -6.0, 0.01), (5.1, -6.0, 0.7), (5.1, 6.0, 0.99)],
+    ids=['seen', 'larger', 'larger but sure'],
+)
+def test_a_gap_beyond_all_that_was_learned_from_is_told_what_the_evidence_says(gap, bias, told):
+    trust = taught(sure_from=0.9, answer_named=(bias, {'gap': 0.0}))
+    signs = {'gap': gap, 'belief': 0.7}
+    assert trust.told('answer', 'named', signs) == pytest.approx(told)
+
+
+def test_the_evidence_alone_makes_no_answer_sure():
+    trust = taught(sure_from=0.9, answer_named=(-6.0, {'gap': 0.0}))
+    assert trust.told('answer', 'named', {'gap': 9.0, 'belief': 0.97}) == 0.8
+
+
 def test_a_sign_that_is_missing_counts_as_usual():
     trust = taught(sure_from=0.5, answer_named=(0.4, {'margin': 1.0}))
     assert trust.told('answer', 'named', {}) == pytest.approx(1.0 / (1.0 + math.exp(-0.4)))

@@ -26,6 +26,12 @@ AS_LOGIT = frozenset({'belief', 'place', 'dependence', 'name', 'leader', 'mass',
 """Signs that are probabilities; their log odds add up, they do not."""
 
 
+SIZES = ('gap', 'strongest', 'cause_size')
+"""Signs that say how large something is against the noise. Where one lies beyond all cases learned
+from, the others mean something else too: of a gap of ten thousand times the noise, a rest of thirty
+times the noise is nothing, of a gap of sixty it was half."""
+BEFORE = {'answer': 'belief', 'place': 'place', 'dependence': 'dependence', 'name': 'name'}
+"""The sign that is the probability of a level before anything was learned."""
 PRODUCTS = {
     'constant_at_rest': ('constants', 'moving'),
     'constant_in_narrow': ('constants', 'wide'),
@@ -99,6 +105,20 @@ class Learned:
                 total += term.nats(taken(name, signs[name]))
         return float(np.clip(1.0 / (1.0 + np.exp(-total)), self.least, self.most))
 
+    def larger(self, signs: Mapping[str, float]) -> bool:
+        """
+        Return whether something is larger against the noise than in any case learned from.
+
+        Parameters
+        ----------
+        signs : mapping from str to float
+
+        """
+        return any(
+            name in signs and name in self.terms and signs[name] > self.terms[name].high
+            for name in SIZES
+        )
+
 
 def taken(name: str, value: float) -> float:
     """
@@ -163,6 +183,9 @@ class Trust:
         """
         Return how far to believe a level: not above ``told_unsure`` where it is not sure.
 
+        Beyond the sizes that were learned from, nothing speaks against what the evidence alone says;
+        so it is told at least that, as far as it is not sure.
+
         Parameters
         ----------
         level : str
@@ -180,6 +203,9 @@ class Trust:
         if learned is None:
             return None
         probability = learned.probability(with_products(signs))
+        before = signs.get(BEFORE[level], 0.0)
+        if learned.larger(signs):
+            probability = max(probability, min(before, self.told_unsure))
         sure = probability >= self.sure_from.get(f'{level} {group}', 1.0)
         return probability if sure else min(probability, self.told_unsure)
 

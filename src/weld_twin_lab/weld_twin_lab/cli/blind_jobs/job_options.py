@@ -32,7 +32,8 @@ def runner_of(args: argparse.Namespace, store: Path, what: str) -> Iterator[Runn
         def tell(done: int, total: int, label: str) -> None:
             progress.update(bar, completed=done, total=total)
 
-        yield Runner(pool_of(args.scheduler, args.workers), store, tell)
+        with Runner(pool_of(args.scheduler, args.workers), store, tell) as runner:
+            yield runner
 
 
 def add_draw(parser: argparse.ArgumentParser) -> None:

@@ -20,6 +20,7 @@ from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
 from .frames.places import not_told
 from .hypotheses.search import Search, search
+from .hypotheses.selection import implausible
 from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.carried import carried
 from .levels.curved import curved
@@ -167,6 +168,7 @@ def _explained(
 
 
 def _held(found: Search, robot: Robot) -> Search:
-    """Return what was found with its frames as near to the given ones as the data bear."""
+    """Return what was found with its frames as near to the given ones as machines and data bear."""
     final = held(found.final, found.problem, found.scale, found.precision, robot)
-    return replace(found, final=final)
+    pushed = implausible(final.model) and not implausible(found.final.model)
+    return found if pushed else replace(found, final=final)

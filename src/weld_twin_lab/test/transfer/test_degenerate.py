@@ -76,6 +76,11 @@ def test_draws_that_once_ended_in_a_traceback(seed):
     assert tried(drawn(seed))['traceback'] is None
 
 
+@pytest.mark.filterwarnings('ignore')
+def test_frames_put_back_where_they_were_push_no_error_beyond_what_machines_have():
+    assert tried(drawn(383))['wrong'] == []
+
+
 def test_a_draw_is_what_it_says():
     draw = Draw('nine', still=4, grid=10.0, repeats=3, flat=2, count=12)
     recording, robot = recording_of(draw)

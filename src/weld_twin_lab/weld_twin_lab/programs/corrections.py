@@ -3,8 +3,8 @@
 """
 Does a corrected program help? Out, in by another reader, run by another arm.
 
-The plant records an arm with sealed causes; the recording is diagnosed; a seam is written as a program,
-corrected with what was found, and with the true causes beside it. A reader that shares nothing with
+The plant records an arm with sealed causes, in free motion and along the seam as its program has it;
+both are diagnosed; the program is corrected with what was found, and with the true causes beside it. A reader that shares nothing with
 the product takes each program in, a plain controller that knows no error interpolates it, and the
 plant runs it. The path is judged against the seam as the program meant it.
 """
@@ -42,7 +42,7 @@ TORCH = 0.25
 NOISE = 3e-5
 """Of the tracker [m]."""
 RECORDED = 30.0
-"""Length of the recording that is diagnosed [s]."""
+"""Length of the free motion that is recorded [s]."""
 STEP, SPEED, RATE = 0.005, 0.02, 50.0
 """Way between two places of the plain controller [m], its speed [m/s], samples a second."""
 REST = 0.5
@@ -64,12 +64,13 @@ def correction(language: str, seed: int = 0) -> dict[str, Any]:
     plain = robot_of(language)
     robot = plain.with_frames(tool=context.controller.flange @ along(2, TORCH))
     causes = _causes(robot, rng)
-    found = _diagnosed(robot, causes, rng)
     context = context._replace(
         robot=robot, controller=replace(context.controller, own_tool=np.array(robot.T_flange_tool))
     )
     made, text, _ = export('arc', context, language, 'seam', Speeds(), 1)
     start = made.moves[0].q
+    along_seam = _driven(robot, language, text, start)[0]
+    found = _diagnosed(robot, causes, along_seam, rng)
     true = ProgramModel(robot, tuple(effects_from_list(causes, robot)))
     left = ''
     try:
@@ -107,11 +108,18 @@ def _causes(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
     ]
 
 
-def _diagnosed(robot: Robot, causes: Sequence[Any], rng: np.random.Generator) -> Diagnosis:
+def _diagnosed(
+    robot: Robot, causes: Sequence[Any], along_seam: np.ndarray, rng: np.random.Generator
+) -> Diagnosis:
+    """Return the diagnosis of a free motion and of the seam, both with the tracker's noise."""
     moved = motion('free', robot, RECORDED, rng)
     tracker = Tracker(rate=60.0, sigma=NOISE)
-    made = run(robot.to_mapping(), causes, Command(moved.t, moved.q), tracker, rng)
-    return diagnose([as_recording('sealed', made)], robot)
+    commands = {'free': Command(moved.t, moved.q), 'seam': _command(along_seam)}
+    made = [
+        as_recording(name, run(robot.to_mapping(), causes, command, tracker, rng))
+        for name, command in commands.items()
+    ]
+    return diagnose(made, robot)
 
 
 def _model(found: Diagnosis) -> ProgramModel:
@@ -152,18 +160,24 @@ def _driven(
     return joints, np.array([tool_pose(robot, row, tool)[:3, 3] for row in joints])
 
 
-def _errors(
-    robot: Robot, causes: Sequence[Any], joints: np.ndarray, wanted: np.ndarray
-) -> np.ndarray:
-    """Return how far the plant's tool is from the line of the seam at every sample [m]."""
+def _command(joints: np.ndarray) -> Command:
+    """Return what a controller that goes along these joints commands, with a stay at either end."""
     clock = STEP / SPEED * np.arange(len(joints))
     stay = int(REST * RATE)
     t = np.arange(int(clock[-1] * RATE) + 1) / RATE
     moving = np.stack([np.interp(t, clock, column) for column in joints.T], axis=1)
     q = np.concatenate([np.tile(moving[0], (stay, 1)), moving, np.tile(moving[-1], (stay, 1))])
-    command = Command(np.arange(len(q)) / RATE, q)
+    return Command(np.arange(len(q)) / RATE, q)
+
+
+def _errors(
+    robot: Robot, causes: Sequence[Any], joints: np.ndarray, wanted: np.ndarray
+) -> np.ndarray:
+    """Return how far the plant's tool is from the line of the seam at every sample [m]."""
+    command = _command(joints)
     made = run(robot.to_mapping(), causes, command, Tracker(), np.random.default_rng(0))
-    real = made.position[stay : stay + len(moving)]
+    stay = int(REST * RATE)
+    real = made.position[stay : len(command.t) - stay]
     starts, ways = wanted[:-1], np.diff(wanted, axis=0)
     size = np.maximum((ways**2).sum(axis=1), 1e-18)
     share = np.clip(((real[:, None] - starts) * ways).sum(axis=2) / size, 0.0, 1.0)

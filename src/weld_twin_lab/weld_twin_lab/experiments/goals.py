@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_msgs_py.files import markdown
+from weld_twin_nodes.offline.investigation import SAID
 
 WAYS = ('loop', 'random', 'rich', 'd_optimal')
 """The loop, and what it is held against."""
@@ -24,24 +25,40 @@ def summary(cases: Sequence[Case]) -> dict[str, Any]:
         return {'cells': 0}
     rounds = [step for case in cases for step in case['rounds']]
     certain = [case for case in cases if _good(case, 'loop')]
-    both = [c for c in certain if c['d_optimal_stations'] is not None]
+    compared = [case for case in cases if 'd_optimal' in case]
+    both = [c for c in certain if c.get('d_optimal_stations') is not None]
     return {
         'cells': len(cases),
+        'compared': len(compared),
         'first': {
             s: _count(cases, lambda c, s=s: c['first']['status'] == s) for s in _statuses(cases)
         },
         'right_and_sure': {way: _count(cases, lambda c, w=way: _good(c, w)) for way in WAYS},
-        'right': {way: _count(cases, lambda c, w=way: c[w]['right']) for way in WAYS},
-        'sure_and_wrong': {
-            way: _count(cases, lambda c, w=way: c[w]['sure'] and not c[w]['right']) for way in WAYS
-        },
+        'right': {way: _count(cases, lambda c, w=way: w in c and c[w]['right']) for way in WAYS},
+        'sure_and_wrong': {way: _count(cases, lambda c, w=way: _misled(c, w)) for way in WAYS},
+        'loop_where_compared': _count(compared, lambda c: _good(c, 'loop')),
         'minutes_to_certainty': _median([c['minutes'] for c in certain]),
         'poses': _median([poses(c) for c in both]),
         'd_optimal_poses': _median([c['d_optimal_stations'] for c in both]),
-        'd_optimal_never': len(certain) - len(both),
+        'd_optimal_never': _count(
+            certain, lambda c: 'd_optimal' in c and c['d_optimal_stations'] is None
+        ),
         'experiments': len(rounds),
-        'decided': sum(bool(step['decided']) for step in rounds),
+        **_promises(rounds),
         'seconds': max((step['seconds'] for step in rounds), default=0.0),
+    }
+
+
+def _promises(rounds: Sequence[Case]) -> dict[str, Any]:
+    """Return how often experiments decided, beside what they had said."""
+    judged = [step for step in rounds if step['decided'] is not None]
+    said = [step for step in judged if (step['promise'] or 0.0) >= SAID]
+    return {
+        'that_compared': len(judged),
+        'foreseen': sum(step['promise'] or 0.0 for step in judged),
+        'decided': _count(judged, lambda step: step['decided']),
+        'said_they_would': len(said),
+        'of_these_decided': _count(said, lambda step: step['decided']),
     }
 
 
@@ -51,7 +68,11 @@ def poses(case: Case) -> float:
 
 
 def _good(case: Case, way: str) -> bool:
-    return bool(case[way]['right'] and case[way]['sure'])
+    return way in case and bool(case[way]['right'] and case[way]['sure'])
+
+
+def _misled(case: Case, way: str) -> bool:
+    return way in case and bool(case[way]['sure'] and not case[way]['right'])
 
 
 def _statuses(cases: Sequence[Case]) -> list[str]:
@@ -75,7 +96,7 @@ def page(result: dict[str, Any]) -> str:
         (
             way,
             *(
-                f'{told[key][way]} of {told["cells"]}'
+                f'{told[key][way]} of {told["cells" if way == "loop" else "compared"]}'
                 for key in ('right_and_sure', 'right', 'sure_and_wrong')
             ),
         )
@@ -115,7 +136,7 @@ def _row(case: Case) -> tuple[str, ...]:
         ', '.join(f'{s["kind"]} {s["robot_minutes"]:.1f} min' for s in case['rounds']),
         _told(case['loop']),
         str(case['end']),
-        *(_told(case[way]) for way in WAYS[1:]),
+        *(_told(case[way]) if way in case else '' for way in WAYS[1:]),
     )
 
 

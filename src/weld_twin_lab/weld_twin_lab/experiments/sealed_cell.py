@@ -5,20 +5,25 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.advice.candidates import LONGER
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import Recording
+from weld_twin_core.recording import Measurements, Recording
+from weld_twin_nodes.offline.set_up_changes import FRAMES, SetUpChange, set_up_change, told
 from weld_twin_nodes.report.diagnosis_files import diagnosis_text
 
 from ..blind.blind_cell import as_recording, of_motion, record
@@ -30,6 +35,8 @@ from ..blind.poor_motion import WAYS
 from ..blind.recorded_motion import RATE, Motion
 from ..blind.seal import text_digest
 
+FOLLOWING = 60.0
+"""Rate [Hz] of an instrument that follows the tool, where another was set up for an experiment."""
 STAY = 15.0
 """A station with the way to it [s], as experiments are planned."""
 
@@ -65,6 +72,7 @@ class SealedCell:
         # Few stations are poor; of a path there is no few.
         self.poor = str(rng.choice([w for w in WAYS if w != 'few' or lot.motion == 'stations']))
         self._case: Case = draw_case(lot, rng, poor=self.poor)
+        self._changed: dict[str, SetUpChange] = {}
         self._salt = int(rng.integers(2**62))
         self.robot: Robot = self._case.cell.robot
         self.still = self._case.lot.motion == 'stations'
@@ -82,16 +90,49 @@ class SealedCell:
         """Return the poor recording that everything begins with."""
         return as_recording('first', record(self._case.cell, self._case.causes, self._case.train))
 
-    def made(self, name: str, motion: Motion, seed: int) -> Recording:
-        """Return the recording of a motion; the seed decides noise and surroundings."""
+    def made(self, name: str, motion: Motion, seed: int, changed: str = '') -> Recording:
+        """
+        Return the recording of a motion.
+
+        Parameters
+        ----------
+        name : str
+        motion : Motion
+        seed : int
+            Decides noise and surroundings.
+        changed : str
+            What is changed in the cell for it, as `set_up_change` reads it.
+
+        """
         rng = np.random.default_rng([seed, *name.encode()])
-        taken = of_motion(self._case.cell, motion, rng)
-        return as_recording(name, record(self._case.cell, self._case.causes, taken))
+        cell = self._case.cell
+        if self.still and not motion.static:
+            cell = replace(cell, tracker=replace(cell.tracker, rate=FOLLOWING))
+        if changed:
+            self._changed[name] = set_up_change(changed)
+            cell = replace(cell, robot=_changed(cell.robot, self._changed[name]))
+        taken = of_motion(cell, motion, rng)
+        made = as_recording(name, record(cell, self._case.causes, taken))
+        return _from_elsewhere(made) if changed == 'instrument' else made
+
+    def seen_anew(self, recordings: Sequence[Recording]) -> bool:
+        """Return whether tool or instrument was changed for one of the recordings."""
+        return any(
+            r.name in self._changed and self._changed[r.name].kind in FRAMES for r in recordings
+        )
 
     def diagnosed(self, recordings: list[Recording], **options: Any) -> dict[str, Any]:
-        """Return the content of diagnosis.json."""
+        """Return the content of diagnosis.json; it is told what was changed for which recording."""
+        names = [recording.name for recording in recordings]
+        changes = {names.index(name): c for name, c in self._changed.items() if name in names}
+        recordings, may_change = told(recordings, changes, self.robot)
         found = diagnose(
-            recordings, self.robot, align=self._case.cell.align, known=self._known, **options
+            recordings,
+            self.robot,
+            align=self._case.cell.align,
+            known=self._known,
+            may_change=may_change,
+            **options,
         )
         return dict(json.loads(diagnosis_text(found, ())))
 
@@ -112,6 +153,26 @@ class SealedCell:
     def judged(self, found: Mapping[str, Any]) -> Judged:
         """Return what a diagnosis is worth."""
         return judge(self.opened(), found)
+
+
+def _changed(robot: Robot, change: SetUpChange) -> Robot:
+    """Return the arm with another load, or with a longer tool."""
+    if change.kind == 'load':
+        return replace(robot, payload_mass=robot.payload_mass + change.numbers[0])
+    if change.kind == 'tool':
+        longer = transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
+        return robot.with_frames(tool=robot.T_flange_tool @ longer)
+    return robot
+
+
+def _from_elsewhere(recording: Recording) -> Recording:
+    """Return the recording as an instrument at another place, turned another way, measures it."""
+    assert recording.measured is not None
+    turn = Rotation.from_rotvec([0.05, -0.03, 0.7]).as_matrix()
+    seen = recording.measured
+    rotation = None if seen.rotation is None else turn @ seen.rotation
+    position = seen.position @ turn.T + np.array([1.2, -0.9, 0.1])
+    return recording.with_measured(Measurements(seen.t, position, rotation))
 
 
 def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:

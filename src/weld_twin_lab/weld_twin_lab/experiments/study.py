@@ -25,7 +25,14 @@ MOST_DRAWN = 40
 Tell = Callable[[str], None]
 
 
-def study(out: Path, seed: int, wanted: int, tell: Tell = lambda text: None) -> dict[str, Any]:
+def study(
+    out: Path,
+    seed: int,
+    wanted: int,
+    tell: Tell = lambda text: None,
+    *,
+    alone: bool = False,
+) -> dict[str, Any]:
     """
     Investigate sealed cells that poor motions leave open, and write the results.
 
@@ -39,6 +46,8 @@ def study(out: Path, seed: int, wanted: int, tell: Tell = lambda text: None) -> 
         Cells that poor motions leave open.
     tell : callable
         Told what is being done.
+    alone : bool
+        Leave out what is usual practice; a later run without this word adds it.
 
     """
     (out / PARTS).mkdir(parents=True, exist_ok=True)
@@ -49,8 +58,9 @@ def study(out: Path, seed: int, wanted: int, tell: Tell = lambda text: None) -> 
             break
         drawn += 1
         entry = _kept(out, seed, number, lot, tell)
-        if entry['open']:
-            cases.append(entry)
+        if not entry['open']:
+            continue
+        cases.append({**entry, **_beside(out, seed, number, lot, entry, alone=alone)})
     result = {
         'schema': SCHEMA,
         'version': __version__,
@@ -74,13 +84,33 @@ def _kept(out: Path, seed: int, number: int, lot: Lot, tell: Tell) -> dict[str, 
     return kept
 
 
+def _beside(
+    out: Path, seed: int, number: int, lot: Lot, entry: dict[str, Any], *, alone: bool
+) -> dict[str, Any]:
+    """Return what usual practice leads to, kept in a file of its own; empty where it was left out."""
+    path = out / PARTS / f'{seed}-{number:04d}-beside.json'
+    if not path.exists():
+        if alone:
+            return {}
+        from ..blind.simulator import require_simulator
+
+        require_simulator()
+        from .sealed_cell import SealedCell
+        from .trial import beside
+
+        told = beside(SealedCell(lot, seed, number), entry)
+        write_text(path, json.dumps(told, indent=1) + '\n')
+    kept: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
+    return kept
+
+
 def _investigated(lot: Lot, seed: int, number: int) -> dict[str, Any]:
     """Return what came of one cell; the simulator is loaded where it is needed."""
     from ..blind.simulator import require_simulator
 
     require_simulator()
     from .sealed_cell import SealedCell
-    from .trial import poor_at_first, trial
+    from .trial import looped, poor_at_first
 
     try:
         cell = SealedCell(lot, seed, number)
@@ -89,4 +119,4 @@ def _investigated(lot: Lot, seed: int, number: int) -> dict[str, Any]:
     first = poor_at_first(cell)
     if first is None:
         return {'open': False, 'why': 'right from the first'}
-    return {'open': True, **trial(cell, *first)}
+    return {'open': True, **looped(cell, *first)}

@@ -11,7 +11,7 @@ from typing import Any
 from weld_twin_core.diagnosis.advice import Limits
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
-from weld_twin_nodes.offline.investigation import decided, question, weighed
+from weld_twin_nodes.offline.investigation import decided, question, third_wanted, weighed
 
 from ..blind.recorded_motion import Motion
 from .sealed_cell import STAY, SealedCell, as_motion
@@ -21,6 +21,15 @@ ROUNDS = 3
 """Experiments at most."""
 MINUTES = 5.0
 """Of robot motion at most, all experiments together."""
+VISIT = 60.0
+"""Minutes at most, all experiments together, with what has to be set up for them."""
+LEAST = 0.25
+"""Minutes that an experiment is planned with where hardly any are left."""
+ASKED = (
+    *('kind', 'minutes', 'robot_minutes', 'stations'),
+    *('expected_sigma', 'between', 'promise', 'changes'),
+)
+"""What is kept of every experiment."""
 STEPS = (8, 20)
 """Stations after which D-optimal ones are diagnosed, up to as many as the minutes hold."""
 
@@ -38,24 +47,45 @@ def said(cell: SealedCell, found: Mapping[str, Any], why: str) -> dict[str, Any]
 
 
 def answered(
-    cell: SealedCell, first: Recording, later: Sequence[Recording], minutes: float = MINUTES
+    cell: SealedCell,
+    first: Recording,
+    later: Sequence[Recording],
+    limits: Limits,
+    before: Mapping[str, Any] | None = None,
 ) -> tuple[Mapping[str, Any], str]:
-    """Return the answer from the first recording and later ones, and why it closes the question."""
-    limits = Limits(minutes=max(minutes, 0.25), set_up=False)
+    """
+    Return the answer from the first recording and later ones, and why it closes the question.
+
+    Parameters
+    ----------
+    cell : SealedCell
+    first : Recording
+    later : sequence of Recording
+    limits : Limits
+        What the next experiment may take.
+    before : mapping, optional
+        The answer before the last recording.
+
+    """
     together = cell.diagnosed([first, *later], limits=limits)
-    if not later:
+    if not later or cell.seen_anew(later):
         return weighed(together)
     try:
         alone = cell.diagnosed(list(later), holdout=[first], limits=limits)
     except TwinError:
         # Too few stations to be diagnosed by themselves.
         return weighed(together)
-    return weighed(together, alone)
+    free = cell.diagnosed(list(later), limits=limits) if third_wanted(together, alone) else None
+    return weighed(together, alone, free, before)
+
+
+def _left(minutes: float, visit: float = VISIT) -> Limits:
+    return Limits(minutes=max(visit, LEAST), moving=max(minutes, LEAST))
 
 
 def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Return the first diagnosis and what it is worth; None where it is right or finds a mistake."""
-    found, why = answered(cell, cell.first(), [])
+    found, why = answered(cell, cell.first(), [], _left(MINUTES))
     first = said(cell, found, why)
     wrong = first['status'] in ('ambiguous', 'unknown') or not first['right']
     # What cannot be told apart by any motion is no question for an experiment.
@@ -63,9 +93,9 @@ def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | N
     return (dict(found), first) if wrong and not closed else None
 
 
-def trial(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any]) -> dict[str, Any]:
+def looped(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any]) -> dict[str, Any]:
     """
-    Return what came of one cell.
+    Return what came of one cell that was investigated.
 
     Parameters
     ----------
@@ -76,18 +106,7 @@ def trial(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any]) 
         The same in short.
 
     """
-    start = cell.first()
-    rounds, end, answer = investigated(cell, start, found, dict(first))
-    minutes = sum(step['robot_minutes'] for step in rounds)
-    spent = max(minutes, 1.0)
-    count = max(int(60.0 * spent / STAY), 1)
-    others = {
-        'random': at_random(cell.robot, cell.still, spent, 1),
-        'rich': rich(cell.robot, cell.still, spent),
-        'd_optimal': d_optimal(cell.robot, count, _points(start)),
-    }
-    told = {name: _with(cell, start, name, motion) for name, motion in others.items()}
-    good = answer['right'] and answer['sure']
+    rounds, end, answer = investigated(cell, cell.first(), found, dict(first))
     return {
         'name': cell.name,
         'seal': cell.seal,
@@ -97,8 +116,33 @@ def trial(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any]) 
         'first': dict(first),
         'rounds': rounds,
         'end': end,
-        'minutes': minutes,
+        'minutes': sum(step['robot_minutes'] for step in rounds),
         'loop': answer,
+    }
+
+
+def beside(cell: SealedCell, entry: Mapping[str, Any]) -> dict[str, Any]:
+    """
+    Return what the minutes of an investigation lead to where nobody asks what is in doubt.
+
+    Parameters
+    ----------
+    cell : SealedCell
+    entry : mapping
+        As `looped` returned it.
+
+    """
+    start = cell.first()
+    spent = max(float(entry['minutes']), 1.0)
+    count = max(int(60.0 * spent / STAY), 1)
+    others = {
+        'random': at_random(cell.robot, cell.still, spent, 1),
+        'rich': rich(cell.robot, cell.still, spent),
+        'd_optimal': d_optimal(cell.robot, count, _points(start)),
+    }
+    told = {name: _with(cell, start, name, motion) for name, motion in others.items()}
+    good = entry['loop']['right'] and entry['loop']['sure']
+    return {
         **told,
         'd_optimal_stations': _to_certainty(cell, start, count, told) if good else None,
     }
@@ -110,27 +154,26 @@ def investigated(
     """Return the rounds of the loop, the word that it ended with, and its last answer."""
     later: list[Recording] = []
     rounds: list[dict[str, Any]] = []
-    left, why = MINUTES, None
+    left, visit, why = MINUTES, VISIT, None
     while True:
-        asked = question(found, left, [step['kind'] for step in rounds], why)
+        asked = question(found, visit, [step['kind'] for step in rounds], why)
         if not isinstance(asked, dict):
             return rounds, asked[0], answer
-        if len(rounds) == ROUNDS:
-            return rounds, 'rounds spent', answer
+        if len(rounds) == ROUNDS or asked['robot_minutes'] > left:
+            return rounds, 'rounds spent' if len(rounds) == ROUNDS else 'minutes spent', answer
         name = f'experiment {len(rounds) + 1}'
-        later.append(cell.made(name, as_motion(asked['motion'], cell.robot), 100 + len(rounds)))
-        left -= asked['robot_minutes']
+        motion = as_motion(asked['motion'], cell.robot)
+        later.append(cell.made(name, motion, 100 + len(rounds), asked['changes']))
+        left, visit = left - asked['robot_minutes'], visit - asked['minutes']
         begun = time.perf_counter()
         try:
-            found, why = answered(cell, start, later, left)
+            found, why = answered(cell, start, later, _left(left, visit), found)
         except TwinError as error:
             return rounds, f'refused: {error}', answer
         answer = said(cell, found, why)
         rounds.append(
             {
-                **{key: asked[key] for key in ('kind', 'robot_minutes', 'stations')},
-                'expected_sigma': asked['expected_sigma'],
-                'between': asked['between'],
+                **{key: asked[key] for key in ASKED},
                 'decided': decided(asked, found),
                 'seconds': time.perf_counter() - begun,
                 'found': answer,
@@ -140,8 +183,9 @@ def investigated(
 
 def _with(cell: SealedCell, start: Recording, name: str, motion: Motion) -> dict[str, Any]:
     """Return what a further recording of a motion leads to."""
+    made = cell.made(name, motion, 200)
     try:
-        return said(cell, *answered(cell, start, [cell.made(name, motion, 200)]))
+        return said(cell, *answered(cell, start, [made], _left(MINUTES)))
     except TwinError as error:
         return {'status': 'refused', 'said': str(error), 'right': False, 'sure': False}
 

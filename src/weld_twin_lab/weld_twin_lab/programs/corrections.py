@@ -4,9 +4,10 @@
 Does a corrected program help? Out, in by another reader, run by another arm.
 
 The plant records an arm with sealed causes, in free motion and along the seam as its program has it;
-both are diagnosed; the program is corrected with what was found, and with the true causes beside it. A reader that shares nothing with
-the product takes each program in, a plain controller that knows no error interpolates it, and the
-plant runs it. The path is judged against the seam as the program meant it.
+both are diagnosed; the program is corrected with what was found, and with the true causes beside
+it. A reader that shares nothing with the product takes each program in, a plain controller that
+knows no error interpolates it, and the plant runs it. The path is judged against the seam as the
+program meant it.
 """
 
 from __future__ import annotations

@@ -7,11 +7,13 @@ import pytest
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.offline.investigation import (
     begin,
+    changed,
     decided,
     question,
     read_state,
     recordings,
     take_in,
+    third_wanted,
     weighed,
     write_state,
 )
@@ -101,6 +103,50 @@ def test_an_experiment_is_judged_by_what_it_said(content, answer):
     assert decided(question(found(wanted=stations()), 30.0, []), content) is answer
 
 
+def at(place, on):
+    return {'effect': 'joint_curve', 'joint': place, 'at': place, 'on': on}
+
+
+def without_name(place, on, probability=0.9):
+    cause = {
+        'place': [{'at': place, 'probability': probability}],
+        'dependence': [{'on': on, 'probability': probability}],
+        'share': 0.8,
+    }
+    content = found('unknown', groups=())
+    return {**content, 'verdict': {**content['verdict'], 'causes': [cause]}}
+
+
+@pytest.mark.parametrize(
+    ('sides', 'content', 'answer'),
+    [
+        ([[at('a', 'angle')], [at('b', 'angle')]], without_name('a', 'angle'), True),
+        ([[at('a', 'angle')], [at('b', 'angle')]], without_name('c', 'angle'), False),
+        ([[at('a', 'angle')], [at('b', 'angle')]], without_name('a', 'angle', 0.5), False),
+        ([[], [at('a', 'load')]], without_name('a', 'load'), True),
+        ([[], [at('a', 'load')]], without_name('a', 'angle'), True),
+        (None, without_name('a', 'angle'), None),
+    ],
+)
+def test_where_no_name_fits_place_and_dependence_are_what_is_decided(sides, content, answer):
+    assert decided({'between': sides}, content) is answer
+
+
+def test_what_was_changed_in_the_cell_is_remembered(tmp_path):
+    bags = [tmp_path / 'monday', tmp_path / 'heavy']
+    for bag in bags:
+        bag.write_text(bag.name)
+    wanted = {**stations(), 'changes': 'load=5', 'promise': 0.9}
+    state = take_in(begin('ur5', [], 60.0), [str(bags[0])], found(wanted=wanted))
+    assert state['rounds'][0]['asked']['changes'] == 'load=5'
+    state = take_in(
+        state, [str(bags[1])], found('identified', groups=((SPRING,),)), None, 'load=4'
+    )
+    assert changed(state) == {str(bags[1].resolve()): 'load=4'}
+    page = investigation_page(state)
+    assert 'heavy (with a weight hung from the tool point)' in page and '90%' in page
+
+
 def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path):
     bags = [tmp_path / 'monday', tmp_path / 'tuesday']
     for bag in bags:
@@ -112,7 +158,9 @@ def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path):
     assert (state['state'], state['spent_min']) == ('sure', 3.0)
     assert state['rounds'][0]['asked']['decided'] is True
     page = investigation_page(state)
-    assert 'it decided that' in page and '1 of 1' in page and 'monday' in page
+    assert 'It decided that' in page and '1 of 1' in page and 'monday' in page
+    # Of the two explanations of the fork one is left, and the other struck out.
+    assert page.count('class="stays"') == 1 and page.count('class="gone"') == 1
     bags[0].write_text('another')
     with pytest.raises(DataError, match=r"monday' has changed since"):
         recordings(state)
@@ -154,3 +202,25 @@ ELSE = {'effect': 'backlash', 'joint': 'wrist_1_joint'}
 def test_experiments_alone_are_heard_beside_all_recordings(together, alone, believed, closed):
     told, why = weighed(together, alone)
     assert told is (together, alone)[believed] and bool(why) is closed
+
+
+def named(cause, confidence, status='identified'):
+    return found(status, groups=((cause,),) if cause else (), confidence=confidence)
+
+
+@pytest.mark.parametrize(
+    ('free', 'before', 'closed'),
+    [
+        # The experiments alone are sure of the same.
+        (named(SPRING, 0.95), None, True),
+        # They are not, but the same was likely before the last of them.
+        (named(SPRING, 0.8), named(SPRING, 0.8), True),
+        (named(SPRING, 0.8), named(ELSE, 0.8), False),
+        (named(SPRING, 0.8), None, False),
+        (named(ELSE, 0.95), named(SPRING, 0.8), False),
+    ],
+)
+def test_what_is_held_out_may_be_too_poor_to_be_foretold(free, before, closed):
+    together, alone = named(SPRING, 0.8), named(None, 0.9, 'unknown')
+    assert third_wanted(together, alone)
+    assert bool(weighed(together, alone, free, before)[1]) is closed

@@ -29,6 +29,11 @@ AGREED = 0.7
 """Confidence that two diagnoses of different recordings each need where only both together are sure:
 two that are wrong seldom name the same."""
 ALIKE = 'the causes are known as far as any motion can tell'
+SAID = 0.8
+"""Probability from which an experiment says that it will decide; below it says that it may."""
+FOUND = 0.7
+"""Probability from which a place and a dependence count as found; below the rest, as not."""
+AGAIN = 'the same causes are named again with a further experiment, and by the experiments alone'
 WIDENED = 3
 """Experiments of one kind without a comparison: more of the same seldom shows anything new."""
 
@@ -111,8 +116,18 @@ def recordings(state: State) -> tuple[list[str], list[str]]:
     return first, later
 
 
+def changed(state: State) -> dict[str, str]:
+    """Return by path for which recordings something was changed in the cell, and what."""
+    taken = [entry for step in state['rounds'] for entry in step['recordings']]
+    return {str(entry['path']): entry['changed'] for entry in taken if entry.get('changed')}
+
+
 def take_in(
-    state: State, bags: Sequence[str], found: Mapping[str, Any], why: str | None = None
+    state: State,
+    bags: Sequence[str],
+    found: Mapping[str, Any],
+    why: str | None = None,
+    changes: str = '',
 ) -> State:
     """
     Return the state after a diagnosis of all recordings so far.
@@ -126,6 +141,8 @@ def take_in(
         The content of diagnosis.json.
     why : str, optional
         Why it closes the question, as `weighed` tells it; left out, this diagnosis alone counts.
+    changes : str
+        What was changed in the cell for the new recordings; every later diagnosis is told.
 
     """
     rounds = list(state['rounds'])
@@ -134,7 +151,9 @@ def take_in(
         asked = rounds[-1]['asked']
         spent += float(asked['minutes'])
         rounds[-1] = {**rounds[-1], 'asked': {**asked, 'decided': decided(asked, found)}}
-    new = [hashed('recording', Path(bag).resolve())._asdict() for bag in bags]
+    new = [
+        {**hashed('recording', Path(bag).resolve())._asdict(), 'changed': changes} for bag in bags
+    ]
     step: dict[str, Any] = {'recordings': new, 'believed': believed(found), 'asked': None}
     out = {**state, 'rounds': [*rounds, step], 'spent_min': spent}
     kinds = [r['asked']['kind'] for r in rounds if r.get('asked')]
@@ -147,13 +166,19 @@ def take_in(
 
 
 def weighed(
-    together: Mapping[str, Any], alone: Mapping[str, Any] | None = None
+    together: Mapping[str, Any],
+    alone: Mapping[str, Any] | None = None,
+    free: Mapping[str, Any] | None = None,
+    before: Mapping[str, Any] | None = None,
 ) -> tuple[Mapping[str, Any], str]:
     """
     Return which diagnosis to believe, and whether and why it closes the question.
 
     What poor recordings show is easily misread, and then stands in the way of what better ones
-    show. So the experiments are also diagnosed alone, with the first recordings held out.
+    show. So the experiments are also diagnosed alone, with the first recordings held out. What was
+    held out may be too poor to be foretold, as where a joint comes from when it hardly moves. So
+    where all recordings name a cause and only the held-out ones are against it, the experiments
+    are heard a third time, without them.
 
     Parameters
     ----------
@@ -161,6 +186,10 @@ def weighed(
         The diagnosis of all recordings.
     alone : mapping, optional
         That of the experiments, with the recordings before them held out.
+    free : mapping, optional
+        That of the experiments with nothing held out; see `third_wanted`.
+    before : mapping, optional
+        What was believed before the last experiment: the content of a diagnosis.json.
 
     Returns
     -------
@@ -179,14 +208,48 @@ def weighed(
     if same and all(naming) and (any(closed) or min(sure) >= AGREED):
         found, why = (together, closed[0]) if sure[0] >= sure[1] else (alone, closed[1])
         alike = 'all recordings, and the experiments alone, show the same causes'
-        open_ends = found['verdict']['status'] == 'ambiguous' and not _inseparable(found)
-        return found, '' if open_ends else (why or alike)
+        return found, '' if _open_ends(found) else (why or alike)
     for k, (found, other) in enumerate(((together, alone), (alone, together))):
         against = naming[1 - k] and (other['verdict']['confidence'] or 0.0) >= AGREED
         if closed[k] and not against:
             return found, closed[k]
+    if free is not None and _named(free) == _named(together):
+        if _closes(free):
+            return free, _closes(free)
+        if _again(together, before) and (free['verdict']['confidence'] or 0.0) >= AGREED:
+            return together, '' if _open_ends(together) else AGAIN
     better = alone if naming[1] and not naming[0] else together
     return better, ''
+
+
+def _again(together: Mapping[str, Any], before: Mapping[str, Any] | None) -> bool:
+    """Return whether the same was named before the last experiment, and likely then."""
+    if before is None or before['verdict']['status'] not in NAMING:
+        return False
+    likely = (before['verdict']['confidence'] or 0.0) >= AGREED
+    return likely and _named(before) == _named(together)
+
+
+def _open_ends(found: Mapping[str, Any]) -> bool:
+    """Return whether causes are left that some motion would part."""
+    return found['verdict']['status'] == 'ambiguous' and not _inseparable(found)
+
+
+def third_wanted(together: Mapping[str, Any], alone: Mapping[str, Any] | None) -> bool:
+    """
+    Return whether the experiments should be heard without anything held out.
+
+    Parameters
+    ----------
+    together, alone : mapping
+        As `weighed` takes them.
+
+    """
+    if alone is None or _closes(together):
+        return False
+    likely = (together['verdict']['confidence'] or 0.0) >= AGREED
+    against = alone['verdict']['status'] not in NAMING
+    return together['verdict']['status'] in NAMING and likely and against
 
 
 def _closes(found: Mapping[str, Any]) -> str:
@@ -224,6 +287,15 @@ def believed(found: Mapping[str, Any]) -> dict[str, Any]:
         'candidates': [
             {key: item.get(key) for key in ('effect', 'joint', 'probability')}
             for item in (found.get('candidates') or [])[:6]
+        ],
+        'causes': [
+            {
+                'at': cause['place'][0]['at'],
+                'on': cause['dependence'][0]['on'],
+                'share': cause['share'],
+            }
+            for cause in verdict.get('causes') or []
+            if cause['place'] and cause['dependence']
         ],
     }
 
@@ -286,17 +358,29 @@ def _asked(wanted: Mapping[str, Any]) -> dict[str, Any]:
         'stations': wanted['stations'],
         'expected_sigma': wanted['expected_separation_sigma'],
         'between': wanted.get('between'),
+        'promise': wanted.get('promise'),
+        'changes': wanted.get('changes') or '',
         'motion': wanted['motion'],
         'decided': None,
     }
 
 
-def decided(asked: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
+def foreseen(asked: Mapping[str, Any]) -> str:
+    """Return in words what an experiment says of itself before it is made."""
+    promise = asked.get('promise')
+    if promise is None:
+        return 'it compares nothing, and shows more of the arm'
+    word = 'will decide' if promise >= SAID else 'may decide'
+    return f'it {word}, with a probability of {promise:.0%}'
+
+
+def decided(asked: Mapping[str, Any], found: Mapping[str, Any]) -> bool | None:
     """
-    Return whether an experiment decided what it said it would.
+    Return whether an experiment decided what it said it would; None where it said nothing.
 
     It did where causes are named now, or excluded, and at most one of its two explanations is
-    among those that cannot be told apart.
+    among those that cannot be told apart. Where still no name fits, it did if the place and the
+    dependence of one of the two are found, and those of the other are not.
 
     Parameters
     ----------
@@ -306,14 +390,36 @@ def decided(asked: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
         The content of the diagnosis.json with the new recording.
 
     """
+    if not asked.get('between'):
+        return None
     verdict = found['verdict']
+    if verdict['status'] == 'unknown':
+        found_causes = verdict.get('causes') or []
+        # What has nothing of its own holds where the other does not.
+        known = [_held(side, found_causes) for side in asked['between'] if side]
+        known += [1.0 - known[0]] if len(known) == 1 else []
+        return max(known) >= FOUND and min(known) <= 1.0 - FOUND
     if verdict['status'] not in (*NAMING, 'none'):
         return False
-    if not asked.get('between'):
-        return True
     groups = [
         {(item['effect'], item.get('joint')) for item in group}
         for group in verdict.get('indistinguishable') or []
     ]
-    one, other = ({(e['effect'], e.get('joint')) for e in side} for side in asked['between'])
-    return not any(one & group and other & group for group in groups)
+    first, second = ({(e['effect'], e.get('joint')) for e in side} for side in asked['between'])
+    return not any(first & group and second & group for group in groups)
+
+
+def _held(side: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]]) -> float:
+    """Return how far the places and dependences of a side are found."""
+    each = []
+    for item in side:
+        pairs = [
+            (_level(cause['place'], 'at', item), _level(cause['dependence'], 'on', item))
+            for cause in causes
+        ]
+        each.append(max((min(pair) for pair in pairs), default=0.0))
+    return min(each)
+
+
+def _level(listed: Sequence[Mapping[str, Any]], key: str, item: Mapping[str, Any]) -> float:
+    return max((float(e['probability']) for e in listed if e[key] == item.get(key)), default=0.0)

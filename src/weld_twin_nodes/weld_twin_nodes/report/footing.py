@@ -14,7 +14,10 @@ from weld_twin_msgs_py.files.input_files import InputFile
 from .html import Child, Html, joined, section, table, tag
 from .words import in_words
 
-_APART = ('kind', 'motion', 'between', 'cost', 'robot_minutes', 'expected_separation_sigma')
+_APART = (
+    *('kind', 'motion', 'between', 'cost', 'robot_minutes', 'expected_separation_sigma'),
+    *('changes', 'promise'),
+)
 """What programs need of a measurement, or the page says in words."""
 _ORDER = {'unsound': 0, 'warning': 1, 'note': 2, 'ok': 3}
 """What needs attention comes first."""

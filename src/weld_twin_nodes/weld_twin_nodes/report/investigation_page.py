@@ -1,16 +1,33 @@
 # SPDX-FileCopyrightText: weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The page of an investigation: what was believed, what was asked, what came back."""
+"""The page of an investigation: the way from what was believed to what came back, as a tree."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import PurePath
 from typing import Any
 
 from weld_twin_core.diagnosis.result import Site
 
-from .html import Html, document, section, table, tag
-from .words import cause, in_words
+from ..offline.investigation import foreseen
+from .html import Child, Html, bars, document, section, tag
+from .words import cause, in_words, listed, place_name
+
+SHOWN = 5
+"""Hypotheses that a round shows at most; further ones have little probability left."""
+LEAST = 0.005
+"""Probability below which a hypothesis is not shown: it would read as 0 %."""
+WITHOUT_NAME = ('joint_curve', 'frame_curve')
+"""Curves that stand for causes without a formula."""
+CHANGES = {
+    'load': 'a weight hung from the tool point',
+    'tool': 'another tool',
+    'instrument': 'the instrument at another place',
+}
+"""What may be changed in the cell, in words."""
+
+Round = Mapping[str, Any]
 
 
 def investigation_page(state: Mapping[str, Any]) -> str:
@@ -23,7 +40,6 @@ def investigation_page(state: Mapping[str, Any]) -> str:
         The content of investigation.json.
 
     """
-    rounds = state['rounds']
     body = tag(
         'main',
         tag(
@@ -32,7 +48,13 @@ def investigation_page(state: Mapping[str, Any]) -> str:
             tag('p', str(state['robot']), class_='subject'),
         ),
         tag('section', tag('h1', headline(state)), _figures(state), id_='verdict'),
-        *(_round(k, step) for k, step in enumerate(rounds)),
+        section(
+            'The way there',
+            _tree(state),
+            id_='way',
+            lead='From top to bottom: what was believed, what was asked, and what came back. '
+            'A fork shows the two explanations that a measurement was to part.',
+        ),
     )
     return document(f'Investigation · {state["robot"]}', body)
 
@@ -52,6 +74,10 @@ def _figures(state: Mapping[str, Any]) -> Html:
     judged = [
         r['asked'] for r in state['rounds'] if r['asked'] and r['asked']['decided'] is not None
     ]
+    foreseen = [a['promise'] for a in judged if a.get('promise') is not None]
+    told = 'experiments decided what they were to decide'
+    if foreseen:
+        told += f'; {sum(foreseen):.1f} were foreseen'
     cells = [
         ('Belief', str(last['status']), '' if sure is None else f'{sure:.0%} sure'),
         (
@@ -59,11 +85,7 @@ def _figures(state: Mapping[str, Any]) -> Html:
             f'{state["spent_min"]:.1f}',
             f'of {state["budget_min"]:g} that may be spent on experiments',
         ),
-        (
-            'Decided',
-            f'{sum(bool(a["decided"]) for a in judged)} of {len(judged)}',
-            'experiments decided what they said they would',
-        ),
+        ('Decided', f'{sum(bool(a["decided"]) for a in judged)} of {len(judged)}', told),
     ]
     return tag(
         'dl',
@@ -75,54 +97,129 @@ def _figures(state: Mapping[str, Any]) -> Html:
     )
 
 
-def _round(number: int, step: Mapping[str, Any]) -> Html:
-    names = ', '.join(str(item['path']).rpartition('/')[2] for item in step['recordings'])
-    return section(
-        f'Round {number}',
-        tag('h3', 'Believed'),
-        _believed(step['believed']),
-        *_asked(step),
+def _tree(state: Mapping[str, Any]) -> Html:
+    rounds = state['rounds']
+    nodes: list[Html] = []
+    for k, step in enumerate(rounds):
+        after = rounds[k + 1] if k + 1 < len(rounds) else None
+        nodes.append(_believed(k, step))
+        if step['asked']:
+            nodes.append(_asked(step, after))
+    if state['state'] != 'open':
+        end = tag('p', tag('b', str(state['state'])), f': {state["why"]}')
+        nodes.append(tag('li', tag('h3', 'Ended'), end, class_='end'))
+    return tag('ol', *nodes, class_='way')
+
+
+def _believed(number: int, step: Round) -> Html:
+    """Return a node of the tree: what came back, and what is believed with it."""
+    belief, names = step['believed'], [_file(item) for item in step['recordings']]
+    came = 'Recorded' if number == 0 else 'Came back'
+    sure = '' if belief['confidence'] is None else f', {belief["confidence"]:.0%} sure'
+    named = listed([_name(effect) for effect in belief['effects']]) or _without_name(belief)
+    alike = [
+        tag('p', f'Not told apart: {listed([_name(item) for item in group])}.', class_='note')
+        for group in belief['indistinguishable']
+        if len(group) > 1
+    ]
+    rows = [
+        (_name(item), float(item['probability']), f'{item["probability"]:.0%}')
+        for item in belief['candidates']
+        if (item['probability'] or 0.0) >= LEAST
+    ]
+    return tag(
+        'li',
+        tag('h3', f'{came}: {listed(names)}'),
+        tag('p', tag('b', f'Believed, {belief["status"]}: '), f'{named}{sure}.'),
+        *alike,
+        bars(rows[:SHOWN], 'wide') if rows else None,
+        class_='believed',
         id_=f'round-{number}',
-        lead=f'With {names}.',
     )
 
 
-def _believed(belief: Mapping[str, Any]) -> Html:
-    sure = '' if belief['confidence'] is None else f', {belief["confidence"]:.0%} sure'
-    named = ' and '.join(_name(effect) for effect in belief['effects']) or 'nothing named'
-    parts = [tag('p', f'{belief["status"]}: {named}{sure}.')]
-    groups = [group for group in belief['indistinguishable'] if len(group) > 1]
-    for group in groups:
-        alike = ', '.join(_name(item) for item in group)
-        parts.append(tag('p', f'Not told apart: {alike}.', class_='lead'))
-    rows = [
-        (_name(item), f'{item["probability"]:.0%}')
-        for item in belief['candidates']
-        if item['probability'] is not None
+def _file(item: Mapping[str, Any]) -> str:
+    path = PurePath(str(item['path']))
+    name = path.name if path.name != 'recording' else f'{path.parent.name}/{path.name}'
+    kind = str(item.get('changed') or '').partition('=')[0]
+    return f'{name} (with {CHANGES[kind]})' if kind in CHANGES else name
+
+
+def _without_name(belief: Mapping[str, Any]) -> str:
+    told = [
+        f'{item["share"]:.0%} of the gap at {place_name(item["at"])}, by {item["on"]}'
+        for item in belief.get('causes') or []
     ]
-    return tag('div', *parts, table(('hypothesis', 'probability'), rows) if rows else None)
+    return f'no name fits; {listed(told)}' if told else 'nothing named'
 
 
-def _asked(step: Mapping[str, Any]) -> Sequence[Html]:
+def _asked(step: Round, after: Round | None) -> Html:
+    """Return a node of the tree: the measurement, what it said beforehand, and its fork."""
     asked = step['asked']
-    if not asked:
-        return []
-    sigma = asked['expected_sigma']
-    rows = [('minutes', f'{asked["minutes"]:.1f}')]
-    if asked['stations']:
-        rows.append(('stations', str(asked['stations'])))
-    if asked['between']:
-        sides = (' with '.join(_name(e) for e in side) or 'the rest' for side in asked['between'])
-        rows.append(('to decide between', ' and '.join(sides)))
-    if sigma is not None:
-        rows.append(('expected to part them by', f'{sigma:.0f} standard deviations'))
-    answers = {None: 'not back yet', True: 'it decided that', False: 'it did not decide that'}
-    rows.append(('came back', answers[asked['decided']]))
     text = tag('p', _told(asked['sentence'], step), ' ', _told(asked['reason'], step))
-    return [tag('h3', 'Asked'), text, table(('', ''), rows)]
+    verdicts = {
+        None: 'It promised to show more, not to decide.',
+        True: 'It decided that.',
+        False: 'It did not decide that.',
+    }
+    answer = 'Not back yet.' if after is None else verdicts[asked['decided']]
+    return tag(
+        'li',
+        tag('h3', f'Asked, {asked["minutes"]:.1f} minutes'),
+        text,
+        tag('p', _foreseen(asked), class_='note'),
+        _fork(asked, after) if asked['between'] else None,
+        tag('p', tag('b', answer)),
+        class_='asked',
+    )
 
 
-def _told(text: str, step: Mapping[str, Any]) -> str:
+def _foreseen(asked: Mapping[str, Any]) -> str:
+    parts = []
+    if asked['stations']:
+        parts.append(f'{asked["stations"]} stations')
+    if asked['expected_sigma'] is not None:
+        parts.append(f'expected to part them by {asked["expected_sigma"]:.0f} standard deviations')
+    parts.append(foreseen(asked))
+    kind = str(asked.get('changes') or '').partition('=')[0]
+    if kind in CHANGES:
+        parts.append(f'with {CHANGES[kind]}')
+    return f'Said before: {"; ".join(parts)}.'
+
+
+def _fork(asked: Mapping[str, Any], after: Round | None) -> Html:
+    """Return the two explanations, and which of them is left."""
+    sides = []
+    left = [_left(side, after) for side in asked['between']]
+    for k, side in enumerate(asked['between']):
+        # What has nothing of its own is left where the other is not.
+        stays = left[k] if side else (None if left[1 - k] is None else not left[1 - k])
+        name = ' with '.join(_name(item) for item in side) or 'neither of that'
+        word: Child = {None: None, True: 'left', False: 'ruled out'}[stays]
+        mark = tag('span', word, class_='level') if word else None
+        class_ = {None: None, True: 'stays', False: 'gone'}[stays]
+        sides.append(tag('li', tag('span', name), mark, class_=class_))
+    return tag('ul', *sides, class_='fork')
+
+
+def _left(side: Sequence[Mapping[str, Any]], after: Round | None) -> bool | None:
+    """Return whether an explanation is among what is believed afterwards; None: not told."""
+    if after is None or not side:
+        return None
+    belief = after['believed']
+    kinds = {(c['at'], c['on']) for c in belief.get('causes') or []}
+    sites = {(e['effect'], e.get('joint')) for group in belief['indistinguishable'] for e in group}
+    sites |= {(e['effect'], e.get('joint')) for e in belief['effects']}
+    nameless = belief['status'] == 'unknown'
+    return all(
+        (item.get('at'), item.get('on')) in kinds
+        if nameless or item['effect'] in WITHOUT_NAME
+        else (item['effect'], item.get('joint')) in sites
+        for item in side
+    )
+
+
+def _told(text: str, step: Round) -> str:
     """Return a sentence with causes as people say them."""
     items = [item for side in step['asked']['between'] or () for item in side]
     items += step['believed']['candidates']
@@ -130,4 +227,9 @@ def _told(text: str, step: Mapping[str, Any]) -> str:
 
 
 def _name(item: Mapping[str, Any]) -> str:
+    if item['effect'] in WITHOUT_NAME and item.get('at'):
+        where = place_name(str(item['at']))
+        if item['on'] == 'constant':
+            return f'something constant at {where}'
+        return f'something at {where} that depends on {item["on"]}'
     return cause(str(item['effect']), item.get('joint'))

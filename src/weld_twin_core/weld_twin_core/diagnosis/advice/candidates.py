@@ -33,7 +33,7 @@ SOAK = 60.0
 RISE = 15.0
 """Warming [K] in an hour: arms do that at work."""
 MASS = 5.0
-"""Load [kg] hung on the flange: a judgement; springs show, and most arms can carry it."""
+"""Load [kg] hung from the tool: a judgement; springs show, and most arms can carry it."""
 LONGER = 0.2
 """Length [m] added to the tool: a turn of 0.1 mrad then moves its tip by 0.02 mm more."""
 PRESS = 50.0
@@ -74,6 +74,10 @@ class Candidate:
         As the cell will be, without found effects; one base.
     new_base, new_tool : bool
         Whether the instrument or the tool is set up anew, so that its frame is not known.
+    alone : int
+        How many of the pieces, at the end, move one joint alone.
+    changed : str
+        What is changed in the cell, as a diagnosis is told of it; empty for nothing.
 
     """
 
@@ -86,6 +90,8 @@ class Candidate:
     whole: bool = False
     new_base: bool = False
     new_tool: bool = False
+    alone: int = 0
+    changed: str = ''
 
     @property
     def static(self) -> bool:
@@ -118,9 +124,9 @@ def candidates(
     if limits.set_up or not still:
         yield _path(problem, now, room, spread, joints, ANOTHER if still else 0.0)
     yield from _at_rest(problem, now, spread)
-    if any(r.wrench is not None for r in problem.recordings):
-        yield _pressed(problem, now, spread)
     if limits.set_up:
+        if all(r.wrench is not None for r in problem.recordings):
+            yield _pressed(problem, now, spread)
         yield _warm_up(problem, now, spread)
         yield from _changed(problem, now, spread)
 
@@ -144,6 +150,7 @@ def _path(
         if len(stops) > 1:
             # Back the same way: every place is passed in both directions.
             motions.append(room.travel([*stops, *stops[-2::-1]], SPEEDS[k % 3]))
+    together = len(motions)
     for name in list(dict.fromkeys(joints))[:SINGLE]:
         motions += [room.travel(_alone(room, now, name), speed) for speed in SPEEDS[::2]]
     recordings = tuple(with_sides(problem, motion) for motion in motions)
@@ -155,6 +162,7 @@ def _path(
         recordings,
         pieces,
         now,
+        alone=len(motions) - together,
     )
 
 
@@ -245,11 +253,11 @@ def _changed(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]
         problem,
         replace(now, robot=heavy),
         'payload_swap',
-        f'{words} with {MASS:g} kg more on the flange, entered as payload.',
+        f'{words} with {MASS:g} kg more hung from the tool point.',
         spread,
         set_up=20.0,
     )
-    yield made
+    yield replace(made, changed=f'load={MASS:g}')
     longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
     yield replace(
         made,
@@ -258,6 +266,7 @@ def _changed(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]
         set_up=30.0,
         model=replace(now, robot=robot.with_frames(tool=longer)),
         new_tool=True,
+        changed='tool',
     )
     base = transform(np.eye(3), np.array([1.5, 0.5, 0.0])) @ now.bases[0]
     yield replace(
@@ -267,6 +276,7 @@ def _changed(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]
         set_up=35.0,
         model=replace(now, bases=(base,)),
         new_base=True,
+        changed='instrument',
     )
 
 
@@ -308,7 +318,8 @@ def with_sides(problem: Problem, joints: JointMotion) -> Recording:
         if r.wrench is not None
     ]
     heat = Signal(ends, np.full(2, np.mean(warm))) if warm else None
-    if not load:
+    if len(load) < len(problem.recordings):
+        # A weight was hung for one experiment; nobody leaves it there for the next.
         return Recording(NAME, joints, temperature=heat)
     wrench = Signal(ends, np.stack([load[0][0]] * 2))
     return Recording(NAME, joints, wrench=wrench, wrench_frame=load[0][1], temperature=heat)

@@ -114,10 +114,9 @@ def planned(
         What the alternatives say of the data at hand.
 
     """
-    if option.whole:
-        least = sum(piece.seconds for piece in option.pieces)
-        if least > 60.0 * limits.minutes:
-            return None
+    room = 60.0 * min(limits.minutes - option.set_up, limits.moving)
+    if option.whole and sum(piece.seconds for piece in option.pieces) > room:
+        return None
     told = normals(problem, model, alternatives, scale, option, now)
     before = told.before()
     chosen: list[int] = []
@@ -125,7 +124,7 @@ def planned(
     score = 0.0
     while True:
         spent = sum(option.pieces[k].seconds for k in chosen)
-        more = _open(option, chosen, 60.0 * limits.minutes - spent)
+        more = _open(option, chosen, room - spent)
         if not more or (spent >= LEAST and _enough(gains)):
             break
         pick, found, gained = _next(told, before, chosen, more, option)
@@ -214,14 +213,24 @@ def widening(problem: Problem, options: Sequence[Candidate], limits: Limits) -> 
     """
     still = all(r.joints.static for r in problem.recordings)
     wanted = ('bidirectional', 'stations') if still else ('path',)
+    room = 60.0 * min(limits.minutes, limits.moving)
     for kind in wanted:
         option = next(option for option in options if option.kind == kind)
         chosen: list[int] = []
         spent = 0.0
-        for k, piece in enumerate(option.pieces):
-            if spent < 2.0 * LEAST and spent + piece.seconds <= 60.0 * limits.minutes:
+        for k in _by_turns(len(option.pieces), option.alone):
+            seconds = option.pieces[k].seconds
+            if spent < 2.0 * LEAST and spent + seconds <= room:
                 chosen.append(k)
-                spent += piece.seconds
+                spent += seconds
         if chosen:
             return Plan(option, tuple(chosen))
     return Plan(option, (0,))
+
+
+def _by_turns(count: int, alone: int) -> list[int]:
+    """Return pieces so that those of all joints and those of one joint alone take turns."""
+    together, single = list(range(count - alone)), list(range(count - alone, count))
+    shorter = min(len(together), len(single))
+    turns = [k for pair in zip(together, single, strict=False) for k in pair]
+    return turns + together[shorter:] + single[shorter:]

@@ -59,7 +59,8 @@ def next_experiment(
     dict or None
         'kind', 'sentence', 'reason', 'expected_separation_sigma' (None where nothing is compared),
         'cost' [min] and, of that, 'robot_minutes', 'stations' (None of a path), 'between' (the two
-        explanations it parts, each a list of effect and joint; None where nothing is compared) and
+        explanations it parts, each a list of effect, joint, place and dependence; None where nothing is
+        compared), 'changes' (what is changed in the cell, as a diagnosis is told; empty: nothing) and
         'motion': 'static', 'joint_names', 't' [s] and 'q' [rad, m]; 'motion' is None when no
         motion decides. 'skipped' says which measurements could not be foreseen. None when none
         could.
@@ -154,6 +155,7 @@ def _outside(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> dict[str,
         'robot_minutes': None,
         'stations': None,
         'between': _sides(first, second),
+        'changes': '',
         'expected_separation_sigma': 0.0,
         'sentence': f'No motion tells {one} from {other}: {way(sorted(families))}.',
         'reason': 'Both move the tool alike wherever the joints go.',
@@ -164,10 +166,16 @@ def _sides(
     first: tuple[Effect, ...], second: tuple[Effect, ...]
 ) -> list[list[dict[str, str | None]]]:
     """Return what each of two explanations has that the other has not."""
-    return [
-        [{'effect': e.name, 'joint': str(e.site) if e.site else None} for e in _only(one, other)]
-        for one, other in ((first, second), (second, first))
-    ]
+    out = []
+    for one, other in ((first, second), (second, first)):
+        side: list[dict[str, str | None]] = []
+        for e in _only(one, other):
+            joint = str(e.site) if e.site else None
+            item = {'effect': e.name, 'joint': joint, 'at': e.at, 'on': e.on}
+            if item not in side:
+                side.append(item)
+        out.append(side)
+    return out
 
 
 def _differing(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> tuple[str, str]:
@@ -176,14 +184,22 @@ def _differing(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> tuple[s
 
 def _only(effects: tuple[Effect, ...], others: tuple[Effect, ...]) -> list[Effect]:
     """Return the effects that the others do not have."""
-    known = {effect.key for effect in others}
-    return [effect for effect in effects if effect.key not in known]
+    known = {(effect.key, effect.on) for effect in others}
+    return [effect for effect in effects if (effect.key, effect.on) not in known]
 
 
 def _named(effects: Sequence[Effect]) -> str:
     if not effects:
         return 'the rest alone'
-    return ' with '.join(f'{e.name} of {e.site}' if e.site else e.name for e in effects)
+    return ' with '.join(dict.fromkeys(_name(effect) for effect in effects))
+
+
+def _name(effect: Effect) -> str:
+    if effect.cause:
+        return f'{effect.name} of {effect.site}' if effect.site else effect.name
+    if effect.on == 'constant':
+        return f'something constant at {effect.at}'
+    return f'something at {effect.at} that depends on {effect.on}'
 
 
 def _entry(
@@ -204,6 +220,7 @@ def _entry(
         'robot_minutes': round(plan.robot_minutes, 2),
         'stations': len(joints.t) if joints.static else None,
         'between': between,
+        'changes': option.changed,
         'motion': _motion(joints, model.robot.joint_names),
     }
 

@@ -23,7 +23,9 @@ class Limits:
     Attributes
     ----------
     minutes : float [min]
-        Of robot motion at most.
+        Of robot motion and of what has to be set up for it, at most.
+    moving : float [min]
+        Of robot motion alone, at most.
     set_up : bool
         Whether something in the cell may be changed for it: another tool, a moved instrument.
     box : array, shape (2, 3), optional [m]
@@ -37,12 +39,14 @@ class Limits:
     """
 
     minutes: float = USUAL_MINUTES
+    moving: float = np.inf
     set_up: bool = True
     box: Array | None = None
 
     def __post_init__(self) -> None:
-        if not self.minutes > 0.0:
-            raise DataError(f'an experiment needs minutes, got {self.minutes:g}')
+        least = min(self.minutes, self.moving)
+        if not least > 0.0:
+            raise DataError(f'an experiment needs minutes, got {least:g}')
         if self.box is None:
             return
         box = np.array(self.box, dtype=float)

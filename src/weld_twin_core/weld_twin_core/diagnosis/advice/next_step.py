@@ -4,27 +4,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
+
+from scipy.special import ndtr
 
 from ...effects.effect import Effect
 from ..hypotheses.choices import ranking
 from ..hypotheses.search import Search
+from ..levels.curved import Curved
 from ..verdict.decision import Verdict
+from .chosen_pieces import NOTHING
 from .experiment import next_experiment
 from .limits import Limits
 from .next_touches import next_touches
+from .postures import Room
+from .without_names import without_names
 
 SURE = 0.9
 """Confidence from which a verdict closes the question. Answers from recordings that show little earn
 less, however well they fit."""
 TOUCHED = 4
 """The same where contacts measured: every touch that could be made is tried with each."""
+NAMELESS = 0.5
+"""Confidence of an unknown cause from which what is believed most has no name: it is then likelier
+than not that the library lacks it."""
+NAMED, GAINED = 0.6, 0.4
+"""Of experiments asked for by answers that name something, the share that decides, where the answer
+has no confidence, and what full confidence adds. Of 21 in cells that this was developed on, 19 did;
+the two others came from answers with 0.3 and 0.55."""
 MOST = 6
 """Explanations compared at most; each is predicted for every measurement that could be made."""
 
 
 def next_step(
-    found: Search, verdict: Verdict, limits: Limits | None = None
+    found: Search,
+    verdict: Verdict,
+    limits: Limits | None = None,
+    rival: Curved | None = None,
 ) -> dict[str, Any] | None:
     """
     Return the next experiment as `next_experiment` does, None when the question is closed.
@@ -36,6 +53,8 @@ def next_step(
         With the confidence that it has earned.
     limits : Limits, optional
         What an experiment may cost, and where it has to stay.
+    rival : Curved, optional
+        What explains the gap without a formula.
 
     """
     if verdict.status in ('identified', 'none') and verdict.confidence >= SURE:
@@ -49,9 +68,16 @@ def next_step(
         return next_touches(found.problem, final, listed[:TOUCHED], found.scale)
     closed = verdict.status == 'ambiguous' and verdict.confidence >= SURE and len(listed) > 1
     if not closed:
+        limits = limits or Limits()
+        room = Room(found.work.problem, found.small.model.robot, limits)
+        shapes = without_names(found, rival, room.low, room.high)
+        if verdict.status == 'unknown' and verdict.confidence >= NAMELESS:
+            listed = [*shapes, *listed]
+        else:
+            listed += shapes[:1]
         listed += _in_place(found, verdict, named=False)
         listed += _beside(found)
-    return next_experiment(
+    wanted = next_experiment(
         found.work.problem,
         found.small.model,
         listed[:MOST],
@@ -59,6 +85,31 @@ def next_step(
         limits,
         closed=closed,
     )
+    return None if wanted is None else {**wanted, 'promise': promise(verdict, wanted)}
+
+
+def promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
+    """
+    Return how probable it is that an experiment decides what it is asked for.
+
+    It has to part its explanations once the noise of it has been drawn, and one of the two has to
+    be near the truth: where nothing of the library is believed, that is not to be expected.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        Before the experiment, with the confidence that it has earned.
+    wanted : mapping
+        As `next_experiment` returned it; None where it compares nothing.
+
+    """
+    sigma = wanted['expected_separation_sigma']
+    if wanted['between'] is None or wanted['motion'] is None or sigma is None:
+        return None
+    parted = float(ndtr(sigma - NOTHING))
+    if verdict.status != 'unknown':
+        return parted * (NAMED + GAINED * verdict.confidence)
+    return parted * (1.0 - verdict.confidence)
 
 
 def _in_place(found: Search, verdict: Verdict, *, named: bool) -> list[tuple[Effect, ...]]:

@@ -79,7 +79,7 @@ def answer(
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,
         unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, rival),
-        next_experiment=next_step(found, verdict, limits),
+        next_experiment=next_step(found, verdict, limits, rival),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         model=found.final.model,
         traces=traces(found),

@@ -22,6 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--cells', type=int, default=120, metavar='N', help='cells that are left open at first'
     )
+    parser.add_argument(
+        '--alone',
+        action='store_true',
+        help='leave out what the others come to; a later run without this word adds it',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -34,6 +39,6 @@ def run(args: argparse.Namespace) -> int:
         print(text, file=sys.stderr, flush=True)
 
     out = Path(args.out)
-    study(out, args.seed, args.cells, tell)
+    study(out, args.seed, args.cells, tell, alone=args.alone)
     print((out / TABLE).read_text(encoding='utf-8'))
     return 0

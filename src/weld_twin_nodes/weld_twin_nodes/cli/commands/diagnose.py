@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from weld_twin_core.recording import Recording
     from weld_twin_msgs_py.files.input_files import InputFile
 
+    from ...offline.set_up_changes import SetUpChange
     from ...report.diagnosis_page import Sheet
 
 LINES = 'WELD_TWIN_PROGRESS'
@@ -69,6 +70,16 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
         help='frames that are not known, and are fitted: base, tool, or base,tool',
     )
     parser.add_argument(
+        '--changed',
+        nargs=2,
+        action='append',
+        default=[],
+        metavar=('BAG', 'WHAT'),
+        help='what was changed in the cell for one of the bags: load=KG hung from the tool point '
+        '(load=KG,X,Y,Z: there in the tool frame [m]), another tool, or the instrument moved; may '
+        'be given again',
+    )
+    parser.add_argument(
         '--apply',
         action='store_true',
         help='if data or set-up are wrong and one correction explains it, make it and go on',
@@ -77,7 +88,7 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
         '--experiment-minutes',
         type=float,
         metavar='MIN',
-        help='of robot motion that the next experiment may take (default: 60)',
+        help='that the next experiment may take, with what has to be set up (default: 60)',
     )
     parser.add_argument(
         '--cell-box',
@@ -197,10 +208,13 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.errors import ModelError
     from weld_twin_msgs_py.bags import read_recording
 
+    from ...offline.set_up_changes import told
+
     align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
     changing = families_named(args.may_change, '--may-change')
     if changing and len(args.bags) < 2:
         raise ModelError('--may-change compares recordings; give two or more bags of one arm')
+    changes = _changes(args)
     twin = twin_of(robot_of(args), args.effects_known)
     topics = topics_of(args)
     with _progress() as tell:
@@ -213,18 +227,33 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             )
             recordings.append(_described(recording, args.contacts))
         count = len(args.bags)
+        fitted, more = told(_bounded(recordings[:count]), changes, twin.robot)
         return diagnose(
-            _bounded(recordings[:count]),
+            fitted,
             twin.robot,
             align=align,
             known=twin.effects,
             exclude=excluded,
             holdout=_bounded(recordings[count:]),
             apply=args.apply,
-            may_change=changing,
+            may_change=tuple(dict.fromkeys([*changing, *more])),
             limits=_limits(args),
             progress=tell,
         )
+
+
+def _changes(args: argparse.Namespace) -> dict[int, SetUpChange]:
+    """Return what was changed for which bag, counted from 0."""
+    from weld_twin_core.errors import DataError
+
+    from ...offline.set_up_changes import set_up_change
+
+    out = {}
+    for bag, what in args.changed:
+        if bag not in args.bags:
+            raise DataError(f"--changed: '{bag}' is none of the recordings")
+        out[args.bags.index(bag)] = set_up_change(what)
+    return out
 
 
 def _limits(args: argparse.Namespace) -> Limits:

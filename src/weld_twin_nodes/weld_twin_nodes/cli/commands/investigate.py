@@ -4,21 +4,25 @@
 
 Begin with a directory and recordings; --robot and --budget belong to the beginning. Record the
 experiment that it asks for (experiment.yaml, and a program with --controller), and go on with the
-directory and the new bag. The directory alone tells where it stands. It ends when the cause is sure,
-when the budget is spent, or when nothing would part what is left, and says which.
+directory and the new bag. The directory alone tells where it stands. With --live the experiment is
+run and recorded in the cell that is up, one after the other. It ends when the cause is sure, when the
+budget is spent, or when nothing would part what is left, and says which.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ..options import add_robot
 
-EXPERIMENT = 'experiment.yaml'
+EXPERIMENT, BAG = 'experiment.yaml', 'recording'
+SLOWER = 2.0
+"""A generator that goes from station to station may take this times what was planned."""
 LEAST = 0.5
 """Minutes that an experiment is planned with where hardly any are left; it is then not asked for."""
 BUDGET = 60.0
@@ -42,6 +46,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='L',
         help='write the experiment as a program too, as export-program does',
     )
+    parser.add_argument(
+        '--changed',
+        metavar='WHAT',
+        help='what was changed in the cell for the new bags, where it was not what was asked: '
+        'load=KG, tool, instrument, or nothing',
+    )
+    parser.add_argument(
+        '--live',
+        action='store_true',
+        help='run experiments with the trajectory generator and record them, in the cell that is '
+        'up; stops where something in the cell has to be changed first',
+    )
+    parser.add_argument(
+        '--playback',
+        type=float,
+        default=1.0,
+        metavar='X',
+        help='with --live: speed against real time (default: 1)',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,13 +76,50 @@ def run(args: argparse.Namespace) -> int:
 
     directory = Path(args.directory)
     begun = (directory / STATE).exists()
-    if not args.bags:
+    if not args.bags and not args.live:
         if not begun:
             raise DataError(f"'{directory}' is no investigation; begin one with recordings")
         print(headline(read_state(directory)))
         return 0
+    if not begun and not args.bags:
+        raise DataError(f"'{directory}' is no investigation; begin one with recordings")
     state = _continued(args, directory) if begun else _begun(args, directory)
-    return _round(args, directory, state)
+    if args.bags:
+        state = _round(args, directory, state, args.bags, _changes(args, state))
+        args.changed = None
+    # What has to be changed by hand is done when the person calls again.
+    done = not args.bags
+    while args.live and state['state'] == 'open' and (done or not _asked(state)['changes']):
+        state = _recorded(args, directory, state)
+        done = False
+    return 0
+
+
+def _asked(state: dict[str, Any]) -> dict[str, Any]:
+    """Return what was asked for last; nothing before the first round."""
+    rounds = state['rounds']
+    return (rounds[-1]['asked'] if rounds else None) or {'changes': ''}
+
+
+def _changes(args: argparse.Namespace, state: dict[str, Any]) -> str:
+    """Return what was changed in the cell for the new bags."""
+    from ...offline.set_up_changes import set_up_change
+
+    if args.changed is None:
+        return str(_asked(state).get('changes') or '')
+    return '' if args.changed == 'nothing' else str(set_up_change(args.changed))
+
+
+def _recorded(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> dict[str, Any]:
+    """Run and record what is asked for in the cell that is up, and take it in."""
+    from ...harness.recorded_experiment import recorded_experiment
+
+    place = directory / f'round-{len(state["rounds"]) - 1}'
+    seconds = 60.0 * SLOWER * float(_asked(state)['robot_minutes']) / max(args.playback, LEAST)
+    bag = recorded_experiment(
+        place / EXPERIMENT, state['robot'], seconds, place / BAG, playback=args.playback
+    )
+    return _round(args, directory, state, [str(bag)], _changes(args, state))
 
 
 def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
@@ -103,23 +163,22 @@ def _continued(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
     return state
 
 
-def _round(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> int:
-    """Diagnose everything so far, and ask or end."""
-    from weld_twin_core.errors import DataError
+def _round(
+    args: argparse.Namespace,
+    directory: Path,
+    state: dict[str, Any],
+    bags: list[str],
+    changes: str,
+) -> dict[str, Any]:
+    """Diagnose everything so far, and ask or end; return the state after it."""
     from weld_twin_msgs_py.files.whole_files import write_text
 
-    from ...offline.investigation import PAGE, recordings, take_in, weighed, write_state
+    from ...offline.investigation import PAGE, foreseen, take_in, write_state
     from ...report.investigation_page import headline, investigation_page
 
-    first, later = recordings(state)
     place = directory / f'round-{len(state["rounds"])}'
-    found = _diagnosed([*first, *later, *args.bags], [], state, place)
-    alone = None
-    if first:
-        beside = place.with_name(f'{place.name}-experiments')
-        with suppress(DataError):  # too few to be diagnosed by themselves
-            alone = _diagnosed([*later, *args.bags], first, state, beside)
-    state = take_in(state, args.bags, *weighed(found, alone))
+    heard = _heard(state, bags, changes, place)
+    state = take_in(state, bags, *heard, changes=changes)
     asked = state['rounds'][-1]['asked']
     if asked is not None:
         _write_experiment(args, place, state, asked)
@@ -127,14 +186,54 @@ def _round(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> 
     write_text(directory / PAGE, investigation_page(state), overwrite=True)
     print(headline(state))
     if asked is not None:
-        print(asked['reason'])
+        print(f'{asked["reason"]} Beforehand: {foreseen(asked)}.')
         print(f'record {place / EXPERIMENT}, then: weld-twin investigate {directory} BAG')
     print(f'page: {directory / PAGE}')
-    return 0
+    return state
+
+
+def _heard(
+    state: dict[str, Any], bags: list[str], changes: str, place: Path
+) -> tuple[Mapping[str, Any], str]:
+    """Diagnose all recordings, and the experiments by themselves; return what to believe."""
+    from weld_twin_core.errors import DataError
+
+    from ...offline.investigation import changed, recordings, third_wanted, weighed
+    from ...offline.set_up_changes import FRAMES
+
+    first, later = recordings(state)
+    told = {**changed(state), **(dict.fromkeys(bags, changes) if changes else {})}
+    found = _diagnosed([*first, *later, *bags], [], state, place, told)
+    if not first or any(what in FRAMES for what in told.values()):
+        # Seen with another tool, or from elsewhere, they cannot be held against the first.
+        return weighed(found)
+    alone = free = None
+    with suppress(DataError):  # too few to be diagnosed by themselves
+        beside = place.with_name(f'{place.name}-experiments')
+        alone = _diagnosed([*later, *bags], first, state, beside, told)
+    if third_wanted(found, alone):
+        beside = place.with_name(f'{place.name}-experiments-only')
+        free = _diagnosed([*later, *bags], [], state, beside, told)
+    return weighed(found, alone, free, _before(place, state))
+
+
+def _before(place: Path, state: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the diagnosis that was believed before; None where it is not there any more."""
+    from ...report.diagnosis_files import RESULT
+
+    file = place.with_name(f'round-{len(state["rounds"]) - 1}') / RESULT
+    if not file.exists():
+        return None
+    found: dict[str, Any] = json.loads(file.read_text(encoding='utf-8'))
+    return found
 
 
 def _diagnosed(
-    bags: list[str], held_out: list[str], state: dict[str, Any], place: Path
+    bags: list[str],
+    held_out: list[str],
+    state: dict[str, Any],
+    place: Path,
+    changes: Mapping[str, str],
 ) -> dict[str, Any]:
     """Run the diagnosis as its own command does; return the content of diagnosis.json."""
     from ...report.diagnosis_files import RESULT
@@ -146,6 +245,7 @@ def _diagnosed(
     words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
     words += ['--experiment-minutes', f'{left:g}']
     words += [word for bag in held_out for word in ('--holdout', bag)]
+    words += [word for bag in bags if bag in changes for word in ('--changed', bag, changes[bag])]
     diagnose.run(parser.parse_args(words))
     found: dict[str, Any] = json.loads((place / RESULT).read_text(encoding='utf-8'))
     return found

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a person changed in the cell for one recording, told to the diagnosis of several.
+
+A load hangs at a known place and pulls with a known force. How a tool was lengthened, or where an
+instrument stands now, is known roughly; what is left of it is fitted along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import Measurements, Recording, Signal
+from weld_twin_core.twin.twin import Twin
+
+KINDS = {'load': (1, 4), 'tool': (0,), 'instrument': (0,)}
+"""Words for what may be changed, and how many numbers may follow each."""
+HEAVIEST = 1000.0
+"""Load [kg] beyond which a number is taken for grams: no bundled arm carries so much."""
+FRAMES = {'tool': 'tool_pose', 'instrument': 'base_pose'}
+"""What then differs between the recordings."""
+
+
+@dataclass(frozen=True)
+class SetUpChange:
+    """
+    What was changed for one recording.
+
+    Attributes
+    ----------
+    kind : str
+        'load', 'tool' or 'instrument'.
+    numbers : tuple of float
+        Of a load its mass [kg] and, where given, its centre of mass in the tool frame [m].
+
+    """
+
+    kind: str
+    numbers: tuple[float, ...] = ()
+
+    def __str__(self) -> str:
+        """Return it as `set_up_change` reads it."""
+        return '='.join(filter(None, (self.kind, ','.join(f'{n:g}' for n in self.numbers))))
+
+
+def set_up_change(text: str) -> SetUpChange:
+    """
+    Return a change from words: 'load=5', 'load=5,0,0,0.1', 'tool' or 'instrument'.
+
+    Raises
+    ------
+    DataError
+        It is none of these.
+
+    """
+    kind, _, rest = text.partition('=')
+    try:
+        numbers = tuple(float(part) for part in rest.split(',')) if rest else ()
+    except ValueError:
+        numbers = (np.nan,)
+    if len(numbers) not in KINDS.get(kind, ()) or not np.isfinite(numbers).all():
+        raise DataError(
+            f"what was changed is 'load=KG', 'load=KG,X,Y,Z', 'tool' or 'instrument', got '{text}'"
+        )
+    if kind == 'load' and not 0.0 < numbers[0] < HEAVIEST:
+        raise DataError(f'a load is given in kg, above 0 and below {HEAVIEST:g}, got {text!r}')
+    return SetUpChange(kind, numbers)
+
+
+def told(
+    recordings: Sequence[Recording], changes: Mapping[int, SetUpChange], robot: Robot
+) -> tuple[list[Recording], tuple[str, ...]]:
+    """
+    Return recordings that say what was changed, and which errors may differ between them.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        The first is what the others are compared with.
+    changes : mapping from int to SetUpChange
+        By recording, counted from 0.
+    robot : Robot
+        As it is without the changes.
+
+    Raises
+    ------
+    DataError
+        The first recording is said to differ.
+
+    """
+    differs = {change.kind for change in changes.values()} & set(FRAMES)
+    if 0 in changes and changes[0].kind in FRAMES:
+        raise DataError('the first recording is what the others are compared with; give it last')
+    out = list(recordings)
+    for k, change in changes.items():
+        if change.kind == 'load':
+            out[k] = _loaded(out[k], change.numbers, robot)
+        elif change.kind == 'instrument':
+            out[k] = _seen_from_before(out[k], robot)
+    return out, tuple(FRAMES[kind] for kind in sorted(differs))
+
+
+def _loaded(recording: Recording, numbers: Sequence[float], robot: Robot) -> Recording:
+    """Return the recording with the weight of a load on the tool, unless forces were measured."""
+    if recording.wrench is not None:
+        return recording
+    t, poses = recording.joints.t, forward(robot, recording.joints.q)
+    force = np.tile(numbers[0] * robot.gravity, (t.size, 1))
+    tools = robot.T_world_base[:3, :3].T @ poses[:, :3, :3]
+    torque = np.cross(tools @ np.array(numbers[1:] or (0.0, 0.0, 0.0)), force)
+    pull = Signal(t, np.concatenate([force, torque], axis=1))
+    return replace(recording, wrench=pull, wrench_frame='base')
+
+
+def _seen_from_before(recording: Recording, robot: Robot) -> Recording:
+    """Return the recording as if measured from where it was, as near as the robot file tells."""
+    measured = recording.measured
+    if measured is None:
+        return recording
+    nominal = Twin(robot).poses(recording, measured.t).position
+    middle, goal = measured.position.mean(axis=0), nominal.mean(axis=0)
+    turn = Rotation.align_vectors(nominal - goal, measured.position - middle)[0].as_matrix()
+    moved = (measured.position - middle) @ turn.T + goal
+    rotation = None if measured.rotation is None else turn @ measured.rotation
+    return recording.with_measured(Measurements(measured.t, moved, rotation))

@@ -49,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_robot(parser)
     _add_setup(parser)
+    _add_next(parser)
     _add_causes(parser)
     _add_sheet(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
@@ -84,6 +85,9 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='if data or set-up are wrong and one correction explains it, make it and go on',
     )
+
+
+def _add_next(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--experiment-minutes',
         type=float,

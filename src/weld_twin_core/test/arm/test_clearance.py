@@ -7,6 +7,7 @@ import pytest
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.clearance import body, clearances, free
+from weld_twin_core.arm.robot import Robot
 
 UPRIGHT = np.array([0.0, -1.4, 1.4, -1.6, -1.5, 0.0])
 FOLDED = np.array([0.0, -1.4, 3.0, 0.0, 0.0, 0.0])
@@ -29,6 +30,11 @@ def test_an_upright_arm_stays_above_its_foot_and_within_a_box(ur5):
 
 def test_where_the_arm_was_is_no_collision(ur5):
     assert free(ur5, FOLDED[None], FOLDED[None])[0]
+
+
+def test_an_axis_without_extent_is_free_anywhere():
+    axis = Robot.from_mapping({'name': 'axis', 'joints': [{'name': 'x', 'type': 'prismatic'}]})
+    assert free(axis, np.array([[-0.1], [0.0], [0.2]]), np.zeros((1, 1))).all()
 
 
 def test_links_are_as_far_apart_as_points_on_them_are(ur5):

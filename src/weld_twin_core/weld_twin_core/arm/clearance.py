@@ -131,5 +131,10 @@ def free(robot: Robot, q: Array, seen: Array, box: Array | None = None) -> Array
     )
     if up @ robot.T_world_base[:3, 2] < 0.99:
         return np.asarray(good)
-    foot = min(float(robot.T_world_base[:3, 3] @ up), float((known.end @ up).min()))
-    return np.asarray(good & ((ends @ up).min(axis=1) >= foot))
+    foot = min(float(robot.T_world_base[:3, 3] @ up), _lowest(known.end @ up).min())
+    return np.asarray(good & (_lowest(ends @ up) >= foot))
+
+
+def _lowest(heights: Array) -> Array:
+    """Return the least along the last axis; an arm whose links have no length is nowhere low."""
+    return np.asarray(heights.min(axis=-1, initial=np.inf))

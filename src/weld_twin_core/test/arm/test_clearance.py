@@ -34,7 +34,8 @@ def test_where_the_arm_was_is_no_collision(ur5):
 
 def test_an_axis_without_extent_is_free_anywhere():
     axis = Robot.from_mapping({'name': 'axis', 'joints': [{'name': 'x', 'type': 'prismatic'}]})
-    assert free(axis, np.array([[-0.1], [0.0], [0.2]]), np.zeros((1, 1))).all()
+    assert free(axis, np.zeros((2, 1)), np.zeros((1, 1))).all()
+    assert free(axis, np.array([[0.1]]), np.zeros((1, 1))).all()
 
 
 def test_links_are_as_far_apart_as_points_on_them_are(ur5):

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """``{weld-twin-nodes}`` and ``{weld-twin-topics}``: parameters of the nodes, and the topics."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """``{blind-score} FILE``: a score of the blind check as tables, from the JSON that is kept."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 from setuptools import find_packages, setup
 
@@ -30,4 +30,7 @@ setup(
     maintainer_email='maintainers@example.org',
     description='Messages, bags, robot files and tables in and out of arrays.',
     license='Apache-2.0',
+    entry_points={
+        'ament_copyright.license': ['apache2_short = weld_twin_msgs_py.short_licence:APACHE_2'],
+    },
 )

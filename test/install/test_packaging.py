@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """One version, one description of each package, and no import that nothing asks for."""
 
@@ -72,6 +72,22 @@ def test_package_xml_and_setup_py_agree(package):
     assert xml.findtext('description') == told['description'].value
     assert xml.findtext('license') == told['license'].value == 'Apache-2.0'
     assert xml.findtext('export/build_type') == 'ament_python'
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_package_names_the_project_where_it_lies_and_what_changed(package):
+    reader = pytest.importorskip('catkin_pkg.package', reason='needs catkin_pkg')
+    changes = pytest.importorskip('catkin_pkg.changelog', reason='needs catkin_pkg')
+    found = reader.parse_package(str(ROOT / 'src' / package / 'package.xml'), warnings=[])
+    assert [person.name for person in found.maintainers] == ['weld_twin contributors']
+    assert {url.type for url in found.urls} == {'website', 'repository', 'bugtracker'}
+    text = (ROOT / 'src' / package / 'CHANGELOG.rst').read_text()
+    assert changes.get_changelog_from_path(str(ROOT / 'src' / package), package) is not None
+    assert text.splitlines()[1] == f'Changelog for package {package}'
+    assert (
+        '(https://www.ros.org/reps/rep-2004.html)'
+        in (ROOT / 'src' / package / 'QUALITY_DECLARATION.md').read_text()
+    )
 
 
 def test_both_ways_of_installing_have_the_same_programs():

@@ -1,3 +1,3 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Proof: an independent plant, sealed cases, campaigns, benchmarks, and real arms."""

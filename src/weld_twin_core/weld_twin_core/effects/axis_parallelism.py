@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Hayati's turn about y, for axes that are nearly parallel (IEEE CDC 1983)."""
 

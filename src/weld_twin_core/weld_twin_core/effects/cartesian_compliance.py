@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Cartesian compliance: the tool yields to the force on it, dx = K^-1 F (paper, eq. II.v)."""
 

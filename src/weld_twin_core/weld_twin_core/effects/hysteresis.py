@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 r"""
 Hysteresis: a loop of lost motion that closes over a travel, as in a strain-wave gear.

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
 Loaded play: lost motion on the loaded flank, theta -> theta + width / 2 * tau / sqrt(tau^2 + T^2).

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Thermal growth: a, d -> (1 + coefficient dT) a, d, with dT measured or a warm-up curve."""
 

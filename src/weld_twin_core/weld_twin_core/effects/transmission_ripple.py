@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Transmission ripple: theta -> theta + sum A sin(n theta + phase), n in cycles per turn."""
 

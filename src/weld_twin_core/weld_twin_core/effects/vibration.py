@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
 Vibration: x'' + 2 damping w x' + w^2 x = -gain theta'', theta -> theta + x, w = 2 pi frequency.

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """SALib, loaded when it is needed: it brings pandas along, and no ROS distribution packages it."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Make the robots and motions of `plant_cells` importable under any of pytest's import modes."""
 

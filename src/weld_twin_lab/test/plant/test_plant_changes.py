@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of the plant on two days: what changed between them is found, and nothing else."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Displacements of the tool over a recording, shape (M, 3) [m]: their size, and what is alike."""
 

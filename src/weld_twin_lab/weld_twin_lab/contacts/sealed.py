@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Sealed contacts: the plant touches sockets with one flaw and some slack; is the flaw named?"""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Every poor recording and every sealed case diagnosed, and its regions tried on other poses."""
 
@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,7 @@ def study(
     entries = []
     for robot, directory in (('ur5', ur5), ('ur10', ur10)):
         for split in splits(robot, tables(robot, directory)[0].recording, HOME[robot]):
-            entries.append(_kept(out, split.name, lambda s=split: _of_split(s), tell))  # type: ignore[misc]
+            entries.append(_kept(out, split.name, partial(_of_split, split), tell))
     if cases is not None:
         for name in _names(cases / 'cases'):
             pair = (cases / 'cases' / name, cases / 'truths' / name)

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """What happens to an arm in a year: knocks, slips, wear, services, seasons, weeks without a check."""
 

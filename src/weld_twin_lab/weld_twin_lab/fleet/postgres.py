@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """A PostgreSQL server of one's own: made in a folder, reached by a socket there, gone afterwards."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """A stream that begins late or ends early is named, and so is what the recorder lacked."""
 

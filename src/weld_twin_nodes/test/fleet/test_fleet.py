@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """A list of recordings into a database: good ones, bad ones, and once each."""
 

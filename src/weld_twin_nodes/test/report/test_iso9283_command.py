@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """``weld-twin iso9283`` on bags of an arm whose errors were put in, to the file and to the page."""
 

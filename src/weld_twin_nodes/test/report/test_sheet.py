@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """The sheet in a real browser: switches, cursors, tolerance; readable on a phone, dark, in print."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """A seam or an experiment as the moves of a program that a controller runs."""
 
@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -171,10 +171,9 @@ def _moves(plan: Plan, context: Context, speeds: Speeds) -> tuple[ExportMove, ..
         stop = plan.stations or last
         dwell = speeds.dwell if plan.stations or last else 0.0
         comment = f'station {k + 1}' if plan.stations else ''
-        kind = 'linear' if linear else 'joint'
-        out.append(
-            ExportMove(kind, q, places[k], speed, share, stop, dwell, duration, comment)  # type: ignore[arg-type]
-        )
+        kind: Literal['linear', 'joint'] = 'linear' if linear else 'joint'
+        place = places[k]
+        out.append(ExportMove(kind, q, place, speed, share, stop, dwell, duration, comment))
     return tuple(out)
 
 

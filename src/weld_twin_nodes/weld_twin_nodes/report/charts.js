@@ -1,4 +1,4 @@
-// SPDX-FileCopyrightText: weld_twin contributors
+// Copyright 2026 weld_twin contributors
 // SPDX-License-Identifier: Apache-2.0
 // Draws every figure.chart with uPlot: ticks, values under the cursor, one cursor for all of a key.
 // What else shows an instant listens to the event 'instant', and sends it: {key, x, from}.

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Circles as a magnified polar plot, like ISO 230-4 has them, with the reversals of the joints."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """The sheet of a diagnosis: one HTML file that needs nothing else, and prints on a side or two."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Joints by the names that stand on the controller: A1 to A6, J1 to J6, or a user's own."""
 

@@ -1,4 +1,4 @@
-// SPDX-FileCopyrightText: weld_twin contributors
+// Copyright 2026 weld_twin contributors
 // SPDX-License-Identifier: Apache-2.0
 // Draws circles: the radial deviation magnified about the commanded circle, reversals at the rim.
 'use strict';

@@ -1,4 +1,4 @@
-// SPDX-FileCopyrightText: weld_twin contributors
+// Copyright 2026 weld_twin contributors
 // SPDX-License-Identifier: Apache-2.0
 // What the parts of the sheet share: which causes are thought mended, what that leaves, which
 // instant is looked at, and whether it passes. Parts listen to 'switched' and 'instant'.

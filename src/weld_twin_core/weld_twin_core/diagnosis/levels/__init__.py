@@ -1,3 +1,3 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """What is certain of each cause, level by level: its place, what it depends on, and its name."""

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """What an arm of this kind may have, whether or not it was found, and how large it may be."""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Is a gap that no plausible arm leaves a mix-up of units, signs, joints, robots or frames?"""
 

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
 `tf2_msgs` and what is needed of `control_msgs`, for real messages where no wheels of them exist.

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Options that several jobs share."""
 
@@ -10,10 +10,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from weld_twin_nodes.cli.options import add_pool as add_pool
+from weld_twin_nodes.cli.options import add_pool
 
 if TYPE_CHECKING:
     from weld_twin_nodes.offline.task_pool import Runner
+
+__all__ = ['add_draw', 'add_pool', 'kinds_of', 'runner_of', 'spans_of']
 
 
 @contextmanager

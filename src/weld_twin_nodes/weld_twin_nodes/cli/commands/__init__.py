@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
 Subcommands, found by their file names: an underscore is a hyphen, a trailing one keeps a name off

@@ -1,4 +1,4 @@
-# SPDX-FileCopyrightText: weld_twin contributors
+# Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """Figures 6, 7, 8 and 9: the path without errors, shifted, fast and slow, and with play."""
 

@@ -31,6 +31,8 @@ setup(
     description='Messages, bags, robot files and tables in and out of arrays.',
     license='Apache-2.0',
     entry_points={
-        'ament_copyright.license': ['apache2_short = weld_twin_msgs_py.files.short_licence:APACHE_2'],
+        'ament_copyright.license': [
+            'apache2_short = weld_twin_msgs_py.files.short_licence:APACHE_2'
+        ],
     },
 )

@@ -56,9 +56,11 @@ def recorded_experiment(
         generator = _started('trajectory_generator', {**path, **moving}, Path(folder))
         try:
             _ended(generator, seconds + GRACE)
-        finally:
-            code = recorder.stop()
-        if code != 0:
+        except BaseException:
+            recorder.stop()
+            raise
+        recorder.interrupt()
+        if recorder.end(GRACE) != 0:
             raise TwinError(f'the recorder failed: {recorder.log.strip()}')
     return out
 

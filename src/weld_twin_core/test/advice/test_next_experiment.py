@@ -4,6 +4,7 @@
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from measured_cells import asked, moving, recorded, stations
 
 import weld_twin_core as wt
 from weld_twin_core.arm import catalog
+from weld_twin_core.arm.clearance import free
 from weld_twin_core.diagnosis.advice import Limits, chosen_pieces, experiment, next_experiment
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem, Scale
@@ -187,6 +189,29 @@ def test_minutes_and_a_box_are_kept(ur5):
     assert ((tips > low) & (tips < high)).all()
 
 
+def test_what_is_set_up_counts_among_the_minutes(ur5):
+    problem, model = at_hand(ur5)
+    made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
+    for minutes in (4.0, 22.0):
+        limits = Limits(minutes=minutes)
+        found = next_experiment(problem, model, made, known_scale(problem), limits)
+        assert found['robot_minutes'] <= found['cost'] <= minutes
+
+
+def test_the_way_from_station_to_station_is_free_too(ur5):
+    problem, model = at_hand(ur5)
+    box = np.array([[-0.7, -0.9, 0.02], [0.9, 0.9, 1.1]])
+    limits = Limits(minutes=5.0, set_up=False, box=box)
+    made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
+    found = next_experiment(problem, model, made, known_scale(problem), limits)
+    q = np.array(found['motion']['q'])
+    assert found['motion']['static'] and len(q) == found['stations']
+    share = np.linspace(0.0, 1.0, 9)[:, None]
+    ways = np.concatenate([a + share * (b - a) for a, b in pairwise(q)])
+    seen = problem.recordings[0].joints.q
+    assert free(ur5, ways, seen, box).all()
+
+
 def test_a_longer_experiment_says_no_less(ur5):
     problem, model = at_hand(ur5, size=0.05)
     made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
@@ -204,3 +229,10 @@ def test_nothing_is_asked_without_minutes():
         Limits(minutes=0.0)
     with pytest.raises(DataError, match='two corners'):
         Limits(box=np.zeros((2, 3)))
+
+
+def test_a_box_without_room_for_the_arm_is_told(ur5):
+    problem, model = at_hand(ur5)
+    far = Limits(box=np.array([[5.0, 5.0, 0.0], [6.0, 6.0, 1.0]]))
+    with pytest.raises(DataError, match='holds no posture near those recorded'):
+        next_experiment(problem, model, [()], known_scale(problem), far)

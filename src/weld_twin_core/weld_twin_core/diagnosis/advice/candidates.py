@@ -72,6 +72,8 @@ class Candidate:
         Whether none of the pieces may be left out.
     model : Model
         As the cell will be, without found effects; one base.
+    room : Room
+        Where the arm may go.
     new_base, new_tool : bool
         Whether the instrument or the tool is set up anew, so that its frame is not known.
     alone : int
@@ -87,6 +89,7 @@ class Candidate:
     recordings: tuple[Recording, ...]
     pieces: tuple[Piece, ...]
     model: Model
+    room: Room
     whole: bool = False
     new_base: bool = False
     new_tool: bool = False
@@ -123,12 +126,12 @@ def candidates(
     still = all(r.joints.static for r in problem.recordings)
     if limits.set_up or not still:
         yield _path(problem, now, room, spread, joints, ANOTHER if still else 0.0)
-    yield from _at_rest(problem, now, spread)
+    yield from _at_rest(problem, now, room, spread)
     if limits.set_up:
         if all(r.wrench is not None for r in problem.recordings):
-            yield _pressed(problem, now, spread)
-        yield _warm_up(problem, now, spread)
-        yield from _changed(problem, now, spread)
+            yield _pressed(problem, now, room, spread)
+        yield _warm_up(problem, now, room, spread)
+        yield from _changed(problem, now, room, spread)
 
 
 def _path(
@@ -162,6 +165,7 @@ def _path(
         recordings,
         pieces,
         now,
+        room,
         alone=len(motions) - together,
     )
 
@@ -179,11 +183,12 @@ def _alone(room: Room, now: Model, name: str) -> list[Array]:
     return stops
 
 
-def _at_rest(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]:
+def _at_rest(problem: Problem, now: Model, room: Room, spread: Array) -> Iterator[Candidate]:
     """Yield stations, and stations approached from both sides."""
     yield _stations(
         problem,
         now,
+        room,
         'stations',
         'Measure {count} stations at rest, spread over a wider part of the workspace.',
         spread,
@@ -194,6 +199,7 @@ def _at_rest(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]
     yield _stations(
         problem,
         now,
+        room,
         'bidirectional',
         'Measure {count} stations at rest, each approached from both sides of every joint.',
         np.asarray(both),
@@ -204,6 +210,7 @@ def _at_rest(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]
 def _stations(
     problem: Problem,
     now: Model,
+    room: Room,
     kind: str,
     sentence: str,
     q: Array,
@@ -214,10 +221,10 @@ def _stations(
     pieces = tuple(
         Piece(0, tuple(range(k, k + group)), STAY * group) for k in range(0, len(q), group)
     )
-    return Candidate(kind, sentence, set_up, (recording,), pieces, now)
+    return Candidate(kind, sentence, set_up, (recording,), pieces, now, room)
 
 
-def _warm_up(problem: Problem, now: Model, spread: Array) -> Candidate:
+def _warm_up(problem: Problem, now: Model, room: Room, spread: Array) -> Candidate:
     again = np.concatenate([spread[:5]] * 12)
     recording = at_rest(problem, again, SOAK, RISE)
     return Candidate(
@@ -227,14 +234,15 @@ def _warm_up(problem: Problem, now: Model, spread: Array) -> Candidate:
         (recording,),
         (Piece(0, tuple(range(len(again))), SOAK * len(again)),),
         now,
+        room,
         whole=True,
     )
 
 
-def _pressed(problem: Problem, now: Model, spread: Array) -> Candidate:
+def _pressed(problem: Problem, now: Model, room: Room, spread: Array) -> Candidate:
     words = f'while the tool is pressed with {PRESS:g} N along x, y and z in turn.'
     made = _stations(
-        problem, now, 'press', 'Measure {count} stations ' + words, spread, 3, set_up=5.0
+        problem, now, room, 'press', 'Measure {count} stations ' + words, spread, 3, set_up=5.0
     )
     force = np.zeros((len(spread), 6))
     force[np.arange(len(force)), np.arange(len(force)) % 3] = PRESS
@@ -244,7 +252,7 @@ def _pressed(problem: Problem, now: Model, spread: Array) -> Candidate:
     return replace(made, recordings=(pushed,), pieces=whole)
 
 
-def _changed(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]:
+def _changed(problem: Problem, now: Model, room: Room, spread: Array) -> Iterator[Candidate]:
     """Yield the same stations with something changed in the cell."""
     robot = now.robot
     words = 'Measure {count} stations'
@@ -252,6 +260,7 @@ def _changed(problem: Problem, now: Model, spread: Array) -> Iterator[Candidate]
     made = _stations(
         problem,
         replace(now, robot=heavy),
+        room,
         'payload_swap',
         f'{words} with {MASS:g} kg more hung from the tool point.',
         spread,

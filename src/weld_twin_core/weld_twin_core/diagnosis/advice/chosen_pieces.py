@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,7 +64,16 @@ class Plan:
     @property
     def robot_minutes(self) -> float:
         """Return how long the arm moves [min]."""
+        if self.candidate.static:
+            t = self.motion().t
+            return float(t[-1] + self._step) / 60.0
         return sum(self.candidate.pieces[k].seconds for k in self.chosen) / 60.0
+
+    @property
+    def _step(self) -> float:
+        """Return the time from station to station [s]."""
+        t = self.candidate.recordings[0].joints.t
+        return float(t[1] - t[0]) if t.size > 1 else STAY
 
     @property
     def minutes(self) -> float:
@@ -77,9 +86,9 @@ class Plan:
         if self.candidate.static:
             joints = self.candidate.recordings[0].joints
             rows = [row for piece in pieces for row in piece.rows or ()]
-            step = joints.t[1] - joints.t[0] if joints.t.size > 1 else STAY
-            t: Array = float(step) * np.arange(len(rows), dtype=np.float64)
-            return JointMotion(t, joints.q[rows], static=True)
+            q = self.candidate.room.linked(joints.q[rows])
+            t: Array = self._step * np.arange(len(q), dtype=np.float64)
+            return JointMotion(t, q, static=True)
         times: list[Array] = []
         places: list[Array] = []
         start = 0.0
@@ -134,7 +143,11 @@ def planned(
         gains, score = found, max(score, gained)
     if not chosen:
         return None
-    return _plan(option, chosen, score, before, gains)
+    plan = _plan(option, chosen, score, before, gains)
+    # Stops on the way take time as well.
+    while plan.robot_minutes * 60.0 > room and len(plan.chosen) > 1 and not option.whole:
+        plan = replace(plan, chosen=plan.chosen[:-1])
+    return plan
 
 
 def _plan(

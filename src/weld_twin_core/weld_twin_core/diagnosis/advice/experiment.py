@@ -210,7 +210,7 @@ def _entry(
 ) -> dict[str, Any]:
     option = plan.candidate
     joints = plan.motion()
-    sentence = option.sentence.format(count=len(plan.chosen) if joints.static else 0)
+    sentence = option.sentence.format(count=len(joints.t) if joints.static else 0)
     return {
         'kind': option.kind,
         'sentence': f'{sentence} Check the motion for collisions first.',

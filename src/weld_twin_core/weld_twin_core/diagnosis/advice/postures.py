@@ -12,6 +12,7 @@ import numpy as np
 from ...arm.clearance import free
 from ...arm.robot import Robot
 from ...arrays import Array
+from ...errors import DataError
 from ...recording import JointMotion
 from ...sequences import halton
 from ..algebra.problem import Problem
@@ -24,6 +25,8 @@ INSET = 0.02
 """Distance to a joint's limits [rad, m]; an approach from either side has room in it."""
 DRAWN = 12
 """Postures drawn for each that is wanted, before fewer have to do."""
+LOOKED_FOR = 2000
+"""Postures that are drawn to find one in the box of the cell."""
 CHECKED = 8
 """Places of a way between two postures that are checked."""
 FASTEST = 0.5
@@ -45,10 +48,15 @@ class Room:
     robot : Robot
     limits : Limits
 
+    Raises
+    ------
+    DataError
+        The box of the cell holds no posture near those recorded.
+
     Attributes
     ----------
     home : array, shape (n,) [rad, m]
-        The recorded posture in the middle of all.
+        The recorded posture in the middle of all, or the nearest to it that lies in the box.
     low, high : array, shape (n,) [rad, m]
 
     """
@@ -64,6 +72,28 @@ class Room:
         self.high = np.minimum(np.maximum(self.home + WIDE, q.max(axis=0)), robot.upper - inset)
         self.low = np.minimum(self.low, self.home)
         self.high = np.maximum(self.high, self.home)
+        if limits.box is not None and not self.free(self.home[None])[0]:
+            self.home = self._inside(middle)
+
+    def _inside(self, middle: Array) -> Array:
+        """
+        Return the posture in the box that is nearest to the middle of what was recorded.
+
+        Raises
+        ------
+        DataError
+            None is.
+
+        """
+        drawn = self.low + halton(self._robot.n, LOOKED_FOR) * (self.high - self.low)
+        for places in (self._seen, drawn):
+            inside = places[self.free(places)]
+            if len(inside):
+                return np.asarray(inside[int(np.argmin(np.abs(inside - middle).sum(axis=1)))])
+        raise DataError(
+            'the box of the cell holds no posture near those recorded; give it more room, in the '
+            'measuring frame and in metres'
+        )
 
     def free(self, q: Array) -> Array:
         """Return which postures, shape (N, n), are free, shape (N,), bool."""
@@ -72,6 +102,8 @@ class Room:
     def spread(self, count: int, skip: int = 0) -> Array:
         """
         Return postures that fill the range evenly, as many as are free, shape (count, n).
+
+        The way from home to each is free too.
 
         Parameters
         ----------
@@ -82,9 +114,10 @@ class Room:
         """
         unit = halton(self._robot.n, skip + DRAWN * count)[skip:]
         q = self.low + unit * (self.high - self.low)
-        kept = q[np.flatnonzero(self.free(q))[:count]]
-        if len(kept) >= min(count, 4):
-            return np.asarray(kept)
+        some = q[np.flatnonzero(self.free(q))[: 2 * count]]
+        kept = some[[self.way([self.home, place]) for place in some]][:count]
+        if len(kept) >= min(count, 4) or self._limits.box is not None:
+            return np.asarray(np.concatenate([kept, self.home[None]]) if len(kept) < 4 else kept)
         # Hardly anything is free: stay near to where the arm was.
         return np.asarray(self.home + 0.2 * (q[:count] - self.home))
 
@@ -93,6 +126,15 @@ class Room:
         share = np.linspace(0.0, 1.0, CHECKED + 1)[:, None]
         ways = [a + share * (b - a) for a, b in pairwise(stops)]
         return bool(self.free(np.concatenate(ways)).all())
+
+    def linked(self, q: Array) -> Array:
+        """Return stations with a stop at home wherever the straight way to the next is not free."""
+        out = [q[0]]
+        for place in q[1:]:
+            if not self.way([out[-1], place]):
+                out.append(self.home)
+            out.append(place)
+        return np.array(out)
 
     def travel(self, stops: Sequence[Array], speed: float) -> JointMotion:
         """

@@ -77,8 +77,9 @@ def test_draws_that_once_ended_in_a_traceback(seed):
 
 
 @pytest.mark.filterwarnings('ignore')
-def test_frames_put_back_where_they_were_push_no_error_beyond_what_machines_have():
-    assert tried(drawn(383))['wrong'] == []
+@pytest.mark.parametrize('seed', [383, 1329], ids=['frames put back', 'many at once'])
+def test_nothing_is_told_beyond_what_machines_have(seed):
+    assert tried(drawn(seed))['wrong'] == []
 
 
 def test_a_draw_is_what_it_says():

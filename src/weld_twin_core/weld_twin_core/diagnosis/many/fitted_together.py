@@ -20,6 +20,7 @@ from ...effects.registry import REGISTRY
 from ..algebra.problem import PLACES
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
+from ..hypotheses.selection import implausible
 from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from .small_errors import many_small
@@ -152,11 +153,27 @@ def _together(
     progress: Callable[[str], None],
     orders: int | None = None,
 ) -> Search:
-    """Return the fit of all families but some."""
-    model = found.small.model
-    kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
-    final, scale, precision = many_small(found.problem, kept, exclude, beliefs, progress, orders)
-    return replace(found, scale=scale, final=final, precision=precision, slots=(), dense=True)
+    """Return the fit of all families but some, and but those that no machine has so large."""
+    refused = list(found.refused)
+    while True:
+        model = found.small.model
+        kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
+        fitted = many_small(found.problem, kept, exclude, beliefs, progress, orders)
+        final, scale, precision = fitted
+        absurd = implausible(final.model)
+        if not absurd:
+            break
+        refused += absurd
+        exclude = (*exclude, *(effect.name for effect in absurd))
+    return replace(
+        found,
+        scale=scale,
+        final=final,
+        precision=precision,
+        slots=(),
+        dense=True,
+        refused=tuple(refused),
+    )
 
 
 def _beyond(demand: int) -> tuple[str, ...]:

@@ -190,11 +190,10 @@ def _foreseen(asked: Mapping[str, Any]) -> str:
 def _fork(asked: Mapping[str, Any], after: Round | None) -> Html:
     """Return the two explanations, and which of them is left."""
     sides = []
-    left = [_left(side, after) for side in asked['between']]
-    for k, side in enumerate(asked['between']):
-        # What has nothing of its own is left where the other is not.
-        stays = left[k] if side else (None if left[1 - k] is None else not left[1 - k])
-        name = ' with '.join(_name(item) for item in side) or 'neither of that'
+    one, other = asked['between']
+    for side, against in ((one, other), (other, one)):
+        stays = None if after is None else _left(side, against, after['believed'])
+        name = ' with '.join(_name(item, against) for item in side) or 'neither of that'
         word: Child = {None: None, True: 'left', False: 'ruled out'}[stays]
         mark = tag('span', word, class_='level') if word else None
         class_ = {None: None, True: 'stays', False: 'gone'}[stays]
@@ -202,11 +201,26 @@ def _fork(asked: Mapping[str, Any], after: Round | None) -> Html:
     return tag('ul', *sides, class_='fork')
 
 
-def _left(side: Sequence[Mapping[str, Any]], after: Round | None) -> bool | None:
-    """Return whether an explanation is among what is believed afterwards; None: not told."""
-    if after is None or not side:
-        return None
-    belief = after['believed']
+Side = Sequence[Mapping[str, Any]]
+
+
+def _left(side: Side, against: Side, belief: Mapping[str, Any]) -> bool:
+    """
+    Return whether an explanation is among what is believed.
+
+    What has nothing of its own is where the other is not; and a curve is not where the formula
+    that it was held against is.
+    """
+    if not side:
+        return not _stands(against, belief)
+    nameless = all(item['effect'] in WITHOUT_NAME for item in side)
+    formula = against and not any(item['effect'] in WITHOUT_NAME for item in against)
+    if nameless and formula and belief['status'] != 'unknown' and _stands(against, belief):
+        return False
+    return _stands(side, belief)
+
+
+def _stands(side: Side, belief: Mapping[str, Any]) -> bool:
     kinds = {(c['at'], c['on']) for c in belief.get('causes') or []}
     sites = {(e['effect'], e.get('joint')) for group in belief['indistinguishable'] for e in group}
     sites |= {(e['effect'], e.get('joint')) for e in belief['effects']}
@@ -226,10 +240,11 @@ def _told(text: str, step: Round) -> str:
     return in_words(text, {Site(item['effect'], item.get('joint')) for item in items})
 
 
-def _name(item: Mapping[str, Any]) -> str:
-    if item['effect'] in WITHOUT_NAME and item.get('at'):
-        where = place_name(str(item['at']))
-        if item['on'] == 'constant':
-            return f'something constant at {where}'
-        return f'something at {where} that depends on {item["on"]}'
-    return cause(str(item['effect']), item.get('joint'))
+def _name(item: Mapping[str, Any], against: Side = ()) -> str:
+    if item['effect'] not in WITHOUT_NAME or not item.get('at'):
+        return cause(str(item['effect']), item.get('joint'))
+    alike = any((i.get('at'), i.get('on')) == (item['at'], item['on']) for i in against)
+    what, where = 'something else' if alike else 'something', place_name(str(item['at']))
+    if item['on'] == 'constant':
+        return f'{what} constant at {where}'
+    return f'{what} at {where} that depends on {item["on"]}'

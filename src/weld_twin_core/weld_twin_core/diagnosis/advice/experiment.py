@@ -179,7 +179,8 @@ def _sides(
 
 
 def _differing(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> tuple[str, str]:
-    return _named(_only(first, second)), _named(_only(second, first))
+    one, other = _only(first, second), _only(second, first)
+    return _named(one, other), _named(other, one)
 
 
 def _only(effects: tuple[Effect, ...], others: tuple[Effect, ...]) -> list[Effect]:
@@ -188,18 +189,21 @@ def _only(effects: tuple[Effect, ...], others: tuple[Effect, ...]) -> list[Effec
     return [effect for effect in effects if (effect.key, effect.on) not in known]
 
 
-def _named(effects: Sequence[Effect]) -> str:
+def _named(effects: Sequence[Effect], others: Sequence[Effect]) -> str:
     if not effects:
         return 'the rest alone'
-    return ' with '.join(dict.fromkeys(_name(effect) for effect in effects))
+    return ' with '.join(dict.fromkeys(_name(effect, others) for effect in effects))
 
 
-def _name(effect: Effect) -> str:
+def _name(effect: Effect, others: Sequence[Effect]) -> str:
     if effect.cause:
         return f'{effect.name} of {effect.site}' if effect.site else effect.name
+    # A curve bends as any formula of the same kind does: what it stands for is the others.
+    alike = any((other.at, other.on) == (effect.at, effect.on) for other in others)
+    what = 'something else' if alike else 'something'
     if effect.on == 'constant':
-        return f'something constant at {effect.at}'
-    return f'something at {effect.at} that depends on {effect.on}'
+        return f'{what} constant at {effect.at}'
+    return f'{what} at {effect.at} that depends on {effect.on}'
 
 
 def _entry(

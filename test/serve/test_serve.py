@@ -94,12 +94,16 @@ def test_from_drop_to_sheet_and_into_a_history_of_ones_own(server, chromium):
     page.on('console', lambda message: console.append(message.text))
     page.goto(server.address)
     page.set_input_files('#files', bag_files())
-    page.select_option('#robot', 'ur5')
     page.get_by_text('Table units, and history').click()
     page.fill('#cell', 'line <3>')
     page.fill('#at', '2026-03-02')
     page.get_by_role('button', name='Diagnose').click()
+    # The robot was forgotten: it is asked for, and the recording need not come again.
+    assert 'Which robot is it?' in until(page, '#refused').inner_text()
+    page.select_option('#robot', 'ur5')
+    page.get_by_role('button', name='Try again').click()
     until(page, 'iframe')
+    assert 'elbow_play' in page.frame_locator('iframe').locator('.subject').inner_text()
     sheet = page.frame_locator('iframe').locator('h1')
     assert 'backlash of elbow_joint' in sheet.inner_text()
     address = page.url
@@ -108,10 +112,21 @@ def test_from_drop_to_sheet_and_into_a_history_of_ones_own(server, chromium):
     assert '"status": "identified"' in fetched.value.path().read_text()
     page.goto(server.root + '/history')
     page.get_by_role('link', name='line <3>').first.click()
+    assert 'One diagnosis so far' in page.locator('h1').inner_text()
+    page.get_by_role('link', name='New recording').click()
+    page.set_input_files('#files', next(name for name in bag_files() if name.endswith('.mcap')))
+    page.select_option('#robot', 'ur5')
+    page.get_by_text('Table units, and history').click()
+    page.fill('#cell', 'line <3>')
+    page.fill('#at', '2026-03-09')
+    page.get_by_role('button', name='Diagnose').click()
+    until(page, 'iframe')
+    page.goto(server.root + '/history')
+    page.get_by_role('link', name='line <3>').first.click()
     until(page, '.chart canvas')
     assert page.locator('.chart canvas').count() == 2
     page.goto(server.root + '/recordings')
-    assert page.locator('#mine tbody tr').count() == 1
+    assert page.locator('#mine tbody tr').count() == 2
     # Nobody else sees any of it, with its address either.
     theirs = other.new_page()
     theirs.goto(server.address)
@@ -176,13 +191,13 @@ def test_who_does_not_come_from_a_page_of_ours_changes_nothing(server):
 @pytest.mark.parametrize(
     ('how', 'said'),
     [
-        ({'files': ()}, 'choose a recording first'),
+        ({'files': ()}, 'Choose a recording first'),
         ({'files': [('x.exe', b'MZ')]}, 'neither a bag, a table nor a robot file'),
         ({'files': [('a.csv', b''), ('A/a.csv', b'')]}, 'same name'),
-        ({'files': [('metadata.yaml', b'')]}, 'no recording is among these'),
+        ({'files': [('metadata.yaml', b'')]}, 'No recording is among these'),
         ({'files': [(f'{k}.mcap', b'') for k in range(30)]}, ''),
-        ({'robot': '/etc/passwd'}, 'choose the robot'),
-        ({'align': '--out'}, 'align cannot be'),
+        ({'robot': '/etc/passwd'}, 'is none of those bundled'),
+        ({'align': '--out'}, 'Align cannot be'),
         ({'at': 'Monday'}, 'is no date'),
     ],
 )

@@ -28,11 +28,17 @@ TROUBLES = 10
 """Recordings without a verdict listed, the newest first."""
 MILLI = 1e3
 """Millimetres of a metre."""
-STYLE = 'a { color: var(--accent); } th[scope=row] { white-space: nowrap; }'
+STYLE = (
+    'a { color: var(--accent); } th[scope=row] { white-space: nowrap; }'
+    'nav { display: flex; flex-wrap: wrap; gap: .25rem 1.25rem; padding-bottom: .6rem; }'
+    '@media print { nav { display: none; } }'
+)
 """What pages of cells have besides: links, and dates and names in one line."""
 
 
-def cell_page(database: Database, cell: str, home: str | None = None) -> str:
+def cell_page(
+    database: Database, cell: str, home: str | None = None, ways: Html | None = None
+) -> str:
     """
     Return the page of a cell.
 
@@ -42,6 +48,8 @@ def cell_page(database: Database, cell: str, home: str | None = None) -> str:
     cell : str
     home : str, optional
         Address of the page of all cells.
+    ways : Html, optional
+        The way to other pages.
 
     Raises
     ------
@@ -57,11 +65,12 @@ def cell_page(database: Database, cell: str, home: str | None = None) -> str:
         'main',
         tag(
             'header',
+            ways,
             tag('p', 'History of ', tag('b', cell), class_='kind'),
             tag('p', f'{entries[-1].robot} · {_span(entries)}', class_='subject'),
             back,
         ),
-        tag('section', tag('h1', _headline(changes)), _figures(entries), id_='verdict'),
+        tag('section', tag('h1', _headline(entries, changes)), _figures(entries), id_='verdict'),
         _changed(changes),
         _charts(entries, changes),
         _diagnoses(entries),
@@ -79,7 +88,9 @@ def _span(entries: Sequence[Entry]) -> str:
     return f'{more}{count} diagnoses, {entries[0].at.date()} to {entries[-1].at.date()}'
 
 
-def _headline(changes: Sequence[Mapping[str, Any]]) -> str:
+def _headline(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> str:
+    if len(entries) == 1:
+        return 'One diagnosis so far: the next ones tell what changes.'
     if not changes:
         return 'Nothing changed by more than chance.'
     latest = max(changes, key=lambda change: str(change['date']))
@@ -122,8 +133,10 @@ def _changed(changes: Sequence[Mapping[str, Any]]) -> Html | None:
     return section('What changed', tag('ul', *said, class_='sentences'), id_='changed', lead=lead)
 
 
-def _charts(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> Html:
-    """Return the control charts: the gap, and single values."""
+def _charts(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> Html | None:
+    """Return the control charts: the gap, and single values; None for a single diagnosis."""
+    if len(entries) == 1:
+        return None
     seconds = np.array([entry.at.timestamp() for entry in entries])
     gaps = np.array([_number(entry.gap_m) for entry in entries])
     charts: list[Child] = [

@@ -29,6 +29,8 @@ FEWEST = 3
 """Diagnoses without which there is no baseline."""
 LIMIT = 3.0
 """Standard deviations from the baseline to a control limit, as ever."""
+MARKED = 60
+"""Diagnoses up to which each has its dot; more of them run into one another."""
 MOVING = 0.6745 * np.sqrt(2.0)
 """Median distance of two normal draws, in standard deviations."""
 
@@ -88,7 +90,7 @@ def control_chart(
 
     """
     usual = baseline(values, before)
-    lines = [Line(axis.label, values)]
+    lines = [Line(axis.label, values, marked=values.size <= MARKED)]
     band = None
     if usual is not None:
         every = np.ones(values.size)

@@ -19,7 +19,7 @@ TROUBLES = 50
 """Recordings without a verdict listed, the newest first."""
 
 
-def ranking_page(database: Database, link: Callable[[str], str]) -> str:
+def ranking_page(database: Database, link: Callable[[str], str], ways: Html | None = None) -> str:
     """
     Return the page that ranks cells by the gap of their newest diagnosis.
 
@@ -28,6 +28,8 @@ def ranking_page(database: Database, link: Callable[[str], str]) -> str:
     database : Database
     link : callable
         Address of the page of a cell.
+    ways : Html, optional
+        The way to other pages.
 
     """
     runs = Runs(database)
@@ -35,12 +37,17 @@ def ranking_page(database: Database, link: Callable[[str], str]) -> str:
     troubles = runs.troubles()
     body = tag(
         'main',
-        tag('header', tag('p', 'Fleet', class_='kind'), tag('p', _span(rows), class_='subject')),
+        tag(
+            'header',
+            ways,
+            tag('p', 'All cells', class_='kind'),
+            tag('p', _span(rows), class_='subject'),
+        ),
         tag('section', tag('h1', _headline(rows)), _figures(rows, troubles), id_='verdict'),
         _cells(rows, link),
         troubles_section(troubles[:TROUBLES]),
     )
-    return document('Fleet', body, style=STYLE)
+    return document('All cells', body, style=STYLE)
 
 
 def _span(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -20,7 +20,7 @@ window.charts = (() => {
       width: 1.5,
       paths: line.points ? () => null : undefined,
       dash: line.dashed ? [6, 4] : undefined,
-      points: { show: line.points, size: 5, fill: () => colour(line.colour) },
+      points: { show: line.points || line.marked, size: 5, fill: () => colour(line.colour) },
       value: value(axis, 4),
     };
   }

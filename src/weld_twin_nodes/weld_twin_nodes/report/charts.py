@@ -41,6 +41,8 @@ class Line(NamedTuple):
     dashed : bool
     points : bool
         Dots in place of a line.
+    marked : bool
+        Dots on the line, where each value is one measurement.
 
     """
 
@@ -49,6 +51,7 @@ class Line(NamedTuple):
     colour: str = 'after'
     dashed: bool = False
     points: bool = False
+    marked: bool = False
 
 
 class Axis(NamedTuple):

@@ -22,6 +22,7 @@ from weld_twin_core.errors import TwinError
 from ..fleet.cell_page import cell_page
 from ..fleet.ranking_page import ranking_page
 from ..history.database import Database
+from ..report.html import Html
 from . import pages
 from .access import Access, TooMuch
 from .job import FOUND, OPEN, UPLOADS, Asked, Job
@@ -78,10 +79,11 @@ def make_app(settings: Settings, queue: Queue, live: Said = lambda: None) -> Acc
 class _Site:
     def __init__(self, settings: Settings, queue: Queue, live: Said) -> None:
         self._settings, self._queue, self._live = settings, queue, live
+        self._ways = pages.Site(bool(settings.database), settings.live)
         self._uploads = asyncio.Semaphore(UPLOADING)
 
     def start(self) -> Response:
-        return HTMLResponse(pages.start_page(live=self._settings.live))
+        return HTMLResponse(pages.start_page(self._ways))
 
     async def drop(self, request: Request) -> Response:
         user = request.scope['user']
@@ -97,7 +99,7 @@ class _Site:
             ):
                 uploads = [f for f in form.getlist('files') if isinstance(f, UploadFile)]
                 names = await save(uploads, folder / UPLOADS, self._settings.files)
-                job = replace(job, names=names, asked=asked_of(form, names))
+                job = replace(job, names=names).ask(asked_of(form, names))
             self._queue.add(job)
         except BaseException:
             shutil.rmtree(folder, ignore_errors=True)
@@ -106,21 +108,21 @@ class _Site:
 
     def recordings(self, request: Request) -> Response:
         mine = self._queue.of(request.scope['user'])
-        return HTMLResponse(pages.recordings_page(mine, self._settings.live))
+        return HTMLResponse(pages.recordings_page(mine, self._ways))
 
     def recording(self, request: Request, key: str) -> Response:
         job = self._job(request, key)
         ahead = self._queue.place(job) if job.state in OPEN else 0
         found = self._queue.folder(job) / FOUND / 'diagnosis.json'
         told = json.loads(found.read_text(encoding='utf-8')) if found.is_file() else None
-        return HTMLResponse(pages.job_page(job, ahead, told, self._settings.live))
+        return HTMLResponse(pages.job_page(job, ahead, told, self._ways))
 
     async def again(self, request: Request, key: str) -> Response:
         job = self._job(request, key)
         async with request.form(max_files=0, max_fields=FIELDS, max_part_size=FIELD) as form:
             asked = asked_of(form, job.names)
         if job.state not in OPEN:
-            self._queue.add(job.again(asked))
+            self._queue.add(job.ask(asked))
         return RedirectResponse(f'/recordings/{key}', 303)
 
     def file(self, request: Request, key: str, name: str) -> Response:
@@ -135,15 +137,17 @@ class _Site:
             return self._message(
                 'my history', 'Nothing yet: name the cell when you drop a recording.'
             )
-        return await run_in_threadpool(_cells, str(file), '/history', cell)
+        return await run_in_threadpool(_cells, str(file), '/history', cell, self._ways.ways())
 
     async def plant(self, cell: str = '') -> Response:
         if not self._settings.database:
             return self._message('plant', 'This server has no history of the plant (--db URL).')
-        return await run_in_threadpool(_cells, self._settings.database, '/plant', cell)
+        return await run_in_threadpool(
+            _cells, self._settings.database, '/plant', cell, self._ways.ways()
+        )
 
     def live(self) -> Response:
-        return HTMLResponse(pages.live_page(self._live()))
+        return HTMLResponse(pages.live_page(self._live(), self._ways))
 
     def _job(self, request: Request, key: str) -> Job:
         job = self._queue.get(key, request.scope['user'])
@@ -152,7 +156,7 @@ class _Site:
         return job
 
     def _message(self, title: str, text: str, status: int = 200) -> Response:
-        page = pages.message_page(title, text, self._settings.live)
+        page = pages.message_page(title, text, self._ways)
         return HTMLResponse(page, status)
 
     async def too_much(self, request: Request, error: Exception) -> Response:
@@ -160,7 +164,7 @@ class _Site:
         return self._message('too large', f'An upload has at most {most:.0f} MB.', 413)
 
     async def refused(self, request: Request, error: Exception) -> Response:
-        return HTMLResponse(pages.start_page(str(error), self._settings.live), 422)
+        return HTMLResponse(pages.start_page(self._ways, str(error)), 422)
 
     async def not_found(self, request: Request, error: Exception) -> Response:
         status = getattr(error, 'status_code', 500)
@@ -168,12 +172,13 @@ class _Site:
         return self._message('not found' if status == 404 else 'refused', text, status)
 
 
-def _cells(url: str, place: str, cell: str) -> Response:
+def _cells(url: str, place: str, cell: str, ways: Html) -> Response:
     """Return the page of all cells of a database, or of one."""
     database = Database(url)
     try:
         if cell:
-            return HTMLResponse(cell_page(database, cell, place))
-        return HTMLResponse(ranking_page(database, lambda name: f'{place}/{quote(name, safe="")}'))
+            return HTMLResponse(cell_page(database, cell, place, ways))
+        page = ranking_page(database, lambda name: f'{place}/{quote(name, safe="")}', ways)
+        return HTMLResponse(page)
     finally:
         database.close()

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import secrets
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,13 @@ FILE, UPLOADS, FOUND, IMPORTED = 'job.json', 'recording', 'found', 'imported'
 """In a job's folder: its state, what was dropped, what was found, and the bag of a table."""
 WAITING, RUNNING = 'waiting', 'running'
 DONE, UNSOUND, REFUSED, FAILED = 'done', 'unsound', 'refused', 'failed'
+NO_ROBOT = 'which robot is it? Choose it below, or drop its file with the recording.'
+"""Asked where the robot was not chosen: what was dropped stays, and need not come again."""
 OPEN = (WAITING, RUNNING)
 """States of a job that is not finished; a server that starts again takes these up."""
 TABLES = ('.csv', '.tsv', '.txt')
+OTHERS = ('.yaml', '.yml', '.urdf', '.xml')
+"""Suffixes of tables, and of what may be dropped besides: a bag's description, and robot files."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Asked:
     Attributes
     ----------
     robot : str
-        A bundled robot, or the name of a robot file among those dropped.
+        A bundled robot, or the name of a robot file among those dropped; empty until it is told.
     align : str
         Frames that are fitted: '', 'base', 'tool' or 'base,tool'.
     length_unit, angle_unit : str
@@ -101,30 +105,48 @@ class Job:
         """Write it into its folder, whole."""
         write_text(folder / FILE, json.dumps(asdict(self)) + '\n', overwrite=True)
 
-    def again(self, asked: Asked) -> Job:
-        """Return the same recording, asked for in another way."""
-        return replace(self, asked=asked, state=WAITING, said='', since=time.time())
+    def ask(self, asked: Asked) -> Job:
+        """Return the same recording, asked for in another way: it waits, or a question does."""
+        state, said = (WAITING, '') if asked.robot else (REFUSED, NO_ROBOT)
+        return replace(self, asked=asked, state=state, said=said, since=time.time())
+
+    def uploads(self, folder: Path) -> Path:
+        """Return where the files lie that were dropped; pages call the recording by its name."""
+        return folder / UPLOADS / title(self.names)
 
     def commands(self, folder: Path) -> list[list[str]]:
         """Return the words of the commands that do the work, one after the other."""
         recording, robot = self._recording(folder), self._robot(folder)
         first = []
         if recording.suffix.lower() in TABLES:
-            words = ['import', str(recording), '--robot', robot, '--out', str(folder / IMPORTED)]
+            words = [
+                'import',
+                str(recording),
+                '--robot',
+                robot,
+                '--out',
+                str(folder / IMPORTED / title(self.names)),
+            ]
             for name in ('length_unit', 'angle_unit'):
                 if value := getattr(self.asked, name):
                     words += [f'--{name.replace("_", "-")}', value]
-            first, recording = [words], folder / IMPORTED
+            first, recording = [words], folder / IMPORTED / title(self.names)
         words = ['diagnose', str(recording), '--robot', robot, '--out', str(folder / FOUND)]
         words += ['--align', self.asked.align] if self.asked.align else []
         return [*first, words + ['--apply'] * self.asked.apply]
 
     def _robot(self, folder: Path) -> str:
-        own = folder / UPLOADS / self.asked.robot
+        own = self.uploads(folder) / self.asked.robot
         return str(own) if self.asked.robot in self.names else self.asked.robot
 
     def _recording(self, folder: Path) -> Path:
         """Return the bag's folder, or the single file, among what was dropped."""
-        uploads = folder / UPLOADS
+        uploads = self.uploads(folder)
         rest = [name for name in self.names if name != self.asked.robot]
         return uploads / rest[0] if len(rest) == 1 else uploads
+
+
+def title(names: Sequence[str]) -> str:
+    """Return what a recording is called: its file of data without the suffix."""
+    data = [name for name in names if not name.lower().endswith(OTHERS)]
+    return Path((data or list(names))[0]).stem

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from time import localtime, strftime
-from typing import Any
+from typing import Any, NamedTuple
 
 from weld_twin_core.arm import catalog
 
@@ -17,13 +17,21 @@ from .job import DONE, OPEN, RUNNING, UNSOUND, Asked, Job
 
 REFRESH = 2
 """Seconds after which the page of a recording that is not finished is asked for anew."""
+LOOK = 10
+"""Seconds after which the list of recordings is, while one of them is not finished."""
 ALLOWED = "form-action 'self'; frame-src 'self'"
 FRAMES = (
-    ('', 'both are known'),
-    ('base', 'where the instrument stood is not known (base)'),
-    ('tool', 'where the reflector sits is not known (tool)'),
-    ('base,tool', 'neither is known (base and tool)'),
+    ('', 'nothing: base and tool are known'),
+    ('base', 'where the instrument stood (base)'),
+    ('tool', 'where the reflector sits (tool)'),
+    ('base,tool', 'neither of the two (base and tool)'),
 )
+OPTIONS = {
+    '--length-unit': "'Lengths of a table'",
+    '--angle-unit': "'Angles of a table'",
+    '--joint-columns': 'the first line of the table',
+}
+"""Where what the command's sentences speak of is here."""
 UNITS = {
     'length_unit': (('', 'as the table says'), ('mm', 'mm'), ('m', 'm')),
     'angle_unit': (('', 'as the table says'), ('deg', 'degrees'), ('rad', 'radians')),
@@ -43,33 +51,61 @@ def _style() -> str:
     return (files(__package__) / 'serve.css').read_text(encoding='utf-8')
 
 
-def page(title: str, *body: Child, refresh: int | None = None, live: bool = False) -> str:
+class Site(NamedTuple):
+    """
+    What this server has besides recordings.
+
+    Attributes
+    ----------
+    plant : bool
+        A history that everybody reads.
+    live : bool
+        The verdict of running nodes.
+
+    """
+
+    plant: bool = False
+    live: bool = False
+
+    def ways(self) -> Html:
+        """Return the way to all pages."""
+        links = [
+            ('/', 'New recording'),
+            ('/recordings', 'My recordings'),
+            ('/history', 'My history'),
+        ]
+        links += [('/plant', 'Plant')] * self.plant + [('/live', 'Live')] * self.live
+        return tag('nav', *(tag('a', text, href=href) for href, text in links))
+
+
+def page(title: str, *body: Child, site: Site, refresh: int | None = None) -> str:
     """Return a whole page with the way to the others."""
-    links = [('/', 'New recording'), ('/recordings', 'My recordings'), ('/history', 'My history')]
-    links += [('/plant', 'Plant')] + [('/live', 'Live')] * live
-    top = tag('nav', *(tag('a', text, href=href) for href, text in links))
     again = None if refresh is None else tag('meta', http_equiv='refresh', content=refresh)
-    head = tag('header', tag('p', tag('b', 'weld_twin'), ' · ', title, class_='kind'), top)
+    name = tag('p', tag('b', 'weld_twin'), ' · ', title, class_='kind')
+    head = tag('header', name, site.ways())
     return document(title, again, tag('main', head, *body), allowed=ALLOWED, style=_style())
 
 
-def start_page(said: str = '', live: bool = False) -> str:
+def start_page(site: Site, said: str = '') -> str:
     """Return the page on which a recording is dropped."""
-    robots = [('', 'choose, or drop its file too'), *((n, n) for n in catalog.names())]
+    robots = [('', 'choose, or drop its file'), *((n, n) for n in catalog.names())]
     form = tag(
         'form',
         tag(
             'label',
             'Recording',
-            _small('Drop a bag or a table here, with the robot file if need be.'),
+            _small(
+                'Drop it here: a table (.csv), or a bag (.mcap, or all its files). The file of your own '
+                'robot (.urdf, .yaml) goes with it.'
+            ),
         ),
         tag('input', type='file', name_='files', multiple='', id='files', aria_label='Recording'),
-        tag('label', 'Or a folder', _small('A bag with metadata.yaml'), for_='folder'),
+        tag('label', 'Or a folder', _small('of a bag, with its metadata.yaml'), for_='folder'),
         tag('input', type='file', name_='files', webkitdirectory='', id='folder', class_='folder'),
         tag(
             'div',
             _choice('robot', 'Robot', robots, ''),
-            _choice('align', 'Frames', FRAMES, ''),
+            _choice('align', 'What is not known?', FRAMES, ''),
             class_='fields',
         ),
         _details(),
@@ -80,7 +116,7 @@ def start_page(said: str = '', live: bool = False) -> str:
     )
     lead = 'Joint angles and measured positions of one robot, recorded together.'
     body = section('Where does the real robot differ?', form, id_='drop', lead=lead)
-    return page('new recording', _said(said), body, live=live)
+    return page('new recording', _said(said), body, site=site)
 
 
 def _details() -> Html:
@@ -120,10 +156,17 @@ def _field(name: str, title: str, hint: str) -> Html:
 
 
 def _said(text: str) -> Html | None:
-    return tag('p', text, class_='said', role='alert') if text else None
+    return tag('p', _sentence(text), class_='said', role='alert') if text else None
 
 
-def recordings_page(jobs: Sequence[Job], live: bool = False) -> str:
+def _sentence(text: str) -> str:
+    """Return a command's sentence as somebody without a command line reads it."""
+    for option, here in OPTIONS.items():
+        text = text.replace(option, here)
+    return text[:1].upper() + text[1:]
+
+
+def recordings_page(jobs: Sequence[Job], site: Site) -> str:
     """Return the list of a user's recordings."""
     rows = [
         (
@@ -131,19 +174,22 @@ def recordings_page(jobs: Sequence[Job], live: bool = False) -> str:
                 'a',
                 strftime('%Y-%m-%d %H:%M', localtime(job.since)),
                 href=f'/recordings/{job.key}',
+                class_='date',
             ),
             ', '.join(job.names[:2]) + (' ...' if len(job.names) > 2 else ''),
             job.state,
-            job.said,
+            _sentence(job.said),
         )
         for job in jobs
     ]
     heads = ('dropped', 'files', 'state', 'said')
     body = table(heads, rows) if rows else tag('p', 'None yet.')
-    return page('my recordings', section('My recordings', body, id_='mine'), live=live)
+    again = LOOK if any(job.state in OPEN for job in jobs) else None
+    mine = section('My recordings', body, id_='mine')
+    return page('my recordings', mine, site=site, refresh=again)
 
 
-def job_page(job: Job, ahead: int, told: Mapping[str, Any] | None, live: bool = False) -> str:
+def job_page(job: Job, ahead: int, told: Mapping[str, Any] | None, site: Site) -> str:
     """
     Return the page of a recording: its place, its progress, its question or its sheet.
 
@@ -154,17 +200,17 @@ def job_page(job: Job, ahead: int, told: Mapping[str, Any] | None, live: bool = 
         How many come before it.
     told : mapping, optional
         Its diagnosis.json, where there is one.
-    live : bool
+    site : Site
 
     """
     if job.state in OPEN:
-        return page('in work', _progress(job, ahead), refresh=REFRESH, live=live)
+        return page('in work', _progress(job, ahead), refresh=REFRESH, site=site)
     if job.state == DONE:
-        return page('verdict', *_result(job), live=live)
+        return page('verdict', *_result(job), site=site)
     if job.state == UNSOUND:
-        return page('unsound', *_question(job, told or {}), live=live)
+        return page('unsound', *_question(job, told or {}), site=site)
     why = section('It could not be diagnosed', _said(job.said), id_='refused')
-    return page(job.state, why, _ask_again(job), live=live)
+    return page(job.state, why, _ask_again(job), site=site)
 
 
 def _progress(job: Job, ahead: int) -> Html:
@@ -185,9 +231,10 @@ def _result(job: Job) -> tuple[Child, ...]:
         for k, (name, what) in enumerate(FILES)
     ]
     sheet = tag('iframe', src=f'{place}/report.html', title='the sheet', sandbox='allow-scripts')
-    said = f'{job.said}; ' if job.said else ''
-    note = tag('p', f'{said}{job.seconds:.0f} s of work', class_='note')
-    return section('Verdict', note, sheet, id_='verdict'), section(
+    said = f'{_sentence(job.said)}. ' if job.said else ''
+    alone = tag('a', 'Open the sheet alone', href=f'{place}/report.html')
+    note = tag('p', alone, f', to print it. {said}It took {job.seconds:.0f} s.', class_='note')
+    return section('Verdict', note, sheet, id_='result'), section(
         'Files', tag('ul', *links), id_='files'
     )
 
@@ -198,8 +245,8 @@ def _question(job: Job, told: Mapping[str, Any]) -> tuple[Child, ...]:
         joined
         for each in told.get('unsound') or []
         for joined in (
-            tag('p', str(each['sentence']), class_='said'),
-            tag('p', str(each.get('remedy') or ''), class_='note'),
+            _said(str(each['sentence'])),
+            tag('p', _sentence(str(each.get('remedy') or '')), class_='note'),
         )
     ]
     mend = tag(
@@ -233,12 +280,13 @@ def _ask_again(job: Job) -> Html:
     asked = job.asked
     own = [(n, n) for n in job.names if n == asked.robot]
     robots = [*own, *((n, n) for n in catalog.names())]
+    robots = robots if asked.robot else [('', 'choose'), *robots]
     form = tag(
         'form',
         tag(
             'div',
             _choice('robot', 'Robot', robots, asked.robot),
-            _choice('align', 'Frames', FRAMES, asked.align),
+            _choice('align', 'What is not known?', FRAMES, asked.align),
             _choice('length_unit', 'Lengths of a table', UNITS['length_unit'], asked.length_unit),
             _choice('angle_unit', 'Angles of a table', UNITS['angle_unit'], asked.angle_unit),
             class_='fields',
@@ -250,15 +298,15 @@ def _ask_again(job: Job) -> Html:
         method='post',
         enctype='multipart/form-data',
     )
-    return section('Another answer', form, id_='again')
+    return section('Answer, and try again', form, id_='again')
 
 
-def message_page(title: str, text: str, live: bool = False) -> str:
+def message_page(title: str, text: str, site: Site) -> str:
     """Return a page that says one thing."""
-    return page(title, section(title.capitalize(), tag('p', text), id_='message'), live=live)
+    return page(title, section(title.capitalize(), tag('p', text), id_='message'), site=site)
 
 
-def live_page(said: Mapping[str, str] | None) -> str:
+def live_page(said: Mapping[str, str] | None, site: Site) -> str:
     """Return the verdict of the running nodes, asked for anew all the time."""
     if said is None:
         body: Child = tag('p', 'No verdict yet: the nodes publish one once they found a gap.')
@@ -266,4 +314,4 @@ def live_page(said: Mapping[str, str] | None) -> str:
         rows = [(key, value) for key, value in said.items() if key != 'sentence']
         body = tag('div', tag('h1', said['sentence']), table(('', ''), rows))
     section_ = section('The running nodes', body, id_='live')
-    return page('live', section_, refresh=REFRESH, live=True)
+    return page('live', section_, refresh=REFRESH, site=site)

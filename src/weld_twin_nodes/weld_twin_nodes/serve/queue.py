@@ -187,7 +187,7 @@ class Queue:
 
         def tell(text: str) -> None:
             with self._news:
-                self._jobs[job.key] = replace(self._jobs[job.key], said=_plain(text, folder))
+                self._jobs[job.key] = replace(self._jobs[job.key], said=_plain(text, job, folder))
 
         seconds = 0.0
         for words in job.commands(folder):
@@ -199,7 +199,7 @@ class Queue:
 
     def _finish(self, job: Job, done: Outcome) -> None:
         state = STATES.get(done.code, FAILED)
-        said = _plain(done.said.removeprefix('weld-twin: '), self.folder(job))
+        said = _plain(done.said.removeprefix('weld-twin: '), job, self.folder(job))
         if state == DONE:
             said = self._into_history(job) if job.asked.cell else ''
         self._set(replace(job, state=state, said=said, seconds=done.seconds))
@@ -221,12 +221,12 @@ class Queue:
             finally:
                 database.close()
         except TwinError as error:
-            return f'not in the history: {_plain(str(error), self.folder(job))}'
+            return f'not in the history: {_plain(str(error), job, self.folder(job))}'
         return 'added to the history' if new else 'it was in the history already'
 
 
-def _plain(text: str, folder: Path) -> str:
+def _plain(text: str, job: Job, folder: Path) -> str:
     """Return a sentence without the places of this machine."""
-    return (
-        text.replace(f'{folder}/{UPLOADS}/', '').replace(f'{folder}/', '').replace(str(folder), '')
-    )
+    for place in (job.uploads(folder), folder / UPLOADS, folder / IMPORTED, folder):
+        text = text.replace(f'{place}/', '')
+    return text.replace(str(folder), '')

@@ -13,11 +13,10 @@ from typing import Any, Protocol
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import DataError
 
-from .job import TABLES, Asked
+from .job import OTHERS, TABLES, Asked, title
 
 BAGS = ('.mcap', '.db3', '.bag', '.zstd')
-OTHERS = ('.yaml', '.yml', '.urdf', '.xml')
-"""Suffixes of what may be dropped besides a table: a bag's files, and robot files."""
+"""Suffixes of a bag's files."""
 PLAIN = re.compile(r'[A-Za-z0-9][A-Za-z0-9._ -]{0,120}')
 PIECE = 1 << 20
 """Bytes copied at once."""
@@ -38,7 +37,7 @@ class Upload(Protocol):
 
 async def save(uploads: Sequence[Upload], place: Path, most: int) -> tuple[str, ...]:
     """
-    Write files into a new folder, and return their names.
+    Write files into a new folder of their title, and return their names.
 
     Parameters
     ----------
@@ -64,6 +63,7 @@ async def save(uploads: Sequence[Upload], place: Path, most: int) -> tuple[str, 
         raise DataError(
             'no recording is among these: a bag ends in .mcap or .db3, a table in .csv'
         )
+    place = place / title(names)
     place.mkdir(parents=True)
     for name, upload in zip(names, (u for u in uploads if u.filename), strict=True):
         with (place / name).open('xb') as stream:
@@ -86,7 +86,7 @@ def _name(given: str | None) -> str:
 
 def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
     """
-    Return what a form asks for.
+    Return what a form asks for; its robot is empty where none was chosen.
 
     Parameters
     ----------
@@ -102,8 +102,8 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
     """
     robots = [n for n in names if n.lower().endswith(OTHERS) and n.lower() != 'metadata.yaml']
     robot = _text(form, 'robot') or (robots[0] if robots else '')
-    if robot not in robots and robot.lower() not in catalog.names():
-        raise DataError('choose the robot, or drop its file (YAML or URDF) with the recording')
+    if robot and robot not in robots and robot.lower() not in catalog.names():
+        raise DataError('the robot is none of those bundled; drop its file with the recording')
     choices = {'align': ALIGN, **UNITS}
     told = {name: _text(form, name) for name in choices}
     for name, value in told.items():

@@ -52,7 +52,9 @@ def ranking_page(database: Database, link: Callable[[str], str], ways: Html | No
 
 def _span(rows: Sequence[Mapping[str, Any]]) -> str:
     count = sum(row['diagnoses'] for row in rows)
-    return f'{len(rows)} cells, {count} diagnoses'
+    cells = 'cell' if len(rows) == 1 else 'cells'
+    diagnoses = 'diagnosis' if count == 1 else 'diagnoses'
+    return f'{len(rows)} {cells}, {count} {diagnoses}'
 
 
 def _headline(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from weld_twin_core.arm import catalog
 
 from ..report.html import Child, Html, document, section, table, tag
-from .job import DONE, OPEN, RUNNING, UNSOUND, Asked, Job
+from .job import DONE, NO_ROBOT, OPEN, RUNNING, UNSOUND, Asked, Job
 
 REFRESH = 2
 """Seconds after which the page of a recording that is not finished is asked for anew."""
@@ -209,7 +209,8 @@ def job_page(job: Job, ahead: int, told: Mapping[str, Any] | None, site: Site) -
         return page('verdict', *_result(job), site=site)
     if job.state == UNSOUND:
         return page('unsound', *_question(job, told or {}), site=site)
-    why = section('It could not be diagnosed', _said(job.said), id_='refused')
+    what = 'One question first' if job.said == NO_ROBOT else 'It could not be diagnosed'
+    why = section(what, _said(job.said), id_='refused')
     return page(job.state, why, _ask_again(job), site=site)
 
 

@@ -200,6 +200,8 @@ class Queue:
     def _finish(self, job: Job, done: Outcome) -> None:
         state = STATES.get(done.code, FAILED)
         said = _plain(done.said.removeprefix('weld-twin: '), job, self.folder(job))
+        if state == UNSOUND:
+            said = 'data or set-up are wrong: it asks what to do'
         if state == DONE:
             said = self._into_history(job) if job.asked.cell else ''
         self._set(replace(job, state=state, said=said, seconds=done.seconds))

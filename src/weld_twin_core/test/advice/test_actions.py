@@ -27,7 +27,7 @@ def said(robot, **entry):
         ({'effect': 'link_twist', 'joint': 'elbow_joint', 'dalpha': -1e-3}, ['-0.0573 deg']),
         (
             {'effect': 'tool_pose', 'xyz': [1e-3, 0.0, -2e-3], 'rotvec': [0.0, 0.01, 0.0]},
-            ['(+1.000, +0.000, -2.000) mm', '(+0.0000, +0.5730, +0.0000) deg'],
+            ['by +1.000 mm along x, -2.000 mm along z and +0.5730 deg about y;'],
         ),
         ({'effect': 'payload', 'mass': 2.1}, ['Enter a payload of 2.10 kg in place of 0.00 kg']),
         (
@@ -42,12 +42,12 @@ def said(robot, **entry):
         ({'effect': 'time_delay', 'delay': -0.0123}, ['12.3 ms early']),
         (
             {'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 2e-5},
-            ['+2.00 mrad per 100 N m', '5e+04 N m/rad'],
+            ['+0.115 deg under 100 N m', '5e+04 N m/rad'],
         ),
         ({'effect': 'drift', 'xyz_rate': [1e-6, 0.0, 0.0]}, ['(+3.60, 0, 0) mm per hour']),
         (
             {'effect': 'thermal_growth', 'coefficient': 1.2e-5, 'links': ['elbow_joint']},
-            ['+12.0 um per m and K for elbow_joint'],
+            ['+0.0120 mm per m and K for elbow_joint'],
         ),
         (
             {
@@ -57,7 +57,7 @@ def said(robot, **entry):
                 'order': [4.0, 9.0],
                 'phase': [0.0, 1.0],
             },
-            ['0.50 mrad at 9 per turn, 0.10 mrad at 4 per turn'],
+            ['0.029 deg at 9 per turn, 0.0057 deg at 4 per turn'],
         ),
     ],
 )

@@ -19,7 +19,8 @@ from .charts import Axis, Line, chart
 from .controllers import BRANDS, correction
 from .curve_plot import curve_figure
 from .html import Child, Html, joined, section, table, tag
-from .quantities import DEGREES, millimetres, odds, parameter_rows, percent, turned, with_ends
+from .quantities import DEGREES, ends_to, millimetres, odds, parameter_rows, percent, turned
+from .remainder import places, remainder
 from .seam_view import seen_at
 from .switches import (
     MOST,
@@ -33,29 +34,21 @@ from .switches import (
     switches,
     trusted,
 )
-from .words import DEPENDENCES, place_name
+from .to_do import TOGETHER
+from .words import DEPENDENCES, parameter_word, place_name
 from .words import cause as named
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
-_WORDS = {
-    'da': 'length off by',
-    'dd': 'offset off by',
-    'dalpha': 'twist off by',
-    'dbeta': 'tilt off by',
-    'width': 'play',
-    'xyz': 'moved by',
-    'rotvec': 'turned by',
-    'offset': 'off by',
-}
-"""Parameters as a fitter says them; the others are words already."""
+_APART = 0.03
+"""Share of the squared gap by which a cause moves the tool beyond its share, to be told."""
 _VALUES = 4
 """Parameters told on a card; effects.yaml has all."""
 
 
 def causes_cards(diagnosis: Diagnosis, brand: str | None, rule: Rule) -> Html | None:
     """Return the shares of the gap and a card for every cause; None without any."""
-    shown = [k for k, cause in enumerate(diagnosis.causes) if cause.share >= _TRIVIAL][:MOST]
+    shown = [k for k in range(len(diagnosis.causes)) if _matters(diagnosis, k)][:MOST]
     if not shown:
         return None
     rest = [c for k, c in enumerate(diagnosis.causes) if k not in shown]
@@ -67,25 +60,55 @@ def causes_cards(diagnosis: Diagnosis, brand: str | None, rule: Rule) -> Html | 
         _smaller(rest),
         id_='cards',
         lead='Shares are of the squared gap, on data not used for fitting; the interval holds the '
-        'true share with 90 %. All shares, with what is left and the noise, add up to 100 %.',
+        f'true share with 90\N{NO-BREAK SPACE}%. All shares, with what is left and the noise, add up '
+        f'to 100\N{NO-BREAK SPACE}%.{_against(diagnosis, shown)}',
+    )
+
+
+def _matters(diagnosis: Diagnosis, k: int) -> bool:
+    """Tell whether a cause holds a share, or at least moves the tool so that mending it shows."""
+    return max(diagnosis.causes[k].share, _own_square(diagnosis, k)) >= _TRIVIAL
+
+
+def _own_square(diagnosis: Diagnosis, k: int) -> float:
+    """Return how far a cause moves the tool by itself, as a part of the squared gap."""
+    told = diagnosis.contributions
+    if told is None or diagnosis.contacts is not None:
+        return 0.0
+    good = [trusted(diagnosis, run) for run in range(len(told.parts))]
+    own = sum(float((p[k][g] ** 2).sum()) for p, g in zip(told.parts, good, strict=True))
+    every = zip(range(len(good)), good, strict=True)
+    whole = sum(float((as_it_is(diagnosis, run)[g] ** 2).sum()) for run, g in every)
+    return own / max(whole, 1e-300)
+
+
+def _against(diagnosis: Diagnosis, shown: list[int]) -> str:
+    """Return how to read a share that is far smaller than what its cause moves."""
+    if all(_own_square(diagnosis, k) < diagnosis.causes[k].share + _APART for k in shown):
+        return ''
+    return (
+        ' Causes that move the tool at the same instants share what they explain together: a small '
+        'share can belong to a cause whose mending is worth it. Its card says what that brings.'
     )
 
 
 def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     """Return one row for each cause, for what is left and for the noise: a whole of 100 %."""
-    causes, rest = diagnosis.causes, diagnosis.shares
+    causes = diagnosis.causes
     rows: list[tuple[str, float, str, str]] = []
+    decimals = places(diagnosis)
     for rank, k in enumerate(shown, 1):
-        value, ends = with_ends(causes[k].share, *causes[k].share_ci90)
+        value, ends = ends_to(decimals, causes[k].share, *causes[k].share_ci90)
         told = f'{value} ({ends})'
         rows.append(
             (f'{rank}. {cause_name(diagnosis, causes[k])}', causes[k].share, told, 'cause')
         )
     smaller = sum(c.share for k, c in enumerate(causes) if k not in shown)
     if smaller > 0.0:
-        rows.append(('smaller causes', smaller, percent(smaller), 'cause'))
-    rows.append(('not explained', rest.unexplained, percent(rest.unexplained), 'rest'))
-    rows.append(('noise', rest.noise, percent(rest.noise), 'rest'))
+        rows.append(('smaller causes', smaller, percent(smaller, decimals), 'cause'))
+    rows += [
+        (name, share, percent(share, decimals), 'rest') for name, share in remainder(diagnosis)
+    ]
     items = [
         tag(
             'li',
@@ -116,7 +139,7 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
         tag('h3', tag('span', str(rank), class_='rank'), f'{name[:1].upper()}{name[1:]}'),
         tag(
             'p',
-            tag('b', with_ends(cause.share, *cause.share_ci90)[0]),
+            tag('b', percent(cause.share, places(diagnosis))),
             ' of the gap',
             class_='share',
         ),
@@ -164,7 +187,7 @@ def _values(diagnosis: Diagnosis, cause: Cause) -> Html | None:
         if isinstance(effect, JointCurve) or 'curve' in effect.name:
             continue
         for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
-            rows.append(tag('span', f'{_WORDS.get(name, name.replace("_", " "))} {value}'))
+            rows.append(tag('span', f'{parameter_word(name)} {value}'))
         if isinstance(effect, ServoLag):
             rows.append(tag('span', _trail(diagnosis, effect)))
     if not rows:
@@ -268,6 +291,8 @@ def _most_without(diagnosis: Diagnosis, k: int) -> float:
 
 def _action(diagnosis: Diagnosis, cause: Cause) -> Html | str | None:
     effects = _effects(diagnosis, cause)[:_VALUES]
+    if diagnosis.families and len(effects) > 1:
+        return TOGETHER
     sentences = list(dict.fromkeys(actions(effects, diagnosis.model.robot)))
     if not sentences:
         return 'Measure as told under "What to measure next".' if cause.name else None

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Candidate, Diagnosis
 from .family_table import families_table
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, change, millimetres, odds, parameter_rows
-from .words import carries_curves, cause, found_name, in_words, listed, site_name
+from .words import carries_curves, cause, found_name, in_words, listed, parameter_word, site_name
 
 _CANDIDATES = 6
 """Hypotheses shown for a cause."""
@@ -50,7 +50,7 @@ def _found(diagnosis: Diagnosis) -> Html | None:
     rows: list[list[Child]] = []
     for found in diagnosis.effects:
         for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
-            rows.append([found_name(found) if k == 0 else '', name.replace('_', ' '), value])
+            rows.append([found_name(found) if k == 0 else '', parameter_word(name), value])
     return joined([tag('h3', 'Effects found'), table(heads, rows, 'effects')])
 
 
@@ -135,11 +135,11 @@ def _absent(diagnosis: Diagnosis) -> Html | None:
 
 
 def _left_out(effect: str, why: str, diagnosis: Diagnosis) -> tuple[str, str]:
-    """Return an effect by its name in words, with the joint that the reason ends with."""
+    """Return an effect by its name in words, with the joints that the reason ends with."""
     reason, _, last = why.rpartition(' (')
-    joint = last.rstrip(')')
-    if joint in diagnosis.model.robot.joint_names:
-        return cause(effect, joint), reason
+    joints = last.rstrip(')').split(', ')
+    if set(joints) <= set(diagnosis.model.robot.joint_names):
+        return cause(effect, listed(joints)), reason
     return cause(effect, None), why
 
 
@@ -153,16 +153,24 @@ def leftover(diagnosis: Diagnosis) -> Html:
             f'What remains, {millimetres(rest.rms_m)}, depends on nothing that was '
             f'looked at, but the instrument is better than that: {millimetres(floor)}.',
         )
+    if carries_curves(diagnosis) and rest.rms_m <= _ABOVE * floor:
+        return joined(
+            [
+                tag('p', 'What no known effect explains, and the curves carry, depends on:'),
+                _dependent(rest.structure),
+                tag('p', f'With the curves, {millimetres(rest.rms_m)} remain.'),
+            ]
+        )
     if not rest.above_noise:
         text = f'What remains, {millimetres(rest.rms_m)}, is at the level of the noise.'
         return tag('p', text)
-    items = [tag('li', line) for line in rest.structure] or [tag('li', MISSING)]
-    return joined(
-        [
-            tag(
-                'p',
-                f'{millimetres(rest.rms_m)} above the noise remain unexplained. It depends on:',
-            ),
-            tag('ul', *items, class_='sentences'),
-        ]
+    text = (
+        f'What remains, {millimetres(rest.rms_m)} at a noise floor of {millimetres(floor)}, is more '
+        'than noise. It depends on:'
     )
+    return joined([tag('p', text), _dependent(rest.structure)])
+
+
+def _dependent(structure: Sequence[str]) -> Html:
+    items = [tag('li', line) for line in structure] or [tag('li', MISSING)]
+    return tag('ul', *items, class_='sentences')

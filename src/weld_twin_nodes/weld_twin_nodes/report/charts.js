@@ -6,6 +6,8 @@
 window.charts = (() => {
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const titled = (axis) => (axis.unit ? `${axis.label} [${axis.unit}]` : axis.label);
+  // Steps of an axis that counts: stations have no halves.
+  const WHOLE = [1, 2, 5].flatMap((k) => [1, 10, 100, 1000, 10000].map((ten) => k * ten)).sort((a, b) => a - b);
   const drawn = [];
   let told = false;
 
@@ -47,7 +49,7 @@ window.charts = (() => {
     const [across, up] = spec.axes;
     return {
       width, height: spec.height, series: lines, bands,
-      axes: [scaled(across, 30), scaled(up, 52)],
+      axes: [{ ...scaled(across, 30), incrs: across.label === 'station' ? WHOLE : undefined }, scaled(up, 52)],
       scales: { x: { time: Boolean(spec.dates) }, y: { range: spec.zero ? (c, low, high) => [0, 1.08 * high || 1] : undefined } },
       cursor: { drag: { x: false, y: false }, y: false, sync: spec.key ? { key: spec.key, setSeries: false } : undefined },
       legend: { live: true },
@@ -76,6 +78,8 @@ window.charts = (() => {
     const chart = new uPlot(options(spec, place.clientWidth || 300, lines, bands), data, place);
     const one = { figure, spec, place, chart };
     drawn.push(one);
+    // A curve over an angle follows no instant: it starts with the values of its middle.
+    if (spec.band) chart.setCursor({ left: chart.bbox.width / devicePixelRatio / 2, top: 1 });
     new ResizeObserver(() => fit(one)).observe(place);
     return one;
   }

@@ -52,9 +52,17 @@ def circle_data(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 'out': [round(float(v), 4) for v in circle.outwards(path).ravel()],
                 'radius': round(1e3 * circle.radius, 3),
                 'reversals': _marks(diagnosis, k, circle),
+                'named': _accused(diagnosis),
             }
         )
     return out
+
+
+def _accused(diagnosis: Diagnosis) -> list[int]:
+    """Return the joints, counted from 0, that a cause sits on; all of them where none does."""
+    names = diagnosis.model.robot.joint_names
+    places = {cause.place[0][0] for cause in diagnosis.causes if cause.place}
+    return [k for k, name in enumerate(names) if name in places] or list(range(len(names)))
 
 
 def _marks(diagnosis: Diagnosis, k: int, circle: Circle) -> list[tuple[int, float]]:
@@ -91,8 +99,8 @@ def circles_section(diagnosis: Diagnosis) -> Html | None:
         tag('div', *figures, class_='panels'),
         id_='circles',
         lead='Radial deviation of the tool point, magnified, against the commanded circle '
-        '(ISO 230-4). The ticks at the rim are where a joint turns back; a number counts joints from '
-        'the base.',
+        '(ISO 230-4). The ticks at the rim are where joints turn back; those of a cause are named, '
+        'long names by their number from the base.',
     )
 
 

@@ -58,7 +58,7 @@ def curve_figure(curve: JointCurve, covariance: Array | None) -> Html:
     return chart(
         f'{curve.joint}: {what} over {curve.over}',
         x * across,
-        [Line('off by', middle), Line('none', 0.0 * middle, 'soft', dashed=True)],
+        [Line('off by', middle), Line('not off', 0.0 * middle, 'soft', dashed=True)],
         (label, Axis('off by', unit)),
         band=(middle - half, middle + half),
     )

@@ -16,7 +16,7 @@ from .quantities import millimetres, turned
 from .words import cause
 
 _LARGEST = 3
-"""Actions told; the others are counted."""
+"""Members of a kind told; the others are counted."""
 _LINES = 3
 """Orders of ripple told for each joint."""
 
@@ -28,20 +28,6 @@ class Ripple(NamedTuple):
     rms: float
     lines: tuple[tuple[float, float], ...]
     """Order and amplitude [rad], strongest first."""
-
-
-def worth_doing(diagnosis: Diagnosis) -> list[str]:
-    """Return the actions worth reading: with dozens of small errors, the first and where to go."""
-    if not diagnosis.families or len(diagnosis.actions) <= _LARGEST:
-        return list(diagnosis.actions)
-    more = len(diagnosis.actions) - _LARGEST
-    return [
-        *diagnosis.actions[:_LARGEST],
-        (
-            f'{more} smaller ones are in diagnosis.json. Together they are best taken in by the '
-            'corrected robot.yaml or robot.urdf, and by compensated commands (weld-twin compensate).'
-        ),
-    ]
 
 
 def family_rows(families: tuple[Family, ...]) -> list[list[str]]:

@@ -12,9 +12,16 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .html import Html, bars, joined, section, tag
 from .quantities import millimetres, percent, seconds
+from .remainder import SEEN, places, remainder
 from .seam_view import at_rest
-from .words import DEPENDENCES, REGIMES, place_name
+from .words import DEPENDENCES, REGIMES, listed, place_name
 
+_STRIP = ('RMS gap of each stretch, and its time.', 'RMS gap of stations, and their numbers.')
+"""What stands under the stretches of a motion, and of stations at rest."""
+_HALF = 0.5
+"""Probability from which one name is enough."""
+_OPEN = 3
+"""Alternatives named together."""
 _VISIBLE = 0.005
 """Share below which a cell of the map stays empty: it would read 0."""
 
@@ -62,12 +69,23 @@ def _summed(
     """Return shares by what is most probable of each cause; with the rest they make a whole."""
     sums: dict[str, float] = {}
     for alternatives, share, word in told:
-        name = word(alternatives[0][0]) if alternatives else 'not found'
+        name = _likely(alternatives, word)
         sums[name] = sums.get(name, 0.0) + share
     rows = sorted(sums.items(), key=lambda item: -item[1])
-    rest = diagnosis.shares
-    rows += [('not explained', rest.unexplained), ('noise', rest.noise)]
-    return [(name, share, percent(share)) for name, share in rows]
+    rows = [row for row in rows if row[1] >= SEEN] + list(remainder(diagnosis))
+    return [(name, share, percent(share, places(diagnosis))) for name, share in rows]
+
+
+def _likely(alternatives: Sequence[tuple[str, float]], word: Callable[[str], str]) -> str:
+    """Return the most probable; two or three where the first alone is not likely enough."""
+    names: list[str] = []
+    sure = 0.0
+    for name, probability in alternatives[:_OPEN]:
+        if sure > _HALF:
+            break
+        names.append(word(name))
+        sure += probability
+    return listed(list(dict.fromkeys(names)), 'or') or 'not found'
 
 
 def _whole(diagnosis: Diagnosis) -> str:
@@ -76,12 +94,13 @@ def _whole(diagnosis: Diagnosis) -> str:
         return 'All of it is at the level of the noise, so it lies nowhere in particular.'
     if not diagnosis.causes:
         return 'Nothing was named, so these are what each joint could explain by itself.'
-    rest = diagnosis.shares
     told = sum(cause.share for cause in diagnosis.causes)
+    rest = [
+        f'{percent(share, places(diagnosis))} is {name}' for name, share in remainder(diagnosis)
+    ]
     return (
-        f'The causes explain {percent(told)} of the squared gap. {percent(rest.noise)} is noise, '
-        f'which nothing explains, and {percent(rest.unexplained)} is left. So a place can be '
-        'certain and still hold less than the whole.'
+        f'The causes explain {percent(told, places(diagnosis))} of the squared gap; '
+        f'{listed(rest)}. So a place can be certain and still hold less than the whole.'
     )
 
 
@@ -174,7 +193,7 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
         tag(
             'div',
             *(tag('ol', *cells, class_='strip') for cells in strips.values()),
-            tag('p', 'RMS gap of each stretch, and its time.', class_='note'),
+            tag('p', _STRIP[at_rest(diagnosis)], class_='note'),
         ),
     )
 
@@ -200,7 +219,7 @@ def _stretch(
     when = f'{start - zero:.1f} to {seconds(end - zero)}'
     if at_rest(diagnosis):
         first, final = np.searchsorted(stamps, [start, end]) + 1
-        when = f'stations {first} to {final}'
+        when = f'{first} to {final}'
     return tag(
         'li',
         tag('span', millimetres(rms), class_='figure'),

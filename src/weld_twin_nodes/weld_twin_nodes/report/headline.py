@@ -11,18 +11,16 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.recording import Recording
 
 from ..offline.where_it_holds import where_it_holds
-from .family_table import worth_doing
 from .html import Html, tag
-from .quantities import left_of, millimetres, milliradians, odds, turned, turns_only
-from .words import STATUS, found_name, listed, mended, verdict
+from .quantities import left_of, millimetres, milliradians, odds, small_turn, turns_only
+from .to_do import worth_doing
+from .words import STATUS, mended, verdict
 
 _SURE_OF = {
-    'identified': 'that the causes named are right',
-    'ambiguous': 'that one of those named is right',
+    'identified': 'that every cause named is right, and none is missing',
+    'ambiguous': 'that what is named holds the causes, and none is missing',
     'unknown': 'that the cause is none of those known',
 }
-_FEW = 3
-"""Causes named in a heading."""
 _FIRST_REAL_STAMP = 10**18
 """Stamps [ns] before 2001 count from something else than the epoch."""
 
@@ -105,7 +103,7 @@ def _figures(diagnosis: Diagnosis) -> Html:
     if diagnosis.status in _SURE_OF:
         rows.append(('Confidence', odds(diagnosis.confidence), _SURE_OF[diagnosis.status]))
     if gap.orientation_rms_rad is not None:
-        rows.append(('Orientation', turned(gap.orientation_rms_rad), _turned(diagnosis)))
+        rows.append(('Orientation', small_turn(gap.orientation_rms_rad), _turned(diagnosis)))
     cells = [
         tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
         for name, value, note in rows
@@ -129,15 +127,13 @@ def _turned(diagnosis: Diagnosis) -> str:
     told = f'RMS gap ({milliradians(gap)})'
     if left is None or not diagnosis.effects:
         return told
-    return f'{told}; {turned(left[1])} left over'
+    return f'{told}; {small_turn(left[1])} left over'
 
 
 def _actions(diagnosis: Diagnosis) -> Html | None:
-    if not diagnosis.actions:
+    told = worth_doing(diagnosis)
+    if not told:
         return None
-    items = [tag('li', action) for action in worth_doing(diagnosis)]
+    items = [tag('li', action) for action in told]
     title = 'What to do, in this order' if len(items) > 1 else 'What to do'
-    if diagnosis.status == 'ambiguous':
-        named = listed([found_name(found) for found in diagnosis.effects[:_FEW]])
-        title = f'What to do, should it be {named}'
     return tag('div', tag('h2', title), tag('ol', *items), class_='actions')

@@ -70,8 +70,8 @@
       const name = data.joints[joint].length > 3 ? String(joint + 1) : data.joints[joint];
       const turn = ((angle % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI);
       const near = told.find((item) => Math.abs(item.turn - turn) < 0.13);
-      if (!near) told.push({ turn, names: [name] });
-      else if (!near.names.includes(name)) near.names.push(name);
+      const names = (near || told[told.push({ turn, names: [] }) - 1]).names;
+      if (circle.named.includes(joint) && !names.includes(name)) names.push(name);
     }
     pen.fillStyle = pen.strokeStyle = colour('ink');
     pen.lineWidth = 1.5;
@@ -82,7 +82,7 @@
       pen.lineTo(1.02 * rim * c, 1.02 * rim * s);
       pen.stroke();
       pen.textAlign = Math.abs(c) < 0.3 ? 'center' : (c > 0 ? 'left' : 'right');
-      const more = names.length > 3 ? `${names.slice(0, 3).join(', ')} …` : names.join(', ');
+      const more = names.length > 2 ? `${names[0]} +${names.length - 1}` : names.join(', ');
       pen.fillText(more, 1.08 * rim * c, 1.08 * rim * s);
     }
   }

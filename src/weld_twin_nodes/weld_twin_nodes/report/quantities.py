@@ -37,6 +37,10 @@ _SMALL = 0.1
 """Share below which whole per cents have only one digit."""
 DEGREES = 180.0 / pi
 """Degrees in a radian."""
+_UNREAD = 5e-4
+"""Angle [degrees] that is left over and that nobody reads: it would be 0.000."""
+_SEEN = 2.0
+"""Standard errors within which all parts of a vector count as nothing: about 95 %."""
 _GAP = '\N{NO-BREAK SPACE}'
 
 
@@ -64,6 +68,11 @@ def turned(radians: float) -> str:
     return f'{value:.{places}f}°'
 
 
+def small_turn(radians: float) -> str:
+    """Return an angle as '0.014°', or that it is smaller than anybody reads."""
+    return f'<{_GAP}0.001°' if abs(DEGREES * radians) < _UNREAD else turned(radians)
+
+
 def both_angles(radians: float | None) -> str:
     """Return an angle as '0.023° (0.400 mrad)'."""
     if radians is None or not isfinite(radians):
@@ -83,7 +92,16 @@ def percent(share: float, places: int = 0) -> str:
 
 def with_ends(share: float, low: float, high: float) -> tuple[str, str]:
     """Return a share and the ends of its interval to the same place, '6.6 %' and '6.2 to 6.9 %'."""
-    places = 1 if high < _SMALL or high - low < _NARROW else 0
+    return ends_to(int(fine(low, high)), share, low, high)
+
+
+def fine(low: float, high: float) -> bool:
+    """Tell whether an interval of shares needs a decimal."""
+    return high < _SMALL or high - low < _NARROW
+
+
+def ends_to(places: int, share: float, low: float, high: float) -> tuple[str, str]:
+    """Return a share and the ends of its interval with so many decimals."""
     return percent(share, places), f'{100.0 * low:.{places}f} to {100.0 * high:.{places}f}{_GAP}%'
 
 
@@ -131,6 +149,8 @@ def uncertain(value: float, std: float | None, factor: float = 1.0, unit: str = 
 
 
 def _signed(number: str) -> str:
+    if not number.strip('-0.'):
+        number = number.lstrip('-')
     return number.replace('-', '\N{MINUS SIGN}')
 
 
@@ -145,17 +165,25 @@ def parameter_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]
 
 def _shown(parameter: Parameter, value: Any, std: Any) -> str:
     factor, unit = display_unit(parameter.name, parameter.unit)
+    if np.ndim(value):
+        return _listed(value, std, *((DEGREES, '°') if unit == 'mrad' else (factor, unit)))
+    error = None if np.ndim(std) else std
     if unit == 'mrad':
-        return f'{_listed(value, std, DEGREES, "°")} ({_listed(value, None, factor, unit)})'
-    return _listed(value, std, factor, unit)
+        beside = uncertain(float(value), error, factor).partition(' ±')[0]
+        return f'{uncertain(float(value), error, DEGREES, "°")} ({beside}{_GAP}{unit})'
+    return uncertain(float(value), error, factor, unit)
 
 
 def _listed(value: Any, std: Any, factor: float, unit: str) -> str:
-    """Return a number or several with their errors, in one unit."""
-    if np.ndim(value) == 0:
-        return uncertain(float(value), None if np.ndim(std) else std, factor, unit)
+    """Return several numbers with their errors in one unit, each with its axis if there are three."""
     errors = std if np.ndim(std) and len(std) == len(value) else [None] * len(value)
-    parts = [uncertain(float(v), e, factor) for v, e in zip(value, errors, strict=True)]
+    axes = ('x ', 'y ', 'z ') if len(value) == len('xyz') else [''] * len(value)
+    if all(e is not None and abs(v) <= _SEEN * e for v, e in zip(value, errors, strict=True)):
+        return f'{uncertain(0.0, max(errors), factor, unit)}{" each" if len(value) > 1 else ""}'
+    parts = [
+        axis + uncertain(float(v), e, factor)
+        for axis, v, e in zip(axes, value, errors, strict=True)
+    ]
     return f'{", ".join(parts)}{"" if unit == "°" else " "}{unit}'.rstrip()
 
 

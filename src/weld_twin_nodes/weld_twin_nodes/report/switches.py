@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from weld_twin_core.diagnosis.result import Cause, Diagnosis, Site
 from weld_twin_core.recording import Recording
 
 from .charts import thinned
+from .words import cause as called
 from .words import listed, site_name, someplace
 
 MOST = 8
@@ -37,9 +39,24 @@ def cause_name(diagnosis: Diagnosis, cause: Cause) -> str:
     named = [site for site, _ in cause.name if site.effect not in _CURVES]
     if not named:
         return someplace(cause)
+    if diagnosis.families and len(named) > 1:
+        return _together(named)
     alike = alternatives(diagnosis, cause) or tuple(named[:1])
     more = [f'{len(alike) - _NAMED} more'] if len(alike) > _NAMED else []
     return listed([*map(site_name, alike[:_NAMED]), *more], 'or')
+
+
+def _together(sites: Sequence[Site]) -> str:
+    """Return small errors of one place, which are there together and are no alternatives."""
+    joints = {site.joint for site in sites}
+    if len(joints) > 1:
+        return listed([site_name(site) for site in sites[:_NAMED]])
+    kinds = [called(site.effect, None) for site in sites]
+    if all(kind.startswith('link ') and kind.endswith(' error') for kind in kinds):
+        own = [kind.removeprefix('link ').removesuffix(' error') for kind in kinds]
+        return f'errors of link {listed(own)} of {joints.pop()}'
+    more = [f'{len(kinds) - _NAMED} more'] if len(kinds) > _NAMED else []
+    return f'{listed([*kinds[:_NAMED], *more])} of {joints.pop() or "the robot"}'
 
 
 def alternatives(diagnosis: Diagnosis, cause: Cause) -> tuple[Site, ...]:

@@ -16,8 +16,9 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from ..offline.where_it_holds import where_it_holds
 from .cause_levels import LEVEL_HEADS, level_row
 from .changed_section import CHANGED_HEADS, changed_rows, nothing_changed
-from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows, worth_doing
+from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
 from .quantities import change, millimetres, odds, parameter_rows
+from .to_do import worth_doing
 from .words import STATUS, found_name, listed, mended, site_name, verdict
 
 _COLOURS = {

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
@@ -46,6 +47,20 @@ CAUSES = {
     'joint_curve': 'curve without a name',
     'frame_curve': 'motion without a name',
 }
+_PARAMETERS = {
+    'da': 'length off by',
+    'dd': 'offset off by',
+    'dalpha': 'twist off by',
+    'dbeta': 'tilt off by',
+    'width': 'play',
+    'xyz': 'moved by',
+    'rotvec': 'turned by',
+    'offset': 'off by',
+    'com': 'centre of gravity at',
+    'xyz_rate': 'creeps by',
+    'scale': 'scale off by',
+}
+"""Parameters as a fitter says them; the others are words already."""
 STATUS = {
     'identified': 'Identified',
     'ambiguous': 'Ambiguous',
@@ -80,6 +95,8 @@ DEPENDENCES = {
     'time': 'the time',
     'place': 'the place in the workspace',
 }
+_EFFECT = re.compile(rf'\b({"|".join(name for name in CAUSES if "_" in name)})\b')
+"""Names as files have them, which a sentence may bring along."""
 _NAMED = 3
 """Names in a sentence; more are counted."""
 
@@ -104,12 +121,18 @@ def in_words(reason: str, sites: Iterable[Site]) -> str:
     """Return a sentence about sites with their names as people say them."""
     for site in sorted(sites, key=lambda s: -len(str(s))):
         reason = reason.replace(str(site), site_name(site))
+    reason = _EFFECT.sub(lambda found: CAUSES[found[0]], reason)
     return f'{reason[:1].upper()}{reason[1:].rstrip(".")}.'
 
 
 def place_name(at: str) -> str:
     """Return a place as people say it."""
     return PLACES.get(at, at)
+
+
+def parameter_word(name: str) -> str:
+    """Return a parameter as a fitter says it."""
+    return _PARAMETERS.get(name, name.replace('_', ' '))
 
 
 def listed(names: Sequence[str], word: str = 'and') -> str:

@@ -92,7 +92,7 @@ def _ripple(effect: Effect, robot: Robot) -> str:
     order = np.atleast_1d(np.asarray(effect.order))  # type: ignore[attr-defined]
     strongest = np.argsort(-np.abs(amplitude))[:3]
     waves = ', '.join(
-        f'{size(amplitude[k] * 1e3, 2)} mrad at {order[k]:g} per turn' for k in strongest
+        f'{size(np.degrees(amplitude[k]), 2)} deg at {order[k]:g} per turn' for k in strongest
     )
     more = f' and {amplitude.size - 3} smaller orders' if amplitude.size > 3 else ''
     return (
@@ -105,7 +105,8 @@ def _joint_coupling(effect: Effect, robot: Robot) -> str:
     source = effect.source  # type: ignore[attr-defined]
     ratio = _value(effect, 'ratio')
     return (
-        f'Enter a coupling of {number(ratio * 1e3)} mrad per rad from {source} into {effect.site}.'
+        f'Enter a coupling of {source} into {effect.site}: {number(90.0 * ratio)} deg for every 90 '
+        'deg.'
     )
 
 
@@ -165,7 +166,7 @@ def _joint_compliance(effect: Effect, robot: Robot) -> str:
     stiffness = f'{1.0 / compliance:.3g} N m/rad' if compliance > 0.0 else 'no physical stiffness'
     return (
         f'Compensate the spring of {effect.site}: it yields '
-        f'{number(compliance * 1e5)} mrad per 100 N m ({stiffness}).'
+        f'{number(np.degrees(compliance * 1e2))} deg under 100 N m ({stiffness}).'
     )
 
 
@@ -206,7 +207,7 @@ def _thermal_growth(effect: Effect, robot: Robot) -> str:
     links = effect.links or ('all links',)  # type: ignore[attr-defined]
     return (
         'Warm the arm up before welding, or compensate '
-        f'{number(_value(effect, "coefficient") * 1e6)} um per m and K for {", ".join(links)}.'
+        f'{number(_value(effect, "coefficient") * 1e3)} mm per m and K for {", ".join(links)}.'
     )
 
 
@@ -237,7 +238,7 @@ def _quantization(effect: Effect, robot: Robot) -> str:
 def _measurement_scale(effect: Effect, robot: Robot) -> str:
     return (
         'Have the instrument calibrated, or correct for air temperature: lengths read '
-        f'{number(_value(effect, "scale") * 1e6)} um per m too long.'
+        f'{number(_value(effect, "scale") * 1e3)} mm per m too long.'
     )
 
 

@@ -160,7 +160,7 @@ def _path(
     pieces = tuple(Piece(k, None, float(m.t[-1])) for k, m in enumerate(motions))
     return Candidate(
         'path',
-        'Run the path and record joints and tool all the way.',
+        'Run the proposed path, and record joints and tool all the way.',
         set_up,
         recordings,
         pieces,

@@ -136,17 +136,17 @@ _ALIKE = (
 def _told(plan: Plan, alternatives: Sequence[tuple[Effect, ...]], model: Model) -> dict[str, Any]:
     assert plan.pair is not None
     one, other = (alternatives[k] for k in plan.pair)
-    first, second = _differing(one, other)
+    told = ' from '.join(filter(None, _differing(one, other)))
     reason = (
-        f'The data at hand hold {first} and {second} {plan.before:.1f} standard deviations '
-        f'apart; this would add {plan.after:.0f}.'
+        f'The data at hand tell {told} by {plan.before:.1f} standard deviations; this would add '
+        f'{plan.after:.0f}.'
     )
     return _entry(plan, reason, model, _sides(one, other))
 
 
 def _outside(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> dict[str, Any]:
     """Return what to do when no motion of the joints separates two explanations."""
-    one, other = _differing(first, second)
+    one, other = (side or 'nothing more' for side in _differing(first, second))
     families = {effect.name for effect in _only(first, second) + _only(second, first)}
     return {
         'kind': 'outside',
@@ -191,7 +191,7 @@ def _only(effects: tuple[Effect, ...], others: tuple[Effect, ...]) -> list[Effec
 
 def _named(effects: Sequence[Effect], others: Sequence[Effect]) -> str:
     if not effects:
-        return 'the rest alone'
+        return ''
     return ' with '.join(dict.fromkeys(_name(effect, others) for effect in effects))
 
 

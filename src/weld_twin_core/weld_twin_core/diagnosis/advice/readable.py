@@ -8,6 +8,13 @@ import numpy as np
 
 from ...arrays import Array
 
+LEAST_MM = 0.005
+"""Shift of a frame [mm] that is not told: no arm repeats that well."""
+_FINE = 1e-3
+"""Length [m] below which three decimals of mm are told: a controller takes no more."""
+LEAST_DEG = 0.0003
+"""Turn of a frame [degrees] that is not told: a metre away it moves the tool by 0.005 mm."""
+
 
 def number(value: float, digits: int = 3) -> str:
     """Return a signed number with a few significant digits and no exponent."""
@@ -24,7 +31,8 @@ def size(value: float, digits: int = 3) -> str:
 
 def metres(value: float) -> str:
     """Return a signed length [m] in mm."""
-    return f'{number(value * 1e3)} mm'
+    told = f'{value * 1e3:+.3f}' if abs(value) < _FINE else number(value * 1e3)
+    return f'{told} mm'
 
 
 def radians(value: float) -> str:
@@ -34,6 +42,16 @@ def radians(value: float) -> str:
 
 def frame(step: Array) -> str:
     """Return a displacement [m] and a turn [rad] of a frame, shape (6,), in mm and degrees."""
-    moved = ', '.join(f'{float(v) * 1e3:+.3f}' for v in step[:3])
-    turned = ', '.join(f'{float(np.degrees(v)):+.4f}' for v in step[3:])
-    return f'({moved}) mm and ({turned}) deg about x, y, z'
+    moved = _axes(np.asarray(step[:3]) * 1e3, LEAST_MM, 'mm along', 3)
+    turned = _axes(np.degrees(step[3:]), LEAST_DEG, 'deg about', 4)
+    return ' and '.join(filter(None, [moved, turned])) or 'less than 0.005 mm'
+
+
+def _axes(values: Array, least: float, words: str, places: int) -> str:
+    """Return the parts that are worth entering, each with its axis."""
+    parts = [
+        f'{value:+.{places}f} {words} {axis}'
+        for value, axis in zip(values.tolist(), 'xyz', strict=True)
+        if abs(value) >= least
+    ]
+    return ', '.join(parts)

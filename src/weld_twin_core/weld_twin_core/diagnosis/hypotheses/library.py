@@ -175,8 +175,15 @@ class _Shelf:
         found, trials = self.features[0].seeds(kind, joint, self.pull)
         seeds = [seed for seed in found if not hardly_moves(self.features, seed)]
         if len(seeds) < len(found):
-            self.absent[kind.name] = f'{REASON} ({joint})'
+            self._leave_out(kind.name, str(joint))
         self._place(kind.name, joint, seeds, trials)
+
+    def _leave_out(self, family: str, joint: str) -> None:
+        """Tell that a joint, too, hardly moves."""
+        told = self.absent.get(family, '')
+        others = told.removeprefix(f'{REASON} (').rstrip(')') if told.startswith(REASON) else ''
+        joints = [*filter(None, others.split(', ')), joint]
+        self.absent[family] = f'{REASON} ({", ".join(dict.fromkeys(joints))})'
 
     def add_dated(self, sudden: Effect) -> None:
         """Add what gave way at an instant that the data checks found."""

@@ -2,9 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lengths in the sentences of the checks."""
 
+_LEAST = 5e-7
+"""Length [m] below which it reads 0.000 mm."""
+_FINE = 1e-4
+"""Length [m] below which three digits of mm are told, which no instrument is better than."""
+
 
 def length(value: float) -> str:
     """Return a length [m] as people read it."""
     if value >= 1.0:
         return f'{value:.3g} m'
-    return f'{value * 1e3:.3g} mm' if value >= 1e-4 else f'{value * 1e6:.3g} um'
+    if value < _LEAST:
+        return 'less than 0.001 mm'
+    return f'{value * 1e3:.3g} mm' if value >= _FINE else f'{value * 1e3:.3f} mm'

@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What to do, in its order: at the top of the page and on the terminal."""
+
+from __future__ import annotations
+
+from weld_twin_core.diagnosis.advice import actions
+from weld_twin_core.diagnosis.advice.inseparable import ELSE, way
+from weld_twin_core.diagnosis.result import Diagnosis, Site
+
+from .words import found_name, listed, site_name
+
+_LARGEST = 3
+"""Actions told; the others are counted."""
+TOGETHER = (
+    'Take them in together, by the corrected robot.yaml or robot.urdf or by corrected programs '
+    '(weld-twin correct-program): one by one they are not certain, their sum is.'
+)
+
+
+def worth_doing(diagnosis: Diagnosis) -> list[str]:
+    """Return what to do first: tell apart what is open, then mend; or where to look."""
+    if diagnosis.status == 'unknown' and not diagnosis.actions:
+        return _looking(diagnosis)
+    if diagnosis.families and len(diagnosis.actions) > _LARGEST:
+        more = len(diagnosis.actions) - _LARGEST
+        rest = f'{more} smaller ones are in diagnosis.json.'
+        return [TOGETHER, *diagnosis.actions[:_LARGEST], rest]
+    if diagnosis.status != 'ambiguous' or len(diagnosis.actions) != len(diagnosis.effects):
+        return list(diagnosis.actions)
+    return [*_telling(diagnosis), *_mending(diagnosis)]
+
+
+def _open(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
+    return [group for group in diagnosis.indistinguishable if len(group) > 1]
+
+
+def _telling(diagnosis: Diagnosis) -> list[str]:
+    """Return what tells the open ones apart."""
+    out = []
+    for group in _open(diagnosis):
+        told = f'Find out whether it is {listed([site_name(site) for site in group], "or")}'
+        by = way(sorted({site.effect for site in group}))
+        if by != ELSE:
+            out.append(f'{told}: {by}.')
+        elif diagnosis.next_experiment is not None:
+            out.append(f'{told}: measure what next_experiment.yaml proposes.')
+    return out
+
+
+def _mending(diagnosis: Diagnosis) -> list[str]:
+    """Return what mends each effect; of those that stand in an open set, under a condition."""
+    unsure = {site for group in _open(diagnosis) for site in group}
+    out = []
+    for found, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
+        if Site(found.effect.name, found.effect.site) in unsure:
+            action = f'Should it be {found_name(found)}: {action[:1].lower()}{action[1:]}'
+        out.append(action)
+    return out
+
+
+def _looking(diagnosis: Diagnosis) -> list[str]:
+    """Return where to look, and what to measure, while no cause has a name."""
+    members = [k for cause in diagnosis.causes for k in cause.members]
+    held = [diagnosis.model.found[k] for k in members if k < len(diagnosis.model.found)]
+    told = list(dict.fromkeys(actions(held[:_LARGEST], diagnosis.model.robot)))
+    if diagnosis.next_experiment is not None:
+        told.append('Measure what next_experiment.yaml proposes, and diagnose all of it together.')
+    return told

@@ -156,7 +156,9 @@ def test_the_orders_of_a_ripple_are_told_largest_first():
 def test_a_vector_is_told_in_one_row():
     tool = effect_from_mapping({'effect': 'tool_pose', 'xyz': [1e-3, 0, -2e-3]})
     rows = parameter_rows(tool, {'xyz': [1e-5, 1e-5, 1e-5]})
-    assert plain(rows[0][1]) == '1.000 ± 0.010, 0.000 ± 0.010, -2.000 ± 0.010 mm'
+    assert plain(rows[0][1]) == 'x 1.000 ± 0.010, y 0.000 ± 0.010, z -2.000 ± 0.010 mm'
+    none = effect_from_mapping({'effect': 'tool_pose', 'xyz': [1e-6, 0, -2e-6]})
+    assert plain(parameter_rows(none, {'xyz': [1e-5] * 3})[0][1]) == '0.000 ± 0.010 mm each'
 
 
 @pytest.mark.parametrize('name', list(diagnoses.ALL))
@@ -164,7 +166,7 @@ def test_the_terminal_tells_the_verdict(name):
     case, out = diagnoses.ALL[name](), StringIO()
     print_summary(case, Console(file=out, width=400))
     assert all(sentence in out.getvalue() for sentence in verdict(case))
-    assert all(action in out.getvalue() for action in case.actions)
+    assert all(action.lower() in out.getvalue().lower() for action in case.actions)
 
 
 def test_brackets_in_names_do_not_confuse_the_terminal():

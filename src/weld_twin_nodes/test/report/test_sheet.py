@@ -11,7 +11,8 @@ import diagnoses
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.result import Traces, Unsound
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis.result import Shares, Site, Traces, Unsound
 from weld_twin_core.recording import JointMotion
 from weld_twin_nodes.cli.commands.diagnose import BRANDS as CHOICES
 from weld_twin_nodes.report import report_page
@@ -20,9 +21,10 @@ from weld_twin_nodes.report.controllers import BRANDS, brand_of
 from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.joint_names import joint_labels, renamed
 from weld_twin_nodes.report.quantities import turned, with_ends
-from weld_twin_nodes.report.switches import page_data
+from weld_twin_nodes.report.switches import cause_name, page_data
 
 THREE = diagnoses.circle()
+PARTS = ('base_yaw_actuator', 'shoulder_lift', 'forearm_elbow_rotation', 'w1', 'w2', 'w3')
 CLIPPED = """() => [...document.querySelectorAll('main *')].filter((item) => {
   const box = item.getBoundingClientRect(), style = getComputedStyle(item);
   if (!box.width || !item.checkVisibility() || style.position === 'absolute') return false;
@@ -71,7 +73,19 @@ def unsound():
     )
 
 
-CASES = {**diagnoses.ALL, 'unsound': unsound}
+def long_names():
+    joints = tuple(f'{name}_of_the_second_arm_of_cell_{k}' for k, name in enumerate(PARTS))
+    robot = replace(load('kuka_kr6_r900'), joint_names=joints)
+    effects = [
+        {'effect': 'backlash', 'joint': joints[2], 'width': 8e-4},
+        {'effect': 'servo_lag', 'joint': joints[0], 'time_constant': 4e-3},
+    ]
+    told = tuple(f'See to the gear of {joint}.' for joint in joints[:2])
+    seam = diagnoses.moving(robot, 'circle')
+    return diagnoses.diagnosis('identified', robot, effects, effects, [seam], actions=told)
+
+
+CASES = {**diagnoses.ALL, 'unsound': unsound, 'long_names': long_names}
 
 
 def rms(parts):
@@ -235,7 +249,7 @@ def test_shares_with_the_rest_and_the_noise_make_a_whole():
 
 
 def test_a_value_is_told_in_degrees_first():
-    assert re.search(r'off by 0\.017\d* ± [\d.]+° \(0\.3\d* mrad\)', report_page(THREE))
+    assert re.search(r'off by 0\.017\d* ± [\d.]+° \(0\.3\d*\s+mrad\)', report_page(THREE))
 
 
 def test_the_maker_of_the_controller_is_told_by_the_robot_or_by_the_user():
@@ -276,9 +290,9 @@ def test_what_is_left_with_one_mended_is_judged_on_its_card(page):
 
 
 def test_what_was_not_considered_is_named_in_words():
-    names = {'friction': 'the joint hardly moves (joint_a4)', 'loaded_play': 'no wrench'}
+    names = {'friction': 'the joint hardly moves (joint_a4, joint_a5)', 'loaded_play': 'no wrench'}
     text = report_page(replace(THREE, absent=names))
-    assert 'friction of joint_a4</th><td>the joint hardly moves<' in text
+    assert 'friction of joint_a4 and joint_a5</th><td>the joint hardly moves<' in text
     assert 'play under load</th><td>no wrench<' in text and 'loaded_play' not in text
 
 
@@ -310,3 +324,48 @@ def test_figures_of_iso_9283_stand_where_stations_were_repeated():
 
 def test_an_angle_is_told_with_two_digits_at_least():
     assert turned(2.46e-4) == '0.014°' and turned(1e-6) == '0.000057°'
+
+
+def test_what_is_open_is_told_apart_before_anything_is_mended():
+    page = report_page(diagnoses.ambiguous())
+    done = page[page.index('What to do, in this order') : page.index('id="acceptance"')]
+    first, second = re.findall('<li>(.*?)</li>', done)
+    assert first.startswith('Find out whether it is zero offset of joint_a1 or base pose error: ')
+    assert 'master the joint with its own gauge' in first
+    assert second.startswith('Should it be zero offset of joint_a1: survey the base')
+
+
+def test_an_unknown_cause_leaves_something_to_do():
+    case = replace(diagnoses.unknown(), next_experiment={'sentence': 'Measure 5 stations.'})
+    page = report_page(case)
+    assert 'Measure what next_experiment.yaml proposes' in page[: page.index('id="acceptance"')]
+
+
+def test_what_is_not_sure_enough_to_be_told_alone_is_told_with_its_alternative():
+    open_one = replace(THREE.causes[0], dependence=(('load', 0.34), ('constant', 0.34)))
+    page = report_page(replace(THREE, causes=(open_one, *THREE.causes[1:])))
+    where = page[page.index('By what it depends on') : page.index('By direction')]
+    assert 'the load or constant' in where and 'the direction of motion' not in where
+
+
+def test_what_is_fitted_without_a_name_is_not_called_unexplained():
+    half = tuple(replace(c, share=0.6 * c.share) for c in THREE.causes)
+    rest = 1.0 - sum(c.share for c in half)
+    page = report_page(replace(THREE, causes=half, shares=Shares(rest, 0.0)))
+    rows = page[page.index('bars wide shares') : page.index('class="cards"')]
+    unnamed = float(re.search(r'fitted, but not to be named.*?width:([\d.]+)%', rows)[1])
+    left = float(re.search(r'not explained.*?width:([\d.]+)%', rows)[1])
+    assert unnamed + left == pytest.approx(100.0 * rest, abs=0.05) and left < 1.0 < unnamed
+
+
+def test_a_cause_without_a_share_has_a_card_if_mending_it_shows():
+    unseen = replace(THREE.causes[2], share=0.0)
+    page = report_page(replace(THREE, causes=(*THREE.causes[:2], unseen)))
+    assert 'id="cause-3"' in page and 'a small share can belong to a cause' in page
+
+
+def test_small_errors_of_one_link_are_no_alternatives():
+    sites = [Site(name, 'joint_a2') for name in ('link_length', 'link_twist')]
+    cause = replace(THREE.causes[0], name=tuple((site, 0.75) for site in sites))
+    named = cause_name(replace(THREE, families=('some',)), cause)
+    assert named == 'errors of link length and twist of joint_a2'

@@ -235,7 +235,7 @@ def test_nothing_hinders_reading_light_dark_phone_or_print(name, browser):
     assert browser.console == []
 
 
-@pytest.mark.parametrize('name', ['circle', 'calibration', 'unknown', 'unsound'])
+@pytest.mark.parametrize('name', ['circle', 'calibration', 'unknown', 'unsound', 'long_names'])
 def test_it_prints_on_one_or_two_sides_to_sign(name, browser):
     pdf = browser.open(report_page(CASES[name]())).pdf(prefer_css_page_size=True)
     assert 1 <= len(re.findall(rb'/Type /Page\b', pdf)) <= 2

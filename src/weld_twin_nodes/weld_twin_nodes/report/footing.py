@@ -62,7 +62,7 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
 def _entries(mapping: dict[str, Any]) -> list[Html]:
     out = []
     for key, value in mapping.items():
-        if value is None or _is_bulk(value):
+        if value in (None, '') or _is_bulk(value):
             continue
         out += [tag('dt', key.replace('_', ' ').capitalize()), tag('dd', _plain(value))]
     return out

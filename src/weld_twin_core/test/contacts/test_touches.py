@@ -176,7 +176,7 @@ def test_spread_is_the_mean_distance_to_the_middle():
     ('entry', 'message'),
     [
         ({'contacts': {'a': {'kind': 'cube'}}}, 'a kind is one of point, length'),
-        ({'sockets': {}}, 'an artefact has contacts, distances and angles; got sockets'),
+        ({'sockets': {}}, 'an artefact has contacts, blocks, distances and angles; got sockets'),
         (
             {'contacts': {'a': 'point'}, 'distances': [{'between': ['a', 'b'], 'value': 1.0}]},
             "there is no contact 'b' in the artefact; it has a",

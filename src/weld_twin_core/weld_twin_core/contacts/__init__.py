@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contacts as a measurement: a ball in a socket, a pin, a bar, a plane, each somewhere unknown."""
 
-from .artefact import KINDS, Artefact, Contact, Tie
+from .artefact import Artefact
+from .contact import KINDS, Contact, Tie
 from .contacts import Contacts
 from .places import Places, places
 from .spreads import Length, lengths, spreads

@@ -11,68 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import DataError
-
-KINDS = ('point', 'length', 'sphere', 'line', 'plane')
-"""What a contact can be; how each is seen is in `surfaces`."""
-TIED = ('distance', 'angle')
-"""What ties two contacts: the distance of two points, the angle of two planes."""
-LOOSE = 1e-4
-"""Uncertainty [m, rad] of a length or an angle that came without one: a calliper's reading, and a
-tenth of a millimetre over a metre of straight edge."""
-
-
-@dataclass(frozen=True)
-class Contact:
-    """
-    One thing that the tool point touches in many postures.
-
-    Attributes
-    ----------
-    label : str
-    kind : str
-        'point', 'length' (distance from a centre), 'sphere', 'line' or 'plane'.
-    radius : float, optional [m]
-        Of a sphere, from its centre to the tool point; unknown when left out.
-
-    Raises
-    ------
-    DataError
-        There is no such kind.
-
-    """
-
-    label: str
-    kind: str = 'point'
-    radius: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise DataError(
-                f'contact {self.label!r} is of kind {self.kind!r}; a kind is one of '
-                + ', '.join(KINDS)
-            )
-
-
-@dataclass(frozen=True)
-class Tie:
-    """
-    What is known between two contacts.
-
-    Attributes
-    ----------
-    between : tuple of str
-        Two labels.
-    value, sigma : float
-        Distance [m] of two points or centres, or angle [rad] of two planes; its uncertainty.
-    kind : str
-        'distance' or 'angle'.
-
-    """
-
-    between: tuple[str, str]
-    value: float
-    sigma: float = LOOSE
-    kind: str = 'distance'
+from .contact import Contact, Tie
+from .described import described
 
 
 @dataclass(frozen=True)
@@ -118,11 +58,17 @@ class Artefact:
         if len(set(tie.between)) != 2:
             raise DataError(f'{what}: name two different contacts')
         kinds = {self.named(label).kind for label in tie.between}
-        fit = {'distance': {'point', 'length', 'sphere'}, 'angle': {'plane'}}
+        fit = {'distance': {'point', 'length', 'sphere', 'plane'}, 'angle': {'plane'}}
         if tie.kind not in fit or len(kinds) != 1 or not kinds <= fit[tie.kind]:
             raise DataError(f'{what}: {" and ".join(sorted(kinds))} cannot have one')
-        if not (np.isfinite(tie.value) and tie.value > 0.0 and tie.sigma > 0.0):
+        some = tie.value > 0.0 or (tie.kind == 'angle' and tie.value == 0.0)
+        if not (np.isfinite(tie.value) and some and tie.sigma > 0.0):
             raise DataError(f'{what}: value and sigma must be positive numbers')
+
+    @property
+    def known(self) -> bool:
+        """Return whether a place of it is known."""
+        return any(contact.known for contact in self.contacts)
 
     def named(self, label: str) -> Contact:
         """
@@ -143,13 +89,16 @@ class Artefact:
     @classmethod
     def from_mapping(cls, entry: Mapping[str, Any]) -> Artefact:
         """
-        Return the artefact of a mapping with 'contacts', 'distances' and 'angles'.
+        Return the artefact of a mapping with 'contacts', 'blocks', 'distances' and 'angles'.
 
         Parameters
         ----------
         entry : mapping
-            'contacts' holds a mapping per label: 'kind', and 'radius' [m] of a sphere;
-            'distances' [m] and 'angles' [rad] are lists of 'between', 'value' and 'sigma'.
+            'contacts' holds a mapping per label: 'kind', 'radius' [m] of a sphere, and 'at' [m],
+            'axis' and 'sigma' [m] where its place is known; 'distances' [m] and 'angles' [rad] are
+            lists of 'between', 'value' and 'sigma'. 'blocks' holds a mapping per block, whose faces
+            are contacts: 'size' [m] along its x, y and z, 'sigma' [m], and 'at' [m] and 'turn'
+            (rotation vector [rad]) of its middle where that is known.
 
         Raises
         ------
@@ -157,27 +106,11 @@ class Artefact:
             Something in it cannot be understood; the message says what.
 
         """
-        known = {'contacts', 'distances', 'angles'}
-        if not isinstance(entry, Mapping) or not set(entry) <= known:
-            found = ', '.join(map(str, entry)) if isinstance(entry, Mapping) else 'no mapping'
-            raise DataError(f'an artefact has contacts, distances and angles; got {found}')
-        each = entry.get('contacts') or {}
-        if not isinstance(each, Mapping):
-            raise DataError('contacts of an artefact: give a mapping from label to kind')
-        contacts = tuple(_contact(str(label), what) for label, what in each.items())
-        ties = [
-            _tie(item, kind, name)
-            for kind, name in (('distance', 'distances'), ('angle', 'angles'))
-            for item in _listed(entry.get(name), name)
-        ]
-        return cls(contacts, tuple(ties))
+        return cls(*described(entry))
 
     def as_mapping(self) -> dict[str, Any]:
         """Return what `from_mapping` reads."""
-        contacts = {
-            c.label: {'kind': c.kind} | ({} if c.radius is None else {'radius': c.radius})
-            for c in self.contacts
-        }
+        contacts = {c.label: c.as_mapping() for c in self.contacts}
         out: dict[str, Any] = {'contacts': contacts}
         for kind, name in (('distance', 'distances'), ('angle', 'angles')):
             out[name] = [
@@ -202,38 +135,3 @@ class Artefact:
             tuple(contact for contact in self.contacts if contact.label in labels),
             tuple(tie for tie in self.ties if set(tie.between) <= set(labels)),
         )
-
-
-def _contact(label: str, what: object) -> Contact:
-    entry = {'kind': what} if isinstance(what, str) else what
-    if not isinstance(entry, Mapping) or not set(entry) <= {'kind', 'radius'}:
-        raise DataError(f'contact {label!r} has a kind, and a radius if it is a sphere')
-    radius = entry.get('radius')
-    if radius is not None:
-        radius = _number(radius, f'the radius of contact {label!r}')
-    return Contact(label, str(entry.get('kind', 'point')), radius)
-
-
-def _listed(entry: object, name: str) -> Sequence[Any]:
-    if entry is None:
-        return ()
-    if not isinstance(entry, Sequence) or isinstance(entry, str):
-        raise DataError(f'{name} of an artefact: give a list of between, value and sigma')
-    return entry
-
-
-def _tie(item: object, kind: str, name: str) -> Tie:
-    if not isinstance(item, Mapping) or not set(item) <= {'between', 'value', 'sigma'}:
-        raise DataError(f'an entry of {name} has between, value and sigma')
-    between = item.get('between')
-    if isinstance(between, str) or not isinstance(between, Sequence) or len(between) != 2:
-        raise DataError(f'an entry of {name} needs between: [LABEL, LABEL]')
-    sigma = _number(item.get('sigma', LOOSE), f'a sigma in {name}')
-    value = _number(item.get('value'), f'a value in {name}')
-    return Tie((str(between[0]), str(between[1])), value, sigma, kind)
-
-
-def _number(value: object, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise DataError(f'{what} must be a number, got {value!r}')
-    return float(value)

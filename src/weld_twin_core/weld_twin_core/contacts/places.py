@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array
-from .artefact import Tie
+from .contact import Tie
 from .contacts import Contacts
 from .surfaces import Surface
 
@@ -66,18 +66,30 @@ class Places:
             at += surface.freedom
         return residual, seen, free
 
-    def ties(self) -> tuple[Array, Array]:
-        """Return how far ties are from what is known (T,), and their change with unknowns (T, Z)."""
+    def ties(self) -> tuple[Array, Array, Array]:
+        """
+        Return how far what is known is off, its change with unknowns, and its uncertainty.
+
+        Shapes (T,), (T, Z) and (T,) [m or rad]: lengths and angles between contacts, and the
+        places of those that are known.
+        """
         ends = np.cumsum([0, *(surface.freedom for surface in self.surfaces)])
         where = {s.contact.label: k for k, s in enumerate(self.surfaces)}
-        ties = self.contacts.artefact.ties
-        off, change = np.zeros(len(ties)), np.zeros((len(ties), ends[-1]))
-        for t, tie in enumerate(ties):
+        parts = []
+        for tie in self.contacts.artefact.ties:
             first, second = (where[label] for label in tie.between)
-            off[t], one, other = _tied(tie, self.surfaces[first], self.surfaces[second])
-            change[t, ends[first] : ends[first] + one.size] = one
-            change[t, ends[second] : ends[second] + other.size] = other
-        return off, change
+            off, *both = _tied(tie, self.surfaces[first], self.surfaces[second])
+            change = np.zeros((off.size, ends[-1]))
+            for k, own in zip((first, second), both, strict=True):
+                change[:, ends[k] : ends[k] + own.shape[1]] = own
+            parts.append((off, change, np.full(off.size, tie.sigma)))
+        for k, surface in enumerate(self.surfaces):
+            off, own, sigma = surface.held()
+            change = np.zeros((off.size, ends[-1]))
+            change[:, ends[k] : ends[k + 1]] = own
+            parts.append((off, change, sigma))
+        offs, changes, sigmas = zip(*parts, strict=True)
+        return np.concatenate(offs), np.concatenate(changes), np.concatenate(sigmas)
 
     def moved(self, step: Array) -> Places:
         """Return the places after a step of all unknowns, shape (Z,)."""
@@ -95,20 +107,49 @@ class Places:
         return out
 
 
-def _tied(tie: Tie, first: Surface, second: Surface) -> tuple[float, Array, Array]:
-    """Return how far a tie is off, and its change with the leading unknowns of both."""
+def _tied(tie: Tie, first: Surface, second: Surface) -> tuple[Array, Array, Array]:
+    """Return how far a tie is off (t,), and its change with the leading unknowns of both."""
     if tie.kind == 'angle':
-        cosine = float(first.axis @ second.axis)
-        sign = 1.0 if cosine * np.cos(tie.value) >= 0.0 else -1.0
-        sine = max(float(np.sin(tie.value)), 1e-3)
-        change = [
-            sign / sine * np.concatenate([[0.0], one.across @ other.axis])
-            for one, other in ((first, second), (second, first))
-        ]
-        return (sign * cosine - float(np.cos(tie.value))) / sine, change[0], change[1]
+        return _parallel(first, second) if tie.value == 0.0 else _turned(tie, first, second)
+    if first.contact.kind == 'plane':
+        return _apart(tie, first, second)
     away = first.point - second.point
     far = max(float(np.linalg.norm(away)), 1e-9)
-    return far - tie.value, away / far, -away / far
+    way = (away / far)[None]
+    return np.array([far - tie.value]), way, -way
+
+
+def _turned(tie: Tie, first: Surface, second: Surface) -> tuple[Array, Array, Array]:
+    """Return the angle of two planes that are not parallel, as a tie."""
+    cosine = float(first.axis @ second.axis)
+    # Normals point to either side; of square planes it makes no difference.
+    sign = -1.0 if cosine * np.cos(tie.value) < -1e-9 else 1.0
+    sine = max(float(np.sin(tie.value)), 1e-3)
+    one, two = (
+        sign / sine * np.concatenate([[0.0], a.across @ b.axis])[None]
+        for a, b in ((first, second), (second, first))
+    )
+    return np.array([(sign * cosine - float(np.cos(tie.value))) / sine]), one, two
+
+
+def _parallel(first: Surface, second: Surface) -> tuple[Array, Array, Array]:
+    """Return what the normals of two parallel planes differ by, as two ties."""
+    sign = 1.0 if first.axis @ second.axis >= 0.0 else -1.0
+    ways = first.across
+    off = sign * (ways @ second.axis)
+    one, two = np.zeros((2, 3)), np.zeros((2, 3))
+    one[:, 1:], two[:, 1:] = -np.eye(2), sign * (ways @ second.across.T)
+    return off, one, two
+
+
+def _apart(tie: Tie, first: Surface, second: Surface) -> tuple[Array, Array, Array]:
+    """Return how far two parallel planes lie apart along the normal of the first, as a tie."""
+    away = first.point - second.point
+    far = float(away @ first.axis)
+    sign = 1.0 if far >= 0.0 else -1.0
+    one = sign * np.concatenate([[1.0], first.across @ away])[None]
+    two = sign * np.array([[-float(first.axis @ second.axis), 0.0, 0.0]])
+    return np.array([abs(far) - tie.value]), one, two
 
 
 def places(contacts: Contacts, points: Array) -> Places:
@@ -144,7 +185,7 @@ def _step(now: Places, points: Array) -> Array:
     size = np.linalg.norm(residual, axis=1) / np.sqrt(residual.shape[1])
     spread = max(NORMAL * float(np.median(size)), 1e-9)
     weight = np.sqrt(np.minimum(1.0, HUBER * spread / np.maximum(size, 1e-12)))[:, None]
-    off, change = now.ties()
+    off, change, _ = now.ties()
     firm = FIRM * np.sqrt(residual.size)
     columns = np.concatenate(
         [(weight[..., None] * free).reshape(-1, free.shape[2]), firm * change]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array
-from .artefact import Contact
+from .contact import Contact
 
 LEAST = 1e-9
 """Length [m] that counts as none; keeps a direction from a division by zero."""
@@ -57,6 +57,8 @@ class Surface:
             Measured distances, of kind 'length'.
 
         """
+        if contact.at is not None:
+            return cls._known(contact, p)
         middle = np.median(p, axis=0)
         _, _, axes = np.linalg.svd(p - p.mean(axis=0), full_matrices=True)
         if contact.kind == 'line':
@@ -69,6 +71,14 @@ class Surface:
                 known = np.full(len(p), contact.radius)
             return _ball(contact, p, known)
         return cls(contact, middle, axes[2])
+
+    @classmethod
+    def _known(cls, contact: Contact, p: Array) -> Surface:
+        """Return the contact where it is known to be; a radius that is not, as points have it."""
+        axis = np.array([0.0, 0.0, 1.0] if contact.axis is None else contact.axis)
+        away = np.linalg.norm(p - np.array(contact.at), axis=1)
+        radius = float(np.median(away)) if contact.radius is None else contact.radius
+        return cls(contact, np.array(contact.at), axis / np.linalg.norm(axis), radius)
 
     @property
     def freedom(self) -> int:
@@ -128,6 +138,27 @@ class Surface:
             more = step[3] if self.freedom == 4 else 0.0
             return replace(self, point=self.point + step[:3], radius=self.radius + more)
         return replace(self, point=point, axis=axis / np.linalg.norm(axis))
+
+    def held(self) -> tuple[Array, Array, Array]:
+        """
+        Return how far it is from its known place (k,), the change of that, and its uncertainty.
+
+        The change (k, z) is by the unknowns, the uncertainty (k,) in m or rad; k is 0 of a contact
+        that may be anywhere.
+        """
+        known = self.contact
+        if known.at is None:
+            return np.zeros(0), np.zeros((0, self.freedom)), np.zeros(0)
+        away = self.point - np.array(known.at)
+        if known.axis is None:
+            return away, np.eye(3, self.freedom), np.full(3, known.sigma)
+        normal = np.array(known.axis) / np.linalg.norm(known.axis)
+        tilt = -self.across @ normal * np.sign(self.axis @ normal)
+        shift = [away @ self.axis] if known.kind == 'plane' else self.across @ away
+        off = np.concatenate([shift, tilt])
+        sigma = np.full(off.size, known.sigma)
+        sigma[-2:] = known.sigma_turn
+        return off, np.eye(off.size), sigma
 
     def foot(self, p: Array) -> Array:
         """Return the place of the contact that is nearest to tool points, shape (m, 3) [m]."""

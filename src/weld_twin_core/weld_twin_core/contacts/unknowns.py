@@ -42,7 +42,7 @@ class Unknowns:
     free : array, shape (M, c, Z)
         Change of each row with the unknowns.
     ties : array, shape (T, Z)
-        Change of every known length with the unknowns, over its uncertainty [1/m].
+        Change of every known length and place with the unknowns, over its uncertainty [1/m].
 
     """
 
@@ -91,6 +91,5 @@ def unknowns(contacts: Contacts, points: Array) -> Unknowns:
     """
     here = places(contacts, points)
     _, seen, free = here.rows(points)
-    _, change = here.ties()
-    sigma = np.array([tie.sigma for tie in contacts.artefact.ties])
-    return Unknowns(seen, free, change / sigma[:, None] if sigma.size else change)
+    _, change, sigma = here.ties()
+    return Unknowns(seen, free, change / sigma[:, None])

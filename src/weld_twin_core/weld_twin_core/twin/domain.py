@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..recording import Recording
+from .spots import Spots
 
 LEAST_MARGIN = 0.02
 """A joint this near [rad or m] to where it was recorded counts as recorded there: one degree."""
@@ -68,6 +69,8 @@ class Domain:
         Largest force [N] and torque [N m] on the tool; None where no wrench was recorded.
     temperature : tuple of float, optional
         Lowest and highest [degC]; None where it was not recorded.
+    spots : Spots, optional
+        The places that were touched; None where an instrument measured.
 
     """
 
@@ -78,6 +81,7 @@ class Domain:
     speeds: tuple[float, ...] | None = None
     load: tuple[float, float] | None = None
     temperature: tuple[float, float] | None = None
+    spots: Spots | None = None
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], robot: Robot) -> Domain:
@@ -100,6 +104,7 @@ class Domain:
             speeds,
             _load(recordings),
             _temperature(recordings),
+            Spots.of(recordings, robot),
         )
 
     def beyond(self, q: Array) -> Array:
@@ -151,8 +156,23 @@ class Domain:
                 out.append(
                     Outside(first, last, f'{name} is {most:.2g} {unit} beyond what was recorded')
                 )
+        out += self._too_far(q)
         out += self._too_fast(qd) + self._too_loaded(wrench) + self._too_warm(temperature)
         return sorted(out)
+
+    def _too_far(self, q: Array) -> list[Outside]:
+        if self.spots is None:
+            return []
+        away, reach = self.spots.away(q), self.spots.reach
+        return [
+            Outside(
+                first,
+                last,
+                f'the tool is {away[first : last + 1].max():.2g} m from the nearest place that '
+                f'was touched, and the model was tested to {reach:.2g} m',
+            )
+            for first, last in runs(away > reach)
+        ]
 
     def _too_fast(self, qd: Array | None) -> list[Outside]:
         if qd is None:
@@ -240,6 +260,7 @@ class Domain:
             'speeds': None if self.speeds is None else list(self.speeds),
             'load': None if self.load is None else list(self.load),
             'temperature': None if self.temperature is None else list(self.temperature),
+            **({} if self.spots is None else {'spots': self.spots.as_dict()}),
         }
 
 

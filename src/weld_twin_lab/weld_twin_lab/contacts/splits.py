@@ -118,8 +118,9 @@ def flagged(found: Diagnosis, data: Path, arm: str, judged: Sequence[str]) -> li
     out = []
     for place in judged:
         recording = touches(data, arm, [place])
-        domain = found.posterior.domain
-        beyond = (domain.beyond(recording.joints.q) > np.array(domain.margins)).any(axis=1)
+        beyond = np.zeros(recording.joints.t.size, dtype=bool)
+        for item in found.posterior.domain.outside(recording.joints.q):
+            beyond[item.first : item.last + 1] = True
         if float(beyond.mean()) > MOSTLY:
             out.append(place)
     return out

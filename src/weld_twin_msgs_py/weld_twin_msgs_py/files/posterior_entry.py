@@ -16,6 +16,7 @@ from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior
+from weld_twin_core.twin.spots import Spots
 
 from .diagnosis_model import read_diagnosis
 
@@ -97,7 +98,16 @@ def _domain(robot: Robot, entry: Mapping[str, Any]) -> Domain:
         None if entry['speeds'] is None else tuple(float(v) for v in entry['speeds']),
         _pair(entry['load']),
         _pair(entry['temperature']),
+        _spots(robot, entry.get('spots')),
     )
+
+
+def _spots(robot: Robot, entry: Mapping[str, Any] | None) -> Spots | None:
+    if entry is None:
+        return None
+    at = np.array(entry['at'], dtype=float)
+    bare = robot.with_frames(base=np.eye(4))
+    return Spots(bare, readonly(at, (len(at), 3), 'spots.at'), _size(entry['reach'], 'reach'))
 
 
 def _pair(value: Any) -> tuple[float, float] | None:

@@ -60,7 +60,7 @@ def next_step(
     if verdict.status in ('identified', 'none') and verdict.confidence >= SURE:
         return None
     listed = [found.small.model.found, *_in_place(found, verdict, named=True)]
-    if found.problem.touched:
+    if found.problem.untracked:
         if verdict.status in ('identified', 'none'):
             return None
         # A motion in the air would show nothing.

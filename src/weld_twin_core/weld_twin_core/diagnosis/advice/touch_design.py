@@ -109,10 +109,13 @@ class Design:
             The noise, and the weight of every touch.
 
         """
+        # A base that is fitted along counts as known: another touch tells more of it anyway.
+        problem = replace(problem, align=problem.align & {'tool'})
         model, tool = model.with_found(tuple(effects)), 'tool' in problem.align
+        taken = [unknown for unknown in problem.touched if unknown is not None]
         sigma = max(scale.position, SLACK)
         prior = np.concatenate([frame_prior(problem, model)[0], effect_precision(model)])
-        freedom = [unknown.freedom for unknown in problem.touched]
+        freedom = [unknown.freedom for unknown in taken]
         starts = prior.size + np.cumsum([0, *freedom])
         information = np.diag(np.append(prior, np.full(sum(freedom), ANYWHERE**-2.0)))
         surfaces = []
@@ -124,7 +127,7 @@ class Design:
             rows = rows * np.sqrt(scale.weights[k])[:, None, None]
             own = np.concatenate([np.arange(prior.size), np.arange(starts[k], starts[k + 1])])
             information[np.ix_(own, own)] += np.einsum('mcp,mcq->pq', rows, rows)
-            ties, at = problem.touched[k].ties, slice(starts[k], starts[k + 1])
+            ties, at = taken[k].ties, slice(starts[k], starts[k + 1])
             information[at, at] += ties.T @ ties
         return cls(
             model,

@@ -114,8 +114,9 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
     """
     at = 0
     if 'base' in problem.align:
-        for k in range(len(problem.recordings)):
-            model = model.moved(k, step[at : at + 6])
+        for group in problem.stands:
+            for k in group:
+                model = model.moved(k, step[at : at + 6])
             at += 6
     if 'tool' in problem.align:
         model = model.retooled(step[at : at + 6])

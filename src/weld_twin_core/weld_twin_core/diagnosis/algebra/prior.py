@@ -48,11 +48,11 @@ def _anchored(problem: Problem, model: Model) -> tuple[Array, Array]:
     """Return the prior precision of base and tool, and how far they are from the anchor."""
     pairs: list[tuple[Array, Array, bool]] = []
     anchor = problem.anchor
-    count = 6 * (('base' in problem.align) * len(model.bases) + ('tool' in problem.align))
     if anchor is None:
-        return np.zeros(count), np.zeros(count)
+        return np.zeros(problem.frame_count), np.zeros(problem.frame_count)
     if 'base' in problem.align:
-        pairs += [(now, was, True) for now, was in zip(model.bases, anchor.bases, strict=True)]
+        first = [group[0] for group in problem.stands]
+        pairs += [(model.bases[k], anchor.bases[k], True) for k in first]
     if 'tool' in problem.align:
         pairs.append((model.robot.T_flange_tool, anchor.tool, False))
     sizes = np.repeat([FRAME_SHIFT, FRAME_TURN], 3)

@@ -7,21 +7,31 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...arm.robot import Robot
-from ...arm.rotation import angle_between, rotation_matrix
+from ...arm.rotation import angle_between
 from ...arrays import Array
 from ...contacts import Unknowns, places, unknowns
 from ...effects.effect import Effect
 from ...errors import DataError, ModelError
 from ...recording import Measurements, Recording
 from ...twin.features import Features
-from ...twin.twin import Twin
+from .model import Anchor, Change, Model, Scale
 from .row_layout import by_sample
+
+__all__ = [
+    'FRAMES',
+    'PLACES',
+    'Anchor',
+    'Change',
+    'Model',
+    'Problem',
+    'Scale',
+    'frames_named',
+    'usable',
+]
 
 FRAMES = ('base', 'tool')
 PLACES = 3
@@ -54,113 +64,6 @@ def frames_named(align: str | Iterable[str], what: str = 'align') -> frozenset[s
 
 
 @dataclass(frozen=True, eq=False)
-class Scale:
-    """
-    Noise that residuals are measured in: position [m], orientation [rad], weight per sample.
-
-    ``weights`` holds one array (M,) per recording, 1 for a good sample, less for an outlier.
-    """
-
-    position: float
-    orientation: float
-    weights: tuple[Array, ...]
-
-
-class Change(NamedTuple):
-    """
-    What one recording has that the first has not, counted from the first.
-
-    Attributes
-    ----------
-    recording : int
-        Counted from 0; never 0.
-    effect : Effect
-
-    """
-
-    recording: int
-    effect: Effect
-
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """
-    What is believed: the robot with its tool frame, a base frame per recording, and effects.
-
-    Attributes
-    ----------
-    robot : Robot
-    bases : tuple of array, shape (4, 4)
-    known, found : tuple of Effect
-        Effects given by the user, and those this diagnosis put in.
-    mended : tuple of str
-        What was wrong with the data it stands on, and was undone.
-    changes : tuple of Change
-        What differs between the recordings.
-
-    """
-
-    robot: Robot
-    bases: tuple[Array, ...]
-    known: tuple[Effect, ...] = ()
-    found: tuple[Effect, ...] = ()
-    mended: tuple[str, ...] = ()
-    changes: tuple[Change, ...] = ()
-
-    def twin(self, k: int) -> Twin:
-        """Return the twin of recording k."""
-        effects = self.known + self.found + self.changed(k)
-        return Twin(self.robot.with_frames(base=self.bases[k]), effects)
-
-    def changed(self, k: int) -> tuple[Effect, ...]:
-        """Return what recording k has that the first has not."""
-        return tuple(change.effect for change in self.changes if change.recording == k)
-
-    def moved(self, k: int, step: Array) -> Model:
-        """Return the model with the base of recording k moved by (xyz, rotvec)."""
-        bases = list(self.bases)
-        bases[k] = _moved(bases[k], step, left=True)
-        return replace(self, bases=tuple(bases))
-
-    def retooled(self, step: Array) -> Model:
-        """Return the model with the tool moved by (xyz, rotvec)."""
-        tool = _moved(self.robot.T_flange_tool, step, left=False)
-        return replace(self, robot=self.robot.with_frames(tool=tool))
-
-    def without(self, k: int) -> Model:
-        """Return the model without found effect k."""
-        return self.with_found(self.found[:k] + self.found[k + 1 :])
-
-    def with_found(self, found: tuple[Effect, ...]) -> Model:
-        """Return the model with other found effects."""
-        return replace(self, found=found)
-
-
-def _moved(frame: Array, step: Array, *, left: bool) -> Array:
-    out = np.array(frame)
-    turn = rotation_matrix(step[3:])
-    out[:3, :3] = turn @ out[:3, :3] if left else out[:3, :3] @ turn
-    out[:3, 3] += step[:3]
-    return out
-
-
-@dataclass(frozen=True, eq=False)
-class Anchor:
-    """
-    Where the frames are believed to be.
-
-    Attributes
-    ----------
-    bases : tuple of array, shape (4, 4)
-    tool : array, shape (4, 4)
-
-    """
-
-    bases: tuple[Array, ...]
-    tool: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Problem:
     """
     Recordings to explain.
@@ -177,9 +80,15 @@ class Problem:
         What may have set in at an instant that was found: hypotheses beside the library's.
     changes : tuple of Change
         What may differ between the recordings: fitted along in every hypothesis, as frames are.
-    touched : tuple of Unknowns
+    touched : tuple of Unknowns or None
         Where recordings are contacts, one each: what they see of the tool point, and their
-        unknown places; see `touching`. Empty where an instrument measured.
+        unknown places; see `touching`. None for a recording that an instrument measured, empty
+        where it measured all.
+    given : tuple of int
+        Of which of the recordings given each is a part, where places of contacts are parts; empty
+        where each was given by itself.
+    loose : tuple of float
+        Noise of every recording in that of the surest; empty where all are alike.
 
     """
 
@@ -188,26 +97,76 @@ class Problem:
     anchor: Anchor | None = None
     dated: tuple[Effect, ...] = ()
     changes: tuple[Change, ...] = ()
-    touched: tuple[Unknowns, ...] = ()
-    _taken: WeakKeyDictionary[Scale, list[tuple[Array, Array]]] = field(
+    touched: tuple[Unknowns | None, ...] = ()
+    given: tuple[int, ...] = ()
+    loose: tuple[float, ...] = ()
+    _taken: WeakKeyDictionary[Scale, list[tuple[Array, Array] | None]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
 
     @property
     def rows(self) -> tuple[int, ...]:
         """Return the scalar rows per sample of each recording: 6 for poses, 3 for points."""
-        if self.touched:
-            return tuple(unknown.seen.shape[1] for unknown in self.touched)
-        return tuple(3 if _measured(r).rotation is None else 6 for r in self.recordings)
+        seen = (self.contact(k) for k in range(len(self.recordings)))
+        return tuple(
+            (3 if _measured(r).rotation is None else 6) if own is None else own.seen.shape[1]
+            for r, own in zip(self.recordings, seen, strict=True)
+        )
+
+    def contact(self, k: int) -> Unknowns | None:
+        """Return what the contacts of recording k see; None where an instrument measured."""
+        return self.touched[k] if self.touched else None
+
+    @property
+    def untracked(self) -> bool:
+        """Return whether contacts are all there is: no instrument measured."""
+        return bool(self.touched) and all(own is not None for own in self.touched)
+
+    @property
+    def places(self) -> int:
+        """Return the number of places that were touched."""
+        return sum(own is not None for own in self.touched)
+
+    @property
+    def placed(self) -> bool:
+        """Return whether a place that was touched is known."""
+        each = (r.contacts for r in self.recordings)
+        return any(c is not None and c.artefact.known for c in each)
+
+    @cached_property
+    def stands(self) -> tuple[tuple[int, ...], ...]:
+        """
+        Return the recordings of every base that is fitted where ``align`` names 'base'.
+
+        Each recording of an instrument has its own. Contacts at known places share one if they
+        were given together; those at unknown places tell nothing of a base.
+        """
+        if not self.touched:
+            return tuple((k,) for k in range(len(self.recordings)))
+        out: dict[tuple[bool, int], list[int]] = {}
+        for k, recording in enumerate(self.recordings):
+            contacts = recording.contacts
+            if contacts is None or contacts.artefact.known:
+                out.setdefault((contacts is None, self.given[k] if self.given else k), []).append(
+                    k
+                )
+        return tuple(tuple(group) for group in out.values())
+
+    @property
+    def frame_count(self) -> int:
+        """Return the number of coordinates of the frames that are fitted along."""
+        return 6 * (('base' in self.align) * len(self.stands) + ('tool' in self.align))
 
     def touching(self, model: Model) -> Problem:
         """Return the problem with its contacts as a model sees them; no contacts, no change."""
-        each = []
+        each: list[Unknowns | None] = []
         for k, recording in enumerate(self.recordings):
-            if recording.contacts is not None:
-                poses = model.twin(k).poses(recording, _measured(recording).t)
-                each.append(unknowns(recording.contacts, poses.position))
-        return replace(self, touched=tuple(each))
+            if recording.contacts is None:
+                each.append(None)
+                continue
+            poses = model.twin(k).poses(recording, _measured(recording).t)
+            each.append(unknowns(recording.contacts, poses.position))
+        return replace(self, touched=tuple(each) if any(each) else ())
 
     def seen(self, k: int, block: Array) -> Array:
         """
@@ -220,27 +179,30 @@ class Problem:
         block : array, shape (..., 6, M) [m, rad]
 
         """
-        if self.touched:
-            ways = self.touched[k].seen
-            return np.asarray(np.einsum('mci,...im->...cm', ways, block[..., :3, :]))
+        own = self.contact(k)
+        if own is not None:
+            return np.asarray(np.einsum('mci,...im->...cm', own.seen, block[..., :3, :]))
         return block[..., : self.rows[k], :]
 
     def pulled(self, k: int, rows: Array) -> Array:
         """Return the pull on the tool of recording k's rows, (c, M), as (3 or 6, M): along each."""
-        if self.touched:
-            return np.asarray(np.einsum('mci,cm->im', self.touched[k].seen, rows))
+        own = self.contact(k)
+        if own is not None:
+            return np.asarray(np.einsum('mci,cm->im', own.seen, rows))
         return rows
 
-    def places_taken(self, scale: Scale) -> list[tuple[Array, Array]]:
+    def places_taken(self, scale: Scale) -> list[tuple[Array, Array] | None]:
         """
         Return what the unknown places of contacts take up of whitened rows, one per recording.
 
         Orthonormal directions (k, rows of the recording), and the share (k,) left of each; see
-        `Unknowns.eliminated`. Empty without contacts.
+        `Unknowns.eliminated`. None for a recording of an instrument; empty without contacts.
         """
         if self.touched and scale not in self._taken:
             pairs = zip(self.touched, scale.weights, strict=True)
-            self._taken[scale] = [u.eliminated(np.sqrt(w) / scale.position) for u, w in pairs]
+            self._taken[scale] = [
+                None if u is None else u.eliminated(np.sqrt(w) / scale.position) for u, w in pairs
+            ]
         return self._taken[scale] if self.touched else []
 
     @property
@@ -253,12 +215,16 @@ class Problem:
         """
         Return the weight of every sample that was told with the data, shape (M,) per recording.
 
-        Of contacts whose uncertainty is known, in shares of the surest; one for all others.
+        Of contacts whose uncertainty is known, in shares of the surest; one for all others. Where
+        recordings are differently sure, less for those that are not.
         """
         told = [None if r.contacts is None else r.contacts.sigma for r in self.recordings]
         least = min((float(sigma.min()) for sigma in told if sigma is not None), default=0.0)
         pairs = zip(told, self.samples, strict=True)
-        return [np.ones(m) if sigma is None else (least / sigma) ** 2 for sigma, m in pairs]
+        out = [np.ones(m) if sigma is None else (least / sigma) ** 2 for sigma, m in pairs]
+        if not self.loose:
+            return out
+        return [weight / loose**2 for weight, loose in zip(out, self.loose, strict=True)]
 
     @property
     def size(self) -> int:
@@ -322,8 +288,9 @@ class Problem:
             scaled = np.empty(turned.shape)
             np.multiply(turned, np.sqrt(weight)[:, None] * unit, out=scaled)
             rows = scaled.reshape(*part.shape[:-2], weight.size * unit.size)
-            if taken:
-                ways, left = taken[k]
+            own = taken[k] if taken else None
+            if own is not None:
+                ways, left = own
                 rows = rows - ((rows @ ways.T) * (1.0 - left)) @ ways
             out.append(rows)
         return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
@@ -336,15 +303,16 @@ class Problem:
         """Return nuisance columns, one (P, c, M) array per recording, and their names."""
         names: list[str] = []
         if 'base' in self.align:
-            names += [f'base {k}.{j}' for k in range(len(self.recordings)) for j in range(6)]
+            names += [f'base {group[0]}.{j}' for group in self.stands for j in range(6)]
         if 'tool' in self.align:
             names += [f'tool.{j}' for j in range(6)]
         parts = []
+        first = {k: group[0] for group in self.stands for k in group}
         for k, maker in enumerate(features):
             block = np.zeros((len(names), self.rows[k], self.samples[k]))
             for p, name in enumerate(names):
                 kind, _, j = name.partition('.')
-                if kind == f'base {k}' or kind == 'tool':
+                if kind == f'base {first.get(k)}' or kind == 'tool':
                     block[p] = self.seen(k, maker.column((kind.split()[0], int(j))))
             parts.append(np.concatenate([block, *self._change_columns(k, maker)]))
         sizes = [change.effect.coordinates().size for change in self.changes]
@@ -353,9 +321,9 @@ class Problem:
 
     def _change_columns(self, k: int, maker: Features) -> list[Array]:
         """Return the columns of every change in recording k, zero for those of the others."""
-        out = []
+        out, own = [], self.given[k] if self.given else k
         for change in self.changes:
-            if change.recording == k:
+            if change.recording == own:
                 out.append(self.seen(k, maker.columns(change.effect, atoms=False)))
             else:
                 size = change.effect.coordinates().size
@@ -386,12 +354,13 @@ class Problem:
         Recordings count by their length; a stretch never spans two recordings. Of contacts each
         place is a stretch, where there are at least `PLACES`.
         """
-        if len(self.touched) >= PLACES:
-            blocks = 1
+        whole = self.places >= PLACES
         total = max(sum(self.samples), 1)
         out, start = [], 0
-        for c, m in zip(self.rows, self.samples, strict=True):
+        for k, (c, m) in enumerate(zip(self.rows, self.samples, strict=True)):
             count = max(1, round(blocks * m / total))
+            if whole and self.contact(k) is not None:
+                count = 1
             labels = start + (np.arange(m) * count) // max(m, 1)
             out.append(np.repeat(labels, c))
             start += count
@@ -400,11 +369,14 @@ class Problem:
     def thinned(self, most_rows: int) -> Problem:
         """Return the problem with evenly fewer measurements when it has too many rows."""
         factor = self.size / most_rows
-        if factor <= 1.0 or self.touched:
+        if factor <= 1.0 or self.untracked:
             return self
         out = []
         for recording in self.recordings:
             measured = _measured(recording)
+            if recording.contacts is not None:
+                out.append(recording)
+                continue
             count = max(2, round(measured.t.size / factor))
             index = np.unique(np.linspace(0, measured.t.size - 1, count).round().astype(int))
             out.append(recording.with_measured(measured.take(index)))

@@ -15,6 +15,10 @@ from ..hypotheses.search import Search
 from ..result import ContactResult, KnownLength, Touched
 from ..unseen.unseen_stretches import Unseen
 
+BASE = (5e-3, 5e-3)
+"""A shift [m] and a turn [rad] of the base that contacts at known places should show: an arm put
+back on its feet is off by that much."""
+
 
 def contact_spreads(found: Search, unseen: Unseen) -> ContactResult | None:
     """
@@ -70,7 +74,23 @@ def not_seen(found: Search) -> tuple[str, ...]:
         if size.max(initial=0.0) < 1.0:
             hidden.setdefault(effect.name.replace('_', ' '), []).append(str(effect.site))
     listed = [f'{name} of {", ".join(sites)}' for name, sites in hidden.items()]
-    return ('where the base stands', *listed)
+    return (*_base_hidden(found), *listed)
+
+
+def _base_hidden(found: Search) -> tuple[str, ...]:
+    """Return what of the base no contact shows: all of it unless places are known."""
+    problem, model = found.problem, found.final.model
+    if not problem.placed:
+        return ('where the base stands',) if problem.untracked else ()
+    rows = [
+        problem.seen(k, np.stack([maker.column(('base', j)) for j in range(6)]))
+        for k, maker in enumerate(problem.features(model))
+    ]
+    size = np.linalg.norm(problem.whitened(rows, found.scale), axis=1)
+    shown = size * np.repeat(BASE, 3) >= 1.0
+    words = [f'the base along {axis}' for axis in 'xyz']
+    words += [f'a turn of the base about {axis}' for axis in 'xyz']
+    return tuple(text for text, seen in zip(words, shown, strict=True) if not seen)
 
 
 def _of(problem: Problem, model: Model) -> tuple[dict[str, Array], list[Length]]:
@@ -78,7 +98,8 @@ def _of(problem: Problem, model: Model) -> tuple[dict[str, Array], list[Length]]
     away: dict[str, Array] = {}
     known: list[Length] = []
     for k, recording in enumerate(problem.recordings):
-        assert recording.contacts is not None
+        if recording.contacts is None:
+            continue
         points = model.twin(k).poses(recording, recording.joints.t).position
         away |= spreads(recording.contacts, points)
         known += lengths(recording.contacts, points)
@@ -93,12 +114,13 @@ def _held_out(unseen: Unseen) -> dict[str, Array]:
         unseen.problem.recordings, parts, unseen.scale.weights, strict=True
     ):
         contacts = recording.contacts
-        assert contacts is not None
+        if contacts is None:
+            continue
         rows = part * unseen.scale.position / np.sqrt(weight)[:, None]
         for label in dict.fromkeys(contacts.labels):
             index = contacts.of(label)
             own = rows[index]
-            if own.shape[1] == 3:
+            if own.shape[1] == 3 and not contacts.artefact.named(label).known:
                 own = own - own.mean(axis=0)
             out[label] = np.linalg.norm(own, axis=1)
     return out

@@ -145,7 +145,8 @@ def _geometry(robot: Robot) -> tuple[Effect, ...]:
 def _candidates(problem: Problem, robot: Robot, families: Sequence[str]) -> tuple[Change, ...]:
     """Return everything that may differ, at zero; frames fitted per recording differ anyway."""
     out = []
-    for k in range(1, len(problem.recordings)):
+    given = problem.given or range(len(problem.recordings))
+    for k in range(1, 1 + max(given)):
         for name in families:
             kind = REGISTRY[name]
             if 'base' in problem.align and kind.fitted_with == 'base':
@@ -199,8 +200,7 @@ def _chosen(
 def _places(problem: Problem, model: Model) -> list[Array]:
     """Return the columns of every change."""
     sizes = [change.effect.coordinates().size for change in model.changes]
-    frames = 6 * (('base' in problem.align) * len(problem.recordings) + ('tool' in problem.align))
-    ends = frames + np.cumsum(np.array([0, *sizes], dtype=int))
+    ends = problem.frame_count + np.cumsum(np.array([0, *sizes], dtype=int))
     return [np.arange(a, b) for a, b in pairwise(ends)]
 
 
@@ -282,20 +282,22 @@ def told(
     ]
     for kind in (REGISTRY[name] for name in families):
         if kind.fitted_with == 'base' and 'base' in problem.align:
-            out += _bases(kind, model, covariance)
+            out += _bases(kind, problem, model, covariance)
     found = sorted(out, key=lambda each: each.change.recording)
     return tuple(each for each in found if each.sure)
 
 
-def _bases(kind: type[Effect], model: Model, covariance: Array) -> list[Told]:
+def _bases(kind: type[Effect], problem: Problem, model: Model, covariance: Array) -> list[Told]:
     """Return how every base differs from the first."""
     out = []
-    for k in range(1, len(model.bases)):
-        step = frame_offset(model.bases[k], model.bases[0], left=True)
+    first, *others = (group[0] for group in problem.stands)
+    for i, k in enumerate(others, 1):
+        step = frame_offset(model.bases[k], model.bases[first], left=True)
         mix = np.zeros((6, covariance.shape[0]))
-        mix[:, :6], mix[:, 6 * k : 6 * k + 6] = -np.eye(6), np.eye(6)
+        mix[:, :6], mix[:, 6 * i : 6 * i + 6] = -np.eye(6), np.eye(6)
         effect = kind().with_coordinates(step)
-        out.append(Told(Change(k, effect), mix @ covariance @ mix.T))
+        own = problem.given[k] if problem.given else k
+        out.append(Told(Change(own, effect), mix @ covariance @ mix.T))
     return out
 
 

@@ -107,7 +107,7 @@ def _off(problem: Problem, model: Model, given: Robot) -> tuple[Array, Array]:
     sizes = np.repeat(1.0 / np.array(VISIBLE), 3)
     off, weight = [np.zeros(0)], [np.zeros(0)]
     if 'base' in problem.align:
-        for base in model.bases:
+        for base in (model.bases[group[0]] for group in problem.stands):
             away = frame_offset(base, given.T_world_base, left=True)
             near = np.linalg.norm(away[:3]) < NEAR[0] and np.linalg.norm(away[3:]) < NEAR[1]
             off.append(away)

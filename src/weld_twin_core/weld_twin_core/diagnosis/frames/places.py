@@ -4,7 +4,8 @@
 Contacts as a problem: one recording per place, the tool point to start from.
 
 A place is whatever hangs together by known lengths: one socket, two sockets on a plate, a block.
-Where it is, is not known, so no contact shows where the base is.
+Where it is not known where it is, no contact shows where the base is. What an instrument measured
+may stand beside; each recording of it stays as it is.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ...errors import DataError
 from ...recording import Measurements, Recording
-from ..algebra.problem import Anchor, Model, Problem
+from ..algebra.problem import Anchor, Model, Problem, usable
+from .alignment import initial_frames
 
 NEAR = 0.02
 """Median distance [m] of the tool point from its contacts from which a fit finds its own way."""
@@ -39,7 +41,11 @@ FEWEST = 2
 
 
 def posed(
-    recordings: Sequence[Recording], robot: Robot, align: frozenset[str], known: Sequence[Effect]
+    recordings: Sequence[Recording],
+    robot: Robot,
+    align: frozenset[str],
+    known: Sequence[Effect],
+    given: Sequence[int] = (),
 ) -> tuple[Problem, Model]:
     """
     Return contacts as a problem, and the model that a search starts from.
@@ -47,44 +53,83 @@ def posed(
     Parameters
     ----------
     recordings : sequence of Recording
-        With contacts, all of them.
+        With contacts; what an instrument measured comes first in the problem.
     robot : Robot
         The nominal model.
     align : frozenset of str
-        'tool' where the tool point is not known; 'base' says nothing here.
+        'tool' where the tool point is not known; 'base' where it is not known where the base stands,
+        which says nothing where all places are unknown too.
     known : sequence of Effect
         Put into the twin first.
+    given : sequence of int
+        Of which of the recordings given each is a part; each by itself when left out.
 
     Raises
     ------
     DataError
-        Some recordings are contacts and others are not, or contacts are too few.
+        Contacts are too few, or a recording holds neither contacts nor measurements.
 
     """
-    each = [part for recording in recordings for part in by_place(recording)]
-    bases = tuple(robot.T_world_base for _ in each)
-    model = Model(robot, bases, tuple(known))
-    if 'tool' in align:
-        model = replace(model, robot=robot.with_frames(tool=_tool(each, model)))
-    filled = [_filled(recording, model, k) for k, recording in enumerate(each)]
-    anchor = Anchor(bases, model.robot.T_flange_tool)
-    problem = Problem(tuple(filled), align & {'tool'}, anchor)
-    return problem.touching(model), model
+    pairs = list(zip(given or range(len(recordings)), recordings, strict=True))
+    tracked = [(k, usable(r)) for k, r in pairs if r.contacts is None]
+    touched = [(k, part) for k, r in pairs if r.contacts is not None for part in by_place(r)]
+    parts = tuple(k for k, _ in (*tracked, *touched))
+    model = _started([r for _, r in tracked], [r for _, r in touched], robot, align, known)
+    model = replace(model, given=parts)
+    filled = [_filled(r, model, k) for k, (_, r) in enumerate(touched, len(tracked))]
+    anchor = Anchor(model.bases, model.robot.T_flange_tool)
+    every = (*(r for _, r in tracked), *filled)
+    problem = Problem(every, align, anchor, given=parts).touching(model)
+    if problem.untracked and not problem.placed:
+        problem = replace(problem, align=align & {'tool'})
+    return problem, model
+
+
+def _started(
+    tracked: list[Recording],
+    touched: list[Recording],
+    robot: Robot,
+    align: frozenset[str],
+    known: Sequence[Effect],
+) -> Model:
+    """Return the model with frames to start from: an instrument tells them better than contacts."""
+    model = Model(robot, tuple(robot.T_world_base for _ in tracked), tuple(known))
+    if tracked:
+        model = initial_frames(Problem(tuple(tracked), align), model)
+    bases = (*model.bases, *(robot.T_world_base for _ in touched))
+    model = replace(model, bases=bases)
+    if 'tool' in align and not tracked:
+        model = replace(model, robot=model.robot.with_frames(tool=_tool(touched, model)))
+    return model
+
+
+def tracked_part(problem: Problem, model: Model) -> tuple[Problem, Model]:
+    """Return what an instrument measured, without the contacts beside it."""
+    kept = [k for k in range(len(problem.recordings)) if problem.contact(k) is None]
+    given = tuple(problem.given[k] for k in kept)
+    anchor = problem.anchor
+    if anchor is not None:
+        anchor = replace(anchor, bases=tuple(anchor.bases[k] for k in kept))
+    recordings = tuple(problem.recordings[k] for k in kept)
+    part = replace(
+        problem, recordings=recordings, anchor=anchor, touched=(), given=given, loose=()
+    )
+    return part, replace(model, bases=tuple(model.bases[k] for k in kept), given=given)
 
 
 def not_told(problem: Problem) -> tuple[str, ...]:
     """
     Return the kinds of effect that no contact tells of; none where an instrument measured.
 
-    A place may be anywhere, so nothing that moves all of the cell shows; a contact has no approach
-    and no time that counts; there is no instrument.
+    A place may be anywhere unless it is known, so nothing that moves all of the cell shows; a
+    contact has no approach and no time that counts; there is no instrument.
     """
-    if not problem.touched:
+    if not problem.untracked:
         return ()
     return tuple(
         name
         for name, kind in REGISTRY.items()
-        if kind.fitted_with == 'base' or kind.depends_on in NO_CONTACT
+        if (kind.fitted_with == 'base' and not problem.placed) or kind.depends_on in NO_CONTACT
     )
 
 
@@ -100,11 +145,9 @@ def by_place(recording: Recording) -> list[Recording]:
     """
     contacts = recording.contacts
     if contacts is None:
-        raise DataError(
-            f'{recording.name} holds no contacts and other recordings do; diagnose them apart'
-        )
+        raise DataError(f'{recording.name} holds no contacts')
     for label in dict.fromkeys(contacts.labels):
-        if contacts.of(label).size < FEWEST:
+        if contacts.of(label).size < FEWEST and not contacts.artefact.named(label).known:
             raise DataError(
                 f'contact {label!r} of {recording.name} has {contacts.of(label).size} postures; '
                 f'touch it in at least {FEWEST}'

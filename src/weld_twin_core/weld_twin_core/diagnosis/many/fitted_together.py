@@ -66,10 +66,10 @@ def fitted_together(
     # First without curves: what a handful of stations bears is the geometry under load.
     curves = tuple(name for name, kind in REGISTRY.items() if kind.bends)
     steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
-    if found.problem.touched:
+    if found.problem.untracked:
         steps = [_but_scales(step) for step in steps]
         # What carries over to another place only a place left out can tell; two are too few.
-        steps = steps[:1] if len(found.problem.touched) < PLACES else steps
+        steps = steps[:1] if found.problem.places < PLACES else steps
     best, left, dropped = found, np.inf, tuple[str, ...]()
     for less in steps:
         trial = _together(found, (*exclude, *less), beliefs, progress)
@@ -82,7 +82,7 @@ def fitted_together(
     if not better:
         many = _crowd(found) > beliefs.crowd or _many(best, beliefs)
         better = left < CHOSEN * few and many
-    if better and len(found.problem.touched) == PLACES - 1:
+    if better and found.problem.untracked and found.problem.places == PLACES - 1:
         return _carrying(found, exclude, steps[0], beliefs, progress)
     return best if better else found
 
@@ -204,7 +204,8 @@ def unseen_rms(found: Search) -> float:
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     everything = range(len(unseen.parts))
     parts = [unseen]
-    if len(found.problem.touched) < PLACES:  # else regions would have places on both sides
+    # Regions would have places of contacts on both sides.
+    if not found.problem.untracked or found.problem.places < PLACES:
         parts.append(unseen.by(posture_regions(found.problem)))
     squares = [each.rms(each.base(everything).residual) ** 2 for each in parts]
     return float(np.sqrt(np.mean(squares)))

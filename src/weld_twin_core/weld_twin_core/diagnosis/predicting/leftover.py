@@ -125,15 +125,22 @@ def leftover(
         """Return errors, moments and levers on three axes of the samples that have them."""
         wide = [k for k, index in enumerate(samples) if index.size >= axes.stop]
         unit = units[axes.start // 3] / np.sqrt(weight[wide])
+        count = axes.stop - axes.start
         return (
-            np.array([errors[k][axes] for k in wide]).reshape(-1, 3) * unit[:, None],
-            np.array([moments[k][axes, axes] for k in wide]).reshape(-1, 3, 3)
+            np.array([errors[k][axes] for k in wide]).reshape(-1, count) * unit[:, None],
+            np.array([moments[k][axes, axes] for k in wide]).reshape(-1, count, count)
             * unit[:, None, None] ** 2,
-            np.array([levers[k][axes, axes] for k in wide]).reshape(-1, 3, 3)
+            np.array([levers[k][axes, axes] for k in wide]).reshape(-1, count, count)
             * unit[:, None, None] ** 2,
         )
 
-    position, gear = _shared(*part(slice(0, 3)))
+    if all(index.size < 3 for index in samples):
+        # Faces and lengths show one way each: nothing parts what is left by axes or gears.
+        off, moment, _ = part(slice(0, 1))
+        position = float(np.sqrt(max(float((off**2).mean() - moment.mean()), 0.0)))
+        gear = 0.0
+    else:
+        position, gear = _shared(*part(slice(0, 3)))
     e, v, levered = part(slice(3, 6))
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
     turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position

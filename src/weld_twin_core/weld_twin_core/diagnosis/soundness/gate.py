@@ -20,6 +20,7 @@ from ..beliefs import Beliefs
 from ..frames.aligned import aligned
 from ..frames.alignment import refined
 from ..frames.changes import with_changes
+from ..frames.places import tracked_part
 from ..result import Check, Unsound
 from .checks import CHECKS
 from .evidence import Case, Mistake
@@ -156,9 +157,21 @@ def _looked(problem: Problem, model: Model) -> _Look:
     if problem.touched:
         touched = touches(problem, model)
         said = tuple(Check('contacts', 'warning', item.sentence) for item in touched.told)
-        return _Look(touched[:2], said, list(touched.mistakes), (), touched.told)
+        found = list(touched.mistakes)
+        if not problem.untracked:
+            checks, more = _checked_beside(touched.problem, touched.model)
+            said, found = (*said, *checks), [*found, *more]
+        return _Look(touched[:2], said, found, (), touched.told)
     checks, found, dated = _checked(problem, model)
     return _Look((problem, model), tuple(checks), found, dated)
+
+
+def _checked_beside(problem: Problem, model: Model) -> tuple[list[Check], list[Mistake]]:
+    """Return the same of an instrument's recordings beside contacts; nothing is mended there."""
+    part = tracked_part(problem, model)
+    checks, found, dated = _checked(*part)
+    mistakes = [*found, *(_undated(slip, part[0]) for slip in dated)]
+    return checks, [mistake._replace(mend=None) for mistake in mistakes]
 
 
 def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, ...]:

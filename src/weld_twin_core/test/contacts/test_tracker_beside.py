@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A tracker on one day and a pin on another: one diagnosis of both."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.reaching import reaching
+from weld_twin_core.contacts import Artefact, Contact, Contacts
+from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.soundness.touches import touches
+
+PINS = {'low': [0.45, 0.1, 0.2], 'left': [0.1, 0.5, 0.35], 'right': [0.35, -0.35, 0.3]}
+EACH = 12
+STATIONS = 40
+TRACKER, SLACK = 2e-5, 1.5e-4
+OFFSET = 0.002
+
+
+@pytest.fixture(scope='module')
+def robot():
+    tool = np.eye(4)
+    tool[:3, 3] = [0.02, 0.03, 0.12]
+    return wt.load('ur5').with_frames(tool=tool)
+
+
+@pytest.fixture(scope='module')
+def real(robot):
+    """Return the arm with an elbow whose zero is wrong."""
+    return replace(robot, theta=robot.theta + OFFSET * (np.arange(6) == 2))
+
+
+def touched(real, seed=1):
+    """Return a recording of rough touches of three pins."""
+    rng = np.random.default_rng(seed)
+    q, labels = [], []
+    for label, place in PINS.items():
+        points = place + rng.normal(0.0, SLACK, (80, 3))
+        found, good = reaching(real, points, rng.uniform(-2.0, 2.0, (80, 6)))
+        q.append(found[good][:EACH])
+        labels += [label] * len(q[-1])
+    every = np.concatenate(q)
+    motion = wt.JointMotion(np.arange(float(len(every))), every, static=True)
+    artefact = Artefact(tuple(Contact(label) for label in PINS))
+    return wt.Recording('pins', motion, contacts=Contacts(artefact, tuple(labels)))
+
+
+def tracked(real, reflector=(0.0, 0.0, 0.0), seed=2):
+    """Return stations under a tracker that stands somewhere, its reflector off the tool point."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-1.5, 1.5, (STATIONS, 6))
+    points = forward(real, q)
+    points = points[:, :3, 3] + points[:, :3, :3] @ np.array(reflector)
+    points = points + [3.0, -1.0, 0.5] + rng.normal(0.0, TRACKER, points.shape)
+    t = np.arange(float(STATIONS))
+    return wt.Recording(
+        'tracker', wt.JointMotion(t, q, static=True), measured=wt.Measurements(t, points)
+    )
+
+
+def test_rough_touches_count_by_what_they_are_worth_beside_a_tracker(robot, real):
+    found = touches(*aligned([tracked(real), touched(real)], robot, 'base', ()))
+
+    instrument, *pins = found.problem.loose
+    assert instrument == 1.0
+    np.testing.assert_allclose(pins, SLACK / TRACKER, rtol=0.35)
+
+
+def test_pins_and_a_tracker_name_the_elbow_together_whatever_carried_the_reflector(robot, real):
+    beside = (0.0, 0.05, -0.02)
+    diagnosis = wt.diagnose(
+        [touched(real), tracked(real, beside)], robot, align='base', may_change='tool_pose'
+    )
+
+    named = [(item.effect.name, item.effect.site) for item in diagnosis.effects]
+    assert named == [('joint_offset', 'elbow_joint')]
+    assert diagnosis.effects[0].effect.offset == pytest.approx(OFFSET, abs=2e-5)
+    assert [item.label for item in diagnosis.contacts.touched] == list(PINS)
+    assert diagnosis.contacts.spread_after_m == pytest.approx(SLACK * np.sqrt(8 / np.pi), rel=0.2)
+    assert 'where the base stands' not in diagnosis.contacts.not_seen
+    base = diagnosis.model.bases[0]
+    np.testing.assert_allclose(
+        base[:3, 3] - robot.T_world_base[:3, 3], [3.0, -1.0, 0.5], atol=3e-4
+    )
+    (change,) = diagnosis.changed
+    assert (change.recording, change.effect.name) == (1, 'tool_pose')
+    np.testing.assert_allclose(change.effect.xyz, beside, atol=3e-4)
+
+
+def test_a_posture_in_the_wrong_place_is_told_beside_a_tracker_too(robot, real):
+    pins = touched(real)
+    labels = list(pins.contacts.labels)
+    labels[2] = 'left'
+    wrong = replace(pins, contacts=Contacts(pins.contacts.artefact, tuple(labels)))
+
+    found = touches(*aligned([tracked(real), wrong], robot, 'base', ()))
+
+    (told,) = found.told
+    assert told.sentence.startswith("Posture 1 of 'left' rests in 'low'")
+    assert sum(found.problem.samples) == STATIONS + 3 * EACH - 1

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is believed so far: the robot with its frames and effects, and the noise of a residual."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arm.rotation import rotation_matrix
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...twin.twin import Twin
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """
+    Noise that residuals are measured in: position [m], orientation [rad], weight per sample.
+
+    ``weights`` holds one array (M,) per recording, 1 for a good sample, less for an outlier.
+    """
+
+    position: float
+    orientation: float
+    weights: tuple[Array, ...]
+
+
+class Change(NamedTuple):
+    """
+    What one recording has that the first has not, counted from the first.
+
+    Attributes
+    ----------
+    recording : int
+        Counted from 0; never 0.
+    effect : Effect
+
+    """
+
+    recording: int
+    effect: Effect
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """
+    What is believed: the robot with its tool frame, a base frame per recording, and effects.
+
+    Attributes
+    ----------
+    robot : Robot
+    bases : tuple of array, shape (4, 4)
+    known, found : tuple of Effect
+        Effects given by the user, and those this diagnosis put in.
+    mended : tuple of str
+        What was wrong with the data it stands on, and was undone.
+    changes : tuple of Change
+        What differs between the recordings.
+    given : tuple of int
+        Of which of the recordings given each is a part; see `Problem`.
+
+    """
+
+    robot: Robot
+    bases: tuple[Array, ...]
+    known: tuple[Effect, ...] = ()
+    found: tuple[Effect, ...] = ()
+    mended: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
+    given: tuple[int, ...] = ()
+
+    def twin(self, k: int) -> Twin:
+        """Return the twin of recording k."""
+        effects = self.known + self.found + self.changed(k)
+        return Twin(self.robot.with_frames(base=self.bases[k]), effects)
+
+    def changed(self, k: int) -> tuple[Effect, ...]:
+        """Return what recording k has that the first has not."""
+        own = self.given[k] if self.given else k
+        return tuple(change.effect for change in self.changes if change.recording == own)
+
+    def moved(self, k: int, step: Array) -> Model:
+        """Return the model with the base of recording k moved by (xyz, rotvec)."""
+        bases = list(self.bases)
+        bases[k] = _moved(bases[k], step, left=True)
+        return replace(self, bases=tuple(bases))
+
+    def retooled(self, step: Array) -> Model:
+        """Return the model with the tool moved by (xyz, rotvec)."""
+        tool = _moved(self.robot.T_flange_tool, step, left=False)
+        return replace(self, robot=self.robot.with_frames(tool=tool))
+
+    def without(self, k: int) -> Model:
+        """Return the model without found effect k."""
+        return self.with_found(self.found[:k] + self.found[k + 1 :])
+
+    def with_found(self, found: tuple[Effect, ...]) -> Model:
+        """Return the model with other found effects."""
+        return replace(self, found=found)
+
+
+def _moved(frame: Array, step: Array, *, left: bool) -> Array:
+    out = np.array(frame)
+    turn = rotation_matrix(step[3:])
+    out[:3, :3] = turn @ out[:3, :3] if left else out[:3, :3] @ turn
+    out[:3, 3] += step[:3]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """
+    Where the frames are believed to be.
+
+    Attributes
+    ----------
+    bases : tuple of array, shape (4, 4)
+    tool : array, shape (4, 4)
+
+    """
+
+    bases: tuple[Array, ...]
+    tool: Array

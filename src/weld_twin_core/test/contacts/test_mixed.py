@@ -41,6 +41,13 @@ def targets(rng):
     yield 'bar', np.array([0.1, 0.5, 0.2]) + ways, 25
 
 
+def pinned(postures):
+    """Return exact touches of a pin."""
+    motion = wt.JointMotion(np.arange(float(len(postures))), postures, static=True)
+    contacts = Contacts(Artefact((Contact('other'),)), ('other',) * len(postures))
+    return wt.Recording('elsewhere', motion, contacts=contacts)
+
+
 def test_kinds_of_contact_together_name_the_elbow():
     rng, tool = np.random.default_rng(1), np.eye(4)
     tool[:3, 3] = [0.02, 0.03, 0.12]
@@ -56,8 +63,11 @@ def test_kinds_of_contact_together_name_the_elbow():
     postures = np.concatenate(q)
     motion = wt.JointMotion(np.arange(float(len(postures))), postures, static=True)
     touched = Contacts(BLOCK, tuple(labels), np.array(values))
+    other = reached(real, np.tile([-0.2, 0.45, 0.3], (60, 1)), rng, 12)
 
-    diagnosis = wt.diagnose(wt.Recording('block', motion, contacts=touched), robot)
+    diagnosis = wt.diagnose(
+        wt.Recording('block', motion, contacts=touched), robot, holdout=[pinned(other)]
+    )
 
     (named,) = diagnosis.effects
     assert (named.effect.name, named.effect.site) == ('joint_offset', 'elbow_joint')
@@ -65,3 +75,7 @@ def test_kinds_of_contact_together_name_the_elbow():
     assert diagnosis.contacts.held_out_spread_m < 0.1 * diagnosis.contacts.spread_before_m
     (square,) = diagnosis.contacts.lengths
     assert abs(square.after - np.pi / 2) < abs(square.before - np.pi / 2)
+    # Judged on another pin, which took no part: exact touches of it hardly scatter any more.
+    assert diagnosis.shrink.held_out == 'elsewhere'
+    assert diagnosis.shrink.rms_before_m > 3e-4
+    assert diagnosis.shrink.ratio < 0.1

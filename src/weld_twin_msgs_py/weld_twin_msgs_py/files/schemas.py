@@ -172,12 +172,24 @@ def _seam() -> Schema:
 
 def _artefact() -> Schema:
     named = {'enum': list(CONTACTS)}
-    contact = _object({'kind': named, 'radius': _said(NUMBER, 'of a sphere [m]')})
+    above: Schema = {'type': 'number', 'exclusiveMinimum': 0}
+    place = {'at': _vector(3, 'where it is known to be [m]'), 'sigma': _said(above, '[m]')}
+    contact = _object(
+        {'kind': named, 'radius': _said(NUMBER, 'of a sphere [m]')}
+        | place
+        | {'axis': _vector(3, 'normal or direction where it is known')}
+    )
+    block = _object(
+        {'size': _vector(3, 'along its x, y and z [m]'), 'square': _said(above, '[rad]')}
+        | place
+        | {'turn': _vector(3, 'rotation vector [rad] where it is known')},
+        ('size',),
+    )
     tie = _object(
         {
             'between': {'type': 'array', 'items': TEXT, 'minItems': 2, 'maxItems': 2},
-            'value': {'type': 'number', 'exclusiveMinimum': 0},
-            'sigma': {'type': 'number', 'exclusiveMinimum': 0},
+            'value': {'type': 'number', 'minimum': 0},
+            'sigma': above,
         },
         ('between', 'value'),
     )
@@ -186,8 +198,12 @@ def _artefact() -> Schema:
     return _object(
         {
             'contacts': _said(each, 'what every label of a table of touches is'),
-            'distances': _said(ties, 'known distances [m]'),
-            'angles': _said(ties, 'known angles between planes [rad]'),
+            'blocks': _said(
+                {'type': 'object', 'additionalProperties': block},
+                'blocks, whose faces are contacts called LABEL +x to LABEL -z',
+            ),
+            'distances': _said(ties, 'known distances [m] of points, centres, parallel planes'),
+            'angles': _said(ties, 'known angles between planes [rad], 0 of parallel ones'),
         }
     )
 

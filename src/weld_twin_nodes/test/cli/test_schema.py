@@ -90,6 +90,11 @@ GOOD = [
     ('seam', {'kind': 'circle', 'centre': PLACE, 'radius': 0.1, 'turns': 1.0}),
     ('seam', {'kind': 'points', 'points': [PLACE, [0.4, 0.1, 0.2], [0.5, 0.1, 0.2]]}),
     ('artefact', {'contacts': {'a': 'point', 'b': {'kind': 'point'}}, 'distances': [TIE]}),
+    ('artefact', {'contacts': {'a': {'kind': 'plane', 'at': PLACE, 'axis': [0.0, 0.0, 1.0]}}}),
+    (
+        'artefact',
+        {'blocks': {'b': {'size': [1, 1, 1], 'at': PLACE, 'turn': PLACE, 'sigma': 1}}},
+    ),
 ]
 BAD = [
     ('robot', {'name': 'no joints'}),
@@ -106,6 +111,7 @@ BAD = [
     ('seam', LINE | {'kind': 'knot'}),
     ('artefact', {'contacts': {'a': 'cone'}}),
     ('artefact', {'lengths': []}),
+    ('artefact', {'blocks': {'b': {'at': PLACE}}}),
 ]
 
 

@@ -38,7 +38,9 @@ def refuse_reused(recordings: Sequence[Recording], holdout: Sequence[Recording])
     """
     for held in holdout:
         for recording in recordings:
-            first, second = measured(recording).position, measured(held).position
+            if (recording.contacts is None) != (held.contacts is None):
+                continue
+            first, second = _shown(recording), _shown(held)
             same = _common(first, second)
             if same > REUSED * len(second):
                 raise DataError(
@@ -46,6 +48,13 @@ def refuse_reused(recordings: Sequence[Recording], holdout: Sequence[Recording])
                     f'measurements in common with {recording.name}, which is fitted; hold out a '
                     'recording of its own'
                 )
+
+
+def _shown(recording: Recording) -> Array:
+    """Return what a recording shows: positions, or the postures of contacts."""
+    if recording.contacts is not None:
+        return recording.joints.q
+    return measured(recording).position
 
 
 def repeats(case: Case) -> Sequence[Finding]:

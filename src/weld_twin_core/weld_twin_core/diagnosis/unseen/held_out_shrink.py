@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from ...recording import Recording
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import Beliefs
+from ..frames.places import posed
 from ..hypotheses.search import Search
 from ..result import Shrink
 from .regions import posture_regions
@@ -155,6 +157,12 @@ def _on_bags(
     after: list[Array] = []
     labels: list[Array] = []
     for recording in holdout:
+        if recording.contacts is not None:
+            for first, last in _on_contacts(found, recording):
+                before.append(first)
+                after.append(last)
+                labels.append(np.full(first.size, 8 * len(labels)))
+            continue
         problem = Problem((usable(recording),), frozenset({'base'}) & found.problem.align)
         pair, good = [], np.ones(problem.samples[0], dtype=bool)
         for model in (found.baseline.model, found.final.model):
@@ -170,6 +178,21 @@ def _on_bags(
         stretch = np.arange(good.sum()) * 8 // max(int(good.sum()), 1)
         labels.append(stretch + 8 * len(labels))
     return np.concatenate(before), np.concatenate(after), np.concatenate(labels)
+
+
+def _on_contacts(found: Search, recording: Recording) -> list[tuple[Array, Array]]:
+    """Return squared errors before and after at every place of held-out contacts."""
+    model = found.final.model
+    problem, start = posed((recording,), model.robot, frozenset(), model.known)
+    own = [k for k, r in enumerate(found.problem.recordings) if r.contacts is not None]
+    sizes = []
+    for fitted in (found.baseline.model, model):
+        base = fitted.bases[own[0] if own else 0]
+        same = replace(
+            start, robot=fitted.robot, bases=(base,) * len(start.bases), found=fitted.found
+        )
+        sizes.append([(part**2).sum(axis=0) for part in problem.residuals(same)])
+    return list(zip(*sizes, strict=True))
 
 
 def _for_bag(

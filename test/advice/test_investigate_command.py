@@ -3,6 +3,7 @@
 """An investigation goes on from files: what it asked for is recorded, taken in, and judged."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import yaml
@@ -15,9 +16,10 @@ SPRING = wt.effects.JointCompliance('shoulder_lift_joint', compliance=1.2e-5)
 BOX = '-1.2,-1.2,-0.2,1.2,1.2,1.6'
 
 
-def measured(robot, place, q, seed):
+def measured(robot, place, q, seed, load=0.0):
+    arm = replace(robot, payload_mass=load)
     motion = wt.JointMotion(15.0 * np.arange(len(q)), np.asarray(q), static=True)
-    real = wt.Twin(robot, [SPRING]).poses(wt.Recording(place.name, motion))
+    real = wt.Twin(arm, [SPRING]).poses(wt.Recording(place.name, motion))
     noise = np.random.default_rng(seed).normal(0.0, 4e-5, real.position.shape)
     seen = wt.Measurements(motion.t, real.position + noise, real.rotation)
     write_recording(place, wt.Recording(place.name, motion, seen), robot)
@@ -48,3 +50,23 @@ def test_what_is_asked_for_is_taken_in_and_judged(ur5, tmp_path):
     assert state['rounds'][0]['asked']['decided'] in (True, False)
     named = {(e['effect'], e['joint']) for e in state['rounds'][1]['believed']['effects']}
     assert ('joint_compliance', 'shoulder_lift_joint') in named
+
+
+def test_a_weight_that_was_hung_for_one_recording_is_told(ur5, tmp_path):
+    rng = np.random.default_rng(1)
+    near = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + 0.4 * rng.uniform(-1, 1, (40, 6))
+    first = measured(ur5, tmp_path / 'first', near[:25], 1)
+    heavy = measured(ur5, tmp_path / 'heavy', near[25:], 2, load=5.0)
+    words = ('diagnose', first, heavy, '--robot', 'ur5', '--out', str(tmp_path / 'out'))
+    said = weld_twin(*words, '--changed', heavy, 'load=5')
+    assert said.code == 0, said.err
+    effect = json.loads((tmp_path / 'out' / 'diagnosis.json').read_text())['verdict']['effects'][0]
+    assert (effect['effect'], effect['joint']) == ('joint_compliance', 'shoulder_lift_joint')
+    assert abs(effect['parameters']['compliance'] / 1.2e-5 - 1.0) < 0.05
+    said = weld_twin(*words, '--changed', 'another', 'load=5')
+    assert said.code == 2 and "'another' is none of the recordings" in said.err
+
+
+def test_a_live_investigation_begins_with_a_recording(tmp_path):
+    said = weld_twin('investigate', str(tmp_path / 'cell'), '--live')
+    assert said.code == 2 and 'begin one with recordings' in said.err

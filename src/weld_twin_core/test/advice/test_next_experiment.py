@@ -14,6 +14,7 @@ import weld_twin_core as wt
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.clearance import free
 from weld_twin_core.diagnosis.advice import Limits, chosen_pieces, experiment, next_experiment
+from weld_twin_core.diagnosis.advice.candidates import candidates
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem, Scale
 from weld_twin_core.effects import effects_from_list
@@ -210,6 +211,24 @@ def test_the_way_from_station_to_station_is_free_too(ur5):
     ways = np.concatenate([a + share * (b - a) for a, b in pairwise(q)])
     seen = problem.recordings[0].joints.q
     assert free(ur5, ways, seen, box).all()
+
+
+def test_a_seam_that_was_recorded_may_be_run_backward_and_slower(ur5):
+    problem, model = at_hand(ur5, moving)
+    path = next(c for c in candidates(problem, model, Limits()) if c.kind == 'path')
+    seam = problem.recordings[0].joints
+    begin, end = seam.q[0], seam.at(np.array([19.9]))[0][0]
+    found = [
+        (int(np.abs(r.joints.q - end).sum(axis=1).argmin()), r.joints)
+        for r in path.recordings[-2:]
+    ]
+    for k, joints in found:
+        # Continuous, from home and back to it, within the joints' speed.
+        assert np.abs(joints.q[k] - end).max() < 0.02
+        assert np.abs(joints.q - begin).sum(axis=1).min() < 0.02
+        assert np.allclose(joints.q[0], joints.q[-1])
+        rates = np.abs(np.diff(joints.q, axis=0) / np.diff(joints.t)[:, None])
+        assert (rates <= ur5.max_velocity).all()
 
 
 def test_a_longer_experiment_says_no_less(ur5):

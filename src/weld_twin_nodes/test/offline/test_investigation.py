@@ -197,6 +197,8 @@ ELSE = {'effect': 'backlash', 'joint': 'wrist_1_joint'}
             False,
         ),
         (found('ambiguous'), found('ambiguous'), 0, False),
+        # What was knocked between two recordings is sound in each.
+        (found('unsound', confidence=None), found('unknown', groups=()), 1, False),
     ],
 )
 def test_experiments_alone_are_heard_beside_all_recordings(together, alone, believed, closed):

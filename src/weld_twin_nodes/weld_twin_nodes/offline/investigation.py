@@ -218,8 +218,14 @@ def weighed(
             return free, _closes(free)
         if _again(together, before) and (free['verdict']['confidence'] or 0.0) >= AGREED:
             return together, '' if _open_ends(together) else AGAIN
-    better = alone if naming[1] and not naming[0] else together
+    # What does not fit together, as after a knock between two recordings, may be sound by itself.
+    torn = _unsound(together) and not _unsound(alone)
+    better = alone if torn or (naming[1] and not naming[0]) else together
     return better, ''
+
+
+def _unsound(found: Mapping[str, Any]) -> bool:
+    return bool(found['verdict']['status'] == 'unsound')
 
 
 def _again(together: Mapping[str, Any], before: Mapping[str, Any] | None) -> bool:

@@ -40,6 +40,12 @@ PRESS = 50.0
 """Force [N] on the tool: a judgement; a hand can press so hard."""
 SPEEDS = (1.0, 0.5, 0.25)
 """Of paths, as shares of the fastest."""
+LONGEST = 40.0
+"""Time [s] of a recorded seam that is run again, backward or slower: half the least experiment."""
+EVERY = 0.1
+"""Time [s] between the points that a recorded seam is run again through: encoders' noise stays out."""
+SLOWER = 2.0
+"""How much slower a recorded seam is run again."""
 ANOTHER = 20.0
 """Time [min] to set up an instrument that follows the tool where so far only stations were
 measured."""
@@ -142,7 +148,7 @@ def _path(
     joints: Sequence[str],
     set_up: float,
 ) -> Candidate:
-    """Return ways from home and back: all joints at once, and those in question alone."""
+    """Return ways from home and back: all joints at once, seams, and joints in question alone."""
     motions, at = [], 0
     for k in range(PATHS):
         stops = [room.home]
@@ -153,6 +159,7 @@ def _path(
         if len(stops) > 1:
             # Back the same way: every place is passed in both directions.
             motions.append(room.travel([*stops, *stops[-2::-1]], SPEEDS[k % 3]))
+    motions += _retraced(problem, room)
     together = len(motions)
     for name in list(dict.fromkeys(joints))[:SINGLE]:
         motions += [room.travel(_alone(room, now, name), speed) for speed in SPEEDS[::2]]
@@ -168,6 +175,34 @@ def _path(
         room,
         alone=len(motions) - together,
     )
+
+
+def _retraced(problem: Problem, room: Room) -> list[JointMotion]:
+    """Return the first seam that was recorded from its end to its begin, and slower."""
+    joints = problem.recordings[0].joints
+    if joints.static:
+        return []
+    t: Array = np.arange(0.0, min(float(np.ptp(joints.t)), LONGEST), EVERY)
+    seam = joints.at(joints.t[0] + t)[0]
+    there, back = [room.home, seam[0]], [seam[-1], room.home]
+    if len(t) < 2 or not (room.way(there) and room.way(back) and room.passed(seam)):
+        return []
+    slow = SLOWER * t
+    return [
+        _joined(
+            room.travel(back[::-1], 1.0), JointMotion(t, seam[::-1]), room.travel(there[::-1], 1.0)
+        ),
+        _joined(room.travel(there, 1.0), JointMotion(slow, seam), room.travel(back, 1.0)),
+    ]
+
+
+def _joined(*motions: JointMotion) -> JointMotion:
+    """Return motions one after the other; each begins where the one before ends."""
+    t, q = motions[0].t, motions[0].q
+    for motion in motions[1:]:
+        t = np.concatenate([t, t[-1] + motion.t[1:] - motion.t[0]])
+        q = np.concatenate([q, motion.q[1:]])
+    return JointMotion(t, q)
 
 
 def _alone(room: Room, now: Model, name: str) -> list[Array]:

@@ -99,6 +99,10 @@ class Room:
         """Return which postures, shape (N, n), are free, shape (N,), bool."""
         return free(self._robot, q, self._seen, self._limits.box)
 
+    def passed(self, q: Array) -> bool:
+        """Return whether a motion that was recorded may be made again: it was free; in the box?"""
+        return self._limits.box is None or bool(self.free(q).all())
+
     def spread(self, count: int, skip: int = 0) -> Array:
         """
         Return postures that fill the range evenly, as many as are free, shape (count, n).

@@ -122,6 +122,17 @@ def test_an_unknown_cause_is_told_by_what_it_depends_on():
     )
 
 
+def test_an_effect_that_was_not_to_be_tried_is_told_where_nothing_explains_the_gap():
+    case = replace(
+        diagnoses.unknown(),
+        absent={'backlash': 'excluded by the user', 'drift': 'no time'},
+    )
+    first, _ = map(plain, verdict(case))
+    assert first == (
+        'No effect in the library (tried without backlash, as asked) explains the gap of 0.693 mm.'
+    )
+
+
 def test_reasons_are_told_in_words():
     sites = [Site('backlash', 'j1'), Site('backlash', 'j10')]
     told = in_words('backlash of j10, backlash of j1 differ by nothing', sites)

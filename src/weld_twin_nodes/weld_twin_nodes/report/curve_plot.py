@@ -43,8 +43,6 @@ def curve_figure(curve: JointCurve, covariance: Array | None) -> Html:
     """
     x = np.linspace(curve.knots[0], curve.knots[-1], _SAMPLES)
     weights = basis(curve.knots, x)
-    # A constant goes with the frames and with the joint's zero; the shape is what was found.
-    weights = weights - weights.mean(axis=1, keepdims=True)
     y = np.asarray(curve.values) @ weights
     band = np.zeros_like(y)
     if covariance is not None:

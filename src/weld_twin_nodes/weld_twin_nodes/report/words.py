@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
 
 from .quantities import both_angles, millimetres, odds, percent, turns_only
@@ -244,7 +245,7 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
             'that no effect in the library explains.'
         )
     else:
-        first = f'No effect in the library explains the gap of {size}.'
+        first = f'No effect in the library{_without(diagnosis)} explains the gap of {size}.'
     structure = diagnosis.unexplained.structure
     if not structure:
         if diagnosis.reasons and not diagnosis.unexplained.above_noise:
@@ -266,8 +267,8 @@ def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
     shrink = diagnosis.shrink
     first = (
         f'The gap of {millimetres(diagnosis.gap.rms_m)} comes mostly from '
-        f'{cause_words(cause)} ({percent(cause.share)} of it); no effect in the library explains '
-        'it.'
+        f'{cause_words(cause)} ({percent(cause.share)} of it); no effect in the library'
+        f'{_without(diagnosis)} explains it.'
     )
     second = (
         f'With its curve in the twin, {millimetres(shrink.rms_before_m)} shrinks to '
@@ -275,6 +276,12 @@ def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
         f'{millimetres(diagnosis.gap.noise_floor_m)}.'
     )
     return first, second
+
+
+def _without(diagnosis: Diagnosis) -> str:
+    """Return which effects were asked not to be tried: one of them may well explain the gap."""
+    names = [CAUSES.get(n, n) for n, why in diagnosis.absent.items() if why == EXCLUDED]
+    return f' (tried without {listed(names)}, as asked)' if names else ''
 
 
 def _none(diagnosis: Diagnosis) -> tuple[str, str]:

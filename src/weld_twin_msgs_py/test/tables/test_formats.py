@@ -102,6 +102,27 @@ def spatial_analyzer():
     return top + '\n'.join(rows) + '\n'
 
 
+def curpos(turntable=True):
+    """As R-30iA and R-30iB controllers answer for MD:CURPOS.DG, the web page's tags left in."""
+    text = ''
+    for k, q in enumerate(np.degrees(Q)):
+        text += f'<PRE>\nF Number: F999999\nDATE:     12-JUN-26 08:{k:02}\n\n'
+        text += 'CURRENT ROBOT POSITION::\nGroup #:  1\n\nCURRENT JOINT POSITION:\n'
+        text += ''.join(f'Joint   {i}: {v:9.2f}\n' for i, v in enumerate(q, 1))
+        text += '\nTool #:  1\nCURRENT WORLD POSITION:\nX:   2032.71\nCFG: N U T, 0, 0, 0\n\n'
+        if turntable:
+            text += 'CURRENT ROBOT POSITION::\nGroup #:  2\n\nCURRENT JOINT POSITION:\n'
+            text += 'Joint   1:     12.34\n</PRE>\n'
+    return text
+
+
+def leica(sign=';'):
+    """No form of Leica or FARO is known: points as a table with names, as anybody exports them."""
+    rows = [sign.join(f'{v:.4f}' for v in row) for row in 1e3 * POINT]
+    names = sign.join(['Point', 'X [mm]', 'Y [mm]', 'Z [mm]'])
+    return '\n'.join([names, *(f'P{k}{sign}{row}' for k, row in enumerate(rows, 1))]) + '\n'
+
+
 def both(tmp_path, log, seen):
     for name, text in (('log.csv', log), ('seen.csv', seen)):
         (tmp_path / name).write_text(text)
@@ -144,6 +165,21 @@ def test_points_without_stamps_are_paired_row_by_row(tmp_path, sign):
     assert recording.joints.static
     np.testing.assert_allclose(recording.measured.position, POINT, atol=1e-6)
     assert 'rows of both files are paired in their order' in said
+
+
+@pytest.mark.parametrize('sign', [';', '\t', ','])
+def test_positions_of_fanuc_and_points_of_any_tracker_are_paired(tmp_path, sign):
+    recording, said = read_two_tables(*both(tmp_path, curpos(), leica(sign)))
+    assert recording.joints.static
+    np.testing.assert_allclose(recording.joints.q, Q, atol=np.radians(0.0051))
+    np.testing.assert_allclose(recording.measured.position, POINT, atol=1e-6)
+    assert any('CURPOS.DG' in sentence for sentence in said)
+
+
+def test_positions_of_two_arms_in_one_file_are_told(tmp_path):
+    mixed = curpos(False) + curpos(False).replace('Joint   6', 'Axis')
+    with pytest.raises(DataError, match='positions of 5 and 6 joints; copy files of one arm'):
+        read_two_tables(*both(tmp_path, mixed, leica()))
 
 
 def test_a_clock_that_began_later_is_shifted(tmp_path):

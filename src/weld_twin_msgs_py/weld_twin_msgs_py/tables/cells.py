@@ -15,6 +15,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
+from .current_positions import is_positions, read_positions
 from .formats import Format, Read, read, recognised
 from .recorded_files import TRACE_MARK, is_c3d, read_c3d, read_trace
 from .words import UNITS
@@ -136,6 +137,8 @@ def read_cells(
     decoded = _decoded(path, text)
     if decoded.startswith(TRACE_MARK):
         return _as_read(path, read_trace(path, decoded))
+    if is_positions(decoded):
+        return _as_read(path, read_positions(path, decoded))
     known = None if delimiter else recognised(decoded)
     if known is not None:
         return _of_known(path, known, decoded, marker)

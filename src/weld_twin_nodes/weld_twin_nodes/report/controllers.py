@@ -56,7 +56,9 @@ _PLACES = {
     ('ur', 'tool'): 'Installation > General > TCP: change position and orientation.',
     ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',
 }
-"""Menus as they are usually called; they were not held against manuals, and releases move them."""
+"""Menus as they are usually called. docs/sheet.md tells which names were found where."""
+UNCHECKED = 'The way through the menus was not checked against a manual.'
+"""Said wherever a menu is named."""
 
 
 def brand_of(robot: str) -> str | None:
@@ -76,7 +78,10 @@ def correction(effect: Effect, brand: str | None) -> str | None:
         return f'Nothing to enter: {_MATTERS.get(effect.name, _OWN)}.'
     if brand is None:
         return None
-    return _PROGRAM if kind is None else _PLACES.get((brand, kind), _PROGRAM)
+    place = _PLACES.get((brand, str(kind)))
+    if place is None:
+        return _PROGRAM
+    return f'{place} {UNCHECKED}' if ' > ' in place else place
 
 
 _BY_PROGRAM = (

@@ -14,6 +14,7 @@ from rich.console import Console
 from weld_twin_core.diagnosis.result import Candidate, Found, Site
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_nodes.report import print_summary
+from weld_twin_nodes.report.footing import next_section
 from weld_twin_nodes.report.quantities import millimetres, odds, parameter_rows, percent, uncertain
 from weld_twin_nodes.report.words import CAUSES, cause, in_words, listed, verdict
 
@@ -131,6 +132,16 @@ def test_an_effect_that_was_not_to_be_tried_is_told_where_nothing_explains_the_g
     assert first == (
         'No effect in the library (tried without backlash, as asked) explains the gap of 0.693 mm.'
     )
+
+
+@pytest.mark.parametrize(('other', 'told'), [('base_pose', False), ('backlash', True)])
+def test_a_measurement_that_leaves_the_open_question_open_says_so(other, told):
+    case = diagnoses.ambiguous()
+    zero = {'effect': 'joint_offset', 'joint': 'joint_a1'}
+    site = {'effect': other, 'joint': None if other == 'base_pose' else 'joint_a1'}
+    wanted = {'sentence': 'Run the path.', 'between': [[zero], [site]]}
+    page = next_section(replace(case, next_experiment=wanted))
+    assert ('not made to tell whether it is zero offset of joint_a1 or base pose' in page) is told
 
 
 def test_reasons_are_told_in_words():

@@ -12,7 +12,7 @@ from weld_twin_core.diagnosis.result import Diagnosis, Site
 from weld_twin_msgs_py.files.input_files import InputFile
 
 from .html import Child, Html, joined, section, table, tag
-from .words import in_words
+from .words import in_words, listed, site_name
 
 _APART = (
     *('kind', 'motion', 'between', 'cost', 'robot_minutes', 'expected_separation_sigma'),
@@ -27,7 +27,7 @@ def next_section(diagnosis: Diagnosis) -> Html:
     """Return the measurement that would decide, or that none is needed."""
     wanted = diagnosis.next_experiment
     if wanted is not None:
-        content = _wanted(wanted, _sites(diagnosis))
+        content = joined([_wanted(wanted, _sites(diagnosis)), *_left_open(diagnosis, wanted)])
     elif diagnosis.status in ('ambiguous', 'unknown'):
         content = tag('p', 'No measurement that would decide has been found.')
     else:
@@ -57,6 +57,20 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     ]
     entries = _entries(rest)
     return joined([*lines, tag('dl', *entries, class_='pairs') if entries else None])
+
+
+def _left_open(diagnosis: Diagnosis, wanted: dict[str, Any]) -> list[Html]:
+    """Return which open questions a measurement is not made for: motion may never part them."""
+    sides = wanted.get('between') or ()
+    asked = {(site['effect'], site['joint']) for side in sides for site in side}
+    out = []
+    for group in diagnosis.indistinguishable:
+        parted = sum((site.effect, site.joint) in asked for site in group)
+        if len(group) > 1 and parted < 2:
+            names = listed([site_name(site) for site in group], 'or')
+            told = f'It is not made to tell whether it is {names}: see what to do first.'
+            out.append(tag('p', told, class_='note'))
+    return out
 
 
 def _entries(mapping: dict[str, Any]) -> list[Html]:

@@ -2,35 +2,55 @@
 # SPDX-License-Identifier: Apache-2.0
 """Intervals of shares, held against cases whose true shares follow from how they were made."""
 
-import json
+import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from weld_twin_core.diagnosis.levels.causes import covering
-from weld_twin_core.diagnosis.result import Cause
+from weld_twin_lab.belief.rows import read_rows
+from weld_twin_lab.belief.share_cover import told_and_true
+from weld_twin_nodes.cli import main
 
 CASES = Path(__file__).parents[4] / 'docs' / 'results' / 'belief' / 'cases.jsonl'
 
 
-def told_and_true():
-    """Yield interval and true share of lone causes that were named, frames known."""
-    for line in CASES.read_text(encoding='utf-8').splitlines():
-        case = json.loads(line)
-        truth = case['truth']
-        if case['error'] or case['poor'] or truth['align'] or len(truth['ratios']) != 1:
-            continue
-        # The ratio is that of the cause to the noise, as RMS of the whole deviation.
-        square = truth['ratios'][0] ** 2
-        for cause in case['verdict']['causes']:
-            if [truth['sites'][0]] == [[n['effect'], n['joint']] for n in cause['name']][:1]:
-                yield cause['share_ci90'], square / (square + 1.0)
+def row(share_ci90, ratios, gap):
+    sites = [['backlash', f'joint_{k}'] for k in range(len(ratios))]
+    name = [{'effect': 'backlash', 'joint': 'joint_0', 'probability': 0.9}]
+    return {
+        'error': '',
+        'poor': False,
+        'truth': {'align': [], 'ratios': ratios, 'sites': sites},
+        'signs': {'gap': gap},
+        'verdict': {'causes': [{'name': name, 'share_ci90': share_ci90}]},
+    }
+
+
+@pytest.mark.parametrize(
+    ('interval', 'ratios', 'held'),
+    [
+        ((0.85, 0.95), [3.0], [True]),
+        ((0.5, 0.6), [3.0], [False]),
+        ((0.4, 0.5), [3.0, 3.0], [True]),
+    ],
+)
+def test_a_share_is_the_square_of_its_cause_in_the_whole(interval, ratios, held):
+    gap = 0.5 * np.log10(sum(r**2 for r in ratios) + 1.0)
+    assert [item.held for item in told_and_true([row(interval, ratios, gap)])] == held
+
+
+def test_causes_that_overlap_have_no_shares_to_be_held():
+    assert not list(told_and_true([row((0.4, 0.5), [3.0, 3.0], np.log10(3.0))]))
 
 
 def test_ninety_per_cent_intervals_cover_the_true_share_in_85_to_95_of_100_cases():
-    held = []
-    for (low, high), true in told_and_true():
-        low, high = covering(Cause((), (), (), true, (low, high))).share_ci90
-        held.append(low <= true <= high)
-    assert len(held) > 60
+    held = [item.held for item in told_and_true(read_rows(CASES))]
+    assert len(held) > 200
     assert 0.85 <= np.mean(held) <= 0.95
+
+
+def test_the_command_prints_the_table(capsys):
+    assert main(['lab', 'shares', str(CASES)]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r'\| all \| \d+ \| \d+ % \|', told) and '| 1 |' in told

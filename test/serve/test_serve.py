@@ -87,17 +87,36 @@ def until(page, selector, seconds=60):
     return page.locator(selector)
 
 
+def drop_in(page, files, at):
+    page.set_input_files('#files', files)
+    page.get_by_text('Table units, and history').click()
+    page.fill('#cell', 'line <3>')
+    page.fill('#at', at)
+    page.get_by_role('button', name='Diagnose').click()
+
+
+def the_history_grows(page, server):
+    """One diagnosis is no history yet; with the next one there are control charts."""
+    page.goto(server.root + '/history')
+    page.get_by_role('link', name='line <3>').first.click()
+    assert 'One diagnosis so far' in page.locator('h1').inner_text()
+    page.get_by_role('link', name='New recording').click()
+    page.select_option('#robot', 'ur5')
+    drop_in(page, [name for name in bag_files() if name.endswith('.mcap')], '2026-03-09')
+    until(page, 'iframe')
+    page.goto(server.root + '/history')
+    page.get_by_role('link', name='line <3>').first.click()
+    until(page, '.chart canvas')
+    assert page.locator('.chart canvas').count() == 2
+
+
 def test_from_drop_to_sheet_and_into_a_history_of_ones_own(server, chromium):
     mine, other = chromium.new_context(), chromium.new_context()
     page = mine.new_page()
     console = []
     page.on('console', lambda message: console.append(message.text))
     page.goto(server.address)
-    page.set_input_files('#files', bag_files())
-    page.get_by_text('Table units, and history').click()
-    page.fill('#cell', 'line <3>')
-    page.fill('#at', '2026-03-02')
-    page.get_by_role('button', name='Diagnose').click()
+    drop_in(page, bag_files(), '2026-03-02')
     # The robot was forgotten: it is asked for, and the recording need not come again.
     assert 'Which robot is it?' in until(page, '#refused').inner_text()
     page.select_option('#robot', 'ur5')
@@ -110,21 +129,7 @@ def test_from_drop_to_sheet_and_into_a_history_of_ones_own(server, chromium):
     with page.expect_download() as fetched:
         page.get_by_text('the diagnosis as data').click()
     assert '"status": "identified"' in fetched.value.path().read_text()
-    page.goto(server.root + '/history')
-    page.get_by_role('link', name='line <3>').first.click()
-    assert 'One diagnosis so far' in page.locator('h1').inner_text()
-    page.get_by_role('link', name='New recording').click()
-    page.set_input_files('#files', next(name for name in bag_files() if name.endswith('.mcap')))
-    page.select_option('#robot', 'ur5')
-    page.get_by_text('Table units, and history').click()
-    page.fill('#cell', 'line <3>')
-    page.fill('#at', '2026-03-09')
-    page.get_by_role('button', name='Diagnose').click()
-    until(page, 'iframe')
-    page.goto(server.root + '/history')
-    page.get_by_role('link', name='line <3>').first.click()
-    until(page, '.chart canvas')
-    assert page.locator('.chart canvas').count() == 2
+    the_history_grows(page, server)
     page.goto(server.root + '/recordings')
     assert page.locator('#mine tbody tr').count() == 2
     # Nobody else sees any of it, with its address either.

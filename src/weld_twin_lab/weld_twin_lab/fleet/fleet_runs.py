@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ Rows = dict[str, tuple[Any, ...]]
 """What a database holds of every run, by its key."""
 COMPARED = ('cell', 'recording', 'state', 'sentence')
 KILLED = (0.5, 6.0)
-"""Seconds from the start of a run, or from its first new row, to its kill; drawn between these."""
+"""Seconds from the start of a run to its kill, drawn between these: a program starts within two."""
 PATIENCE = 3600.0
 """Seconds after which a run that is not killed is taken to hang."""
 
@@ -99,44 +99,95 @@ def cluster(workers: int) -> Iterator[str]:
         yield str(made.scheduler_address)
 
 
-def kills(listed: Path, database: str, times: int, seed: int) -> dict[str, Any]:
+def kills(listed: Path, place: Path, times: int, seed: int) -> dict[str, Any]:
     """
-    Kill a run again and again, then let it end; return what was lost or written twice.
+    Kill runs of a list until so many were killed; return what was lost or written twice.
+
+    A list that is done before begins anew with an empty database.
 
     Parameters
     ----------
     listed : Path
-    database : str
+    place : Path
+        Directory of the databases.
     times : int
-        Kills; fewer where the list is done before.
+        Kills.
     seed : int
 
     """
     rng = np.random.default_rng(seed)
+    whole = place / 'whole.db'
+    timed(listed, _fresh(whole), '--workers', '2')
+    expected = rows(str(whole))
+    moments: list[float] = []
+    lost = differing = lists = 0
+    while len(moments) < times:
+        found = _killed(listed, _fresh(place / 'killed.db'), rng, times - len(moments))
+        lists += 1
+        moments += found.moments
+        lost += found.lost
+        differing += same(rows(str(place / 'killed.db')), expected)
+    return {
+        'kills': len(moments),
+        'lists': lists,
+        'rows': len(expected),
+        'lost_or_rewritten': lost,
+        'differing_rows': differing,
+        'moments_s': moments,
+    }
+
+
+class Killed(NamedTuple):
+    """A list that was done in spite of kills: their moments, and rows lost or rewritten."""
+
+    moments: list[float]
+    lost: int
+
+
+def _killed(listed: Path, database: str, rng: np.random.Generator, most: int) -> Killed:
+    """Run a list to its end, and kill the run at most so often."""
     before: Rows = {}
-    killed = lost = 0
-    moments = []
-    while killed < times:
+    moments: list[float] = []
+    lost = 0
+    while len(moments) < most:
+        wait = float(rng.uniform(*KILLED))
         with subprocess.Popen(
             command(listed, database, '--workers', '2'),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         ) as process:
-            wait = float(rng.uniform(*KILLED))
             try:
                 process.wait(timeout=wait)
                 break  # it was faster
             except subprocess.TimeoutExpired:
                 process.kill()
-        killed += 1
         moments.append(wait)
         after = rows(database, with_cost=True) if Path(database).exists() else {}
         lost += sum(after.get(key) != row for key, row in before.items())
         before = after
     timed(listed, database, '--workers', '2')
     final = rows(database, with_cost=True)
-    lost += sum(final.get(key) != row for key, row in before.items())
-    return {'kills': killed, 'lost_or_rewritten': lost, 'rows': len(final), 'moments_s': moments}
+    return Killed(moments, lost + sum(final.get(key) != row for key, row in before.items()))
+
+
+def _fresh(file: Path) -> str:
+    """Return the name of a database that is not there yet."""
+    for name in (file, file.with_name(f'{file.name}-wal'), file.with_name(f'{file.name}-shm')):
+        name.unlink(missing_ok=True)
+    return str(file)
+
+
+def costs(url: str) -> tuple[float, float, float]:
+    """Return medians of what the first and the last third took [s], and the most memory [MB]."""
+    database = Database(url)
+    runs = database.table('runs')
+    query = database.sql.select(runs.c.seconds, runs.c.memory).order_by(runs.c.id)
+    with database.transaction() as connection:
+        found = np.array(connection.execute(query).all(), float).reshape(-1, 2)
+    database.close()
+    third = max(len(found) // 3, 1)
+    first, last = (float(np.median(part)) for part in (found[:third, 0], found[-third:, 0]))
+    return first, last, float(found[:, 1].max()) / 1e6
 
 
 def same(one: Rows, other: Rows) -> int:

@@ -17,6 +17,8 @@ from .yearly_cell import ROBOTS
 
 SPAN = 20.0
 """Length of a recording [s]: fifty stations."""
+MINUTE = 60.0
+"""Length [s] of what users drop."""
 PLAY = (2e-4, 1e-3)
 """Width [rad] of the play of one joint."""
 
@@ -44,12 +46,21 @@ def make_list(place: Path, count: int, seed: int = 1) -> Path:
     return file
 
 
-def _make(bag: Path, robot: Path, number: int, seed: int) -> None:
+def make_one(place: Path, seed: int = 2) -> tuple[Path, Path]:
+    """Write a recording of a minute in motion; return its bag and its robot's file."""
+    bag, robot = place / 'one_minute', place / 'robot.yaml'
+    _make(bag, robot, 0, seed, 'seams', MINUTE)
+    return bag, robot
+
+
+def _make(
+    bag: Path, robot: Path, number: int, seed: int, kind: str = 'stations', span: float = SPAN
+) -> None:
     rng = np.random.default_rng([seed, number])
-    cell = draw_cell(ROBOTS[number % len(ROBOTS)], 'stations', (), rng)
+    cell = draw_cell(ROBOTS[number % len(ROBOTS)], kind, (), rng)
     cell = replace(cell, warming=False, loaded=False, known=())
     joint = cell.robot.joint_names[int(rng.integers(1, 3))]
     play = {'effect': 'backlash', 'joint': joint, 'width': float(rng.uniform(*PLAY))}
-    taken = take(cell, 'stations', SPAN, rng)
+    taken = take(cell, kind, span, rng)
     write_robot_yaml(robot, cell.robot)
     write_recording(bag, as_recording(bag.name, record(cell, [play], taken)), cell.robot)

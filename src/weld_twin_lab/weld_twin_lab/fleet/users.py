@@ -8,7 +8,6 @@ import re
 import secrets
 import subprocess
 import sys
-import threading
 import time
 import urllib.error
 import urllib.request
@@ -16,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from http.cookiejar import CookieJar
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from weld_twin_core.errors import DataError
 
@@ -54,8 +53,20 @@ def server(place: Path, *words: str) -> Iterator[str]:
             process.terminate()
 
 
+class Person(Protocol):
+    """Somebody who drops recordings and looks at pages."""
+
+    def drop(self, files: Sequence[Path], **fields: str) -> tuple[int, str, str]:
+        """Drop a recording; return status, address and text of what comes."""
+        ...
+
+    def look(self, address: str) -> str:
+        """Return the page of a recording as it is now; empty while it changes."""
+        ...
+
+
 class Visitor:
-    """Somebody with a browser of one's own."""
+    """Somebody with a plain client: it keeps cookies and follows what the server says."""
 
     def __init__(self, root: str) -> None:
         self._root = root
@@ -91,39 +102,53 @@ class Visitor:
         body += b'--%s--\r\n' % edge.encode()
         return self.page('/recordings', body, f'multipart/form-data; boundary={edge}')
 
-    def wait(self, address: str) -> tuple[float, int, str]:
-        """Return how long it takes to the sheet or a refusal, the places told, and the page."""
-        began, places = time.perf_counter(), set()
-        while time.perf_counter() - began < PATIENCE:
-            _, _, text = self.page(address)
+    def look(self, address: str) -> str:
+        """Return the page of a recording as it is now."""
+        return self.page(address)[2]
+
+
+def wait(visitor: Person, address: str) -> str:
+    """Return the page of a recording that is finished."""
+    return wait_all([(visitor, address)])[0][1]
+
+
+def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]]:
+    """
+    Return, for each visitor, the places in the queue that were told, and the page that came at last.
+
+    Raises
+    ------
+    DataError
+        A visitor waited too long.
+
+    """
+    found: list[tuple[set[int], str]] = [(set(), '') for _ in waiting]
+    left = set(range(len(waiting)))
+    until = time.perf_counter() + PATIENCE
+    while left:
+        if time.perf_counter() > until:
+            raise DataError('a visitor waited for nothing')
+        for k in sorted(left):
+            visitor, address = waiting[k]
+            text = visitor.look(address)
             told = re.search(r'Waiting: (\d+) before it', text)
             if told:
-                places.add(int(told[1]))
-            if 'http-equiv="refresh"' not in text:
-                return time.perf_counter() - began, len(places), text
-            time.sleep(ASK_EVERY)
-        raise DataError('a visitor waited for nothing')
+                found[k][0].add(int(told[1]))
+            if text and 'http-equiv="refresh"' not in text:
+                found[k] = (found[k][0], text)
+                left.remove(k)
+        time.sleep(ASK_EVERY)
+    return found
 
 
-def at_once(root: str, files: Sequence[Path], count: int, **fields: str) -> dict[str, Any]:
-    """Return how long so many users take who drop the same recording at once."""
-    found: list[tuple[float, int, bool]] = []
-
-    def one() -> None:
-        visitor = Visitor(root)
-        _, address, _ = visitor.drop(files, **fields)
-        took, places, text = visitor.wait(address)
-        found.append((took, places, '<iframe' in text))
-
-    threads = [threading.Thread(target=one) for _ in range(count)]
+def at_once(visitors: Sequence[Person], files: Sequence[Path], **fields: str) -> dict[str, Any]:
+    """Return how long users take who drop the same recording at once."""
     began = time.perf_counter()
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    waiting = [(visitor, visitor.drop(files, **fields)[1]) for visitor in visitors]
+    found = wait_all(waiting)
     return {
-        'users': count,
+        'users': len(visitors),
         'seconds': time.perf_counter() - began,
-        'sheets': sum(ok for *_, ok in found),
-        'saw_their_place': sum(places > 0 for _, places, _ in found),
+        'sheets': sum('<iframe' in text for _, text in found),
+        'saw_their_place': sum(bool(places) for places, _ in found),
     }

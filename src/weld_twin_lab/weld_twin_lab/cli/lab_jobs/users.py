@@ -2,80 +2,130 @@
 # SPDX-License-Identifier: Apache-2.0
 """Let one user, and then many at once, drop a recording on a server; and drop every malicious file.
 
-What one user waits is held against the command, what many wait against the same work done in turn.
+The recording lasts 60 s and is made by the plant, if none is given. What one user waits is held
+against the command, what many wait against the same work done in turn. The machine must be quiet.
 """
 
 from __future__ import annotations
 
 import argparse
+import html
 import json
+import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
 
-RESULT = 'users.json'
+if TYPE_CHECKING:
+    from ...fleet.users import Person
+
+RESULT, TABLE = 'users.json', 'users.md'
 MISSED = 1
 """Exit code where somebody waited too long, or a malicious file was taken."""
+LONGEST = 120
+"""Signs of a refusal in the table."""
 ONE, MANY = 1.5, 1.2
 """Times the command that one user may wait, and times the serial work that many may."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('bag', metavar='BAG', help='the recording that is dropped')
-    parser.add_argument('--robot', required=True, metavar='R', help='a bundled robot')
-    parser.add_argument('--out', required=True, metavar='DIR', help='directory for users.json')
+    parser.add_argument('bag', metavar='BAG', nargs='?', help='the recording that is dropped')
+    parser.add_argument('--robot', metavar='R', default='', help='its robot, a bundled one')
+    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
     parser.add_argument('--users', type=int, default=20, metavar='N')
+    parser.add_argument(
+        '--chromium', action='store_true', help='users have Chromium, not a plain client'
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure, write the result, print it."""
+    """Measure, write the results, print the table."""
+    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.files.whole_files import write_text
 
-    from ...fleet.users import Visitor, at_once, server
+    from ...fleet.run_pages import users_page
 
-    bag = Path(args.bag)
-    files = sorted(bag.iterdir()) if bag.is_dir() else [bag]
+    if args.bag and not args.robot:
+        raise DataError('--robot names the robot of the recording')
     with tempfile.TemporaryDirectory(prefix='users-') as place:
-        command = _command(bag, args.robot, Path(place))
-        with server(Path(place) / 'served') as root:
-            visitor = Visitor(root)
-            ones = []
-            for _ in range(3):  # the first also waits for the worker to start
-                began = time.perf_counter()
-                _, address, _ = visitor.drop(files, robot=args.robot)
-                visitor.wait(address)
-                ones.append(time.perf_counter() - began)
-            many = at_once(root, files, args.users, robot=args.robot)
-            malicious = _malicious(root, Path(place))
-    one = sorted(ones)[1]
-    result = {
+        result = _measured(args, Path(place))
+    out = Path(args.out)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / RESULT, json.dumps(result, indent=1) + '\n', overwrite=True)
+    write_text(out / TABLE, users_page(result), overwrite=True)
+    print(users_page(result))
+    fine = result['one_user_times_command'] <= ONE and result['times_serial_work'] <= MANY
+    refused = all(said.startswith('refused') for said in result['malicious'].values())
+    return 0 if fine and refused and result['sheets'] == args.users else MISSED
+
+
+def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:
+    from ...fleet.made_list import make_one
+    from ...fleet.users import at_once, server
+
+    if args.bag:
+        bag, robot, align = Path(args.bag), args.robot, ''
+        files = sorted(bag.iterdir()) if bag.is_dir() else [bag]
+    else:
+        bag, own = make_one(place)
+        files, robot, align = [*sorted(bag.iterdir()), own], str(own), 'base'
+    fields = {'robot': Path(robot).name, 'align': align}
+    command = _command(bag, robot, align, place)
+    with server(place / 'served') as root, _people(root, args.chromium) as somebody:
+        ones = [_one(somebody(), files, fields) for _ in range(3)]  # the first starts the worker
+        one = sorted(ones)[1]
+        many = at_once([somebody() for _ in range(args.users)], files, **fields)
+        malicious = _malicious(somebody, place)
+    return {
+        'options': ' --chromium' * args.chromium,
+        'recording': str(args.bag or 'a recording of 60 s, moving, made by the plant'),
+        'browser': 'a Chromium profile' if args.chromium else 'a plain client',
         'command_s': command,
-        'one_user_s': ones,
+        'one_user_s': one,
+        'one_user_all_s': ones,
         'one_user_times_command': one / command,
         **many,
         'times_serial_work': many['seconds'] / (args.users * one),
         'malicious': malicious,
     }
-    text = json.dumps(result, indent=1)
-    Path(args.out).mkdir(parents=True, exist_ok=True)
-    write_text(Path(args.out) / RESULT, text + '\n', overwrite=True)
-    print(text)
-    fine = one <= ONE * command and result['times_serial_work'] <= MANY
-    refused = all(said.startswith('refused') for said in malicious.values())
-    return 0 if fine and refused and many['sheets'] == args.users else MISSED
 
 
-def _command(bag: Path, robot: str, place: Path) -> float:
+@contextmanager
+def _people(root: str, chromium: bool) -> Iterator[Callable[[], Person]]:
+    from ...fleet.users import Visitor
+    from ...fleet.users_in_chromium import chromium_users
+
+    if not chromium:
+        yield lambda: Visitor(root)
+        return
+    with chromium_users(root) as somebody:
+        yield somebody
+
+
+def _one(visitor: Person, files: Sequence[Path], fields: dict[str, str]) -> float:
+    """Return how long one user takes from drop to sheet [s]."""
+    from ...fleet.users import wait
+
+    began = time.perf_counter()
+    _, address, _ = visitor.drop(files, **fields)
+    wait(visitor, address)
+    return time.perf_counter() - began
+
+
+def _command(bag: Path, robot: str, align: str, place: Path) -> float:
     """Return how long the command takes, the median of three [s]."""
     took = []
     for k in range(3):
         began = time.perf_counter()
         words = ['diagnose', str(bag), '--robot', robot, '--out', str(place / f'found{k}')]
+        words += ['--align', align] if align else []
         subprocess.run(
             [sys.executable, '-m', 'weld_twin_nodes', *words], check=True, capture_output=True
         )
@@ -83,10 +133,9 @@ def _command(bag: Path, robot: str, place: Path) -> float:
     return sorted(took)[1]
 
 
-def _malicious(root: str, place: Path) -> dict[str, str]:
+def _malicious(somebody: Callable[[], Person], place: Path) -> dict[str, str]:
     """Return what became of every malicious file of the campaign that the server might take."""
     from ...campaigns.fuzzing.malicious import harms
-    from ...fleet.users import Visitor
 
     out = {}
     for number, (name, (make, _)) in enumerate(harms().items()):
@@ -96,12 +145,14 @@ def _malicious(root: str, place: Path) -> dict[str, str]:
         found = sorted(made.iterdir()) if made.is_dir() else [made]
         files = [file for file in found if file.is_file()]
         # A device is no file, and no browser sends it.
-        out[name] = _dropped(Visitor(root), files) if files else 'refused by the browser'
+        out[name] = _dropped(somebody(), files) if files else 'refused by the browser'
     return out
 
 
-def _dropped(visitor: Any, files: Sequence[Path]) -> str:
+def _dropped(visitor: Person, files: Sequence[Path]) -> str:
     """Return 'refused' and why, or that it was taken."""
+    from ...fleet.users import wait
+
     own = [
         file
         for file in files
@@ -114,6 +165,12 @@ def _dropped(visitor: Any, files: Sequence[Path]) -> str:
         files = [*files, table]
     status, address, text = visitor.drop(files, robot=robot)
     if status != 200:
-        return f'refused at the door: {status}'
-    _, _, text = visitor.wait(address)
-    return 'taken' if '<iframe' in text else 'refused by the reader'
+        return f'refused at the door: {_said(text)}'
+    text = wait(visitor, address)
+    return 'taken' if '<iframe' in text else f'refused by the reader: {_said(text)}'
+
+
+def _said(text: str) -> str:
+    """Return what a page says is wrong, shortened."""
+    told = re.search(r'role="alert">(.*?)</p>', text, re.DOTALL)
+    return shorten(html.unescape(told[1]), LONGEST, placeholder=' ...') if told else ''

@@ -64,6 +64,34 @@ def test_a_node_is_waited_for_until_it_has_told_or_never_will():
     assert book.silent_since(10.5) == []
 
 
+def test_a_node_of_the_project_is_never_taken_for_somebody_else():
+    book = SentBook()
+    for look in np.arange(0.0, 2 * NEW, 0.2):
+        book.meet(TWIN, 10.0 + look)
+        book.meet('/driver', 10.0 + look)
+    assert book.silent_since(10.5) == book.never_told() == [TWIN]
+
+
+def test_a_node_that_did_not_hear_all_is_named():
+    def listens(count, run='1'):
+        return {**health(TWIN, run), 'heard': json.dumps({'/x': [1, count], '/y': [0, 0]})}
+
+    book = SentBook()
+    book.take(health('/a', sent={'/x': [100, 1, 100]}), 0.0)
+    book.take(listens(0), 0.1)
+    assert book.unheard([TWIN]) == []  # they may be under way
+    book.take(health('/a', sent={'/x': [150, 1, 150]}), 1.0)
+    book.take(listens(30), 1.1)
+    assert book.unheard([INJECTOR]) == []
+    assert book.unheard([TWIN]) == [
+        f"{TWIN} has received 30 of 100 messages on '/x': what it publishes lacks the others"
+    ]
+    book.take(listens(150), 2.1)
+    assert book.unheard([TWIN]) == []
+    book.take(listens(3, '2'), 3.1)
+    assert book.unheard([TWIN]) == []  # it was started anew, and counts anew
+
+
 def test_time_in_which_the_recorder_stood_still_is_not_time_to_tell_in():
     book = SentBook()
     book.meet('/new', 10.0)
@@ -94,9 +122,10 @@ def test_nothing_is_missing_where_all_is_there_or_nobody_told():
     assert shortfall(None, Sent(3)) is None
 
 
-def told(neighbours, node, inputs=(), **reached):
+def told(neighbours, node, inputs=(), heard=(), **reached):
     make = bag_messages()
-    own = Status(node, 0, '', {**health(node), 'reached': json.dumps(reached)})
+    hears = json.dumps({topic: [count, 0] for topic, count in heard})
+    own = Status(node, 0, '', {**health(node), 'reached': json.dumps(reached), 'heard': hears})
     others = [Status(f'{node}: {topic}', 0, '', {}) for topic in inputs]
     neighbours.take(make.statuses(1, [own, *others]))
 
@@ -113,6 +142,30 @@ def test_nodes_have_met_when_each_reaches_all_who_listen():
     told(neighbours, TWIN, ['/joints'], **{'/pose': 1})
     assert neighbours.apart(there) == []
     assert neighbours.apart([INJECTOR]) == []
+    told(neighbours, '/recorder', ['/pose'], heard=[('/pose', 0)])
+    assert neighbours.apart(there) == [f'/recorder to hear {TWIN} on /pose']
+    told(neighbours, '/recorder', ['/pose'], heard=[('/pose', 1)])
+    assert neighbours.apart(there) == []
+
+
+def test_whom_others_have_met_is_waited_for():
+    neighbours = Neighbours()
+    told(neighbours, '/recorder', ['/pose'], heard=[('/pose', 2)], **{'/counts': 1})
+
+    def seen(topic):
+        return {'/pose': 2, '/counts': 1}[topic]
+
+    def nothing(_):
+        return 0
+
+    assert neighbours.beyond(['/recorder'], seen, seen) == []
+    assert neighbours.beyond(['/recorder'], nothing, seen) == [
+        'somebody to be seen who sends /pose to /recorder'
+    ]
+    assert neighbours.beyond(['/recorder'], seen, nothing) == [
+        'somebody to be seen who takes /counts from /recorder'
+    ]
+    assert neighbours.beyond([TWIN], nothing, nothing) == []
 
 
 def test_the_definition_of_a_type_holds_all_it_is_made_of():

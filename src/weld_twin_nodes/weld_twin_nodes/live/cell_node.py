@@ -352,6 +352,7 @@ class CellNode(Node):
     def _tell_health(self) -> None:
         for source in self._sources:
             source.adapt()
+            self.health.inputs[source.name].matched = source.matched()
             self._tell_once(source.switched())
         for name, state in self.health.inputs.items():
             state.publishers = self.count_publishers(name)

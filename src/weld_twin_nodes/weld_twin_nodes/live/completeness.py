@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
-from .outputs import NODE, RUN, Sent, read_told
+from .all_nodes import MODULES
+from .outputs import NODE, RUN, Heard, Sent, read_heard, read_told
 
 NEW = 3.0
 """Seconds a node is listened to for the first time; each tells of itself once a second. One that
 has not by then is not of this project."""
+UNDER_WAY = 0.5
+"""Seconds after which what was sent counts as due at every listener; a message takes milliseconds."""
 STEP = 0.5
 """Longest time [s] between two looks that counts as listened: a recorder that stood still, or was
 not given a processor, has not listened meanwhile."""
@@ -26,17 +29,54 @@ class SentBook:
 
     def __init__(self) -> None:
         self._tellers: dict[tuple[str, str], dict[str, Sent]] = {}
+        self._due: dict[tuple[str, str], list[tuple[float, dict[str, Sent]]]] = {}
+        self._inputs: dict[str, dict[str, dict[str, tuple[Heard, int]]]] = {}
         self._heard: dict[str, float] = {}
         self._looked: dict[str, float] = {}
         self._listened: dict[str, float] = {}
 
     def take(self, values: Mapping[str, str], now: float) -> None:
         """Take the health of a node at a time [s]; what tells of no messages is passed over."""
-        sent = read_told(values)
+        sent, heard = read_told(values), read_heard(values)
+        node, run = values.get(NODE, ''), values.get(RUN, '')
         if sent:
-            node = values.get(NODE, '')
-            self._tellers[node, values.get(RUN, '')] = sent
+            self._tellers[node, run] = sent
+            self._due[node, run] = [*self._due.get((node, run), ())[-1:], (now, sent)]
+        if heard:
+            due = {topic: (own, self._due_by(topic, now)) for topic, own in heard.items()}
+            self._inputs.setdefault(node, {})[run] = due
+        if node:
             self._heard[node] = now
+
+    def _due_by(self, topic: str, now: float) -> int:
+        """Return how many messages on a topic every listener should have by now [s]."""
+        out = 0
+        for told in self._due.values():
+            early = [sent for then, sent in told if then <= now - UNDER_WAY and topic in sent]
+            out += early[-1][topic].number if early else 0
+        return out
+
+    def unheard(self, nodes: Collection[str]) -> list[str]:
+        """
+        Return a sentence for every input of nodes that has less than was sent.
+
+        What a node publishes is then as incomplete, though all of it may be recorded. Nodes that
+        were started again begin to count anew, and are passed over.
+        """
+        out = []
+        for node in sorted(nodes):
+            runs = list(self._inputs.get(node, {}).values())
+            for topic, (heard, due) in runs[0].items() if len(runs) == 1 else ():
+                if heard.received < due:
+                    out.append(
+                        f"{node} has received {heard.received:,} of {due:,} messages on '{topic}': "
+                        'what it publishes lacks the others'
+                    )
+        return out
+
+    def never_told(self) -> list[str]:
+        """Return the nodes of the project that were met and have not told anything at all."""
+        return [node for node in self._listened if _ours(node) and node not in self._heard]
 
     def meet(self, node: str, now: float) -> None:
         """Take note at every look [s] that a node publishes something that is recorded."""
@@ -49,7 +89,8 @@ class SentBook:
         out = []
         for node, listened in self._listened.items():
             heard = self._heard.get(node)
-            if listened < NEW if heard is None else heard < then:
+            new = listened < NEW or _ours(node)
+            if new if heard is None else heard < then:
                 out.append(node)
         return out
 
@@ -62,6 +103,11 @@ class SentBook:
         lasts = [row.last for row in rows if row.last is not None]
         count = sum(row.number for row in rows)
         return Sent(count, min(firsts, default=None), max(lasts, default=None))
+
+
+def _ours(node: str) -> bool:
+    """Return whether a node has the name of one of the project's."""
+    return node.rpartition('/')[2] in MODULES
 
 
 class Shortfall(NamedTuple):

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections import deque
 from math import inf, isfinite
 
 from weld_twin_msgs_py.messages.to_messages import Status
 
-from .outputs import NODE, REACHED, RUN, SENT, Output, reached
+from .outputs import HEARD, NODE, REACHED, RUN, SENT, Output, reached
 from .outputs import told as sent_so_far
 
 OK, WARN, ERROR, STALE = range(4)
@@ -40,6 +41,8 @@ class Input:
         self.topic = topic
         self.received = self.refused = self.others = 0
         self.publishers = 0
+        self.matched = 0
+        """Publishers that the subscription itself has met; the graph may know of more."""
         self.last_reason = ''
         self.last = 0.0
         self._required = required
@@ -130,6 +133,9 @@ class Health:
                 **{f'remark_{k}': sentence for k, sentence in enumerate(self.remarks)},
                 SENT: sent_so_far(self.outputs),
                 REACHED: reached(self.outputs),
+                HEARD: json.dumps(
+                    {name: [item.matched, item.received] for name, item in self.inputs.items()}
+                ),
                 RUN: self._run,
                 NODE: self._node,
             },

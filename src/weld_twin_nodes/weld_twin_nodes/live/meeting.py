@@ -13,7 +13,7 @@ from weld_twin_msgs_py.messages.topics import DIAGNOSTICS
 
 from .all_nodes import MODULES
 from .cell_node import CellNode
-from .outputs import NODE, read_reached
+from .outputs import NODE, Heard, read_heard, read_reached
 
 QUIET = 1.0
 """
@@ -22,18 +22,21 @@ are started together appear within some tenths of a second of each other.
 """
 LOOK_EVERY = 0.05
 """Seconds between two looks at who is there."""
+Count = Callable[[str], int]
 
 
 class Neighbours:
     """
-    What the nodes of the project tell of their inputs and of the subscriptions they reach.
+    What the nodes of the project tell of the subscriptions they reach and the publishers they hear.
 
-    The graph a node sees is its own: that two others have not found each other yet, only they know.
+    The graph a node sees is its own: that two others have not found each other yet, only they know,
+    and one of the two may know it before the other.
     """
 
     def __init__(self) -> None:
         self._inputs: dict[str, set[str]] = {}
         self._reached: dict[str, dict[str, int]] = {}
+        self._heard: dict[str, dict[str, Heard]] = {}
 
     def take(self, message: Any) -> None:
         """Take a node's health."""
@@ -46,6 +49,7 @@ class Neighbours:
                     topic for owner, _, topic in names if topic and owner == node
                 }
                 self._reached[node] = read_reached(values)
+                self._heard[node] = read_heard(values)
 
     def apart(self, there: Collection[str]) -> list[str]:
         """Return whose word or whose listeners are still to come, among the nodes there are."""
@@ -56,6 +60,37 @@ class Neighbours:
                 wanted = [o for o, takes in self._inputs.items() if topic in takes and o in there]
                 if count < len(wanted):
                     out.append(f'{node} to reach {" and ".join(wanted)} on {topic}')
+        return out + self._deaf(there)
+
+    def beyond(self, there: Collection[str], publishers: Count, subscribers: Count) -> list[str]:
+        """
+        Return whom the nodes that are there have met and the own graph does not show yet.
+
+        Parameters
+        ----------
+        there : collection of str
+        publishers, subscribers : callable
+            From the name of a topic to how many the own graph has.
+
+        """
+        out = []
+        for node in there:
+            for topic, heard in self._heard.get(node, {}).items():
+                if publishers(topic) < heard.publishers:
+                    out.append(f'somebody to be seen who sends {topic} to {node}')
+            for topic, count in self._reached.get(node, {}).items():
+                if subscribers(topic) < count:
+                    out.append(f'somebody to be seen who takes {topic} from {node}')
+        return out
+
+    def _deaf(self, there: Collection[str]) -> list[str]:
+        """Return whom a node does not hear yet though it publishes what the node listens to."""
+        out = []
+        for node, inputs in self._heard.items():
+            for topic, heard in inputs.items() if node in there else ():
+                wanted = [o for o, gives in self._reached.items() if topic in gives and o in there]
+                if heard.publishers < len(wanted):
+                    out.append(f'{node} to hear {" and ".join(wanted)} on {topic}')
         return out
 
 
@@ -122,6 +157,7 @@ class Meeting:
             return f'somebody to listen to {" or ".join(node.listeners())}'
         there = {f'{space.rstrip("/")}/{name}' for name, space in seen[0]}
         apart = self._neighbours.apart(there)
+        apart += self._neighbours.beyond(there, node.count_publishers, node.count_subscribers)
         if apart:
             return ', '.join(apart)
         if node.unmatched() or now - self._changed < QUIET:

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 from rclpy.duration import Duration
 
-SENT, REACHED, RUN, NODE = 'sent', 'reached', 'run', 'node'
-"""Keys of a node's health: what it sent by topic, how many subscriptions it reaches by topic, a
-number of its own for every start, and its name with the namespace."""
+SENT, REACHED, HEARD, RUN, NODE = 'sent', 'reached', 'heard', 'run', 'node'
+"""Keys of a node's health: what it sent by topic, how many subscriptions it reaches by topic, how
+many publishers it hears by topic and how many messages came, a number of its own for every start,
+and its name with the namespace."""
 CDR_HEADER = 4
 """Bytes before the first field of a serialised message."""
 
@@ -33,6 +34,23 @@ class Sent(NamedTuple):
     number: int
     first: int | None = None
     last: int | None = None
+
+
+class Heard(NamedTuple):
+    """
+    What one input of a node has of its topic.
+
+    Attributes
+    ----------
+    publishers : int
+        Whose messages reach it, by the middleware of its own process.
+    received : int
+        Messages.
+
+    """
+
+    publishers: int
+    received: int
 
 
 class Output:
@@ -110,6 +128,15 @@ def read_reached(values: Mapping[str, str]) -> dict[str, int]:
     try:
         return {str(topic): int(count) for topic, count in json.loads(values[REACHED]).items()}
     except (KeyError, ValueError, TypeError, AttributeError):
+        return {}
+
+
+def read_heard(values: Mapping[str, str]) -> dict[str, Heard]:
+    """Return what a node hears, by topic; empty for anybody else's health."""
+    try:
+        rows = json.loads(values[HEARD])
+        return {str(topic): Heard(int(row[0]), int(row[1])) for topic, row in rows.items()}
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError):
         return {}
 
 

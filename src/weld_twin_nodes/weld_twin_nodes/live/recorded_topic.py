@@ -118,6 +118,7 @@ class RecordedTopic:
 
     def adapt(self) -> None:
         """Subscribe anew where a publisher has come that the subscription does not suit."""
+        self._state.matched = self._subscription.get_publisher_count()
         qos = self.suited(self._qos)
         if qos == self._qos:
             return

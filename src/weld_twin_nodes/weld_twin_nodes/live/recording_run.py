@@ -72,6 +72,7 @@ class RecordingRun:
         )
         self._asked = AskedNodes(node, self._bag.note)
         self._book = SentBook()
+        self._publishers: set[str] = set()
         self._ending_since: float | None = None
         self._moved = 0.0
         self._lacked: dict[str, int] = {}
@@ -191,6 +192,7 @@ class RecordingRun:
     def _meet(self) -> set[str]:
         """Return who publishes what is recorded, and take note of them."""
         there = {name for topic in self._topics.values() for name in topic.publishing_nodes()}
+        self._publishers |= there
         for node in there:
             self._book.meet(node, time.monotonic())
         return there
@@ -221,8 +223,12 @@ class RecordingRun:
         self._bag.note(COMPLETENESS, told)
         sentences = [short.sentence(name) for name, short in lacking.items()]
         sentences += [f'{name}: nobody published this topic' for name in self._untyped]
+        silent = set(self._book.never_told())
         if self._ending_since is not None:
-            sentences += [f'{node} has not told what it sent' for node in self._untold()]
+            silent.update(self._untold())
+        sentences += [f'{node} has not told what it sent' for node in sorted(silent)]
+        if not self._joins:
+            sentences += self._book.unheard(self._publishers)
         for k, sentence in enumerate(sentences):
             self._node.get_logger().warning(sentence)
             self._node.health.lasting[f'incomplete {k}'] = sentence

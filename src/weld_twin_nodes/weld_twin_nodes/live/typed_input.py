@@ -46,6 +46,8 @@ class TypedInput:
     ----------
     kind : str
         The type that is taken now.
+    name : str
+        The resolved name of the topic.
 
     """
 
@@ -63,7 +65,7 @@ class TypedInput:
         unmatched: Callable[[str], None],
     ) -> None:
         self._node, self._topic, self._kinds = node, topic, tuple(kinds)
-        self._name = node.resolve_topic_name(topic.relative)
+        self.name = node.resolve_topic_name(topic.relative)
         self._wanted, self._take = wanted, take
         self._required, self._senders = required, Senders()
         self._remark, self._lack, self._unmatched = remark, lack, unmatched
@@ -76,21 +78,25 @@ class TypedInput:
 
     def adapt(self) -> None:
         """Follow the publishers where none is left of the type that is taken."""
-        there = {info.topic_type for info in self._node.get_publishers_info_by_topic(self._name)}
+        there = {info.topic_type for info in self._node.get_publishers_info_by_topic(self.name)}
         kind = next((kind for kind in (self.kind, *self._kinds) if kind in there), self.kind)
         if kind != self.kind and kind not in self._missing:
             self._subscribe(kind)
 
     def unheard(self) -> list[str]:
         """Return a sentence for every publisher of which nothing arrives, or where one may be."""
-        if self._required and not self._node.count_publishers(self._name):
-            lost = elsewhere(self._node, self._name, self._topic.name, self._kinds)
+        if self._required and not self._node.count_publishers(self.name):
+            lost = elsewhere(self._node, self.name, self._topic.name, self._kinds)
             return [lost] if lost else []
-        return unheard_publishers(self._node, self._name, self.kind, self._wanted, self._kinds)
+        return unheard_publishers(self._node, self.name, self.kind, self._wanted, self._kinds)
 
     def switched(self) -> str:
         """Return in a sentence that somebody else publishes it now, empty where that is not so."""
-        return self._senders.changed(self._node, self._name)
+        return self._senders.changed(self._node, self.name)
+
+    def matched(self) -> int:
+        """Return how many publishers the subscription has met."""
+        return int(self._subscription.get_publisher_count())
 
     def close(self) -> None:
         """Take nothing more."""
@@ -102,12 +108,12 @@ class TypedInput:
             wanted_class = message_class(kind)
         except ImportError as error:
             self._missing.add(kind)
-            self._lack(f'{self._name} carries what cannot be read: {error}')
+            self._lack(f'{self.name} carries what cannot be read: {error}')
             return
         if self._subscription is not None:
             self._node.destroy_subscription(self._subscription)
         if kind != self._kinds[0]:
-            self._remark(f'{self._name} is taken as {kind}')
+            self._remark(f'{self.name} is taken as {kind}')
         self.kind = kind
 
         def take(data: bytes) -> None:
@@ -119,7 +125,7 @@ class TypedInput:
             take,
             self._wanted.to_rclpy(),
             raw=True,
-            event_callbacks=qos_events.of_subscription(self._name, self._wanted, self._unmatched),
+            event_callbacks=qos_events.of_subscription(self.name, self._wanted, self._unmatched),
         )
 
 

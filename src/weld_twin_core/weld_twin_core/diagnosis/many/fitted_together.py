@@ -82,6 +82,8 @@ def fitted_together(
     if not better:
         many = _crowd(found) > beliefs.crowd or _many(best, beliefs)
         better = left < CHOSEN * few and many
+    if better and not found.crowded and _one_and_crumbs(best, beliefs):
+        better = False
     if better and found.problem.untracked and found.problem.places == PLACES - 1:
         return _carrying(found, exclude, steps[0], beliefs, progress)
     return best if better else found
@@ -138,12 +140,27 @@ def _crowd(found: Search) -> int:
     return sum(effect.causes() for effect in found.final.model.found)
 
 
+def _one_and_crumbs(found: Search, beliefs: Beliefs) -> bool:
+    """
+    Return whether contacts show a large cause or two, and nothing else that counts.
+
+    Of three or four places left out in turn, tiny errors by the dozen predict some better by chance.
+    """
+    whole = found.problem.untracked and found.problem.places >= PLACES
+    return whole and _members(found, beliefs) < beliefs.several
+
+
 def _many(found: Search, beliefs: Beliefs) -> bool:
     """Return whether many effects move the tool by much of what all of them leave."""
+    return _members(found, beliefs) >= beliefs.many
+
+
+def _members(found: Search, beliefs: Beliefs) -> int:
+    """Return how many effects move the tool by much of what all of them leave."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     least = beliefs.member * unseen.rms(unseen.base(range(len(unseen.parts))).residual)
     sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
-    return int((sizes > least).sum()) >= beliefs.many
+    return int((sizes > least).sum())
 
 
 def _together(

@@ -61,7 +61,8 @@ def test_touches_become_a_corrected_urdf(cell, weld_twin):
     artefact = ('--contacts', str(cell / 'artefact.yaml'))
     bag, out = str(cell / 'bag'), cell / 'out'
     weld_twin('import', str(cell / 'touches.csv'), *artefact, *urdf, '--out', bag)
-    weld_twin('diagnose', bag, *urdf, '--out', str(out))
+    said = weld_twin('diagnose', bag, *urdf, '--out', str(out)).out
+    assert 'mm from what it touched on average' in ' '.join(said.split())
 
     found = json.loads((out / 'diagnosis.json').read_text())
     named = [(item['effect'], item['joint']) for item in found['verdict']['effects']]

@@ -16,6 +16,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from ..offline.where_it_holds import where_it_holds
 from .cause_levels import LEVEL_HEADS, level_row
 from .changed_section import CHANGED_HEADS, changed_rows, nothing_changed
+from .contact_clouds import contacts_told
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
 from .quantities import change, millimetres, odds, parameter_rows
 from .to_do import worth_doing
@@ -54,15 +55,22 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
         _print_candidates(diagnosis, console)
     _print_sets(diagnosis, console)
     _print_changed(diagnosis, console)
+    _print_data(diagnosis, console)
+    _print_holds(diagnosis, console)
+    for action in worth_doing(diagnosis):
+        console.print(f'[bold]do:[/] {escape(action)}')
+
+
+def _print_data(diagnosis: Diagnosis, console: Console) -> None:
+    """Print what is to be said of the data."""
     for check in diagnosis.checks:
         if check.level == 'warning':
             console.print(f'[yellow]data:[/] {escape(check.sentence)}')
     for recording in diagnosis.recordings:
-        for note in recording.notes:
+        for note in () if recording.contacts is not None else recording.notes:
             console.print(f'[dim]note:[/] {escape(recording.name)}: {escape(note)}')
-    _print_holds(diagnosis, console)
-    for action in worth_doing(diagnosis):
-        console.print(f'[bold]do:[/] {escape(action)}')
+    if diagnosis.contacts is not None:
+        console.print(escape(contacts_told(diagnosis.contacts)))
 
 
 def _print_changed(diagnosis: Diagnosis, console: Console) -> None:

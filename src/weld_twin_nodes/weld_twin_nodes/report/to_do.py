@@ -44,7 +44,7 @@ def _telling(diagnosis: Diagnosis) -> list[str]:
         if by != ELSE:
             out.append(f'{told}: {by}.')
         elif diagnosis.next_experiment is not None:
-            out.append(f'{told}: measure what next_experiment.yaml proposes.')
+            out.append(f'{told}: measure what {_proposed(diagnosis)} proposes.')
     return out
 
 
@@ -65,5 +65,11 @@ def _looking(diagnosis: Diagnosis) -> list[str]:
     held = [diagnosis.model.found[k] for k in members if k < len(diagnosis.model.found)]
     told = list(dict.fromkeys(actions(held[:_LARGEST], diagnosis.model.robot)))
     if diagnosis.next_experiment is not None:
-        told.append('Measure what next_experiment.yaml proposes, and diagnose all of it together.')
+        told.append(f'Measure what {_proposed(diagnosis)} proposes, and diagnose all together.')
     return told
+
+
+def _proposed(diagnosis: Diagnosis) -> str:
+    """Return the file that holds the next experiment."""
+    touches = (diagnosis.next_experiment or {}).get('kind') == 'touches'
+    return 'next_touches.csv' if touches else 'next_experiment.yaml'

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...effects.effect import Effect, Stage
 from ...effects.registry import REGISTRY
-from ..algebra.problem import PLACES
+from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..hypotheses.selection import implausible
@@ -62,14 +62,7 @@ def fitted_together(
     if not found.problem.recordings[0].joints.static or stations < BEAR[0]:
         return found
     progress('many small errors at once: fitting them together')
-    steps = [_beyond(demand) for demand, least in enumerate(BEAR) if stations >= least]
-    # First without curves: what a handful of stations bears is the geometry under load.
-    curves = tuple(name for name, kind in REGISTRY.items() if kind.bends)
-    steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
-    if found.problem.untracked:
-        steps = [_but_scales(step) for step in steps]
-        # What carries over to another place only a place left out can tell; two are too few.
-        steps = steps[:1] if found.problem.places < PLACES else steps
+    steps = _steps(found.problem, stations)
     best, left, dropped = found, np.inf, tuple[str, ...]()
     for less in steps:
         trial = _together(found, (*exclude, *less), beliefs, progress)
@@ -87,6 +80,19 @@ def fitted_together(
     if better and found.problem.untracked and found.problem.places == PLACES - 1:
         return _carrying(found, exclude, steps[0], beliefs, progress)
     return best if better else found
+
+
+def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:
+    """Return the kinds left out of every step, from the least that is fitted to the most."""
+    steps = [_beyond(demand) for demand, least in enumerate(BEAR) if stations >= least]
+    # First without curves: what a handful of stations bears is the geometry under load.
+    curves = tuple(name for name, kind in REGISTRY.items() if kind.bends)
+    steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
+    if not problem.untracked:
+        return steps
+    steps = [_but_scales(step) for step in steps]
+    # What carries over to another place only a place left out can tell; two are too few.
+    return steps[:1] if problem.places < PLACES else steps
 
 
 def _carrying(

@@ -12,6 +12,7 @@ from weld_twin_core.diagnosis.result import Diagnosis, Site
 from weld_twin_msgs_py.files.input_files import InputFile
 
 from .html import Child, Html, joined, section, table, tag
+from .to_do import made_for
 from .words import in_words, listed, site_name
 
 _APART = (
@@ -61,12 +62,9 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
 
 def _left_open(diagnosis: Diagnosis, wanted: dict[str, Any]) -> list[Html]:
     """Return which open questions a measurement is not made for: motion may never part them."""
-    sides = wanted.get('between') or ()
-    asked = {(site['effect'], site['joint']) for side in sides for site in side}
     out = []
     for group in diagnosis.indistinguishable:
-        parted = sum((site.effect, site.joint) in asked for site in group)
-        if len(group) > 1 and parted < 2:
+        if len(group) > 1 and not made_for(wanted, group):
             names = listed([site_name(site) for site in group], 'or')
             told = f'It is not made to tell whether it is {names}: see what to do first.'
             out.append(tag('p', told, class_='note'))

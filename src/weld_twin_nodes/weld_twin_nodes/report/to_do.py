@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.advice.inseparable import ELSE, way
 from weld_twin_core.diagnosis.result import Diagnosis, Site
@@ -43,9 +46,20 @@ def _telling(diagnosis: Diagnosis) -> list[str]:
         by = way(sorted({site.effect for site in group}))
         if by != ELSE:
             out.append(f'{told}: {by}.')
-        elif diagnosis.next_experiment is not None:
+        elif made_for(diagnosis.next_experiment, group):
             out.append(f'{told}: measure what {_proposed(diagnosis)} proposes.')
+        else:
+            out.append(
+                f'{told}: record other postures and motions than these, and diagnose all together.'
+            )
     return out
+
+
+def made_for(wanted: Mapping[str, Any] | None, group: Sequence[Site]) -> bool:
+    """Tell whether a proposed measurement is to part two of a set that cannot be told apart."""
+    sides = (wanted or {}).get('between') or ()
+    asked = {(site['effect'], site['joint']) for side in sides for site in side}
+    return sum((site.effect, site.joint) in asked for site in group) > 1
 
 
 def _mending(diagnosis: Diagnosis) -> list[str]:

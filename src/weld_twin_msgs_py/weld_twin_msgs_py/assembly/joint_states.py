@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite
+from operator import ge, itemgetter, le
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,6 +59,14 @@ def names_called(
         twice = next(name for name in names if names.count(name) > 1)
         raise ModelError(f'two joints are given the name {twice!r}')
     return names
+
+
+def _picker(index: Sequence[int]) -> Callable[[Any], tuple[float, ...]]:
+    """Return what picks values out of a row by their places."""
+    if len(index) > 1:
+        return itemgetter(*index)
+    only = index[0]
+    return lambda row: (row[only],)
 
 
 class JointSample(NamedTuple):
@@ -128,7 +137,8 @@ class JointStates:
             for low, high in zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)
         ]
         self._usual: Any = None
-        self._index: list[int] = []
+        self._low, self._high = zip(*self._ranges, strict=True)
+        self._pick = _picker(range(robot.n))
         self._spread: set[str] = set()
         self._stamp = 0
         self._parts: dict[str, tuple[float, float]] = {}
@@ -202,7 +212,7 @@ class JointStates:
         q = from_messages.joint_positions(message, self._names)
         self._check(q)
         self._usual = message.name
-        self._index = [list(message.name).index(name) for name in self._names]
+        self._pick = _picker([list(message.name).index(name) for name in self._names])
         return JointSample(stamp, q, from_messages.joint_velocities(message, self._names))
 
     def _take_own_names(self, message: Any) -> bool:
@@ -260,11 +270,11 @@ class JointStates:
         position, velocity, count = message.position, message.velocity, len(message.name)
         if len(position) != count or len(velocity) not in (0, count):
             return None
-        q = [position[k] for k in self._index]
-        qd = [velocity[k] for k in self._index] if len(velocity) else []
-        for value, (low, high) in zip(q, self._ranges, strict=True):
-            if not low <= value <= high:
-                return None
+        # What runs in C runs as fast after two idle milliseconds; bytecode takes five times as long.
+        q = self._pick(position)
+        qd = self._pick(velocity) if len(velocity) else ()
+        if not (all(map(ge, q, self._low)) and all(map(le, q, self._high))):
+            return None
         if not (isfinite(sum(q)) and isfinite(sum(qd))):
             return None
         return JointSample(stamp, np.array(q), np.array(qd) if qd else None)

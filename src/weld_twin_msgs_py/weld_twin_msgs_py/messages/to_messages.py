@@ -12,6 +12,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -300,24 +301,21 @@ def quaternion(rotation: Array) -> list[float]:
     .. [1] S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1, 1978.
 
     """
-    r = rotation.tolist()
-    squares = [1.0 + 2.0 * r[k][k] - r[0][0] - r[1][1] - r[2][2] for k in range(3)]
-    squares.append(1.0 + r[0][0] + r[1][1] + r[2][2])
-    largest = max(range(4), key=squares.__getitem__)  # dividing by it loses no digits
-    out = [0.0] * 4
-    out[largest] = squares[largest]
-    if largest == 3:
-        for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            out[k] = r[j][i] - r[i][j]
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    trace = xx + yy + zz
+    if trace > max(
+        xx, yy, zz
+    ):  # the largest part of the quaternion: dividing by it loses no digits
+        x, y, z, w = zy - yz, xz - zx, yx - xy, 1.0 + trace
+    elif xx >= yy and xx >= zz:
+        x, y, z, w = 1.0 + 2.0 * xx - trace, xy + yx, xz + zx, zy - yz
+    elif yy >= zz:
+        x, y, z, w = xy + yx, 1.0 + 2.0 * yy - trace, yz + zy, xz - zx
     else:
-        i, j = (largest + 1) % 3, (largest + 2) % 3
-        out[i] = r[i][largest] + r[largest][i]
-        out[j] = r[j][largest] + r[largest][j]
-        out[3] = r[j][i] - r[i][j]
-    length = sum(value * value for value in out) ** 0.5
-    sign = -1.0 if out[3] < 0.0 else 1.0
-    return [sign * value / length for value in out]
+        x, y, z, w = xz + zx, yz + zy, 1.0 + 2.0 * zz - trace, yx - xy
+    length = sqrt(x * x + y * y + z * z + w * w)
+    scale = -length if w < 0.0 else length
+    return [x / scale, y / scale, z / scale, w / scale]
 
 
 def _text(value: Any) -> str:

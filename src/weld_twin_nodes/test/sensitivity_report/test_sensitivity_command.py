@@ -4,6 +4,7 @@
 
 import csv
 import json
+import re
 
 import pytest
 
@@ -59,7 +60,9 @@ def test_one_command_writes_figures_indices_and_a_page(tmp_path, two_effects, ca
     out = tmp_path / 'out'
     words = ['sensitivity', '--robot', 'ur5', '--out', str(out), '--tolerances', two_effects]
     assert main([*words, *SMALL]) == 0
-    assert 'tighten first' in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert re.search(r'smooth: \S.* first: from .*° .*gains [\d.]+ mm', told), told
+    assert '[' not in told and 'what drives the largest deviation' in told
     for number in range(6, 15):
         assert (out / 'figures' / f'figure-{number:02}.svg').read_text().startswith('<svg')
         assert len((out / 'figures' / f'figure-{number:02}.csv').read_text().splitlines()) > 20

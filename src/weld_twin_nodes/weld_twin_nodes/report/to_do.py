@@ -46,7 +46,7 @@ def _telling(diagnosis: Diagnosis) -> list[str]:
         by = way(sorted({site.effect for site in group}))
         if by != ELSE:
             out.append(f'{told}: {by}.')
-        elif made_for(diagnosis.next_experiment, group):
+        elif diagnosis.contacts is not None or made_for(diagnosis.next_experiment, group):
             out.append(f'{told}: measure what {_proposed(diagnosis)} proposes.')
         else:
             out.append(

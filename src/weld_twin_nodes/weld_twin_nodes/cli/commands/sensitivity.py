@@ -260,6 +260,7 @@ def _claims_robots(args: argparse.Namespace) -> list[Robot]:
 def _print_summary(place: Path) -> None:
     import json
 
+    from ...sensitivity_report.fitter_words import advised, parameter_words
     from ...sensitivity_report.study_files import CLAIMS, RESULT
 
     if (place / RESULT).is_file():
@@ -267,9 +268,14 @@ def _print_summary(place: Path) -> None:
             inside = found['global']['stack']['inside']['both']
             rows = found['global']['sobol']['parameter']['d_norm']['indices']
             best = sorted(rows, key=lambda row: -row['ST'])[:3]
+            for first in advised(found['local']['parameters'], 1):
+                print(
+                    f'{motion}: {first.instruction} first: from {first.now} to {first.wanted}, '
+                    f'gains {1e3 * first.gain_m:.3f} mm'
+                )
             print(
-                f'{motion}: tighten first '
-                + ', '.join(f'{row["name"]} (ST {row["ST"]:.2f})' for row in best)
+                f'{motion}: what drives the largest deviation: '
+                + ', '.join(f'{parameter_words(r["name"])} ({r["ST"]:.2f})' for r in best)
             )
             print(
                 f'{motion}: inside the weld tolerance with probability {inside["value"]:.3f} '

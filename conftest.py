@@ -69,6 +69,38 @@ def chromium():
         made.close()
 
 
+CLIPPED = """() => [...document.querySelectorAll('main *')].filter((item) => {
+  const box = item.getBoundingClientRect(), style = getComputedStyle(item);
+  if (!box.width || !item.checkVisibility() || style.position === 'absolute') return false;
+  if (item.closest('.scroll, .u-wrap')) return false;
+  return box.right > innerWidth + 1 || (item.scrollWidth > item.clientWidth + 2
+    && style.overflowX === 'hidden' && !item.classList.contains('plot'));
+}).map((item) => item.outerHTML.slice(0, 90))"""
+OVERLAP = """() => {
+  const kinds = 'h1, h2, h3, p, li, dt, dd, td, th, label, button, figcaption';
+  const items = [...document.querySelectorAll(`main :is(${kinds})`)]
+    .filter((item) => item.checkVisibility() && item.textContent.trim() && !item.closest('.uplot'))
+    .map((item) => [item, item.getBoundingClientRect()]).filter(([, box]) => box.width && box.height);
+  const out = [];
+  items.forEach(([a, p], i) => items.slice(i + 1).forEach(([b, q]) => {
+    if (a.contains(b) || b.contains(a)) return;
+    const w = Math.min(p.right, q.right) - Math.max(p.left, q.left);
+    const h = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
+    if (w > 2 && h > 2) out.push(`${a.textContent.slice(0, 30)} | ${b.textContent.slice(0, 30)}`);
+  }));
+  return out;
+}"""
+EMPTY = """() => [...document.querySelectorAll('canvas')].filter((item) => {
+  if (!item.checkVisibility()) return false;
+  if (!item.width || !item.height) return true;
+  const small = document.createElement('canvas');
+  small.width = small.height = 60;
+  const pen = small.getContext('2d', { willReadFrequently: true });
+  pen.drawImage(item, 0, 0, 60, 60);
+  return !pen.getImageData(0, 0, 60, 60).data.some((value) => value);
+}).length"""
+
+
 class Browser:
     """Opens pages given as text, and notes what they say on the console."""
 
@@ -89,6 +121,23 @@ class Browser:
         page.on('request', lambda request: self._only_files(request.url))
         page.goto(place.as_uri())
         return page
+
+    def hindrances(self, text):
+        """Return what hinders reading a page: light, dark, on a phone, in print; or on its console."""
+        axe = pytest.importorskip('axe_playwright_python.sync_playwright').Axe()
+        page, out = self.open(text), []
+        for width, scheme in ((1100, 'light'), (390, 'dark')):
+            page.set_viewport_size({'width': width, 'height': 900})
+            page.emulate_media(color_scheme=scheme)
+            page.wait_for_timeout(60)
+            told = [*page.evaluate(CLIPPED), *page.evaluate(OVERLAP)]
+            told += ['an empty drawing'] * page.evaluate(EMPTY)
+            for found in axe.run(page).response['violations']:
+                if found['impact'] in ('serious', 'critical'):
+                    told += [f'{found["id"]}: {node["html"][:90]}' for node in found['nodes'][:4]]
+            out += [f'{width} {scheme}: {item}' for item in told]
+        page.emulate_media(media='print', color_scheme='light')
+        return [*out, *(f'print: {item}' for item in page.evaluate(CLIPPED)), *self.console]
 
     def _only_files(self, url):
         if not url.startswith(('file:', 'data:')):

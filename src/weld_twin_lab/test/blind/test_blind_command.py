@@ -53,6 +53,10 @@ def test_a_check_leaves_a_score_of_every_case(checked):
     assert (checked[0] / layout.PAGE).stat().st_size > 10_000
 
 
+def test_nothing_hinders_reading_the_scores(checked, browser):
+    assert browser.hindrances((checked[0] / layout.PAGE).read_text(encoding='utf-8')) == []
+
+
 def test_the_recordings_tell_nothing_of_the_truth(checked):
     cases, truths = checked[0] / 'cases', checked[0] / 'truths'
     for name in ('case_0001', 'case_0002'):

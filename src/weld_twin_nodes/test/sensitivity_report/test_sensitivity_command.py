@@ -5,6 +5,8 @@
 import csv
 import json
 import re
+from contextlib import redirect_stdout
+from io import StringIO
 
 import pytest
 
@@ -26,10 +28,10 @@ SMALL = [
 ]
 
 
-@pytest.fixture
-def two_effects(tmp_path):
+@pytest.fixture(scope='module')
+def two_effects(tmp_path_factory):
     """Return the path of a tolerance file."""
-    path = tmp_path / 'tolerances.yaml'
+    path = tmp_path_factory.mktemp('asked') / 'tolerances.yaml'
     path.write_text('- {effect: joint_offset, std: 3e-4}\n- {effect: link_length, std: 1e-4}\n')
     return str(path)
 
@@ -55,12 +57,25 @@ def test_a_recorded_motion_is_studied_with_its_deviations_beside(tmp_path, two_e
     assert max(float(r['recorded_m']) for r in rows) == result['recorded']['max_m']
 
 
-@pytest.mark.slow
-def test_one_command_writes_figures_indices_and_a_page(tmp_path, two_effects, capsys):
-    out = tmp_path / 'out'
+@pytest.fixture(scope='module')
+def studied(tmp_path_factory, two_effects):
+    """Return the directory of a small study, the words that asked for it, and what was printed."""
+    out = tmp_path_factory.mktemp('study') / 'out'
     words = ['sensitivity', '--robot', 'ur5', '--out', str(out), '--tolerances', two_effects]
-    assert main([*words, *SMALL]) == 0
-    told = capsys.readouterr().out
+    with redirect_stdout(StringIO()) as told:
+        assert main([*words, *SMALL]) == 0
+    return out, words, told.getvalue()
+
+
+@pytest.mark.slow
+def test_nothing_hinders_reading_a_study(studied, browser):
+    page = (studied[0] / 'sensitivity.html').read_text(encoding='utf-8')
+    assert browser.hindrances(page) == []
+
+
+@pytest.mark.slow
+def test_one_command_writes_figures_indices_and_a_page(studied):
+    out, words, told = studied
     assert re.search(r'smooth: \S.* first: from .*° .*gains [\d.]+ mm', told), told
     assert '[' not in told and 'what drives the largest deviation' in told
     for number in range(6, 15):

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What investigated cells add up to, and what a cell records when something in it is changed."""
+
+import numpy as np
+import pytest
+
+from weld_twin_lab.experiments.goals import page, summary
+
+
+def said(right, sure, status='identified'):
+    return {'status': status, 'right': right, 'sure': sure, 'confidence': 0.9, 'said': ''}
+
+
+def step(promise, decided):
+    return {
+        'kind': 'path',
+        'robot_minutes': 1.5,
+        'seconds': 9.0,
+        'promise': promise,
+        'decided': decided,
+    }
+
+
+def case(name, loop, rounds, **others):
+    truth = {'robot': 'ur5', 'motion': 'free', 'sites': [['drift', None]]}
+    first, minutes = said(False, False, 'ambiguous'), 1.5 * len(rounds)
+    return {
+        'name': name,
+        'truth': truth,
+        'poor': 'small',
+        'first': first,
+        'rounds': rounds,
+        'end': 'sure',
+        'minutes': minutes,
+        'loop': loop,
+        **others,
+    }
+
+
+def test_only_what_was_said_counts_and_only_what_was_compared_is_compared():
+    beside = {way: said(True, False) for way in ('random', 'rich', 'd_optimal')}
+    cases = [
+        case('a', said(True, True), [step(0.9, True)], **beside, d_optimal_stations=None),
+        case('b', said(False, True), [step(0.4, False), step(None, None), step(0.85, False)]),
+    ]
+    told = summary(cases)
+    assert (told['cells'], told['compared'], told['loop_where_compared']) == (2, 1, 1)
+    assert told['right_and_sure'] == {'loop': 1, 'random': 0, 'rich': 0, 'd_optimal': 0}
+    assert told['sure_and_wrong']['loop'] == 1 and told['minutes_to_certainty'] == 1.5
+    assert (told['experiments'], told['that_compared'], told['decided']) == (4, 3, 1)
+    assert (told['said_they_would'], told['of_these_decided']) == (2, 1)
+    assert told['foreseen'] == pytest.approx(2.15)
+    text = page({'summary': told, 'cases': cases})
+    assert '1 of 2' in text and '0 of 1' in text
+
+
+def test_a_sealed_cell_records_with_what_was_changed():
+    pytest.importorskip('mujoco', reason='the plant needs MuJoCo')
+    from weld_twin_lab.blind.deck import lots
+    from weld_twin_lab.experiments.sealed_cell import SealedCell, stations
+    from weld_twin_nodes.offline.set_up_changes import set_up_change, told
+
+    number, lot = next(
+        (k, x) for k, x in enumerate(lots(3, 40, ('single',))) if x.motion == 'stations'
+    )
+    cell = SealedCell(lot, 3, number)
+    middle = np.clip(np.zeros(cell.robot.n), cell.robot.lower + 0.6, cell.robot.upper - 0.6)
+    q = middle + np.random.default_rng(1).uniform(-0.5, 0.5, (12, cell.robot.n))
+    plain = cell.made('plain', stations(q), 5)
+    moved = cell.made('moved', stations(q), 5, 'instrument')
+    longer = cell.made('longer', stations(q), 5, 'tool')
+    assert cell.seen_anew([moved]) and not cell.seen_anew([plain])
+    step = np.linalg.norm(longer.measured.position - plain.measured.position, axis=1)
+    assert np.abs(step - 0.2).max() < 0.01
+    assert np.linalg.norm(moved.measured.position - plain.measured.position, axis=1).min() > 0.3
+    (_, back), _ = told([plain, moved], {1: set_up_change('instrument')}, cell.robot)
+    assert np.abs(back.measured.position - plain.measured.position).max() < 0.02

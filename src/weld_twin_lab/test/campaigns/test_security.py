@@ -48,8 +48,19 @@ def test_the_lab_has_the_proof():
     assert 'security' in proofs()
 
 
+def test_a_folder_without_the_middleware_is_refused_with_what_to_fetch(tmp_path):
+    out = tmp_path / 'security.json'
+    code, _, _ = weld_twin('lab', 'security', '--source', str(tmp_path), '--out', str(out))
+    assert code == 1
+    assert json.loads(out.read_text())['reason'] == (
+        f"open: '{tmp_path}' holds no rmw_cyclonedds_cpp: fetch the branch jazzy of "
+        'ros2/rmw_cyclonedds, ros2/ros2cli and ros2/sros2 into a folder, and give it as --source'
+    )
+
+
 @pytest.mark.skipif(
-    shutil.which('ros2') is None, reason='ros2 security is not here: no keys can be made'
+    shutil.which('ros2') is None,
+    reason='ros2 security is not here, and no wheel of it: no keys can be made; see --source',
 )
 def test_strangers_hear_and_say_nothing_under_enforced_security(tmp_path):
     code, printed, _ = weld_twin('lab', 'security', '--out', str(tmp_path / 'security.json'))

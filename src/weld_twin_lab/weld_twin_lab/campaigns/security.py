@@ -4,12 +4,13 @@
 
 The same is tried without keys first: there a stranger must hear the twin and be recorded, or else
 the trial shows nothing. It needs `ros2 security` and a middleware that is built with DDS security; where
-they are missing, the result says so and does not pass.
+they are missing, the result says so and does not pass. With ``--source`` both are built first.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,30 +21,52 @@ WAYS = ('open', 'enforced')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options: there are none of its own."""
+    """Add the options."""
+    parser.add_argument(
+        '--source',
+        metavar='DIR',
+        help='folder with rmw_cyclonedds, ros2cli and sros2 (branch jazzy), to be built and used',
+    )
+    parser.add_argument(
+        '--work', metavar='DIR', help='where to build it; kept, and used again next time'
+    )
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what strangers heard and what was recorded of them, without keys and with."""
     import tempfile
 
+    with tempfile.TemporaryDirectory() as folder:
+        result = _tried(args, Path(folder), tell)
+    return {'passed': verdict(result), **result}
+
+
+def _tried(args: argparse.Namespace, folder: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return what came of each way, as far as it could be tried, and why not further."""
+    from contextlib import ExitStack
+
     from weld_twin_core.errors import TwinError
 
+    from .securing.middleware import secured_middleware
     from .securing.scenario import keystore, played
 
     result: dict[str, Any] = {'reason': ''}
-    with tempfile.TemporaryDirectory() as folder:
+    with ExitStack() as stack:
         for way in WAYS:
-            place = Path(folder) / way
+            place = folder / way
             place.mkdir()
             try:
+                if args.source and way == WAYS[0]:
+                    work = Path(args.work) if args.work else folder / 'built'
+                    stack.enter_context(secured_middleware(Path(args.source), work))
+                result['middleware'] = os.environ.get('RMW_IMPLEMENTATION', '')
                 keys = keystore(place) if way == 'enforced' else None
                 result[way] = played(place, keys)
             except TwinError as error:
                 result['reason'] = f'{way}: {error}'
                 break
             tell(f'{way}: {result[way]}')
-    return {'passed': verdict(result), **result}
+    return result
 
 
 def verdict(result: dict[str, Any]) -> bool:

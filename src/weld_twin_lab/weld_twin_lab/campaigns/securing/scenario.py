@@ -22,6 +22,7 @@ from weld_twin_nodes.harness.ros_domain import own_domain
 from weld_twin_nodes.live.all_nodes import MODULES
 from weld_twin_nodes.live.policy import HEAD, TAIL, policy
 
+from .middleware import FETCH
 from .party import MARKS
 
 SECONDS = 6.0
@@ -63,7 +64,9 @@ def keystore(folder: Path) -> Path:
 
     """
     if shutil.which('ros2') is None:
-        raise TwinError('the command ros2 with sros2 is not here, so that no keys can be made')
+        raise TwinError(
+            f'the command ros2 with sros2 is not here, so that no keys can be made; {FETCH}'
+        )
     file, keys = folder / 'policy.xml', folder / 'keys'
     file.write_text(HEAD + PARTY + policy().removeprefix(HEAD).removesuffix(TAIL) + TAIL)
     _ros2('create_keystore', str(keys))

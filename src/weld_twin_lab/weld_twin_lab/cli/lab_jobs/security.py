@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run the nodes under enforced security, beside strangers without keys or with others.
 
-Needs `ros2 security` and a middleware that is built with DDS security. Exits with 1 where it could
-not be shown; the file tells why.
+Needs `ros2 security` and a middleware that is built with DDS security; ``--source`` builds both from
+checkouts of rmw_cyclonedds, ros2cli and sros2. Exits with 1 where it could not be shown; the file
+tells why.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ CAMPAIGN = 'security'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
+    from ...campaigns.security import add_arguments as add_own
+
+    add_own(parser)
     parser.add_argument('--out', required=True, metavar='FILE', help='JSON file to write')
 
 

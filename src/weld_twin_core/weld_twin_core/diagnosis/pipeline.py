@@ -25,6 +25,7 @@ from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.carried import carried
 from .levels.curved import curved
 from .levels.held_against import held_against
+from .levels.placed import placed
 from .many.fitted_together import fitted_together
 from .predicting.allowed import allowed
 from .result import Diagnosis
@@ -157,13 +158,24 @@ def _explained(
     rival = curved(found, verdict, beliefs)
     verdict = held_against(verdict, unseen, rival, beliefs)
     signs = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks)
+    placing = placed(found, verdict, rival, beliefs)
     progress('held against curves without a formula')
     found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)
     found = _held(found, examined.given.robot)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
     return answer(
-        found, unseen, evidence, verdict, shrink, examined, posterior, signs, rival, limits
+        found,
+        unseen,
+        evidence,
+        verdict,
+        shrink,
+        examined,
+        posterior,
+        signs,
+        rival,
+        placing,
+        limits,
     )
 
 

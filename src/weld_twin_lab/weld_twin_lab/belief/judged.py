@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from weld_twin_core.diagnosis.trust.trusted import NAMING, group_of
+from weld_twin_core.diagnosis.trust.trusted import NAMING, group_of, level_group_of
 
 from ..blind.judging import Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
@@ -179,6 +179,7 @@ def _examples(case: Case) -> Iterator[Example]:
     yield Example(name, f'answer {group}', signs, case.right, signs['belief'])
     if status == 'none':
         return
+    group = level_group_of(status, row['signs'])
     truths = levels_of(row['truth'])
     at_work = _at_work(row['truth'])
     for cause, more in zip(row['verdict']['causes'], row['cause_signs'], strict=True):

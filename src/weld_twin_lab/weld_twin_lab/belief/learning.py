@@ -12,6 +12,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.trust.model import (
     AS_LOGIT,
+    PRESENT,
     SCHEMA,
     Trust,
     taken,
@@ -32,6 +33,8 @@ FOLDS = 8
 """Parts of the cases that take turns in being unseen."""
 FEWEST = 20
 """Examples of a level from which on it is learned at all."""
+FEWEST_NAMED = 5
+"""Examples in which a family is named from which on its name is a sign at all."""
 RISK = 0.01
 """Probability that a case may be sure and wrong."""
 TOLD_UNSURE = 0.8
@@ -146,7 +149,7 @@ def _told(bound: Bound) -> dict[str, Any]:
 
 def _level(examples: Sequence[Example], name: str) -> Level:
     table = _table(examples, name)
-    ways = np.array(list(TERMS[name].values()), dtype=float)
+    ways = np.array([TERMS[name][sign] for sign in table.names], dtype=float)
     tried = [(_unseen(table, ways, ridge), ridge) for ridge in RIDGES]
     unseen, ridge = min(tried, key=lambda item: log_loss(item[0], table.right, table.weight))
     middle, spread = _scaling(table.values)
@@ -177,8 +180,12 @@ def _level(examples: Sequence[Example], name: str) -> Level:
 
 
 def _table(examples: Sequence[Example], name: str) -> Table:
-    names = list(TERMS[name])
     signs = [with_products(e.signs) for e in examples]
+    names = [
+        sign
+        for sign in TERMS[name]
+        if not sign.startswith(PRESENT) or sum(sign in s for s in signs) >= FEWEST_NAMED
+    ]
     values = np.array([[entered(s, sign) for sign in names] for s in signs])
     cases = [e.case for e in examples]
     counts = {case: cases.count(case) for case in set(cases)}

@@ -9,6 +9,12 @@ starts from what was believed of it before, the first of its signs.
 
 from __future__ import annotations
 
+from weld_twin_core.diagnosis.trust.model import PRESENT
+from weld_twin_core.effects.registry import REGISTRY
+
+_FAMILIES = [name for name, kind in REGISTRY.items() if kind.cause]
+_IN_ANSWER = {start + name: 0 for start in PRESENT[:2] for name in _FAMILIES}
+_IN_CAUSE = {start + name: 0 for start in PRESENT[2:] for name in _FAMILIES}
 _MOTION = {'moving': 1, 'wide': 1, 'rows': 1, 'static': 0, 'orientation': 1, 'aligned': -1}
 _TRAVELLED = {'travel': 1, 'turns': 0, 'samples': 0}
 _LEFT = {
@@ -70,7 +76,7 @@ _CAUSE = {
     **_MOTION,
 }
 TERMS: dict[str, dict[str, int]] = {
-    'answer named': {'belief': 1, **_NAMED},
+    'answer named': {'belief': 1, **_NAMED, **_IN_ANSWER},
     'answer unknown': {
         'belief': 1,
         'gap': 0,
@@ -111,6 +117,8 @@ TERMS: dict[str, dict[str, int]] = {
         'margin': 1,
         'apart': 1,
         **_CAUSE,
+        **_IN_ANSWER,
+        **_IN_CAUSE,
     },
     'place unknown': {
         'place': 1,
@@ -126,6 +134,8 @@ TERMS: dict[str, dict[str, int]] = {
         'margin': 1,
         'apart': 1,
         **_CAUSE,
+        **_IN_ANSWER,
+        **_IN_CAUSE,
     },
     'dependence unknown': {
         'dependence': 1,
@@ -133,7 +143,7 @@ TERMS: dict[str, dict[str, int]] = {
         'curve_sure': 1,
         **_CAUSE,
     },
-    'name named': {'name': 1, 'belief': 1, **_CAUSE, **_NAMED},
+    'name named': {'name': 1, 'belief': 1, **_CAUSE, **_NAMED, **_IN_ANSWER, **_IN_CAUSE},
 }
 """Signs of each level and group of status, with the way they may count."""
 RANGES = {'curve_gain': (-1.0, 1.0), 'curve_sure': (-3.0, 10.0), 'structure_sure': (-3.0, 10.0)}

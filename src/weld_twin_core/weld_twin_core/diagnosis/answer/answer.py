@@ -15,6 +15,7 @@ from ..hypotheses.search import Search
 from ..levels.causes import causes, covering
 from ..levels.contributions import contributions
 from ..levels.curved import Curved
+from ..levels.free_form import FreeForm
 from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
 from ..trust.model import usual_trust
@@ -41,6 +42,7 @@ def answer(
     posterior: Posterior,
     signs: Mapping[str, float],
     rival: Curved | None = None,
+    placing: FreeForm | None = None,
     limits: Limits | None = None,
 ) -> Diagnosis:
     """
@@ -62,11 +64,15 @@ def answer(
         Of the answer: what says how far it can be trusted.
     rival : Curved or None
         What explains the gap without a formula.
+    placing : FreeForm or None
+        What tells place and dependence of an unknown gap.
     limits : Limits, optional
         What the next experiment may cost, and where it has to stay.
 
     """
-    verdict, told, shares, known = _trusted(found, unseen, evidence, verdict, signs, rival)
+    verdict, told, shares, known = _trusted(
+        found, unseen, evidence, verdict, signs, rival, placing
+    )
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
         gap=gap(found, evidence.floor),
@@ -78,7 +84,7 @@ def answer(
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,
-        unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, rival),
+        unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, placing),
         next_experiment=next_step(found, verdict, limits, rival),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         model=found.final.model,
@@ -115,9 +121,12 @@ def _trusted(
     verdict: Verdict,
     signs: Mapping[str, float],
     rival: Curved | None,
+    placing: FreeForm | None,
 ) -> tuple[Verdict, tuple[Cause, ...], Shares, Signs]:
     """Return the verdict and the causes as far as they can be trusted, shares, and all signs."""
-    told, shares = causes(found, unseen, verdict, rival, evidence.floor, found.work.beliefs)
+    told, shares = causes(
+        found, unseen, verdict, rival, evidence.floor, found.work.beliefs, placing
+    )
     known = Signs(
         {**signs, 'top_share': told[0].share if told else 0.0},
         tuple(

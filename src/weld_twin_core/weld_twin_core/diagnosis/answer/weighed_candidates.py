@@ -9,7 +9,7 @@ import numpy as np
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
-from ..levels.curved import Curved
+from ..levels.free_form import FreeForm
 from ..result import Candidate, Shrink, Unexplained
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
@@ -37,7 +37,11 @@ def _position_rms(found: Search, rival: Rival) -> float:
 
 
 def unexplained(
-    beliefs: Beliefs, evidence: Evidence, verdict: Verdict, shrink: Shrink, rival: Curved | None
+    beliefs: Beliefs,
+    evidence: Evidence,
+    verdict: Verdict,
+    shrink: Shrink,
+    placing: FreeForm | None,
 ) -> Unexplained:
     """
     Return what remains after the verdict, and what that or the gap itself depends on.
@@ -49,12 +53,12 @@ def unexplained(
     verdict : Verdict
     shrink : Shrink
         Of the model that is carried.
-    rival : Curved or None
-        Curves tell what an unknown gap depends on where nothing else does.
+    placing : FreeForm or None
+        What tells the places of an unknown gap, so that this says what the causes say.
 
     """
     case = Weighed(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
-    if not names and rival is not None and verdict.status == 'unknown':
-        names = tuple(str(part.group) for part in rival.form.parts)
+    if verdict.status == 'unknown' and placing is not None and placing.parts:
+        names = tuple(dict.fromkeys(str(part.group) for part in placing.parts))
     return Unexplained(shrink.rms_after_m, case.above_noise, names)

@@ -25,7 +25,7 @@ from ..result import Cause, Shares, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
-from .free_form import Part
+from .free_form import FreeForm, Part
 
 LISTED = 0.02
 """A place, dependence or name less probable than this is not listed."""
@@ -40,7 +40,7 @@ noise and the fit. Chosen on 167 causes of sealed cases so that 90 % are covered
 88 % are."""
 
 
-Places = list[tuple[Part, tuple[int, ...]]]
+Members = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +51,8 @@ class _Claim:
     place: dict[str, float]
     dependence: dict[str, float]
     name: dict[Site, float]
-    uncarried: float = 0.0
-    """Share of what no curve of the model stands for, as unseen folds tell it."""
+    taken: float | None = None
+    """Share of the squared gap that groups at this place take off unseen folds; None of a name."""
 
 
 def causes(
@@ -62,6 +62,7 @@ def causes(
     rival: Curved | None,
     floor: float,
     beliefs: Beliefs,
+    placing: FreeForm | None = None,
 ) -> tuple[tuple[Cause, ...], Shares]:
     """
     Return the causes, largest share first, and what of the squared gap is left and is noise.
@@ -77,11 +78,14 @@ def causes(
     floor : float
         RMS of the noise alone [m].
     beliefs : Beliefs
+    placing : FreeForm or None
+        What tells the places of an unknown gap; the curves carried, where left out.
 
     """
     if rival is not None and verdict.status == 'unknown':
         found, unseen = rival.found, rival.unseen
-    claims = _claims(found, verdict, rival, beliefs)
+        placing = placing or rival.form
+    claims = _claims(found, verdict, rival, placing, beliefs)
     squares = (
         unseen.squares(unseen.predict([])),
         unseen.squares(unseen.predict(range(len(unseen.parts)))),
@@ -90,7 +94,7 @@ def causes(
     labels = unseen.trusted_labels()
     whole = _shares(squares, parts, claims, np.ones(labels.size, dtype=bool))
     spread = _spread(squares, parts, claims, labels)
-    whole, spread = _with_uncarried(whole, spread, claims, rival)
+    whole, spread = _as_placed(whole, spread, claims, placing)
     out = [
         Cause(
             place=_listed(claim.place),
@@ -117,16 +121,24 @@ def covering(cause: Cause) -> Cause:
     return replace(cause, share_ci90=(max(low - SHARED, 0.0), min(high + SHARED, 1.0)))
 
 
-def _with_uncarried(
-    whole: Array, spread: Array, claims: Sequence[_Claim], rival: Curved | None
+def _as_placed(
+    whole: Array, spread: Array, claims: Sequence[_Claim], placing: FreeForm | None
 ) -> tuple[Array, Array]:
-    """Return shares and their errors with what no curve carries, one at most in all."""
-    if rival is None or not claims:
+    """
+    Return shares and their errors with those of places as the groups take the gap off.
+
+    Curves that are carried stand for a place as well as curves can; what a place is worth its own
+    groups say, whether or not a curve carries them.
+    """
+    of_groups = np.array([claim.taken is not None for claim in claims])
+    if placing is None or not of_groups.any():
         return whole, spread
-    more = np.array([claim.uncarried for claim in claims], dtype=np.float64)
-    room = max(1.0 - float(whole.sum()), 0.0) / max(float(more.sum()), 1e-300)
-    more *= min(room, 1.0)
-    return whole + more, np.hypot(spread, more / max(rival.form.steady, 1.0))
+    parts = np.array([claim.taken or 0.0 for claim in claims])
+    explained = max(float(whole[of_groups].sum()), float(parts.sum()))
+    explained = min(explained, max(1.0 - float(whole[~of_groups].sum()), 0.0))
+    told = parts * explained / max(float(parts.sum()), 1e-300)
+    error = np.hypot(spread, told / max(placing.steady, 1.0))
+    return np.where(of_groups, told, whole), np.where(of_groups, error, spread)
 
 
 def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
@@ -135,20 +147,25 @@ def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
 
 
 def _claims(
-    found: Search, verdict: Verdict, rival: Curved | None, beliefs: Beliefs
+    found: Search,
+    verdict: Verdict,
+    rival: Curved | None,
+    placing: FreeForm | None,
+    beliefs: Beliefs,
 ) -> list[_Claim]:
     model = found.final.model.found
-    if rival is not None and verdict.status == 'unknown':
-        return _curve_claims(model, rival, beliefs)
+    if verdict.status == 'unknown' and placing is not None and placing.parts:
+        return _curve_claims(model, rival, placing, beliefs)
     named = {site for group in verdict.sets for site in group}
     if found.dense:
         return _crowd_claims(model, named, verdict.confidence)
     out = []
     each = verdict.confidence ** (1.0 / max(len(verdict.sets), 1))
-    for k, effect in enumerate(model):
-        if Site(effect.name, effect.site) not in named or k >= len(found.slots):
-            continue
-        out.append(_named_claim(k, found.slots[k], each, rival, beliefs))
+    for k, (effect, slot) in enumerate(zip(model, found.slots, strict=False)):
+        # A member that was taken out of the library may lead its set; the model holds another.
+        sites = {Site(effect.name, effect.site), slot[0].site} if slot else set()
+        if sites & named:
+            out.append(_named_claim(k, slot, each, rival, beliefs))
     return out
 
 
@@ -187,52 +204,80 @@ def _effect_of(rival: Rival) -> Effect | None:
     return None
 
 
-def _curve_claims(model: tuple[Effect, ...], rival: Curved, beliefs: Beliefs) -> list[_Claim]:
-    """Return a claim for every effect that stayed, and for every place that curves bend."""
+def _curve_claims(
+    model: tuple[Effect, ...], rival: Curved | None, placing: FreeForm, beliefs: Beliefs
+) -> list[_Claim]:
+    """Return a claim for every effect that stayed, and for every place that the gap bends at."""
+    free = beliefs.level_free
+    kept = rival.kept if rival is not None else ()
     out = [
-        _Claim(
-            (k,),
-            {e.at: beliefs.level_free},
-            {e.on: beliefs.level_free},
-            {Site(e.name, e.site): beliefs.level_free},
-        )
-        for k, e in enumerate(rival.kept)
+        _Claim((k,), {e.at: free}, {e.on: free}, {Site(e.name, e.site): free})
+        for k, e in enumerate(kept)
     ]
-    at = len(rival.kept)
-    by_place: dict[str, Places] = {}
-    for part in rival.form.parts:
-        members = tuple(range(at, at + len(part.group.carried)))
-        at += len(members)
-        by_place.setdefault(part.group.at, []).append((part, members))
-    for place, parts in _merged(by_place).items():
-        held = tuple(k for _, members in parts for k in members)
-        believed = {a: w * beliefs.level_free for a, w in parts[0][0].weight_of('at').items()}
-        if place not in believed:
-            believed = {
-                place: beliefs.level_shared,
-                **{
-                    a: w * (beliefs.level_free - beliefs.level_shared) for a, w in believed.items()
-                },
-            }
-        on: dict[str, float] = {}
-        for part, _ in parts:
-            for name, weight in part.weight_of('on').items():
-                on[name] = max(on.get(name, 0.0), weight * beliefs.level_free)
-        curves = {Site(model[k].name, model[k].site): beliefs.level_free for k in held}
-        uncarried = float(sum(part.share for part, members in parts if not members))
-        out.append(_Claim(held, believed, on, curves, uncarried))
+    places: dict[str, list[Part]] = {}
+    for part in placing.parts:
+        places.setdefault(part.group.at, []).append(part)
+    places = _merged(places)
+    held = _carried_by(places, rival)
+    for place, parts in places.items():
+        curves = {Site(model[k].name, model[k].site): free for k in held[place]}
+        taken = sum(part.share for part in parts)
+        levels = (_place_of(place, parts, beliefs), _dependence_of(parts, beliefs))
+        out.append(_Claim(held[place], *levels, curves, float(taken)))
     return out
 
 
-def _merged(by_place: dict[str, Places]) -> dict[str, Places]:
+def _carried_by(places: dict[str, list[Part]], rival: Curved | None) -> dict[str, Members]:
+    """Return the curves of the model that stand for each place; the largest has what is over."""
+    out: dict[str, Members] = dict.fromkeys(places, ())
+    if rival is None:
+        return out
+    largest = max(places, key=lambda place: sum(part.share for part in places[place]))
+    # Joints that were put under one cause bring their curves along.
+    owner = {part.group.at: place for place, parts in places.items() for part in parts}
+    at = len(rival.kept)
+    for part in rival.form.parts:
+        members = tuple(range(at, at + len(part.group.carried)))
+        out[owner.get(part.group.at, largest)] += members
+        at += len(members)
+    return out
+
+
+def _place_of(place: str, parts: list[Part], beliefs: Beliefs) -> dict[str, float]:
+    """Return what is believed of the place of some parts, by the one that does most."""
+    free, shared = beliefs.level_free, beliefs.level_shared
+    weights = max(parts, key=lambda part: part.share).weight_of('at')
+    if place in weights:
+        return {at: w * free for at, w in weights.items()}
+    return {place: shared, **{at: w * (free - shared) for at, w in weights.items()}}
+
+
+def _dependence_of(parts: list[Part], beliefs: Beliefs) -> dict[str, float]:
+    """Return what is believed of the dependence of some parts, each counted by its share."""
+    whole = sum(part.share for part in parts)
+    out: dict[str, float] = {}
+    for part in parts:
+        size = part.share / whole if whole > 0.0 else 1.0 / len(parts)
+        for on, weight in part.weight_of('on').items():
+            out[on] = out.get(on, 0.0) + size * weight * beliefs.level_free
+    return out
+
+
+def _merged(places: dict[str, list[Part]]) -> dict[str, list[Part]]:
     """Return the places, with joints that all depend on the load, or lag, put under one cause."""
-    out = dict(by_place)
+    out = dict(places)
     for on, together, least in (('load', 'load', 2), ('speed', 'clock', 3)):
         joints = [
-            place for place, parts in out.items() if all(part.group.on == on for part, _ in parts)
+            place
+            for place, parts in out.items()
+            if place != together and all(part.group.on == on for part in parts)
         ]
-        if len(joints) >= least:
-            out[together] = [item for place in joints for item in out.pop(place)]
+        if len(joints) >= least or (joints and together in out):
+            out.setdefault(together, [])
+            out[together] = [
+                *out[together],
+                *(part for place in joints for part in out.pop(place)),
+            ]
     return out
 
 

@@ -16,6 +16,7 @@ from ..beliefs import Beliefs
 from ..unseen.regions import posture_regions
 from .groups import Group, all_groups, wandering_groups
 from .sparse_groups import choosing, chosen, rival_weights, worth
+from .whole_arm import whole_arm_groups
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +96,7 @@ def free_form(
     beliefs: Beliefs,
     *,
     wandering: bool = False,
+    whole_arm: bool = False,
 ) -> FreeForm:
     """
     Return the few groups that explain what a fit leaves, each with its rivals.
@@ -111,6 +113,8 @@ def free_form(
     wandering : bool
         Look for what changes as the recording goes on, and ask no more of it than to predict
         short stretches from their neighbours.
+    whole_arm : bool
+        Look also for causes that act at several joints at once, which no curve can carry.
 
     """
     columns, _ = design(problem, bare.model, scale)
@@ -118,6 +122,8 @@ def free_form(
     if precision.size:
         held[-precision.size :] = precision
     groups = all_groups(problem, bare.model, scale)
+    if whole_arm:
+        groups += whole_arm_groups(problem, bare.model, scale)
     ways = [problem.block_labels(STRETCHES), posture_regions(problem)]
     if wandering:
         groups += wandering_groups(problem, bare.model, scale)

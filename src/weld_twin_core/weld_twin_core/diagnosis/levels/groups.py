@@ -100,9 +100,9 @@ def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
     for at, on, curves in _curved(features, model):
         parts = [problem.effect_columns(features, curve, atoms=False) for curve in curves]
         joined = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)]
-        out.append(_group(problem, scale, at, on, tuple(curves), joined))
+        out.append(spanned(problem, scale, at, on, tuple(curves), joined))
     for at, on, blocks in _plain(problem, features, model):
-        group = _group(problem, scale, at, on, (), blocks)
+        group = spanned(problem, scale, at, on, (), blocks)
         out.append(replace(group, carriers=_late(features, model) if at == 'clock' else ()))
     return [group for group in out if group.columns.size]
 
@@ -130,11 +130,11 @@ def wandering_groups(problem: Problem, model: Model, scale: Scale) -> list[Group
             near = np.maximum(1.0 - np.abs(since - np.arange(WANDERS)[:, None]), 0.0)
             column = maker.column(('q', index))[None, : problem.rows[k]]
             parts.append(column * (near * way)[:, None, :])
-        out.append(_group(problem, scale, joint, 'direction', (), parts))
+        out.append(spanned(problem, scale, joint, 'direction', (), parts))
     return [group for group in out if group.columns.size]
 
 
-def _group(
+def spanned(
     problem: Problem,
     scale: Scale,
     at: str,
@@ -142,6 +142,21 @@ def _group(
     curves: tuple[Effect, ...],
     parts: list[Array],
 ) -> Group:
+    """
+    Return the group of some columns, without any where these data do not show it.
+
+    Parameters
+    ----------
+    problem : Problem
+    scale : Scale
+    at, on : str
+        Place and dependence.
+    curves : tuple of Effect
+        What the columns stand for; empty for plain columns.
+    parts : list of array, each (E, c, M)
+        Columns, one array per recording.
+
+    """
     columns = problem.whitened(parts, scale)
     size = np.sqrt((columns**2).mean(axis=1))
     if not curves:

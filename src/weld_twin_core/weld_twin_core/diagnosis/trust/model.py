@@ -40,6 +40,10 @@ PRODUCTS = {
 or not widely. What depends on the angle of a joint at rest looks like a constant."""
 
 
+PRESENT = ('named_', 'alone_', 'cause_is_', 'cause_only_')
+"""Beginnings of signs that say which families are named; one that is not there is not named."""
+
+
 @dataclass(frozen=True)
 class Term:
     """
@@ -96,13 +100,15 @@ class Learned:
         Parameters
         ----------
         signs : mapping from str to float
-            A sign that is missing counts as at its middle.
+            A sign that is missing counts as at its middle, a family that is missing as not named.
 
         """
         total = self.bias
         for name, term in self.terms.items():
             if name in signs:
                 total += term.nats(taken(name, signs[name]))
+            elif name.startswith(PRESENT):
+                total += term.nats(0.0)
         return float(np.clip(1.0 / (1.0 + np.exp(-total)), self.least, self.most))
 
     def larger(self, signs: Mapping[str, float]) -> bool:

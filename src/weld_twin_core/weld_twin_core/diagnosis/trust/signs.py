@@ -96,6 +96,7 @@ def signs_of_answer(
             **_of_rivals(evidence, verdict),
             **_of_curves(unseen, rival, evidence.floor),
             **_of_data(found.problem),
+            **families_in('named_', 'alone_', verdict.sets),
             'rows': _log(found.effective(found.small)),
             'notes': sum(check.level == 'note' for check in checks),
             'warnings': sum(check.level == 'warning' for check in checks),
@@ -136,8 +137,28 @@ def signs_of_cause(
             'curve_at_place': float(bool(cause.place) and cause.place[0][0] in at),
             'curve_on_dependence': float(bool(cause.dependence) and cause.dependence[0][0] in on),
             'one_joint': float(bool(cause.name) and cause.name[0][0].joint is not None),
+            **families_in('cause_is_', 'cause_only_', [[site for site, _ in cause.name]]),
         }
     )
+
+
+def families_in(any_of: str, only: str, sets: Iterable[Sequence[Site]]) -> Numbers:
+    """
+    Return which families are named, and which of them alone: some stand in for others often.
+
+    Parameters
+    ----------
+    any_of, only : str
+        What the signs begin with, for a family that is in a set and for one that is the whole set.
+    sets : iterable of sequences of Site
+
+    """
+    out = {}
+    for group in sets:
+        out.update({any_of + site.effect: 1.0 for site in group})
+        if len(group) == 1:
+            out[only + group[0].effect] = 1.0
+    return out
 
 
 def _levels(level: str, listed: Sequence[float]) -> Numbers:

@@ -36,6 +36,20 @@ def group_of(status: str, signs: Mapping[str, float]) -> str:
     return 'named' if status in NAMING else status
 
 
+def level_group_of(status: str, signs: Mapping[str, float]) -> str:
+    """
+    Return which causes are learned from together: all of an unknown gap are placed by one means.
+
+    Parameters
+    ----------
+    status : str
+    signs : mapping from str to float
+        Of the answer.
+
+    """
+    return status if status == 'unknown' else group_of(status, signs)
+
+
 def trusted(
     verdict: Verdict, causes: Sequence[Cause], signs: Signs, trust: Trust
 ) -> tuple[Verdict, tuple[Cause, ...]]:
@@ -89,7 +103,7 @@ def trusted_cause(cause: Cause, status: str, signs: Mapping[str, float], trust: 
 
     """
 
-    group = group_of(status, signs)
+    group = level_group_of(status, signs)
     place, dependence, name = (
         trust.told(level, group, signs) for level in ('place', 'dependence', 'name')
     )

@@ -202,3 +202,16 @@ def test_what_groups_are_worth_adds_up():
     assert sum(told.shares) == pytest.approx(told.gain)
     assert told.gain == pytest.approx(5.0 / 5.25, abs=0.02)
     assert told.shares[0] / told.shares[1] == pytest.approx(4.0, rel=0.3)
+
+
+def test_a_wrong_unit_that_no_effect_stands_for_is_placed_at_the_instrument():
+    recording = recorded(lambda angle: 0.0 * angle)
+    measured = recording.measured
+    stretched = wt.Measurements(measured.t, 1.0004 * measured.position)
+    told = wt.diagnose(
+        recording.with_measured(stretched), wt.load('ur5'), exclude=['measurement_scale']
+    )
+    assert told.status == 'unknown'
+    assert (told.causes[0].place[0][0], told.causes[0].dependence[0][0]) == ('instrument', 'place')
+    assert told.unexplained.structure[0] == 'instrument, depending on place'
+    assert sum(share for _, share in told.where.joints) < 0.5 * told.causes[0].share

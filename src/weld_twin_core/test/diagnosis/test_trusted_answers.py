@@ -136,3 +136,10 @@ def test_what_this_package_has_learned_can_be_read():
     for level in trust.levels.values():
         assert 0.0 < level.least < level.most < 1.0
         assert all(term.spread > 0.0 and term.low <= term.high for term in level.terms.values())
+
+
+def test_a_family_that_is_missing_counts_as_not_named():
+    trust = taught(sure_from=0.5, answer_named=(0.0, {'named_backlash': 1.0}))
+    absent, named = (trust.told('answer', 'named', s) for s in ({}, {'named_backlash': 1.0}))
+    assert absent == pytest.approx(1.0 / (1.0 + math.exp(0.5)))
+    assert named == pytest.approx(0.5)

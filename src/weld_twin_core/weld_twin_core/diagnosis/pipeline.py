@@ -158,24 +158,14 @@ def _explained(
     rival = curved(found, verdict, beliefs)
     verdict = held_against(verdict, unseen, rival, beliefs)
     signs = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks)
-    placing = placed(found, verdict, rival, beliefs)
+    places = placed(found, verdict, rival, beliefs)
     progress('held against curves without a formula')
     found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)
     found = _held(found, examined.given.robot)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
     return answer(
-        found,
-        unseen,
-        evidence,
-        verdict,
-        shrink,
-        examined,
-        posterior,
-        signs,
-        rival,
-        placing,
-        limits,
+        found, unseen, evidence, verdict, shrink, examined, posterior, signs, rival, places, limits
     )
 
 

@@ -14,7 +14,9 @@ from weld_twin_core.effects.registry import REGISTRY
 
 _FAMILIES = [name for name, kind in REGISTRY.items() if kind.cause]
 _IN_ANSWER = {start + name: 0 for start in PRESENT[:2] for name in _FAMILIES}
+"""Which families an answer names, in a set or alone: either way, as some stand in for others."""
 _IN_CAUSE = {start + name: 0 for start in PRESENT[2:] for name in _FAMILIES}
+"""The same of one cause."""
 _MOTION = {'moving': 1, 'wide': 1, 'rows': 1, 'static': 0, 'orientation': 1, 'aligned': -1}
 _TRAVELLED = {'travel': 1, 'turns': 0, 'samples': 0}
 _LEFT = {

@@ -70,9 +70,7 @@ def answer(
         What the next experiment may cost, and where it has to stay.
 
     """
-    verdict, told, shares, known = _trusted(
-        found, unseen, evidence, verdict, signs, rival, placing
-    )
+    verdict, told, shares, own = _trusted(found, unseen, evidence, verdict, signs, rival, placing)
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
         gap=gap(found, evidence.floor),
@@ -95,7 +93,7 @@ def answer(
         evidence=evidence,
         posterior=posterior,
         **_parted(unseen, told, shares, verdict, rival),
-        signs=known,
+        signs=own,
         contacts=contact_spreads(found, unseen),
         **_compared(found, examined),
     )

@@ -43,7 +43,9 @@ def placed(
     bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
     none = np.zeros(0)
     form = free_form(small, scale, bare, none, beliefs, whole_arm=True)
-    if form.parts or rival is not None:
-        return form if form.parts else rival.form
+    if form.parts:
+        return form
+    if rival is not None:
+        return rival.form
     # What carries to no other posture may still be told from neighbours in time.
     return free_form(small, scale, bare, none, beliefs, whole_arm=True, wandering=True)

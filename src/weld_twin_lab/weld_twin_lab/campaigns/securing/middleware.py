@@ -24,6 +24,7 @@ from weld_twin_core.errors import TwinError
 WANTED = ('rmw_cyclonedds_cpp', 'ros2cli', 'sros2')
 """Packages that are built, where the folder has them."""
 MIDDLEWARE = WANTED[0]
+"""The one that nothing works without."""
 FETCH = (
     'fetch the branch jazzy of ros2/rmw_cyclonedds, ros2/ros2cli and ros2/sros2 into a folder, and give '
     'it as --source'

@@ -10,8 +10,10 @@ same table and the same words.
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from weld_twin_msgs_py.files import markdown
@@ -33,22 +35,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='M',
         help='begin no more demos after this time (default: no limit)',
     )
+    parser.add_argument(
+        '--go-on', action='store_true', help='add to the demos that the file has, up to --runs'
+    )
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return one row for each run, and what they come to."""
     from .demonstrating.one_demo import run_once
+    from .keeping.result_file import write_result
 
-    rows: list[dict[str, Any]] = []
-    latest = time.monotonic() + 60.0 * args.minutes
-    for k in range(args.runs):
-        if time.monotonic() > latest:
+    rows = _before(args) if args.go_on else []
+    begun = time.monotonic()
+    for k in range(len(rows), args.runs):
+        if rows and time.monotonic() > begun + 60.0 * args.minutes:
             break
         row = run_once(args.busy if k % 2 else 0)
         rows.append(row)
         what = fault(row, rows[0]) or 'whole and the same'
         tell(f'{k + 1}: {row["busy"]} busy, {row["seconds"]} s, {what}')
+        made = {**summary(rows, args.busy), 'demos': rows}
+        write_result(args.out, 'demos', time.monotonic() - begun, made)  # a kill leaves these
     return {**summary(rows, args.busy), 'demos': rows}
+
+
+def _before(args: argparse.Namespace) -> list[dict[str, Any]]:
+    """Return the demos of the file, none where there is no file yet."""
+    file = Path(args.out)
+    rows: list[dict[str, Any]] = []
+    if file.exists():
+        rows += json.loads(file.read_text(encoding='utf-8'))['demos']
+    return rows
 
 
 def summary(rows: list[dict[str, Any]], busy: int) -> dict[str, Any]:

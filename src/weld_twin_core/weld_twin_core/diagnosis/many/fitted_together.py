@@ -77,8 +77,10 @@ def fitted_together(
         better = left < CHOSEN * few and many
     if better and not found.crowded and _one_and_crumbs(best, beliefs):
         better = False
-    if better and found.problem.untracked and found.problem.places == PLACES - 1:
-        return _carrying(found, exclude, steps[0], beliefs, progress)
+    if better and found.problem.untracked and found.problem.places >= PLACES - 1:
+        trial = _carrying(found, exclude, steps[0], beliefs, progress)
+        if found.problem.places < PLACES or unseen_rms(trial) < left:
+            return trial
     return best if better else found
 
 

@@ -230,3 +230,14 @@ def test_a_tool_that_slipped_is_told_from_a_base_that_moved():
     bare = fit(problem, model, scale)
     found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, Beliefs())
     assert found.depends_on[0].endswith('seen from the tool')
+
+
+def test_every_joint_that_hardly_moves_is_named_with_the_family_it_cannot_show():
+    problem, model = tiny()
+    recording = problem.recordings[0]
+    q = recording.joints.q.copy()
+    q[:, 3:5] = q[:1, 3:5]
+    still = replace(recording, joints=replace(recording.joints, q=q))
+    found = library(Problem((still,)), model)
+    names = model.robot.joint_names
+    assert found.absent['gear_ratio'] == f'the joint hardly moves ({names[3]}, {names[4]})'

@@ -229,13 +229,15 @@ def _dated(event: Event, change: Change, weeks: Array) -> bool:
     """
     Tell whether a date is right within one recording.
 
-    Of a step its first recording; of a trend the interval told must reach the week it began in;
-    a season has none.
+    Of a step its first recording; of a trend the interval told must reach the week it began in, that
+    of a slow change where a step is told with one; a season has none.
     """
     if event.kind == 'season':
         return True
     after = int(np.searchsorted(weeks, event.begin))
-    days = [float(np.searchsorted(weeks, day / WEEK)) for day in (change.day, *change.between)]
+    first, last = change.between
+    first = first if change.since is None else min(first, change.since)
+    days = [float(np.searchsorted(weeks, day / WEEK)) for day in (change.day, first, last)]
     if event.kind == 'step' and change.kind == 'step':
         return abs(days[0] - after) <= 1.0
     return days[1] - 1.0 <= after <= days[2] + 1.0

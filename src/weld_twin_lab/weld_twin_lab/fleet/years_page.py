@@ -33,7 +33,8 @@ What is counted: a change is real from the recording on after which its size is 
 errors, all else left free. It is found when it, or the set told with it, holds its coordinate. Effect
 and joint are judged at the end of the year, by the coordinate told first; the last joint's row and the
 tool are one place. The date of a step is right within one recording, that of a trend if the interval
-told reaches the week it began in. Limits of forecasts lie half as far ahead again as the wear has
+told reaches the week it began in; a step may be told as *at once or slowly since* a date, which counts
+for wear. Limits of forecasts lie half as far ahead again as the wear has
 gone. The changes drawn are those that use makes: a link that was bent would come second in a set.
 """
 MORE = {

@@ -34,6 +34,9 @@ def sentence(change: Change) -> str:
     if change.kind == 'step':
         size = uncertain(change.size, change.std, what.factor, what.unit)
         said = f'{what.words}: stepped by {size} {when}'
+        if change.since is not None:
+            slowly = f'slowly since {date(change.since)}'
+            said = f'{what.words}: changed by {size}, at once {when} or {slowly}'
     elif change.kind == 'trend':
         size = uncertain(change.size * WEEK, change.std * WEEK, what.factor, what.unit)
         said = f'{what.words}: moves by {size} a week since {date(change.day)}'
@@ -106,6 +109,7 @@ def as_dict(change: Change) -> dict[str, Any]:
         'kind': change.kind,
         'date': date(change.day),
         'between': [date(day) for day in change.between],
+        'slowly_since': None if change.since is None else date(change.since),
         'size': change.size,
         'std': change.std,
         'nats': change.nats,

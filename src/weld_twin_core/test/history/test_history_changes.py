@@ -72,22 +72,6 @@ def test_what_may_have_come_slowly_is_told_so():
     assert (sudden[0].kind, sudden[0].since) == ('step', None)
 
 
-def test_the_date_of_a_limit_is_as_uncertain_as_the_begin_of_a_trend():
-    """Of many worn arms, nine in ten reach the limit within the interval told."""
-    place, rise, held, told = 5, 0.03, 0, 0
-    for seed in range(20):
-        seen = year(seed, lambda w: rise * (np.arange(COUNT) == place) * max(w - 24, 0), weeks=40)
-        start = 0.5 * np.random.default_rng(seed).normal(size=COUNT)[place]
-        now = outlook(seen, changes(seen), NAMES[place])
-        if now is None or start < 0.0:
-            continue
-        limit = start + rise * (39 - 24) + 0.3
-        low, _, high = reaches(limit, now)
-        held += low <= 7.0 * 0.3 / rise <= high
-        told += 1
-    assert told >= 5 and held >= 0.8 * told
-
-
 def test_a_season_is_neither():
     def swing(week):
         return 0.6 * (np.arange(COUNT) == 2) * np.sin(2.0 * np.pi * week * 7.0 / 365.25 + 0.4)

@@ -17,13 +17,13 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri, softmax
+from scipy.special import chdtri
 
 from ..arrays import Array
 from .observation import Observation, Series, series_of
@@ -221,31 +221,9 @@ def value_and_rise(
 
     """
     series = series_of(observations)
-    place = series.names.index(name)
-    fits = [_System(series, taken) for taken in _ways(series, found, name)]
-    told = [fit.now(place) for fit in fits]
-    likely = softmax([0.5 * fit.explained / fits[0].scatter for fit in fits])
-    values = np.array([value for value, _ in told])
-    mean = likely @ values
-    inside = np.einsum('k,kij->ij', likely, np.array([covariance for _, covariance in told]))
-    return mean, inside + np.einsum('k,ki,kj->ij', likely, values - mean, values - mean)
-
-
-def _ways(series: Series, found: Sequence[Change], name: str) -> Iterator[list[Found]]:
-    """
-    Yield the changes as they were told, then with trends of a coordinate that begin elsewhere.
-
-    The day on which a slow trend began is known to weeks, and with it the rise is.
-    """
     shapes = {(each.kind, float(series.days[each.begin])): each for each in _shapes(series.days)}
     taken = [Found(shapes[each.kind, each.day], series.names.index(each.name)) for each in found]
-    yield taken
-    for k, each in enumerate(found):
-        if each.kind == 'trend' and each.name == name:
-            first, last = each.between
-            for (kind, day), shape in shapes.items():
-                if kind == 'trend' and first <= day <= last and day != each.day:
-                    yield [*taken[:k], taken[k]._replace(shape=shape), *taken[k + 1 :]]
+    return _System(series, taken).now(series.names.index(name))
 
 
 def _shapes(days: Array) -> list[Shape]:
@@ -288,11 +266,6 @@ class _System:
         self._right = np.concatenate([np.atleast_1d(r) for r in right])
         self._inverse = np.linalg.inv(self._matrix)
         self.solution = self._inverse @ self._right
-
-    @property
-    def explained(self) -> float:
-        """Return by how much the fit lowers the sum of squares."""
-        return float(self._right @ self.solution)
 
     @cached_property
     def scatter(self) -> float:

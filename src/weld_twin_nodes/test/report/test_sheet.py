@@ -135,6 +135,35 @@ def test_a_tolerance_is_asked_for_and_judged_by_the_uncertainty(browser):
         assert verdict.inner_text() == word
 
 
+def test_a_tolerance_is_read_with_a_comma_and_nothing_else_is_guessed(browser):
+    page = browser.open(report_page(THREE))
+    field, wrong = page.locator('#tolerance'), page.locator('#unread')
+    top = page.locator('#verdict .judged')
+    for text, value in (('0,3', '0.300'), ('0.3', '0.300'), (' 1,25 mm', '1.250')):
+        field.fill('')
+        field.press_sequentially(text)
+        assert f'of {value} mm allowed' in top.inner_text() and not wrong.is_visible()
+    for text in ('0,3.1', '1e3', 'abc', '-1', '0', '1 000', '3 cm'):
+        field.fill('')
+        field.press_sequentially(text)
+        assert wrong.is_visible() and not top.is_visible()
+        assert page.locator('[data-verdict=as-it-is]').inner_text() == 'no tolerance given'
+        assert field.get_attribute('aria-invalid') == 'true'
+
+
+def test_an_open_verdict_tells_its_limits_and_what_to_do(browser):
+    size = max(np.linalg.norm(THREE.traces.before[0], axis=1))
+    static = report_page(THREE, sheet=Sheet(demand=Demand(size, 1e-5)))
+    told = re.search(r'passes up to ([\d.]+).mm, fails above ([\d.]+).mm', static)
+    low, high = float(told[1]), float(told[2])
+    page = browser.open(static)
+    top, field = page.locator('#verdict .judged'), page.locator('#tolerance')
+    assert f'passes up to {low:.3f} mm, fails above {high:.3f} mm' in top.inner_text()
+    assert low < 1e3 * size < high and page.locator('#remedy').is_visible()
+    field.fill(f'{3e3 * size:.3f}')
+    assert 'passes up to' not in top.inner_text() and not page.locator('#remedy').is_visible()
+
+
 def test_the_mark_at_the_top_follows_the_tolerance_field(browser):
     page = browser.open(report_page(THREE))
     top, table = page.locator('#verdict .judged'), page.locator('[data-verdict=as-it-is]')

@@ -30,6 +30,12 @@ _ROWS = 6
 """Poses of ISO 9283 on the page; `weld-twin iso9283` has all."""
 
 
+_REMEDY = (
+    'Where it cannot be said, what to do: measure again with a better instrument, mend the causes '
+    'and measure anew, or agree on another tolerance.'
+)
+
+
 @dataclass(frozen=True)
 class Demand:
     """
@@ -72,6 +78,18 @@ def on_what(diagnosis: Diagnosis) -> str:
     return f'{"at the stations" if at_rest(diagnosis) else "on the seam"} recorded'
 
 
+def judged_words(rule: Rule, size: float) -> str:
+    """Return the verdict on a largest deviation [m], and where it is open its limits."""
+    verdict = rule.judged(size)
+    told = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
+    if verdict == OPEN and rule.tolerance_m is not None:
+        low = rule.tolerance_m - rule.to_pass * rule.uncertainty_m
+        high = rule.tolerance_m + rule.to_fail * rule.uncertainty_m
+        passes = f'passes up to {millimetres(low)}' if low > 0.0 else 'nothing passes'
+        told += f' ({passes}, fails above {millimetres(high)})'
+    return f'{told[:1].upper()}{told[1:]}'
+
+
 def rule_data(rule: Rule) -> dict[str, Any]:
     """Return what the page's script judges by; lengths in mm."""
     return {
@@ -96,6 +114,13 @@ def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
         'Does it pass',
         _field(rule),
         table(heads, rows, 'acceptance'),
+        tag(
+            'p',
+            _REMEDY,
+            class_='note',
+            id_='remedy',
+            hidden=None if rule.judged(before) == OPEN else '',
+        ),
         tag('p', _rule_words(diagnosis, rule, demand), class_='note'),
         _standard(diagnosis),
         id_='acceptance',
@@ -104,11 +129,21 @@ def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
 
 def _field(rule: Rule) -> Html:
     value = None if rule.tolerance_m is None else f'{1e3 * rule.tolerance_m:g}'
+    # A field of type number drops a comma without a word in some languages: 0,3 becomes 3.
     entry = tag(
-        'input', type='number', id_='tolerance', min='0', step='any', value=value, size='6',
-        inputmode='decimal',
+        'input', type='text', id_='tolerance', value=value, size='6', inputmode='decimal',
+        autocomplete='off', aria_describedby='unread',
     )  # fmt: skip
-    return tag('p', tag('label', 'Tolerance of the tool point: ', entry, ' mm'), class_='asked')
+    unread = tag(
+        'span',
+        'Not understood: write millimetres above 0, such as 0.3 or 0,3.',
+        id_='unread',
+        class_='mark fail',
+        role='alert',
+        hidden='',
+    )
+    label = tag('label', 'Tolerance of the tool point: ', entry, ' mm')
+    return tag('p', label, ' ', unread, class_='asked')
 
 
 def _row(name: str, value: float, rule: Rule, key: str) -> tuple[Html | str, ...]:
@@ -127,8 +162,8 @@ def _rule_words(diagnosis: Diagnosis, rule: Rule, demand: Demand) -> str:
     text = (
         f'ISO 14253-1: it passes where the largest deviation stays below the tolerance by '
         f'{millimetres(rule.to_pass * rule.uncertainty_m)}, it fails where it is above by '
-        f'{millimetres(rule.to_fail * rule.uncertainty_m)}, being the largest of '
-        f'{rule.readings} readings; in between it cannot be said. The standard uncertainty is '
+        f'{millimetres(rule.to_fail * rule.uncertainty_m)}; in between it cannot be said. '
+        f'{_unequal(rule)}The standard uncertainty is '
         f'{millimetres(rule.uncertainty_m)}, from {source}.'
     )
     text += f' It is judged {on_what(diagnosis)}, and nowhere else.'
@@ -138,6 +173,16 @@ def _rule_words(diagnosis: Diagnosis, rule: Rule, demand: Demand) -> str:
             'certificate of the instrument, which was not given.'
         )
     return text
+
+
+def _unequal(rule: Rule) -> str:
+    """Return why the two margins differ, where they do."""
+    if rule.readings < 2:
+        return ''
+    return (
+        'The second margin is wider: noise alone makes the largest of '
+        f'{rule.readings} readings larger, and that must not fail a good robot. '
+    )
 
 
 def _standard(diagnosis: Diagnosis) -> Html | None:

@@ -11,7 +11,15 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_msgs_py.files.input_files import InputFile
 
-from .acceptance import WORDS, Demand, acceptance_section, largest, on_what, rule_data, rule_of
+from .acceptance import (
+    Demand,
+    acceptance_section,
+    judged_words,
+    largest,
+    on_what,
+    rule_data,
+    rule_of,
+)
 from .cause_cards import causes_cards
 from .cause_list import causes_section
 from .changed_section import changed_section
@@ -24,7 +32,6 @@ from .gap_location import where_section
 from .headline import header, opening
 from .html import Html, document, joined, own_file, tag
 from .joint_names import renamed
-from .quantities import millimetres
 from .seam_view import seam_section
 from .shrinking import shrink_section
 from .switches import page_data
@@ -117,11 +124,10 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
         return None
     size = largest(diagnosis)[0]
     verdict = rule.judged(size)
-    told = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
     where = f'as it is, {on_what(diagnosis)}'
     return tag(
         'p',
-        f'{told[:1].upper()}{told[1:]}, {where}',
+        f'{judged_words(rule, size)}, {where}',
         class_=f'status judged {verdict}',
         hidden='' if rule.tolerance_m is None else None,
         data_top=where,

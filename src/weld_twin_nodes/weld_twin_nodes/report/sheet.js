@@ -48,6 +48,29 @@ window.sheet = (() => {
     return ['open', words.open];
   }
 
+  // Where a verdict is open: up to where it would pass, and from where it would fail.
+  function limits(kind) {
+    const { tolerance, below, above } = data.rule;
+    if (kind !== 'open') return '';
+    const passes = tolerance > below ? `passes up to ${mm(tolerance - below)}` : 'nothing passes';
+    return ` (${passes}, fails above ${mm(tolerance + above)})`;
+  }
+
+  // Millimetres as they are written in any language, 0.3 or 0,3; null where it is nothing of the kind.
+  function read(text) {
+    const told = /^(\d+(?:[.,]\d*)?|[.,]\d+)(?:\s*mm)?$/.exec(text.trim());
+    const value = told ? Number(told[1].replace(',', '.')) : NaN;
+    return value > 0 ? value : null;
+  }
+
+  function asked(field) {
+    const empty = field.value.trim() === '', unread = !empty && read(field.value) == null;
+    data.rule.tolerance = empty ? null : read(field.value);
+    document.getElementById('unread').hidden = !unread;
+    field.setAttribute('aria-invalid', String(unread));
+    accept();
+  }
+
   function accept() {
     const largest = { 'as-it-is': most('before'), mended: most('now') };
     for (const item of all('[data-largest]')) item.textContent = mm(largest[item.dataset.largest]);
@@ -56,6 +79,8 @@ window.sheet = (() => {
       item.className = `mark ${kind}`;
       item.textContent = word;
     }
+    const remedy = document.getElementById('remedy');
+    if (remedy) remedy.hidden = !['as-it-is', 'mended'].some((side) => judged(largest[side])[0] === 'open');
     for (const item of all('[data-alone]')) {
       const [kind, word] = judged(Number(item.dataset.alone));
       item.className = `mark ${kind}`;
@@ -66,7 +91,7 @@ window.sheet = (() => {
       item.className = `status judged ${kind}`;
       item.hidden = tolerance == null;
       if (tolerance == null) continue;
-      const told = `${word}: ${mm(largest['as-it-is'])} of ${mm(tolerance)} allowed, ${item.dataset.top}`;
+      const told = `${word}: ${mm(largest['as-it-is'])} of ${mm(tolerance)} allowed${limits(kind)}, ${item.dataset.top}`;
       item.textContent = told[0].toUpperCase() + told.slice(1);
     }
   }
@@ -126,11 +151,9 @@ window.sheet = (() => {
     }
     const field = document.getElementById('tolerance');
     if (field) {
-      field.addEventListener('input', () => {
-        const value = Number(field.value);
-        data.rule.tolerance = field.value !== '' && value > 0 ? value : null;
-        accept();
-      });
+      field.addEventListener('input', () => asked(field));
+      // A browser keeps what was typed when the page is loaded again.
+      asked(field);
     }
     document.addEventListener('instant', instant);
     window.addEventListener('beforeprint', () => {

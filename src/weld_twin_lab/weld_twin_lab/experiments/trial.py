@@ -51,7 +51,6 @@ def answered(
     first: Recording,
     later: Sequence[Recording],
     limits: Limits,
-    before: Mapping[str, Any] | None = None,
 ) -> tuple[Mapping[str, Any], str]:
     """
     Return the answer from the first recording and later ones, and why it closes the question.
@@ -63,8 +62,6 @@ def answered(
     later : sequence of Recording
     limits : Limits
         What the next experiment may take.
-    before : mapping, optional
-        The answer before the last recording.
 
     """
     together = cell.diagnosed([first, *later], limits=limits)
@@ -76,7 +73,7 @@ def answered(
         # Too few stations to be diagnosed by themselves.
         return weighed(together)
     free = cell.diagnosed(list(later), limits=limits) if third_wanted(together, alone) else None
-    return weighed(together, alone, free, before)
+    return weighed(together, alone, free)
 
 
 def _left(minutes: float, visit: float = VISIT) -> Limits:
@@ -167,7 +164,7 @@ def investigated(
         left, visit = left - asked['robot_minutes'], visit - asked['minutes']
         begun = time.perf_counter()
         try:
-            found, why = answered(cell, start, later, _left(left, visit), found)
+            found, why = answered(cell, start, later, _left(left, visit))
         except TwinError as error:
             return rounds, f'refused: {error}', answer
         answer = said(cell, found, why)

@@ -33,7 +33,6 @@ SAID = 0.8
 """Probability from which an experiment says that it will decide; below it says that it may."""
 FOUND = 0.7
 """Probability from which a place and a dependence count as found; below the rest, as not."""
-AGAIN = 'the same causes are named again with a further experiment, and by the experiments alone'
 WIDENED = 3
 """Experiments of one kind without a comparison: more of the same seldom shows anything new."""
 
@@ -169,7 +168,6 @@ def weighed(
     together: Mapping[str, Any],
     alone: Mapping[str, Any] | None = None,
     free: Mapping[str, Any] | None = None,
-    before: Mapping[str, Any] | None = None,
 ) -> tuple[Mapping[str, Any], str]:
     """
     Return which diagnosis to believe, and whether and why it closes the question.
@@ -188,8 +186,6 @@ def weighed(
         That of the experiments, with the recordings before them held out.
     free : mapping, optional
         That of the experiments with nothing held out; see `third_wanted`.
-    before : mapping, optional
-        What was believed before the last experiment: the content of a diagnosis.json.
 
     Returns
     -------
@@ -214,10 +210,7 @@ def weighed(
         if closed[k] and not against:
             return found, closed[k]
     if free is not None and _named(free) == _named(together):
-        if _closes(free):
-            return free, _closes(free)
-        if _again(together, before) and (free['verdict']['confidence'] or 0.0) >= AGREED:
-            return together, '' if _open_ends(together) else AGAIN
+        return (free, _closes(free)) if _closes(free) else (together, '')
     # What does not fit together, as after a knock between two recordings, may be sound by itself.
     torn = _unsound(together) and not _unsound(alone)
     better = alone if torn or (naming[1] and not naming[0]) else together
@@ -226,14 +219,6 @@ def weighed(
 
 def _unsound(found: Mapping[str, Any]) -> bool:
     return bool(found['verdict']['status'] == 'unsound')
-
-
-def _again(together: Mapping[str, Any], before: Mapping[str, Any] | None) -> bool:
-    """Return whether the same was named before the last experiment, and likely then."""
-    if before is None or before['verdict']['status'] not in NAMING:
-        return False
-    likely = (before['verdict']['confidence'] or 0.0) >= AGREED
-    return likely and _named(before) == _named(together)
 
 
 def _open_ends(found: Mapping[str, Any]) -> bool:

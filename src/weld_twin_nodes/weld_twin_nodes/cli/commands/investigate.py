@@ -214,18 +214,7 @@ def _heard(
     if third_wanted(found, alone):
         beside = place.with_name(f'{place.name}-experiments-only')
         free = _diagnosed([*later, *bags], [], state, beside, told)
-    return weighed(found, alone, free, _before(place, state))
-
-
-def _before(place: Path, state: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the diagnosis that was believed before; None where it is not there any more."""
-    from ...report.diagnosis_files import RESULT
-
-    file = place.with_name(f'round-{len(state["rounds"]) - 1}') / RESULT
-    if not file.exists():
-        return None
-    found: dict[str, Any] = json.loads(file.read_text(encoding='utf-8'))
-    return found
+    return weighed(found, alone, free)
 
 
 def _diagnosed(

@@ -78,7 +78,7 @@ _CAUSE = {
     **_MOTION,
 }
 TERMS: dict[str, dict[str, int]] = {
-    'answer named': {'belief': 1, **_NAMED, **_IN_ANSWER},
+    'answer named': {'belief': 1, **_NAMED},
     'answer unknown': {
         'belief': 1,
         'gap': 0,

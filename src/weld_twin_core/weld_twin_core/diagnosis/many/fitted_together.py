@@ -15,7 +15,9 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from ...arm.robot import Robot
 from ...effects.effect import Effect, Stage
+from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
@@ -190,6 +192,8 @@ def _together(
         fitted = many_small(found.problem, kept, exclude, beliefs, progress, orders)
         final, scale, precision = fitted
         absurd = implausible(final.model)
+        if found.problem.untracked:
+            absurd = [effect for effect in absurd if _too_large(final.model.robot, effect)]
         if not absurd:
             break
         refused += absurd
@@ -203,6 +207,20 @@ def _together(
         dense=True,
         refused=tuple(refused),
     )
+
+
+def _too_large(robot: Robot, effect: Effect) -> bool:
+    """
+    Return whether an effect is larger than in any machine, whichever way it points.
+
+    Contacts tell some members of a family hardly, and a spring of theirs may come out a little below
+    zero. It must not take the springs of all other joints with it.
+    """
+    for name, value, _ in beyond(robot, effect):
+        each = plausible(robot, effect.name, name, effect.site)
+        if abs(value) > max(abs(each.low), abs(each.high)):
+            return True
+    return False
 
 
 def _beyond(demand: int) -> tuple[str, ...]:

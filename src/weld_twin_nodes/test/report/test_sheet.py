@@ -19,6 +19,7 @@ from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.acceptance import Demand
 from weld_twin_nodes.report.controllers import BRANDS, brand_of
 from weld_twin_nodes.report.diagnosis_page import Sheet
+from weld_twin_nodes.report.directions import components, sides_words
 from weld_twin_nodes.report.joint_names import joint_labels, renamed
 from weld_twin_nodes.report.quantities import turned, with_ends
 from weld_twin_nodes.report.switches import cause_name, page_data
@@ -60,6 +61,10 @@ CASES = {**diagnoses.ALL, 'unsound': unsound, 'long_names': long_names}
 
 def rms(parts):
     return float(np.sqrt(np.mean(np.concatenate([(p**2).sum(axis=1) for p in parts]))))
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def millimetres(text):
@@ -347,6 +352,24 @@ def test_a_cause_without_a_share_has_a_card_if_mending_it_shows():
     unseen = replace(THREE.causes[2], share=0.0)
     page = report_page(replace(THREE, causes=(*THREE.causes[:2], unseen)))
     assert 'id="cause-3"' in page and 'a small share can belong to a cause' in page
+
+
+def test_cards_and_bars_have_the_same_three_directions_and_tell_the_side():
+    recording, traces = THREE.recordings[0], THREE.traces
+    travel = np.gradient(recording.measured.position, axis=0)
+    tool = recording.measured.rotation[:, :, 2]
+    for vectors, axis in ((travel, 0), (np.cross(-tool, travel), 1)):
+        found = components(THREE, 0, 1e-3 * unit(vectors))
+        assert found[:, axis].min() > 0.98e-3
+    assert sides_words(np.array([-2e-4, 0.0, 3e-4])) == (
+        '0.200\N{NO-BREAK SPACE}mm behind, 0.300\N{NO-BREAK SPACE}mm out along the tool'
+    )
+    whole = components(THREE, 0, traces.before[0])
+    assert np.linalg.norm(whole, axis=1) == pytest.approx(
+        np.linalg.norm(traces.before[0], axis=1), rel=1e-6
+    )
+    page = report_page(THREE)
+    assert 'RMS. The largest, ' in page and ' across it, ' in page
 
 
 def test_small_errors_of_one_link_are_no_alternatives():

@@ -14,10 +14,11 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.metrics.conformity import FAIL, OPEN, PASS, Rule
 from weld_twin_core.metrics.performance import Performance, performance_of
 
+from .directions import worst
 from .html import Html, joined, section, table, tag
 from .performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows
 from .quantities import millimetres
-from .seam_view import at_rest
+from .seam_view import at_rest, instant
 from .switches import as_it_is, parted, trusted
 
 WORDS = {
@@ -106,7 +107,7 @@ def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
         return None
     rule = rule_of(diagnosis, demand)
     before, after = largest(diagnosis)
-    rows = [_row('as it is', before, rule, 'as-it-is')]
+    rows = [_row(f'as it is{_where(diagnosis)}', before, rule, 'as-it-is')]
     if diagnosis.model.found:
         rows.append(_row('with what is ticked below as mended', after, rule, 'mended'))
     heads = ('the robot', 'largest deviation', 'verdict')
@@ -153,6 +154,16 @@ def _row(name: str, value: float, rule: Rule, key: str) -> tuple[Html | str, ...
         tag('span', millimetres(value), data_largest=key),
         tag('span', WORDS[verdict], class_=f'mark {verdict}', data_verdict=key),
     )
+
+
+def _where(diagnosis: Diagnosis) -> str:
+    """Return where along the recordings it is worst."""
+    found = worst(diagnosis)
+    if found is None:
+        return ''
+    k, sample, _ = found
+    name = f'{diagnosis.recordings[k].name}, ' if len(diagnosis.recordings) > 1 else ''
+    return f', worst at {name}{instant(diagnosis, k, sample)}'
 
 
 def _rule_words(diagnosis: Diagnosis, rule: Rule, demand: Demand) -> str:

@@ -18,6 +18,7 @@ from .cause_levels import LEVEL_HEADS, level_row, spreads
 from .charts import Axis, Line, chart
 from .controllers import BRANDS, correction
 from .curve_plot import curve_figure
+from .directions import components, rms_words, sides_words
 from .html import Child, Html, joined, section, table, tag
 from .quantities import DEGREES, ends_to, millimetres, odds, parameter_rows, percent, turned
 from .remainder import places, remainder
@@ -234,24 +235,16 @@ def _effect(diagnosis: Diagnosis, k: int) -> str | None:
         f'moves the tool by {millimetres(float(np.sqrt((size**2).mean())))} RMS, at most '
         f'{seen_at(diagnosis, run, int(good[peak]), float(size[peak]))}'
     )
-    along_it = _along(diagnosis, k, run, good)
-    return f'{text}{along_it}.'
+    return f'{text}{_along(diagnosis, k, run, good, int(good[peak]))}.'
 
 
-def _along(diagnosis: Diagnosis, k: int, run: int, good: np.ndarray) -> str:
-    """Return how much of it goes along the seam and how much across, in words."""
+def _along(diagnosis: Diagnosis, k: int, run: int, good: np.ndarray, worst: int) -> str:
+    """Return how much of it goes in which direction, and to which side where it is largest."""
     told = diagnosis.contributions
-    if told is None or static(diagnosis, run) or good.size < 3:
+    parts = None if told is None else components(diagnosis, run, told.parts[run][k])
+    if parts is None:
         return ''
-    path = diagnosis.traces.measured[run] - diagnosis.traces.before[run]
-    travel = np.gradient(path, axis=0)
-    length = np.linalg.norm(travel, axis=1, keepdims=True)
-    unit = np.divide(travel, length, out=np.zeros_like(travel), where=length > 1e-9)
-    part = told.parts[run][k]
-    ahead = float((((part * unit).sum(axis=1)[good]) ** 2).mean())
-    whole = max(float((part[good] ** 2).sum(axis=1).mean()), 1e-300)
-    across = np.sqrt(max(whole - ahead, 0.0))
-    return f'; {millimetres(across)} RMS across the seam, {millimetres(np.sqrt(ahead))} along it'
+    return f' ({sides_words(parts[worst])}). RMS {rms_words(parts[good])}'
 
 
 def _mended(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:

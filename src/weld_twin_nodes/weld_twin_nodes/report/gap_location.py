@@ -10,10 +10,12 @@ import numpy as np
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
+from .directions import components, sides_words, worst
 from .html import Html, bars, joined, section, tag
 from .quantities import millimetres, percent, seconds
 from .remainder import SEEN, places, remainder
-from .seam_view import at_rest
+from .seam_view import at_rest, seen_at
+from .switches import as_it_is
 from .words import DEPENDENCES, REGIMES, listed, place_name
 
 _STRIP = ('RMS gap of each stretch, and its time.', 'RMS gap of stations, and their numbers.')
@@ -169,12 +171,25 @@ def _directions(diagnosis: Diagnosis) -> Html:
         direction = {key: value for key, value in direction.items() if key != 'along_m'}
         names['across_m'] = 'across the tool'
     largest = max([*direction.values(), 1e-12])
-    return bars(
-        [
-            (names.get(key, key), value / largest, millimetres(value))
-            for key, value in direction.items()
-        ]
-    )
+    rows = [
+        (names.get(key, key), value / largest, millimetres(value))
+        for key, value in direction.items()
+    ]
+    return joined([bars(rows), _worst(diagnosis)])
+
+
+def _worst(diagnosis: Diagnosis) -> Html | None:
+    """Return to which side the tool is off where it is off most."""
+    found = worst(diagnosis)
+    if found is None or diagnosis.contacts is not None:
+        return None
+    k, sample, size = found
+    parts = components(diagnosis, k, as_it_is(diagnosis, k))
+    if parts is None:
+        return None
+    told = f'RMS. The largest, {seen_at(diagnosis, k, sample, size)}: {sides_words(parts[sample])}'
+    keys = 'Left is as seen from the tool, looking along it; out is away from the flange.'
+    return tag('p', f'{told}. {keys}', class_='note')
 
 
 def _stretches(diagnosis: Diagnosis) -> Html | None:

@@ -166,6 +166,11 @@ def _size(deviation: np.ndarray) -> np.ndarray:
 
 def seen_at(diagnosis: Diagnosis, k: int, sample: int, size: float) -> str:
     """Return where along a recording a deviation [m] is, in words."""
+    return f'{millimetres(size)} at {instant(diagnosis, k, sample)}'
+
+
+def instant(diagnosis: Diagnosis, k: int, sample: int) -> str:
+    """Return when a sample of a recording was taken, or which station it is."""
     if static(diagnosis, k):
-        return f'{millimetres(size)} at station {sample + 1}'
-    return f'{millimetres(size)} at {along(diagnosis, k)[sample]:.1f} s'
+        return f'station {sample + 1}'
+    return f'{along(diagnosis, k)[sample]:.1f} s'

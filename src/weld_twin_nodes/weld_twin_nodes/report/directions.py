@@ -55,7 +55,9 @@ def components(diagnosis: Diagnosis, k: int, vectors: Array) -> Array | None:
 
 def _unit(vectors: Array) -> Array:
     size = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, size, out=np.zeros_like(vectors), where=size > _STILL)
+    return np.asarray(
+        np.divide(vectors, size, out=np.zeros_like(vectors), where=size > _STILL), dtype=float
+    )
 
 
 def rms_words(parts: Array) -> str:

@@ -22,7 +22,6 @@ from ...effects.registry import REGISTRY
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..hypotheses.selection import implausible
 from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from .small_errors import many_small
@@ -191,9 +190,8 @@ def _together(
         kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
         fitted = many_small(found.problem, kept, exclude, beliefs, progress, orders)
         final, scale, precision = fitted
-        absurd = implausible(final.model)
-        if found.problem.untracked:
-            absurd = [effect for effect in absurd if _too_large(final.model.robot, effect)]
+        robot = final.model.robot
+        absurd = [effect for effect in final.model.found if _too_large(robot, effect)]
         if not absurd:
             break
         refused += absurd
@@ -213,8 +211,8 @@ def _too_large(robot: Robot, effect: Effect) -> bool:
     """
     Return whether an effect is larger than in any machine, whichever way it points.
 
-    Contacts tell some members of a family hardly, and a spring of theirs may come out a little below
-    zero. It must not take the springs of all other joints with it.
+    Some members of a family are hardly told, and a spring of theirs may come out a little below zero.
+    It must not take the springs of all other joints with it.
     """
     for name, value, _ in beyond(robot, effect):
         each = plausible(robot, effect.name, name, effect.site)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis.result import Shares, Site, Traces, Unsound
+from weld_twin_core.diagnosis.result import Check, Shares, Site, Traces, Unsound
 from weld_twin_core.recording import JointMotion
 from weld_twin_nodes.cli.commands.diagnose import BRANDS as CHOICES
 from weld_twin_nodes.report import report_page
@@ -370,6 +370,41 @@ def test_cards_and_bars_have_the_same_three_directions_and_tell_the_side():
     )
     page = report_page(THREE)
     assert 'RMS. The largest, ' in page and ' across it, ' in page
+
+
+def test_the_cursor_of_a_curve_follows_the_instant(browser):
+    robot = load('kuka_kr6_r900')
+    seam = [diagnoses.moving(robot, 'circle')]
+    ends = [float(end(seam[0].joints.q[:, 1])) for end in (np.min, np.max)]
+    curve = {'effect': 'joint_curve', 'joint': 'joint_a2', 'values': [0.0, 1e-3], 'knots': ends}
+    case = diagnoses.diagnosis('unknown', robot, [curve], [curve], seam)
+    page = browser.open(report_page(case))
+    told = page.locator('.card .chart .u-legend').first
+    for left in (120, 400):
+        page.locator('#seam .chart .u-over').first.hover(position={'x': left, 'y': 40})
+        angle = page.locator('td[data-joint="1"]').inner_text()
+        stands = float(re.search(r'angle(-?[\d.]+)', told.inner_text())[1])
+        assert stands == pytest.approx(
+            float(angle.split()[0]), abs=0.1 + np.degrees(ends[1] - ends[0]) / 59
+        )
+
+
+def test_the_worst_stretch_has_a_mark_of_its_own_beside_that_of_the_cursor():
+    page = report_page(THREE)
+    figures = [
+        float(v)
+        for v in re.findall(r'class="figure">(?:▼ )?([\d.]+).mm</span><span class="when', page)
+    ]
+    marked = float(re.search(r'▼ ([\d.]+).mm</span><span class="when', page)[1])
+    assert marked == max(figures) and 'Framed: the one that' in page
+
+
+def test_a_lag_says_on_its_card_that_the_joints_look_commanded():
+    note = Check('source of the joints', 'note', 'The joint positions are as smooth as a command.')
+    page = report_page(replace(THREE, checks=(note,)))
+    cards = re.findall(r'<article.*?</article>', page, re.DOTALL)
+    told = [note.sentence in card for card in cards]
+    assert any(told) and all('lag' in c for c, there in zip(cards, told, strict=True) if there)
 
 
 def test_small_errors_of_one_link_are_no_alternatives():

@@ -43,6 +43,10 @@ _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
 _APART = 0.03
 """Share of the squared gap by which a cause moves the tool beyond its share, to be told."""
+_LATE = {'servo_lag', 'time_delay'}
+"""Causes that read otherwise where the joints were commanded, not measured."""
+_SOURCE = 'source of the joints'
+"""Name of the check that tells so."""
 _VALUES = 4
 """Parameters told on a card; effects.yaml has all."""
 
@@ -129,6 +133,7 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
     entries = [
         ('How sure', _sure(cause)),
         ('Value', _values(diagnosis, cause)),
+        ('Stands on', _commanded(diagnosis, cause)),
         ('Effect on the seam', _effect(diagnosis, k)),
         ('If mended', _mended(diagnosis, k, rule)),
         ('What to do', _action(diagnosis, cause)),
@@ -157,7 +162,7 @@ def _box(diagnosis: Diagnosis, k: int) -> Html | None:
     for at, switch in enumerate(switches(diagnosis)):
         if switch.members == (k,):
             box = tag('input', type='checkbox', data_switch=at, checked='')
-            return tag('label', box, ' think as mended', class_='one-switch')
+            return tag('label', box, ' take as mended', class_='one-switch')
     return None
 
 
@@ -195,6 +200,17 @@ def _values(diagnosis: Diagnosis, cause: Cause) -> Html | None:
         return None
     more = [tag('span', f'and {len(rows) - _VALUES} more')] if len(rows) > _VALUES else []
     return tag('span', *rows[:_VALUES], *more, class_='lines')
+
+
+def _commanded(diagnosis: Diagnosis, cause: Cause) -> str | None:
+    """Return what was noted of the joints, where a cause is a matter of command and arm."""
+    late = {effect.name for effect in _effects(diagnosis, cause)} | {
+        s.effect for s, _ in cause.name
+    }
+    if not late & _LATE:
+        return None
+    noted = [c.sentence for c in diagnosis.checks if c.name == _SOURCE and c.level != 'ok']
+    return ' '.join(noted) or None
 
 
 def _trail(diagnosis: Diagnosis, lag: ServoLag) -> str:
@@ -261,8 +277,8 @@ def _mended(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:
             word = '' if verdict is None else f': {WORDS[verdict]}'
             return joined(
                 [
-                    f'{millimetres(1e-3 * before)} become {millimetres(1e-3 * left)} RMS, '
-                    f'{millimetres(most)} at most',
+                    f'RMS falls from {millimetres(1e-3 * before)} to {millimetres(1e-3 * left)}, '
+                    f'the largest is then {millimetres(most)}',
                     tag('span', word, class_=f'mark {verdict}', data_alone=f'{1e3 * most:.6f}'),
                     '.',
                 ]
@@ -338,7 +354,7 @@ def _curve(diagnosis: Diagnosis, cause: Cause) -> Html | None:
     told = spreads(diagnosis)
     found = diagnosis.model.found
     figures = [
-        curve_figure(effect, told[m])
+        curve_figure(effect, told[m], diagnosis.model.robot.index(effect.joint))
         for m in cause.members
         if m < len(found)
         and isinstance(effect := found[m], JointCurve)

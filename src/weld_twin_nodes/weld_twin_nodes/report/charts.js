@@ -78,7 +78,7 @@ window.charts = (() => {
     const chart = new uPlot(options(spec, place.clientWidth || 300, lines, bands), data, place);
     const one = { figure, spec, place, chart };
     drawn.push(one);
-    // A curve over an angle follows no instant: it starts with the values of its middle.
+    // Until an instant is looked at, a curve has the values of its middle.
     if (spec.band) chart.setCursor({ left: chart.bbox.width / devicePixelRatio / 2, top: 1 });
     new ResizeObserver(() => fit(one)).observe(place);
     return one;
@@ -107,12 +107,22 @@ window.charts = (() => {
     told = false;
   }
 
+  // A curve over the angle of a joint shows where that joint stands at the instant looked at.
+  function stand(event) {
+    const { run, sample } = event.detail;
+    for (const { spec, chart } of drawn) {
+      const q = spec.joint == null ? null : window.sheet.data.runs[run].joints[spec.joint];
+      if (q) chart.setCursor({ left: chart.valToPos(q[sample], 'x'), top: 1 }, false);
+    }
+  }
+
   function again() {
     for (const { chart } of drawn) chart.redraw(false);
   }
 
   document.querySelectorAll('figure.chart').forEach(make);
   document.addEventListener('instant', follow);
+  document.addEventListener('looked', stand);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', again);
   matchMedia('print').addEventListener('change', again);
   window.addEventListener('beforeprint', again);

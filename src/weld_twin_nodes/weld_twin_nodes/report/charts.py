@@ -72,6 +72,7 @@ def chart(
     dates: bool = False,
     from_zero: bool = False,
     height: int = 180,
+    joint: int | None = None,
 ) -> Html:
     """
     Return a figure of lines over something; a page's script draws it.
@@ -93,6 +94,8 @@ def chart(
         Whether the axis starts at zero, as sizes do.
     height : int
         Of the drawing [px].
+    joint : int, optional
+        The chart runs over the position of this joint, so its cursor follows the instant looked at.
 
     """
     spec: dict[str, Any] = {
@@ -104,6 +107,7 @@ def chart(
         'dates': dates,
         'zero': from_zero,
         'height': height,
+        'joint': joint,
     }
     return tag(
         'figure',

@@ -30,7 +30,7 @@ _AXES = {
 _VALUES = {'d': (1e3, 'mm'), 'a': (1e3, 'mm')}
 
 
-def curve_figure(curve: JointCurve, covariance: Array | None) -> Html:
+def curve_figure(curve: JointCurve, covariance: Array | None, joint: int) -> Html:
     """
     Return a figure of a curve over what it runs over.
 
@@ -39,6 +39,8 @@ def curve_figure(curve: JointCurve, covariance: Array | None) -> Html:
     curve : JointCurve
     covariance : array, shape (K, K), optional
         Of its values; without it there is no band.
+    joint : int
+        Number of its joint: over its angle, the cursor follows the instant looked at.
 
     """
     x = np.linspace(curve.knots[0], curve.knots[-1], _SAMPLES)
@@ -59,4 +61,5 @@ def curve_figure(curve: JointCurve, covariance: Array | None) -> Html:
         [Line('off by', middle), Line('not off', 0.0 * middle, 'soft', dashed=True)],
         (label, Axis('off by', unit)),
         band=(middle - half, middle + half),
+        joint=joint if curve.over == 'angle' else None,
     )

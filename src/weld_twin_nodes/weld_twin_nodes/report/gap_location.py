@@ -18,7 +18,11 @@ from .seam_view import at_rest, seen_at
 from .switches import as_it_is
 from .words import DEPENDENCES, REGIMES, listed, place_name
 
-_STRIP = ('RMS gap of each stretch, and its time.', 'RMS gap of stations, and their numbers.')
+_STRIP = (
+    'RMS gap of each stretch, and its time. ▼ the worst stretch by RMS. Framed: the one that '
+    'holds the instant looked at, at first the largest single deviation.',
+    'RMS gap of stations, and their numbers. ▼ the worst by RMS.',
+)
 """What stands under the stretches of a motion, and of stations at rest."""
 _HALF = 0.5
 """Probability from which one name is enough."""
@@ -229,6 +233,7 @@ def _stretch(
     diagnosis: Diagnosis, run: int, told: tuple[float, float, float, float], largest: float
 ) -> Html:
     start, end, share, rms = told
+    most = rms >= largest
     stamps = diagnosis.traces.t[run] if run < len(diagnosis.traces.t) else np.zeros(0)
     zero = float(stamps[0]) if stamps.size else 0.0
     when = f'{start - zero:.1f} to {seconds(end - zero)}'
@@ -237,10 +242,11 @@ def _stretch(
         when = f'{first} to {final}'
     return tag(
         'li',
-        tag('span', millimetres(rms), class_='figure'),
+        tag('span', '▼ ' if most else '', millimetres(rms), class_='figure'),
         tag('span', when, class_='when'),
         style=f'--share:{rms / largest:.3f};flex-grow:{max(end - start, 1e-3):.3f}',
         title=f'{when}: {millimetres(rms)}, {percent(share)} of the squared gap',
+        class_='most' if most else None,
         data_run=run,
         data_from=f'{start - zero:.3f}',
         data_to=f'{end - zero:.3f}',

@@ -64,7 +64,7 @@ def _switches(diagnosis: Diagnosis) -> Html | None:
     ]
     return tag(
         'fieldset',
-        tag('legend', 'Think as mended:'),
+        tag('legend', 'Take as mended:'),
         *boxes,
         tag('span', *buttons, class_='views'),
         class_='switches',

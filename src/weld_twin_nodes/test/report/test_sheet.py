@@ -14,6 +14,7 @@ import pytest
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.result import Check, Shares, Site, Traces, Unsound
 from weld_twin_core.recording import JointMotion
+from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_nodes.cli.commands.diagnose import BRANDS as CHOICES
 from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.acceptance import Demand
@@ -405,6 +406,36 @@ def test_a_lag_says_on_its_card_that_the_joints_look_commanded():
     cards = re.findall(r'<article.*?</article>', page, re.DOTALL)
     told = [note.sentence in card for card in cards]
     assert any(told) and all('lag' in c for c, there in zip(cards, told, strict=True) if there)
+
+
+def test_a_print_tells_data_open_questions_files_and_date_and_is_light(browser):
+    note = Check('motion', 'note', 'joint_a4 hardly moves.')
+    asked = {'sentence': 'Measure 5 stations.'}
+    case = replace(diagnoses.ambiguous(), checks=(note,), next_experiment=asked)
+    files = [InputFile('bag', '/data/monday.mcap', 'abcdef0123456789' * 4)]
+    page = browser.open(report_page(case, files))
+    assert not page.locator('.printed').is_visible()
+    page.emulate_media(media='print', color_scheme='dark')
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    told = page.locator('.printed').inner_text()
+    for part in ('note: joint_a4 hardly moves', 'zero offset of joint_a1 or base pose error',
+                 'Measure 5 stations.', 'monday.mcap (SHA-256 abcdef012345…)', 'weld_twin ',
+                 'printed 20', 'Signature', 'Ambiguous'):  # fmt: skip
+        assert part in told
+    assert '/data/' not in told
+    ends = "getComputedStyle(document.querySelector('.u-legend th'), '::after').content"
+    assert page.evaluate(ends) in ('none', '""')
+
+
+def test_pictures_are_drawn_in_light_colours_before_a_dark_page_is_printed(browser):
+    page = browser.open(report_page(THREE))
+    page.emulate_media(color_scheme='dark')
+    ink = "getComputedStyle(document.documentElement).getPropertyValue('--ink').trim()"
+    dark = page.evaluate(ink)
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate(ink) == '#000000' != dark
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate(ink) == dark
 
 
 def test_small_errors_of_one_link_are_no_alternatives():

@@ -201,7 +201,7 @@ def _standard(diagnosis: Diagnosis) -> Html | None:
     found = _repeated(diagnosis)
     if found is None:
         text = 'ISO 9283: no pose and no path was repeated, so there are no figures by it.'
-        return tag('p', text, class_='note')
+        return tag('p', text, class_='note detail')
     tables = []
     if found.poses:
         tables.append(table(POSE_HEADS, pose_rows(found)[:_ROWS]))

@@ -241,7 +241,7 @@ def _part(diagnosis: Diagnosis, k: int) -> tuple[int, np.ndarray, np.ndarray] | 
     return best
 
 
-def _effect(diagnosis: Diagnosis, k: int) -> str | None:
+def _effect(diagnosis: Diagnosis, k: int) -> Html | None:
     most = _part(diagnosis, k)
     if most is None:
         return None
@@ -251,16 +251,17 @@ def _effect(diagnosis: Diagnosis, k: int) -> str | None:
         f'moves the tool by {millimetres(float(np.sqrt((size**2).mean())))} RMS, at most '
         f'{seen_at(diagnosis, run, int(good[peak]), float(size[peak]))}'
     )
-    return f'{text}{_along(diagnosis, k, run, good, int(good[peak]))}.'
+    return joined([text, *_along(diagnosis, k, run, good, int(good[peak]))])
 
 
-def _along(diagnosis: Diagnosis, k: int, run: int, good: np.ndarray, worst: int) -> str:
+def _along(diagnosis: Diagnosis, k: int, run: int, good: np.ndarray, worst: int) -> list[Child]:
     """Return how much of it goes in which direction, and to which side where it is largest."""
     told = diagnosis.contributions
     parts = None if told is None else components(diagnosis, run, told.parts[run][k])
     if parts is None:
-        return ''
-    return f' ({sides_words(parts[worst])}). RMS {rms_words(parts[good])}'
+        return ['.']
+    sides = f' ({sides_words(parts[worst])}).'
+    return [sides, tag('span', f' RMS {rms_words(parts[good])}.', class_='detail')]
 
 
 def _mended(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:

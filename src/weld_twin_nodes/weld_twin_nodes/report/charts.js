@@ -120,6 +120,11 @@ window.charts = (() => {
     for (const { chart } of drawn) chart.redraw(false);
   }
 
+  // Canvases are drawn before the rules of a print hold: this class has its colours at once.
+  const printing = (on) => document.documentElement.classList.toggle('printing', on);
+  window.addEventListener('beforeprint', () => printing(true), { capture: true });
+  window.addEventListener('afterprint', () => printing(false), { capture: true });
+
   document.querySelectorAll('figure.chart').forEach(make);
   document.addEventListener('instant', follow);
   document.addEventListener('looked', stand);

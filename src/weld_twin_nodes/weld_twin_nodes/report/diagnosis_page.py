@@ -32,6 +32,7 @@ from .gap_location import where_section
 from .headline import header, opening
 from .html import Html, document, joined, own_file, tag
 from .joint_names import renamed
+from .printed import printed_section
 from .seam_view import seam_section
 from .shrinking import shrink_section
 from .switches import page_data
@@ -78,13 +79,14 @@ def report_page(
     sheet = sheet or Sheet()
     rule = rule_of(diagnosis, sheet.demand)
     sound = diagnosis.status != 'unsound'
+    judged = _judged(diagnosis, rule) if sound else None
     body = joined(
         [
             header(diagnosis),
-            opening(diagnosis, _judged(diagnosis, rule) if sound else None),
+            opening(diagnosis, judged),
             *(_causes(diagnosis, sheet, rule) if sound else ()),
             checks_section(diagnosis),
-            _signatures(),
+            printed_section(diagnosis, inputs, judged),
         ]
     )
     title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
@@ -132,9 +134,3 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
         hidden='' if rule.tolerance_m is None else None,
         data_top=where,
     )
-
-
-def _signatures() -> Html:
-    """Return the lines to sign on; they are seen in print alone."""
-    lines = [tag('span', text) for text in ('Checked by', 'Date', 'Signature')]
-    return tag('p', *lines, class_='signatures')

@@ -36,6 +36,14 @@ def next_section(diagnosis: Diagnosis) -> Html:
     return section('What to measure next', content, id_='next')
 
 
+def measured_next(diagnosis: Diagnosis) -> str | None:
+    """Return the measurement that would decide in a sentence; None where none is proposed."""
+    wanted = diagnosis.next_experiment
+    if wanted is None or not wanted.get('sentence'):
+        return None
+    return in_words(wanted['sentence'], _sites(diagnosis))
+
+
 def _sites(diagnosis: Diagnosis) -> set[Site]:
     """Return the sites that sentences may speak of."""
     named = {site for group in diagnosis.indistinguishable for site in group}

@@ -158,6 +158,7 @@ window.sheet = (() => {
     document.addEventListener('instant', instant);
     window.addEventListener('beforeprint', () => {
       all('details').forEach((item) => { item.open = true; });
+      put('printed-at', `; printed ${new Date().toISOString().slice(0, 16).replace('T', ' ')} UTC`);
     });
   }
 

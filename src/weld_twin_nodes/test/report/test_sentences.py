@@ -180,7 +180,9 @@ def test_a_vector_is_told_in_one_row():
     rows = parameter_rows(tool, {'xyz': [1e-5, 1e-5, 1e-5]})
     assert plain(rows[0][1]) == 'x 1.000 ± 0.010, y 0.000 ± 0.010, z -2.000 ± 0.010 mm'
     none = effect_from_mapping({'effect': 'tool_pose', 'xyz': [1e-6, 0, -2e-6]})
-    assert plain(parameter_rows(none, {'xyz': [1e-5] * 3})[0][1]) == '0.000 ± 0.010 mm each'
+    assert (
+        plain(parameter_rows(none, {'xyz': [1e-5] * 3})[0][1]) == '0.000 ± 0.010 mm in x, y and z'
+    )
 
 
 @pytest.mark.parametrize('name', list(diagnoses.ALL))

@@ -287,6 +287,13 @@ def test_what_was_not_considered_is_named_in_words():
     assert 'play under load</th><td>no wrench<' in text and 'loaded_play' not in text
 
 
+def test_of_a_coupling_it_is_the_joint_beside_that_hardly_moves():
+    names = {'joint_coupling': 'the joint hardly moves (joint_a3)'}
+    assert 'joint_a3</th><td>the joint beside it hardly moves<' in report_page(
+        replace(THREE, absent=names)
+    )
+
+
 def test_circles_name_the_joints_that_turn_back():
     page = report_page(THREE)
     assert 'ISO 230-4' in page and re.search(r'"reversals":\[\[\d,', page)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from weld_twin_core.diagnosis.result import Candidate, Diagnosis
+from weld_twin_core.effects import REGISTRY
 
 from .family_table import families_table
 from .html import Child, Html, bars, joined, section, table, tag
@@ -27,6 +28,11 @@ _STAND_IN = (
 )
 _ABOVE = 1.5
 """Ratio to the noise floor above which what remains is not at its level."""
+_STILL = 'hardly moves'
+_ENOUGH = (
+    'Each effect needs a motion of its own kind to show, so joints that move enough for one can '
+    'stand here for another.'
+)
 
 
 def causes_section(diagnosis: Diagnosis) -> Html:
@@ -102,7 +108,16 @@ def _sets(diagnosis: Diagnosis) -> Html | None:
         shared = [tag('li', in_words(reason, ())) for reason in diagnosis.reasons]
         return joined([title, tag('ul', *shared, class_='sentences')])
     if not sets:
-        return joined([title, tag('p', 'Nothing: every effect named stands alone.')])
+        return joined(
+            [
+                title,
+                tag(
+                    'p',
+                    'Nothing: in these recordings no other effect looks like one of those named. '
+                    'How sure each is stands on its card.',
+                ),
+            ]
+        )
     items = [
         tag(
             'li',
@@ -131,6 +146,7 @@ def _absent(diagnosis: Diagnosis) -> Html | None:
         'details',
         tag('summary', f'Not considered, and why ({len(rows)})'),
         table(('Effect', 'Why'), rows),
+        tag('p', _ENOUGH, class_='note') if any(_STILL in why for _, why in rows) else None,
     )
 
 
@@ -139,6 +155,8 @@ def _left_out(effect: str, why: str, diagnosis: Diagnosis) -> tuple[str, str]:
     reason, _, last = why.rpartition(' (')
     joints = last.rstrip(')').split(', ')
     if set(joints) <= set(diagnosis.model.robot.joint_names):
+        if 'source' in getattr(REGISTRY.get(effect), 'options', ()):
+            reason = reason.replace('the joint hardly', 'the joint beside it hardly')
         return cause(effect, listed(joints)), reason
     return cause(effect, None), why
 

@@ -58,7 +58,7 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     if cost:
         rest['takes'] = f'about {cost:.0f} min'
     if sigma:
-        rest['parts them by'] = f'{sigma:.0f} standard deviations, as far as can be foreseen'
+        rest['tells them apart by'] = f'{sigma:.0f} standard deviations, as far as can be foreseen'
     lines = [
         tag('p', in_words(wanted[key], sites), class_=class_)
         for key, class_ in (('sentence', None), ('reason', 'note'))

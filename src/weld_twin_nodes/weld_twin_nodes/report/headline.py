@@ -119,7 +119,7 @@ def _left(diagnosis: Diagnosis) -> str:
         return 'on unseen data; what was found turns the tool'
     with_what = '' if diagnosis.effects else ', with what fits best'
     value, interval = left_of(shrink)
-    return f'{value} of it on unseen data{with_what} ({interval})'
+    return f'{value} of the RMS gap, on unseen data{with_what} ({interval})'
 
 
 def _turned(diagnosis: Diagnosis) -> str:

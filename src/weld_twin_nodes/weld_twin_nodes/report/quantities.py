@@ -179,7 +179,9 @@ def _listed(value: Any, std: Any, factor: float, unit: str) -> str:
     errors = std if np.ndim(std) and len(std) == len(value) else [None] * len(value)
     axes = ('x ', 'y ', 'z ') if len(value) == len('xyz') else [''] * len(value)
     if all(e is not None and abs(v) <= _SEEN * e for v, e in zip(value, errors, strict=True)):
-        return f'{uncertain(0.0, max(errors), factor, unit)}{" each" if len(value) > 1 else ""}'
+        alike = ' each' if len(value) > 1 else ''
+        alike = ' in x, y and z' if len(value) == len('xyz') else alike
+        return f'{uncertain(0.0, max(errors), factor, unit)}{alike}'
     parts = [
         axis + uncertain(float(v), e, factor)
         for axis, v, e in zip(axes, value, errors, strict=True)

@@ -127,7 +127,7 @@
     told.push([u, v, text]);
     const long = pen.measureText(text).width;
     const box = (dx, dy) => [u + dx, v + dy - 7, u + dx + long, v + dy + 7];
-    const free = ([left, top, right, bottom]) => left >= 0 && top >= 0 && right <= width && bottom <= height
+    const free = ([left, top, right, bottom]) => left >= 5 && top >= 3 && right <= width - 5 && bottom <= height - 3
       && taken.every(([a, b, c, d]) => right < a || left > c || bottom < b || top > d);
     const places = [-9, 12, -26, 28, -44, -62].flatMap((dy) => [[7, dy], [-7 - long, dy]]);
     const under = ([left, top, right, bottom]) => line.filter(([x, y]) => x > left - 3 && x < right + 3

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from weld_twin_lab.fleet.fleet_runs import kills, rows, same, timed
+from weld_twin_lab.fleet.fleet_runs import kills, rows
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 
@@ -19,10 +19,9 @@ def test_a_killed_run_goes_on_and_ends_with_the_rows_of_one_that_was_not(tmp_pat
     listed = tmp_path / 'list.csv'
     lines = [f'cell {k},{BAG},ur5,2026-03-0{k + 1}' for k in range(3)]
     listed.write_text('cell,recording,robot,at\n' + '\n'.join(lines) + '\n')
-    found = kills(listed, str(tmp_path / 'killed.db'), 1, seed=3)
-    assert found['lost_or_rewritten'] == 0
-    timed(listed, str(tmp_path / 'whole.db'), '--workers', '1')
-    killed, whole = rows(str(tmp_path / 'killed.db')), rows(str(tmp_path / 'whole.db'))
-    assert len(whole) == 3
-    assert same(killed, whole) == 0
-    assert {row[2] for row in whole.values()} == {'done'}
+    found = kills(listed, tmp_path, 1, seed=3)
+    assert found['kills'] == 1
+    assert found['lost_or_rewritten'] == found['differing_rows'] == 0
+    whole, killed = (rows(str(tmp_path / f'{name}.db')) for name in ('whole', 'killed'))
+    assert len(whole) == len(killed) == 3
+    assert {row[2] for row in killed.values()} == {'done'}

@@ -16,6 +16,7 @@ from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_nodes.report import print_summary
 from weld_twin_nodes.report.footing import next_section
 from weld_twin_nodes.report.quantities import millimetres, odds, parameter_rows, percent, uncertain
+from weld_twin_nodes.report.to_do import worth_doing
 from weld_twin_nodes.report.words import CAUSES, cause, in_words, listed, verdict
 
 
@@ -121,6 +122,23 @@ def test_an_unknown_cause_is_told_by_what_it_depends_on():
         'What remains depends on the speed and acceleration of joint_1 and the place in the '
         'workspace.'
     )
+
+
+def test_what_is_certain_and_largest_is_to_be_done_first():
+    case = diagnoses.ambiguous()
+    sure = Found(effect_from_mapping({'effect': 'time_delay', 'delay': 0.01}), {})
+    causes = [
+        replace(case.causes[0], share=share, members=(k,)) for k, share in enumerate((0.1, 0.9))
+    ]
+    both = replace(
+        case,
+        effects=(*case.effects, sure),
+        actions=(*case.actions, 'Set the clock right.'),
+        causes=tuple(causes),
+    )
+    first, second, third = worth_doing(both)
+    assert first == 'Set the clock right.'
+    assert second.startswith('Find out whether') and third.startswith('Should it be')
 
 
 def test_an_effect_that_was_not_to_be_tried_is_told_where_nothing_explains_the_gap():

@@ -278,7 +278,8 @@ def _mended(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:
             word = '' if verdict is None else f': {WORDS[verdict]}'
             return joined(
                 [
-                    f'RMS falls from {millimetres(1e-3 * before)} to {millimetres(1e-3 * left)}, '
+                    f'RMS {"falls" if left < before else "rises"} from '
+                    f'{millimetres(1e-3 * before)} to {millimetres(1e-3 * left)}, '
                     f'the largest is then {millimetres(most)}',
                     tag('span', word, class_=f'mark {verdict}', data_alone=f'{1e3 * most:.6f}'),
                     '.',

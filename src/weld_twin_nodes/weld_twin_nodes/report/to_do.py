@@ -31,7 +31,22 @@ def worth_doing(diagnosis: Diagnosis) -> list[str]:
         return [TOGETHER, *diagnosis.actions[:_LARGEST], rest]
     if diagnosis.status != 'ambiguous' or len(diagnosis.actions) != len(diagnosis.effects):
         return list(diagnosis.actions)
-    return [*_telling(diagnosis), *_mending(diagnosis)]
+    settled = _settled(diagnosis)
+    mending = _mending(diagnosis)
+    first = [mending[k] for k in settled]
+    rest = [action for k, action in enumerate(mending) if k not in settled]
+    return [*first, *_telling(diagnosis), *rest]
+
+
+def _settled(diagnosis: Diagnosis) -> list[int]:
+    """Return which effects are certain and larger than all that is open, the largest first."""
+    share = {k: cause.share for cause in diagnosis.causes for k in cause.members}
+    unsure = {site for group in _open(diagnosis) for site in group}
+    sites = [Site(found.effect.name, found.effect.site) for found in diagnosis.effects]
+    open_ones = [share.get(k, 0.0) for k, site in enumerate(sites) if site in unsure]
+    most = max(open_ones, default=0.0)
+    sure = [k for k, site in enumerate(sites) if site not in unsure and share.get(k, 0.0) > most]
+    return sorted(sure, key=lambda k: -share[k])
 
 
 def _open(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:

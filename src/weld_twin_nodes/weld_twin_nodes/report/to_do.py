@@ -22,20 +22,20 @@ TOGETHER = (
 
 
 def worth_doing(diagnosis: Diagnosis) -> list[str]:
-    """Return what to do first: tell apart what is open, then mend; or where to look."""
+    """Return what to do first: mend what is certain and large, tell apart what is open; or look."""
     if diagnosis.status == 'unknown' and not diagnosis.actions:
         return _looking(diagnosis)
     if diagnosis.families and len(diagnosis.actions) > _LARGEST:
         more = len(diagnosis.actions) - _LARGEST
-        rest = f'{more} smaller ones are in diagnosis.json.'
-        return [TOGETHER, *diagnosis.actions[:_LARGEST], rest]
+        smaller = f'{more} smaller ones are in diagnosis.json.'
+        return [TOGETHER, *diagnosis.actions[:_LARGEST], smaller]
     if diagnosis.status != 'ambiguous' or len(diagnosis.actions) != len(diagnosis.effects):
         return list(diagnosis.actions)
     settled = _settled(diagnosis)
     mending = _mending(diagnosis)
     first = [mending[k] for k in settled]
-    rest = [action for k, action in enumerate(mending) if k not in settled]
-    return [*first, *_telling(diagnosis), *rest]
+    others = [action for k, action in enumerate(mending) if k not in settled]
+    return [*first, *_telling(diagnosis), *others]
 
 
 def _settled(diagnosis: Diagnosis) -> list[int]:

@@ -24,6 +24,8 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: (item.get_closest_marker(CELLS) is None, item.path not in slow))
 
 
+FIRST_LINE = ('/recording/', '/install/')
+"""Directories whose cells stand in the first of two lines; both take about two minutes."""
 BESIDE = 5
 """How much less the other tests weigh for the scheduler than those of cells, which stand in line one
 after the other and would else end last; 5 is a third of the weight."""
@@ -39,8 +41,8 @@ def pytest_runtest_setup(item):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers():
-    """Return one process for each core, and one for the tests of cells: it waits most of the time."""
-    return (os.cpu_count() or 1) + 1
+    """Return one process for each core, and two for the tests of cells: they wait most of the time."""
+    return (os.cpu_count() or 1) + 2
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -48,9 +50,9 @@ def pytest_xdist_make_scheduler(config, log):
     """
     Return what hands out the tests of `make test`.
 
-    Files with the mark `cells` go to one process, one after the other, so that no two cells of
-    nodes compete for the processor. Any other file goes to the next process that is free, and
-    stays whole, so that its fixtures are made once.
+    Files with the mark `cells` stand in two lines, those that record or install and the others, so
+    that no more than two cells of nodes compete for the processor. Any other file goes to the next
+    process that is free, and stays whole, so that its fixtures are made once.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -59,7 +61,9 @@ def pytest_xdist_make_scheduler(config, log):
         def _split_scope(self, nodeid):
             file = nodeid.partition('::')[0]
             text = (config.rootpath / file).read_text(encoding='utf-8')
-            return CELLS if f'mark.{CELLS}' in text else file
+            if f'mark.{CELLS}' not in text:
+                return file
+            return f'{CELLS} {any(part in file for part in FIRST_LINE)}'
 
     return ByFile(config, log)
 

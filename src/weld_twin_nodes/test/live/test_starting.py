@@ -23,9 +23,17 @@ PACKAGE = Path(__file__).parents[2]
 LAUNCH = ('cell', 'demo')
 
 
+AS_FOUND = dict(os.environ)
+"""The environment before any test of this process has added messages of others to it."""
+
+
 def started(name, *words):
     return subprocess.run(
-        [sys.executable, '-m', MODULES[name], *words], capture_output=True, text=True, timeout=60
+        [sys.executable, '-m', MODULES[name], *words],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=AS_FOUND,
     )
 
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import traceback
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -20,6 +19,8 @@ from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 from weld_twin_core.twin.twin import Twin
+
+from .crash import traceback_told
 
 ROBOTS = ('slide', 'turn', 'planar', 'ur5', 'franka_panda', 'nine')
 ALIGNS = ('', 'base', 'tool', 'base,tool')
@@ -167,7 +168,7 @@ def tried(draw: Draw) -> dict[str, Any]:
     except TwinError as error:
         return out | {'status': 'refused', 'sentence': str(error)}
     except Exception:  # what is counted here is exactly what nobody expected
-        return out | {'traceback': traceback.format_exc()}
+        return out | {'traceback': traceback_told()}
     wrong = []
     if found.status == 'identified' and not (found.effects or found.families):
         wrong.append('identified with nothing named')

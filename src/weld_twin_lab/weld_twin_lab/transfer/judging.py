@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import traceback
 from time import perf_counter
 from typing import Any
 
@@ -18,6 +17,7 @@ from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.recording import Recording
 
 from ..real_robots.unseen_stations import ALIGN, residual
+from .crash import traceback_told
 from .flags import flagged
 from .plain import PLAIN, plain_fit
 from .splits import Split, halves
@@ -65,7 +65,7 @@ def tried(train: Recording, robot: str) -> tuple[Diagnosis | None, str | None]:
     try:
         return diagnose([train], catalog.load(robot), align=ALIGN), None
     except Exception:  # what is counted here is exactly what nobody expected
-        return None, traceback.format_exc()
+        return None, traceback_told()
 
 
 def said(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 from ..real_robots.unseen_stations import residual
+from .crash import traceback_told
 from .judging import said
 from .splits import Rows
 
@@ -61,7 +62,6 @@ def axis_recording(directory: Path) -> Recording:
 
 def judge_axis(directory: Path) -> dict[str, Any]:
     """Return what is named of the axis, and what is left on the part not fitted on."""
-    import traceback
 
     recording, robot = axis_recording(directory), axis_robot()
     measured = recording.measured
@@ -76,7 +76,7 @@ def judge_axis(directory: Path) -> dict[str, Any]:
     try:
         diagnosis = diagnose([train], robot)
     except Exception:
-        return out | {'traceback': traceback.format_exc()}
+        return out | {'traceback': traceback_told()}
     out['seconds'] = round(perf_counter() - start, 2)
     out['traceback'] = None
     out |= said(diagnosis)

@@ -26,14 +26,6 @@ def block(**more):
     return Artefact.from_mapping({'blocks': {'block': {'size': SIZE, 'sigma': 5e-5, **more}}})
 
 
-@pytest.fixture(scope='module')
-def robot():
-    """Return an arm with a torch."""
-    tool = np.eye(4)
-    tool[:3, 3] = [0.02, 0.03, 0.12]
-    return wt.load('ur5').with_frames(tool=tool)
-
-
 def felt(real, artefact, rng):
     """Return touches of all six faces by an arm as it really is, with a little noise."""
     q, labels = [], []

@@ -48,10 +48,8 @@ def pinned(postures):
     return wt.Recording('elsewhere', motion, contacts=contacts)
 
 
-def test_kinds_of_contact_together_name_the_elbow():
-    rng, tool = np.random.default_rng(1), np.eye(4)
-    tool[:3, 3] = [0.02, 0.03, 0.12]
-    robot = wt.load('ur5').with_frames(tool=tool)
+def test_kinds_of_contact_together_name_the_elbow(robot):
+    rng = np.random.default_rng(1)
     real = replace(robot, theta=robot.theta + OFFSET * (np.arange(6) == 2))
     q, labels, values = [], [], []
     for label, points, most in targets(rng):

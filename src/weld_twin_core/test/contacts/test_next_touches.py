@@ -3,7 +3,6 @@
 """The touches that are proposed can be made, and tell what they are said to tell."""
 
 import numpy as np
-import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.arm.chain import forward
@@ -19,13 +18,6 @@ from weld_twin_core.diagnosis.hypotheses.plain_causes import plain_causes
 PLACES = {'low': [0.45, 0.1, 0.2], 'left': [0.1, 0.5, 0.35], 'right': [0.35, -0.35, 0.3]}
 SIGMA = 1e-4
 EACH = 8
-
-
-@pytest.fixture(scope='module')
-def robot():
-    tool = np.eye(4)
-    tool[:3, 3] = [0.02, 0.03, 0.12]
-    return wt.load('ur5').with_frames(tool=tool)
 
 
 def touched(robot, labels, rng):

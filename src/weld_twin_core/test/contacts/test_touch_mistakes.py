@@ -18,14 +18,6 @@ EACH = 14
 
 
 @pytest.fixture(scope='module')
-def robot():
-    """Return an arm with a spike on its flange."""
-    tool = np.eye(4)
-    tool[:3, 3] = [0.02, 0.03, 0.12]
-    return wt.load('ur5').with_frames(tool=tool)
-
-
-@pytest.fixture(scope='module')
 def sound(robot):
     """Return touches of three sockets, two of them a known distance apart, 0.1 mm of noise."""
     rng = np.random.default_rng(11)

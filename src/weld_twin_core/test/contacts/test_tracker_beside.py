@@ -22,13 +22,6 @@ OFFSET = 0.002
 
 
 @pytest.fixture(scope='module')
-def robot():
-    tool = np.eye(4)
-    tool[:3, 3] = [0.02, 0.03, 0.12]
-    return wt.load('ur5').with_frames(tool=tool)
-
-
-@pytest.fixture(scope='module')
 def real(robot):
     """Return the arm with an elbow whose zero is wrong."""
     return replace(robot, theta=robot.theta + OFFSET * (np.arange(6) == 2))

@@ -13,7 +13,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 
 from .html import Child, Html, joined, section, table, tag
 from .to_do import made_for
-from .words import in_words, listed, site_name
+from .words import in_words, listed, open_sets, site_name
 
 _APART = (
     *('kind', 'motion', 'between', 'cost', 'robot_minutes', 'expected_separation_sigma'),
@@ -71,8 +71,8 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
 def _left_open(diagnosis: Diagnosis, wanted: dict[str, Any]) -> list[Html]:
     """Return which open questions a measurement is not made for: motion may never part them."""
     out = []
-    for group in diagnosis.indistinguishable:
-        if len(group) > 1 and not made_for(wanted, group):
+    for group in open_sets(diagnosis):
+        if not made_for(wanted, group):
             names = listed([site_name(site) for site in group], 'or')
             told = f'It is not made to tell whether it is {names}: see what to do first.'
             out.append(tag('p', told, class_='note'))

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.advice.inseparable import ELSE, way
 from weld_twin_core.diagnosis.result import Diagnosis, Site
 
-from .words import found_name, listed, site_name
+from .words import found_name, listed, open_sets, open_sites, site_name, site_of
 
 _LARGEST = 3
 """Actions told; the others are counted."""
@@ -41,22 +41,18 @@ def worth_doing(diagnosis: Diagnosis) -> list[str]:
 def _settled(diagnosis: Diagnosis) -> list[int]:
     """Return which effects are certain and larger than all that is open, the largest first."""
     share = {k: cause.share for cause in diagnosis.causes for k in cause.members}
-    unsure = {site for group in _open(diagnosis) for site in group}
-    sites = [Site(found.effect.name, found.effect.site) for found in diagnosis.effects]
+    unsure = open_sites(diagnosis)
+    sites = [site_of(found) for found in diagnosis.effects]
     open_ones = [share.get(k, 0.0) for k, site in enumerate(sites) if site in unsure]
     most = max(open_ones, default=0.0)
     sure = [k for k, site in enumerate(sites) if site not in unsure and share.get(k, 0.0) > most]
     return sorted(sure, key=lambda k: -share[k])
 
 
-def _open(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
-    return [group for group in diagnosis.indistinguishable if len(group) > 1]
-
-
 def _telling(diagnosis: Diagnosis) -> list[str]:
     """Return what tells the open ones apart."""
     out = []
-    for group in _open(diagnosis):
+    for group in open_sets(diagnosis):
         told = f'Find out whether it is {listed([site_name(site) for site in group], "or")}'
         by = way(sorted({site.effect for site in group}))
         if by != ELSE:
@@ -79,10 +75,10 @@ def made_for(wanted: Mapping[str, Any] | None, group: Sequence[Site]) -> bool:
 
 def _mending(diagnosis: Diagnosis) -> list[str]:
     """Return what mends each effect; of those that stand in an open set, under a condition."""
-    unsure = {site for group in _open(diagnosis) for site in group}
+    unsure = open_sites(diagnosis)
     out = []
     for found, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
-        if Site(found.effect.name, found.effect.site) in unsure:
+        if site_of(found) in unsure:
             action = f'Should it be {found_name(found)}: {action[:1].lower()}{action[1:]}'
         out.append(action)
     return out

@@ -205,9 +205,9 @@ def _families(diagnosis: Diagnosis) -> str:
 
 def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     size = _size(diagnosis)
-    open_sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
-    choices = '; and from '.join(_either(group) for group in open_sets[:2])
-    settled = listed(_settled(diagnosis))
+    choices = '; and from '.join(_either(group) for group in open_sets(diagnosis)[:2])
+    unsure = open_sites(diagnosis)
+    settled = listed([found_name(f) for f in diagnosis.effects if site_of(f) not in unsure])
     start = f'The {size} comes '
     if settled:
         start += f'in part from {settled}, in part '
@@ -221,17 +221,19 @@ def _either(group: Sequence[Site]) -> str:
     return listed(names, 'or')
 
 
-def _settled(diagnosis: Diagnosis) -> list[str]:
-    """Return the effects that stand in no set with others."""
-    unsure = {
-        (site.effect, site.joint)
-        for group in diagnosis.indistinguishable
-        if len(group) > 1
-        for site in group
-    }
-    return [
-        found_name(f) for f in diagnosis.effects if (f.effect.name, f.effect.site) not in unsure
-    ]
+def open_sets(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
+    """Return the sets of which these data do not tell which it is."""
+    return [group for group in diagnosis.indistinguishable if len(group) > 1]
+
+
+def open_sites(diagnosis: Diagnosis) -> set[Site]:
+    """Return the sites that stand in a set with others."""
+    return {site for group in open_sets(diagnosis) for site in group}
+
+
+def site_of(found: Found) -> Site:
+    """Return the site of an effect that was found."""
+    return Site(found.effect.name, found.effect.site)
 
 
 def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One run of the demo as a program of its own, with busy processes beside it or none."""
+"""Runs of the demo as programs of their own, with busy processes beside them or none."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,24 +25,33 @@ SAID = 2000
 """Characters kept of what a failed run says."""
 
 
-def run_once(busy: int) -> dict[str, Any]:
+def run_demos(busy: int, together: int = 1) -> list[dict[str, Any]]:
     """
-    Return what one run left.
+    Return what each of some demos left that ran at once.
 
     Parameters
     ----------
     busy : int
-        How many processes compute beside it.
+        How many processes compute beside them.
+    together : int, optional
+        How many demos run at once, each in a ROS domain of its own.
 
     Returns
     -------
-    dict
-        ``seconds``, ``code``, ``messages`` by topic of the bag, ``incomplete`` sentences,
-        ``digests`` of the compared files, ``headline``, and ``said`` where the run failed.
+    list of dict
+        For each ``busy``, ``together``, ``seconds``, ``code``, ``messages`` by topic of the bag,
+        ``incomplete`` sentences, ``digests`` of the compared files, ``headline``, and ``said``
+        where the run failed.
 
     """
+    with _busy(busy), ThreadPoolExecutor(together) as demos:
+        rows = list(demos.map(lambda _: _run_once(), range(together)))
+    return [{'busy': busy, 'together': together, **row} for row in rows]
+
+
+def _run_once() -> dict[str, Any]:
     begin = time.monotonic()
-    with tempfile.TemporaryDirectory(prefix='weld_twin_demo_') as place, _busy(busy):
+    with tempfile.TemporaryDirectory(prefix='weld_twin_demo_') as place:
         out = Path(place) / 'out'
         try:
             run = subprocess.run(
@@ -53,7 +63,7 @@ def run_once(busy: int) -> dict[str, Any]:
             code, said = run.returncode, run.stderr
         except subprocess.TimeoutExpired:
             code, said = -1, f'not finished after {LIMIT:g} s'
-        row = {'busy': busy, 'seconds': round(time.monotonic() - begin, 1), 'code': code}
+        row = {'seconds': round(time.monotonic() - begin, 1), 'code': code}
         return {**row, **(_left(out) if code == 0 else {'said': said[-SAID:]})}
 
 

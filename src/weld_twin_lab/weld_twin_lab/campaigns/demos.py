@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run the demo again and again: every recording whole, every result the same.
 
-Half of the runs have busy processes beside them, and some other demos too. A run passes if it ends by itself with a recording of
-one message on each topic for each joint state; the campaign passes if all runs do and leave the
-same table and the same words.
+Half of the runs have busy processes beside them, and some other demos too. A run passes if it ends
+by itself with a recording of one message on each topic for each joint state; the campaign passes if
+all runs do and leave the same table and the same words.
 """
 
 from __future__ import annotations

@@ -22,6 +22,8 @@ Rows = dict[str, tuple[Any, ...]]
 COMPARED = ('cell', 'recording', 'state', 'sentence')
 KILLED = (0.5, 6.0)
 """Seconds from the start of a run to its kill, drawn between these: a program starts within two."""
+PROFILE = 'distributed.worker.profile.enabled'
+"""Dask's setting by which workers look a hundred times a second at what they run; for nothing here."""
 PATIENCE = 3600.0
 """Seconds after which a run that is not killed is taken to hang."""
 
@@ -90,12 +92,16 @@ def rows(url: str, *, with_cost: bool = False) -> Rows:
 def cluster(workers: int) -> Iterator[str]:
     """Yield the address of a Dask cluster on this machine, with one thread for each worker."""
     try:
+        from dask import config
         from distributed import LocalCluster
     except ImportError:
         raise DataError("a cluster needs Dask: pip install 'weld-twin[cluster]'") from None
-    with LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as made:
+    with (
+        config.set({PROFILE: False}),
+        LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as made,
+    ):
         yield str(made.scheduler_address)
 
 

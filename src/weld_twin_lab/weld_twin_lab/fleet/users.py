@@ -131,9 +131,7 @@ def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]
         for k in sorted(left):
             visitor, address = waiting[k]
             text = visitor.look(address)
-            told = re.search(r'Waiting: (\d+) before it', text)
-            if told:
-                found[k][0].add(int(told[1]))
+            found[k][0].update(_places(text))
             if text and 'http-equiv="refresh"' not in text:
                 found[k] = (found[k][0], text)
                 left.remove(k)
@@ -141,14 +139,25 @@ def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]
     return found
 
 
+def _places(text: str) -> list[int]:
+    """Return the place in the queue that a page tells, if it does."""
+    return [int(told) for told in re.findall(r'Waiting: (\d+) before it', text)]
+
+
 def at_once(visitors: Sequence[Person], files: Sequence[Path], **fields: str) -> dict[str, Any]:
     """Return how long users take who drop the same recording at once."""
     began = time.perf_counter()
-    waiting = [(visitor, visitor.drop(files, **fields)[1]) for visitor in visitors]
-    found = wait_all(waiting)
+    dropped = [visitor.drop(files, **fields) for visitor in visitors]
+    first = [_places(text) for _, _, text in dropped]  # later pages may tell the verdict already
+    pages = [
+        (visitor, address) for visitor, (_, address, _) in zip(visitors, dropped, strict=True)
+    ]
+    found = wait_all(pages)
     return {
         'users': len(visitors),
         'seconds': time.perf_counter() - began,
         'sheets': sum('<iframe' in text for _, text in found),
-        'saw_their_place': sum(bool(places) for places, _ in found),
+        'saw_their_place': sum(
+            bool(told or places) for told, (places, _) in zip(first, found, strict=True)
+        ),
     }

@@ -74,7 +74,8 @@ def _next(rows: list[dict[str, Any]], args: argparse.Namespace) -> int:
     crowded = sum(row['busy'] > 0 for row in rows)
     if len(rows) - crowded <= crowded:
         return 0
-    return min(args.together, args.runs // 2 - crowded)
+    left: int = args.runs // 2 - crowded
+    return min(int(args.together), left)
 
 
 def _before(args: argparse.Namespace) -> list[dict[str, Any]]:

@@ -65,6 +65,7 @@ EXAMPLES = {
     'joint_slip': {**ELBOW, 'offset': 1e-3, 'time': 0.7},
     'thermal_growth': {'coefficient': 1.2e-5},
     'time_delay': {'delay': 0.004},
+    'clock_rate': {'rate': 1e-4},
     'tool_pose': {'xyz': [1e-3, 2e-3, -1e-3], 'rotvec': [1e-3, 0.0, 2e-3]},
     'transmission_ripple': {**ELBOW, 'amplitude': 1e-3, 'order': 100.0, 'phase': 0.3},
     'vibration': {**ELBOW, 'frequency': 8.0, 'damping': 0.05, 'gain': 0.3},
@@ -137,7 +138,8 @@ def compare(path, entries, effects, robot=ARM, at_least=200):
         k, poses = place[sample.stamp], sample.poses
         np.testing.assert_allclose(poses.position, offline.position[k], rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(poses.rotation, offline.rotation[k], rtol=0.0, atol=1e-12)
-        assert sample.pose_stamp == sample.stamp + round(twin.delay * 1e9)
+        late = twin.late(recording.joints.t[k])
+        assert sample.pose_stamp == sample.stamp + round(float(late) * 1e9)
     return recording, {sample.stamp for sample in live} - set(stamps)
 
 

@@ -40,6 +40,7 @@ def said(robot, **entry):
         ),
         ({'effect': 'time_delay', 'delay': 0.0123}, ['Fix the clock', '12.3 ms late']),
         ({'effect': 'time_delay', 'delay': -0.0123}, ['12.3 ms early']),
+        ({'effect': 'clock_rate', 'rate': -3e-5}, ['30.0 ppm slow', '0.108 s in an hour']),
         (
             {'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 2e-5},
             ['+0.115 deg under 100 N m', '5e+04 N m/rad'],

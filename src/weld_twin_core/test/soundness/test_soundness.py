@@ -327,6 +327,7 @@ ORDINARY = {
     'spring': [{'effect': 'joint_compliance', 'compliance': 2e-5}],
     'lag': [{'effect': 'servo_lag', 'time_constant': 0.02}],
     'late': [{'effect': 'time_delay', 'delay': 0.015}],
+    'clock': [{'effect': 'clock_rate', 'rate': 9e-5}],
     'drift': [{'effect': 'drift', 'xyz_rate': [2e-5, 0.0, 1e-5]}],
     'base': [{'effect': 'base_pose', 'xyz': [2e-3, 0.0, 1e-3], 'rotvec': [0.0, 3e-3, 0.0]}],
     'tool': [{'effect': 'tool_pose', 'xyz': [2e-3, 0.0, 1e-3], 'rotvec': [0.0, 3e-3, 0.0]}],
@@ -335,7 +336,7 @@ ORDINARY = {
 
 def on_all_joints(robot, entries):
     """Return the effects, those of a joint on the second and third."""
-    whole = ('time_delay', 'drift', 'base_pose', 'tool_pose')
+    whole = ('time_delay', 'clock_rate', 'drift', 'base_pose', 'tool_pose')
     out = []
     for entry in entries:
         sites = (

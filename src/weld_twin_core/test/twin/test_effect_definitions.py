@@ -240,7 +240,7 @@ DEFINITIONS = {
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
     'measurement_noise': ({'sigma': 1e-3}, nothing),
 }
-IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay'}
+IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay', 'clock_rate'}
 LOST_MOTION = {'friction', 'hysteresis'}
 """Tested in test_lost_motion."""
 
@@ -433,9 +433,35 @@ def test_time_delay_shows_the_robot_as_it_was(robot, make_recording, motion_at, 
         np.testing.assert_allclose(found.position[k], expected[:3, 3], atol=1e-12)
 
 
-def test_time_delay_means_nothing_to_stations(arm, make_recording):
+def test_a_fast_clock_shows_the_robot_earlier_with_every_second(
+    robot, make_recording, motion_at, stamps, textbook
+):
+    recording = make_recording(robot)
+    at, first = stamps(recording, 6), recording.joints.t[0]
+    both = (effect('clock_rate', rate=2e-2), effect('time_delay', delay=0.05))
+    found = Twin(robot, both).poses(recording, at)
+    for k, t in enumerate(at):
+        shown = first + (t - first) * 0.98 - 0.05
+        expected = textbook.pose(robot, motion_at(robot, shown))
+        np.testing.assert_allclose(found.position[k], expected[:3, 3], atol=1e-12)
+
+
+def test_a_pose_is_stamped_so_that_its_stamp_shows_it(arm):
+    twin = Twin(arm, (effect('clock_rate', rate=1e-4), effect('time_delay', delay=0.05)))
+    instants = np.linspace(0.0, 100.0, 7)
+    # stamp - delay - rate stamp = instant
+    np.testing.assert_allclose(
+        instants + twin.late(instants), (instants + 0.05) / (1.0 - 1e-4), atol=1e-12
+    )
+    assert Twin(arm).late(3.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    'apart', [effect('time_delay', delay=5.0), effect('clock_rate', rate=0.1)]
+)
+def test_clocks_mean_nothing_to_stations(arm, make_recording, apart):
     recording = make_recording(arm, static=True)
-    late = Twin(arm, (effect('time_delay', delay=5.0),)).poses(recording, recording.joints.t)
+    late = Twin(arm, (apart,)).poses(recording, recording.joints.t)
     np.testing.assert_array_equal(late.position, Twin(arm).poses(recording).position)
 
 

@@ -156,6 +156,7 @@ DRAWN = {
     'payload': {'mass': 2.0, 'com': [0.01, 0.02, 0.03]},
     'servo_lag': {'joint': 'j1', 'time_constant': 0.05},
     'time_delay': {'delay': 0.03},
+    'clock_rate': {'rate': 1e-4},
     'thermal_growth': {'coefficient': 1e-5},
     'drift': {'xyz_rate': [1e-5, 2e-5, 3e-5]},
     'vibration': {'joint': 'j1', 'frequency': 4.0, 'damping': 0.05, 'gain': 0.4},

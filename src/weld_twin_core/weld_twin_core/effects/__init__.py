@@ -21,6 +21,7 @@ from .backlash import Backlash
 from .base_pose import BasePose
 from .bearing_tilt import BearingTilt
 from .cartesian_compliance import CartesianCompliance
+from .clock_rate import ClockRate
 from .drift import Drift
 from .effect import Effect, MemoryEffect
 from .frame_curve import FrameCurve
@@ -61,6 +62,7 @@ __all__ = [
     'BasePose',
     'BearingTilt',
     'CartesianCompliance',
+    'ClockRate',
     'Drift',
     'Effect',
     'FrameCurve',

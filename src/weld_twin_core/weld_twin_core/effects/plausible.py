@@ -185,6 +185,13 @@ TABLE: dict[tuple[str, str], Plausible] = {
     ('time_delay', 'delay'): _even(
         2e-2, 0.5, 'derived: buses and filters take milliseconds; half a second is another clock'
     ),
+    ('clock_rate', 'rate'): _even(
+        2e-5,
+        1e-4,
+        'oscillators are rated to 10 to 20 ppm (doi.org/10.1186/s40462-024-00512-7, table 1), a '
+        'computer gained 14 ppm (ntp.org, NTP-s-sw-clocks-quality); range derived: what the checks '
+        'of the data let pass as a clock',
+    ),
     ('vibration', 'frequency'): Plausible(
         np.inf, 1.0, 100.0, 'derived: softer is a swing, stiffer does not reach the tool'
     ),

@@ -14,11 +14,14 @@ from ..arm.chain import Frames
 from ..arm.channels import Channel, Shift
 from ..arm.dynamics import chain_gravity_torque, wrench_torque
 from ..arm.robot import Robot
+from ..arrays import Array
 from ..effects.effect import Effect, Stage, View
 from ..errors import ModelError
 from .memory import Tangent, indexed
 from .poses import Poses, posed
 
+CLOCK_ROUNDS = 3
+"""Rounds that find the stamp of an instant: each leaves a ten-thousandth, the rate of a clock."""
 POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
 
 
@@ -63,10 +66,43 @@ class EffectStages:
         """Return the draw axis of the effects' parameters: (D,), or () for plain numbers."""
         return np.broadcast_shapes(*(effect.vector().shape[:-1] for effect in self.effects))
 
-    @property
-    def delay(self) -> float:
-        """Return how late the measurement stamps are, in total [s]."""
-        return float(sum(effect.vector()[0] for effect in self.of_stage(Stage.CLOCK)))
+    def late(self, elapsed: Array | float) -> Array:
+        """
+        Return how much later measurements are stamped than the instants they show.
+
+        Parameters
+        ----------
+        elapsed : array, shape (N,), or float [s]
+            Instants, since the first joint stamp.
+
+        Returns
+        -------
+        array, shape as ``elapsed`` [s]
+
+        """
+        instants = np.asarray(elapsed, dtype=np.float64)
+        late = np.zeros(instants.shape)
+        # What a clock is behind by goes by its own stamps, and these are what is asked for.
+        for _ in range(CLOCK_ROUNDS if self.of_stage(Stage.CLOCK) else 0):
+            late = self.behind(np.ravel(instants + late)).reshape(instants.shape)
+        return late
+
+    def behind(self, elapsed: Array, *, static: bool = False) -> Array:
+        """
+        Return how far before their stamps measurements show the robot, shape (..., N) [s].
+
+        Parameters
+        ----------
+        elapsed : array, shape (N,) [s]
+            Stamps of measurements, since the first joint stamp.
+        static : bool
+            The measurements are of stations at rest.
+
+        """
+        still = np.zeros((1, self.robot.n))
+        view = View(self.robot, elapsed, elapsed, still, still, static)
+        each = [effect.displace(view)['clock', 0] for effect in self.of_stage(Stage.CLOCK)]
+        return np.asarray(sum(each, start=np.zeros(elapsed.shape)))
 
     def of_stage(self, stage: Stage) -> list[Effect]:
         """Return the effects of one stage, in the order given."""

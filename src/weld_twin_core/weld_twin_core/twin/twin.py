@@ -16,7 +16,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects.effect import Parameter, Stage, View
-from ..recording import JointMotion, Recording
+from ..recording import Recording
 from .memory import Tangent, indexed, rates, run_all
 from .poses import Poses
 from .resampling import Picker
@@ -214,8 +214,8 @@ class Twin(EffectStages):
             picker = None
         else:
             t = np.asarray(at, dtype=np.float64)
-            for effect in self.of_stage(Stage.CLOCK):
-                t = t - effect.displace(_clock_view(self.robot, motion))[('clock', 0)][..., :1]
+            if self.of_stage(Stage.CLOCK):
+                t = t - self.behind(t - motion.t[0], static=motion.static)
             q, qd, *sides = recording.at(t)
             picker = Picker(motion, t)
         if moved is not None:
@@ -266,14 +266,3 @@ def _sides(recording: Recording) -> list[Array | None]:
     """Return wrench and temperature at the joint stamps."""
     t = recording.joints.t
     return [s if s is None else s.at(t) for s in (recording.wrench, recording.temperature)]
-
-
-def _clock_view(robot: Robot, motion: JointMotion) -> View:
-    return View(
-        robot=robot,
-        t=motion.t[:1],
-        elapsed=motion.t[:1],
-        q=motion.q[:1],
-        qd=motion.q[:1],
-        static=motion.static,
-    )

@@ -56,6 +56,14 @@ def test_time_delay_makes_stamps_late():
     assert np.allclose(got.position, dh_positions(UR5, command.q), atol=1e-10)
 
 
+def test_a_clock_that_runs_fast_gains_in_proportion():
+    command = weave(UR5, 2.0)
+    got = record(UR5, [{'effect': 'clock_rate', 'rate': 8e-5}], command, richness=0.0)
+    since = command.t - command.t[0]
+    assert np.allclose(got.t_measured, command.t + 8e-5 * since, rtol=0.0, atol=6e-7)
+    assert np.allclose(got.position, dh_positions(UR5, command.q), atol=1e-10)
+
+
 def test_drift_starts_at_the_first_stamp():
     command = stations(UR5, 5)
     got = record(UR5, [{'effect': 'drift', 'xyz_rate': [1e-6, -2e-6, 0.0]}], command)

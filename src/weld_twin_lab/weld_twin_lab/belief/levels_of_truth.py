@@ -37,6 +37,7 @@ OUTSIDE_LEVELS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 ALSO: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     'drift': (('base', 'instrument'), ('time',)),
     'payload': (('load', 'tool'), ('load',)),
+    'clock_rate': (('clock',), ('time', 'speed')),
 }
 """The same for causes in the library whose place has more than one right word."""
 LAGGING = 'equal lag'

@@ -32,6 +32,7 @@ SIZES: dict[str, tuple[str, ...]] = {
     'payload': ('mass',),
     'servo_lag': ('time_constant',),
     'time_delay': ('delay',),
+    'clock_rate': ('rate',),
     'thermal_growth': ('coefficient',),
     'drift': ('xyz_rate',),
     'vibration': ('gain',),
@@ -65,6 +66,7 @@ MOVING = frozenset(
     {
         'servo_lag',
         'time_delay',
+        'clock_rate',
         'vibration',
         'friction_wander',
         'stick_slip',
@@ -291,6 +293,7 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'payload': _payload,
     'servo_lag': _one('time_constant', 0.008),
     'time_delay': _whole('delay', 0.006),
+    'clock_rate': _whole('rate', 2e-5),
     'thermal_growth': _whole('coefficient', 3e-5),
     'drift': lambda robot, span, rng: {'xyz_rate': _vector(1e-5, rng)},
     'vibration': _vibration,

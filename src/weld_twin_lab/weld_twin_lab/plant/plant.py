@@ -152,11 +152,12 @@ def _record(cell: _Cell, instrument: Tracker, rng: np.random.Generator) -> Plant
     wrench_t, wrench = sensors.wrench_stream(instrument, cell.course, rng)
     temperature_t, temperature = sensors.temperature_stream(instrument, cell.course, rng)
     late = float(cell.causes.total('time_delay', 'delay')) + instrument.clock_offset
+    gained = sensors.gained(cell.causes, t - cell.start, cell.richness)
     return PlantRecording(
         t_joint=joint_stamps,
         q=cell.course.q(t_joint),
         qd=cell.course.q(t_joint, 1) if instrument.velocity else None,
-        t_measured=stamps + late,
+        t_measured=stamps + late + gained,
         position=position,
         quaternion=quaternion,
         wrench_t=wrench_t,

@@ -40,6 +40,7 @@ LIBRARY = frozenset(ROW_EFFECTS) | {
     'payload',
     'servo_lag',
     'time_delay',
+    'clock_rate',
     'thermal_growth',
     'drift',
     'vibration',

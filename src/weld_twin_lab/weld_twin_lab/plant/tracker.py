@@ -9,12 +9,18 @@ from scipy.spatial.transform import Rotation
 
 from .plant_recording import Course
 from .screws import Motion
+from .textbook_effects import Causes
 
 Readings = tuple[np.ndarray, np.ndarray] | tuple[None, None]
 """Stamps and values of a sensor, or that there is none."""
 
 STAMP_MARGIN = 0.45
 """Share of the spacing that jitter may move a stamp by, so that stamps keep their order."""
+
+SETTLING, SETTLED = 0.02, 120.0
+"""Share by which a quartz runs further off while it warms up, and the seconds that takes."""
+TICK = 1e-6
+"""What a clock that runs on its own counts in [s]."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +100,25 @@ def stamped(t: np.ndarray, jitter: float, rng: np.random.Generator) -> np.ndarra
         return np.array(t)
     limit = STAMP_MARGIN * float(np.diff(t).min())
     return np.asarray(t + np.clip(jitter * rng.standard_normal(len(t)), -limit, limit))
+
+
+def gained(causes: Causes, since: np.ndarray, richness: float) -> np.ndarray:
+    """
+    Return what the tracker's clock has gained on that of the joints, shape (M,) [s].
+
+    Its quartz warms up with the instrument, and it counts whole ticks.
+
+    Parameters
+    ----------
+    causes : Causes
+    since : array, shape (M,) [s]
+        True time since both were set.
+    richness : float
+
+    """
+    rate = float(causes.total('clock_rate', 'rate'))
+    warm = richness * SETTLING * SETTLED * -np.expm1(-since / SETTLED)
+    return np.asarray(TICK * np.round(rate * (since + warm) / TICK))
 
 
 def observe(

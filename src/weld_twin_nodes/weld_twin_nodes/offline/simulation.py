@@ -142,7 +142,8 @@ class Simulation:
 
 def _late(stamps: np.ndarray, twin: Twin) -> list[int]:
     """Return the stamps of measurements, late by the delay of the measurement clock."""
-    return [int(ns) for ns in stamps + round(twin.delay * NANOSECONDS)]
+    late = twin.late((stamps - stamps[0]) * 1e-9)
+    return [int(ns) for ns in stamps + np.rint(late * NANOSECONDS).astype(np.int64)]
 
 
 def _poses(make: Messages, topic: str, stamps: list[int], poses: Poses) -> Iterator[Entry]:

@@ -109,6 +109,7 @@ _MATTERS = {
     'drift': 'a matter of what the frame stands on, or of the temperature',
     'setup_settling': 'a matter of how the set-up is held',
     'time_delay': f'{_RECORDING}: its clocks',
+    'clock_rate': f'{_RECORDING}: its clocks',
     'measurement_scale': f'{_RECORDING}: the scale of the instrument',
     'instrument_knock': f'{_RECORDING}: the instrument or the base was knocked',
 }

@@ -21,6 +21,7 @@ _BY_UNIT = {
     '1/K': (1e6, 'ppm/K'),
     'rad/(N m)': (1e6, 'µrad/(N m)'),
     'm/N': (1e6, 'µm/N'),
+    's/s': (1e6, 'ppm'),
     '-': (1.0, ''),
 }
 """Factor from SI and the unit that people read, by the unit of the parameter ..."""

@@ -35,6 +35,7 @@ CAUSES = {
     'payload': 'wrong payload',
     'servo_lag': 'servo lag',
     'time_delay': 'clock delay',
+    'clock_rate': 'clock that runs fast or slow',
     'thermal_growth': 'thermal growth',
     'drift': 'drift of the frame',
     'vibration': 'vibration',

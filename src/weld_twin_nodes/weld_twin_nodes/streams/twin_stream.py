@@ -62,7 +62,6 @@ class JointStream:
     def __init__(self, twin: Twin, joint_names: tuple[str, ...] | None = None) -> None:
         self._twin = twin
         self._live = twin.live()
-        self._delay = round(twin.delay * NANOSECONDS)
         self._intake = Intake(twin.robot, joint_names=joint_names, mend=True)
         self._epoch: int | None = None
         self._wrench = HeldSignal()
@@ -86,7 +85,6 @@ class JointStream:
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""
         self._twin = self._live.twin = twin
-        self._delay = round(twin.delay * NANOSECONDS)
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock; wrench and temperature hold."""
@@ -128,15 +126,17 @@ class JointStream:
         wrench, frame = self._wrench.at(stamp), self._intake.wrench_frame.meaning
         warm = self._temperature.at(stamp)
         temperature = None if warm is None else float(warm[0])
+        elapsed = (stamp - self._epoch) * 1e-9
         joints, poses = self._live.step(
-            (stamp - self._epoch) * 1e-9,
+            elapsed,
             q,
             qd,
             wrench,
             temperature,
             frame,
         )
-        return Sample(stamp, stamp + self._delay, joints, poses, wrench, frame, temperature)
+        late = round(float(self._twin.late(elapsed)) * NANOSECONDS)
+        return Sample(stamp, stamp + late, joints, poses, wrench, frame, temperature)
 
 
 def _keep(signal: HeldSignal, taken: Taken | None) -> None:

@@ -203,6 +203,15 @@ def _time_delay(effect: Effect, robot: Robot) -> str:
     )
 
 
+def _clock_rate(effect: Effect, robot: Robot) -> str:
+    ppm = _value(effect, 'rate') * 1e6
+    way = 'fast' if ppm > 0.0 else 'slow'
+    return (
+        f'Synchronise the clocks of both computers all the time: that of the measurements runs '
+        f'{size(abs(ppm))} ppm {way}, {size(abs(ppm) * 3.6e-3)} s in an hour.'
+    )
+
+
 def _thermal_growth(effect: Effect, robot: Robot) -> str:
     links = effect.links or ('all links',)  # type: ignore[attr-defined]
     return (
@@ -316,6 +325,7 @@ _SENTENCES: dict[str, Sentence] = {
     'payload': _payload,
     'servo_lag': _servo_lag,
     'time_delay': _time_delay,
+    'clock_rate': _clock_rate,
     'thermal_growth': _thermal_growth,
     'drift': _drift,
     'vibration': _vibration,

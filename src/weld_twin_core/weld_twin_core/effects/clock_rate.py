@@ -1,0 +1,41 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Clock rate: the instrument's clock runs fast or slow against that of the joints."""
+
+from dataclasses import dataclass
+
+from ..arm.channels import Shift
+from .effect import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class ClockRate(Effect):
+    """
+    A measurement stamped t shows the robot at t - rate (t - t_first); stations do not move.
+
+    The two clocks agree at the first joint stamp; what they are apart then is `time_delay`.
+    """
+
+    rate: Value = 0.0
+
+    name = 'clock_rate'
+    depends_on = 'time'
+    place = 'clock'
+    of = 'robot'
+    stage = Stage.CLOCK
+    common = False
+    parameters = (Parameter('rate', 's/s', typical=1e-5, lower=-0.1, upper=0.1, idealised=0.03),)
+    needs = frozenset({'velocity', 'time'})
+
+    def displace(self, view: View) -> Shift:
+        """Return the delay so far on the 'clock' channel; the twin samples that much earlier."""
+        gained = 0.0 * view.elapsed if view.static else view.elapsed
+        return {('clock', 0): self.number('rate') * gained}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return minus the joint velocity times the time that the measurement's clock shows."""
+        shown = view.elapsed / (1.0 - self.number('rate'))
+        return [{('q', i): -view.qd[..., i] * shown for i in range(view.robot.n)}]

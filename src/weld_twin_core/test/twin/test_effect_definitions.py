@@ -189,6 +189,55 @@ def measurement_scale(cell):
     cell.move = move
 
 
+def pedestal_tilt(cell):
+    """Two levers at a time: every weight, and the wrench, about the base's origin."""
+    robot, base = cell.robot, cell.robot.T_world_base
+    gravity, pose = base[:3, :3] @ robot.gravity, base
+    moment = np.zeros(3)
+    for k, row in enumerate(cell.textbook.rows(robot, cell.q)):
+        pose = pose @ row
+        centre = (pose @ [*robot.com[k], 1.0])[:3]
+        moment += np.cross(centre - base[:3, 3], robot.mass[k] * gravity)
+    tool = pose @ robot.T_flange_tool
+    centre = (tool @ [*robot.payload_com, 1.0])[:3]
+    moment += np.cross(centre - base[:3, 3], robot.payload_mass * gravity)
+    force, twist = tool[:3, :3] @ cell.wrench[:3], tool[:3, :3] @ cell.wrench[3:]
+    moment += twist + np.cross(tool[:3, 3] - base[:3, 3], force)
+    own = base[:3, :3].T @ moment
+    turn = base[:3, :3] @ [1e-5 * own[0], 3e-5 * own[1], 0.0]
+    cell.base = cell.textbook.frame(base, np.zeros(3), turn, 'left')
+
+
+def hose_pull(cell):
+    """Virtual work: the joint turns a little, and the energy of a spring and a weight changes."""
+
+    def energy(q):
+        pose = cell.textbook.pose(cell.robot, q, tool=np.eye(4))
+        place = (np.linalg.inv(cell.robot.T_world_base) @ pose)[:3, 3]
+        return 0.5 * 40.0 * place @ place - place @ [10.0, -20.0, 30.0]
+
+    step = 1e-5 * np.eye(cell.robot.n)[1]
+    torque = cell.textbook.load_torque(cell.robot, cell.q, cell.wrench)[1]
+    torque -= (energy(cell.q + step) - energy(cell.q - step)) / 2e-5
+    cell.q[1] += 1e-4 * torque
+
+
+def refraction(cell):
+    """Half the square of the way across the gradient to the warmth; as much nearer along it."""
+
+    less = 7.86e-4 * 101.325 * (1.0 / 292.15 - 1.0 / 294.15) / 2.0
+
+    def move(pose):
+        sight, warming = pose[:3, 3] - [-4.0, 1.0, 0.0], np.array([100.0, -200.0, 300.0])
+        far = np.linalg.norm(sight)
+        along = (warming @ sight) * sight / far**2
+        out = pose.copy()
+        out[:3, 3] += 0.5 * less * far**2 * ((warming - along) - along)
+        return out
+
+    cell.move = move
+
+
 def nothing(cell):
     pass
 
@@ -238,6 +287,12 @@ DEFINITIONS = {
     'bearing_tilt': ({'joint': 'j0', 'lean': [2e-3, 1e-3, 0.0, 3e-3]}, bearing_tilt),
     'wear': ({'rate': 1e-3}, wear),
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
+    'pedestal_tilt': ({'compliance': [1e-5, 3e-5]}, pedestal_tilt),
+    'hose_pull': ({'force': [10.0, -20.0, 30.0], 'stiffness': 40.0}, hose_pull),
+    'refraction': (
+        {'warming': [100.0, -200.0, 300.0], 'instrument': [-4.0, 1.0, 0.0]},
+        refraction,
+    ),
     'measurement_noise': ({'sigma': 1e-3}, nothing),
 }
 IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay', 'clock_rate'}
@@ -250,9 +305,9 @@ def effect(name, **values):
 
 
 def with_helpers(name, effects):
-    """Return the effects; a payload shows only through a spring."""
+    """Return the effects; a payload or a hose shows only through a spring."""
     spring = [effect('joint_compliance', joint='j1', compliance=1e-4)]
-    return tuple(effects) + tuple(spring if name == 'payload' else [])
+    return tuple(effects) + tuple(spring if name in ('payload', 'hose_pull') else [])
 
 
 def test_every_registered_effect_is_tested_here():

@@ -162,6 +162,9 @@ DRAWN = {
     'vibration': {'joint': 'j1', 'frequency': 4.0, 'damping': 0.05, 'gain': 0.4},
     'quantization': {'joint': 'j1', 'step': 1e-3},
     'measurement_scale': {'scale': 1e-4},
+    'pedestal_tilt': {'compliance': [1e-5, 2e-5]},
+    'hose_pull': {'force': [10.0, -20.0, 30.0], 'stiffness': 40.0},
+    'refraction': {'warming': [1.0, -2.0, 3.0]},
     'measurement_noise': {'sigma': 1e-4},
 }
 

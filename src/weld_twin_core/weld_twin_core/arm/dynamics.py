@@ -170,3 +170,41 @@ def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
         y = cross(z, x)
     place: Array = origin + point[0] * x + point[1] * y + point[2] * z
     return place
+
+
+def base_moment(
+    robot: Robot, chain: Frames, wrench: Array | None = None, frame: str = 'tool'
+) -> Array:
+    """
+    Return the moment of all load about the base's origin, world frame, shape (3, ...) [N m].
+
+    What a pedestal has to hold: weights of links and payload, and the wrench on the tool.
+
+    Parameters
+    ----------
+    robot : Robot
+        Links without masses weigh nothing.
+    chain : Frames
+        The chain at the samples.
+    wrench : array, shape (..., 6), optional [N, N m]
+        On the tool; see `wrench_torque`.
+    frame : str
+        Where the wrench is expressed: 'tool' or 'base'.
+
+    """
+    samples = chain.position.shape[:-1]
+    origin = pad(components(chain.base_point), len(samples))
+    lever = np.zeros((3, *samples))
+    if robot.mass is not None and robot.com is not None:
+        for i, (mass, com) in enumerate(zip(robot.mass, robot.com, strict=True)):
+            lever = lever + mass * (link_point(robot, chain, i, com) - origin)
+    if robot.payload_mass:
+        centre = chain.position + chain.rotation @ robot.payload_com
+        lever = lever + robot.payload_mass * (components(centre) - origin)
+    moment: Array = cross(lever, gravity_direction(robot, chain))
+    if wrench is not None:
+        rotation = chain.rotation if frame == 'tool' else chain.base_rotation
+        force = components((rotation @ wrench[..., :3, None])[..., 0])
+        own = components((rotation @ wrench[..., 3:, None])[..., 0])
+        moment = moment + own + cross(components(chain.position) - origin, force)
+    return moment

@@ -27,6 +27,7 @@ from .effect import Effect, MemoryEffect
 from .frame_curve import FrameCurve
 from .friction import Friction
 from .gear_ratio import GearRatio
+from .hose_pull import HosePull
 from .hysteresis import Hysteresis
 from .instrument_knock import InstrumentKnock
 from .joint_compliance import JointCompliance
@@ -41,7 +42,9 @@ from .loaded_play import LoadedPlay
 from .measurement_noise import MeasurementNoise
 from .measurement_scale import MeasurementScale
 from .payload import Payload
+from .pedestal_tilt import PedestalTilt
 from .quantization import Quantization
+from .refraction import Refraction
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
 from .servo_lag import ServoLag
 from .setup_settling import SetupSettling
@@ -68,6 +71,7 @@ __all__ = [
     'FrameCurve',
     'Friction',
     'GearRatio',
+    'HosePull',
     'Hysteresis',
     'InstrumentKnock',
     'JointCompliance',
@@ -84,7 +88,9 @@ __all__ = [
     'MemoryEffect',
     'Parameter',
     'Payload',
+    'PedestalTilt',
     'Quantization',
+    'Refraction',
     'ServoLag',
     'SetupSettling',
     'SetupStep',

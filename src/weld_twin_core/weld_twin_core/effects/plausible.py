@@ -157,6 +157,23 @@ TABLE: dict[tuple[str, str], Plausible] = {
     ('payload', 'com'): _even(
         0.1, 0.5, 'derived: centres of torches and grippers lie within half a metre'
     ),
+    ('hose_pull', 'force'): _even(
+        20.0,
+        200.0,
+        'derived: as much as the load that a payload may be off by, 2 kg; range derived: ten '
+        'times that lifts a small arm',
+    ),
+    ('hose_pull', 'stiffness'): _even(
+        20.0, 200.0, 'derived: the same pull over a metre of way; a hose that pushes sags instead'
+    ),
+    ('pedestal_tilt', 'compliance'): Plausible(
+        1e-5,
+        -1e-5,
+        1e-4,
+        'a foundation shall swing above 30 Hz with the arm on it (ABB IRB 4400, 3HAC022032-001, '
+        'p. 39, easymanua.ls): 1e-5 under a small arm of 3 kg m^2 about its foot; range derived: '
+        'at 10 Hz it swings to the eye; see joint_compliance for the lower end',
+    ),
     ('thermal_growth', 'coefficient'): Plausible(
         2.4e-5,
         -2.4e-5,
@@ -175,6 +192,13 @@ TABLE: dict[tuple[str, str], Plausible] = {
         2e-3,
         'trackers are within 6 um/m across the beam (user manual of an AT9xx, section 2.8.2); '
         'range derived: 2 mm/m is a wrong length, not an instrument',
+    ),
+    ('refraction', 'warming'): _even(
+        3.0,
+        30.0,
+        'in still air a line of sight bends by 0.2 mm over 12 m (0.008 in over 40 ft; Hamar Laser, '
+        'Stealth series, appendix D, manualshive.com), 3 K/m; range derived: ten times that is air '
+        'beside a furnace',
     ),
     ('quantization', 'step'): Plausible(
         1e-3, 0.0, 1e-2, 'derived: 12 bits a turn are 1.5 mrad; a centiradian is no encoder'

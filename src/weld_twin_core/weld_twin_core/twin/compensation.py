@@ -30,6 +30,7 @@ BEYOND_COMMANDS = frozenset(
     {
         'measurement_scale',
         'measurement_noise',
+        'refraction',
         'time_delay',
         'drift',
         'setup_step',

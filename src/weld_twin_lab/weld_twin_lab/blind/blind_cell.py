@@ -29,6 +29,9 @@ SPANS = (20.0, 60.0)
 """Length [s] of a recording, drawn between these."""
 RICHNESS = (0.0, 1.0)
 """How far the physics goes beyond the textbook, drawn between these."""
+DISTANCE = (3.5, 8.0)
+"""How far [m] a tracker stands from the arm where its line of sight matters, drawn between
+these; an arm and its torch reach up to 2 m."""
 GROSS = 6.0
 """Standard deviations from which a measurement is an outlier."""
 
@@ -80,14 +83,11 @@ def draw_cell(robot: str, kind: str, families: Sequence[str], rng: np.random.Gen
     known: tuple[Cause, ...] = ()
     if 'payload' in families:
         arm = replace(arm, payload_mass=float(rng.uniform(1.0, 4.0)))
-        known = tuple(
-            {
-                'effect': 'joint_compliance',
-                'joint': joint,
-                'compliance': float(rng.uniform(1e-5, 3e-5)),
-            }
-            for joint in arm.joint_names[1:4]
-        )
+        known = _springs(arm.joint_names[1:4], rng)
+    elif 'hose_pull' in families:
+        known = _springs(arm.joint_names[:4], rng)
+    if 'refraction' in families:
+        arm = arm.with_frames(base=_far(rng))
     spring = {'joint_compliance', 'loaded_play'} & set(families)
     return Cell(
         arm,
@@ -99,6 +99,26 @@ def draw_cell(robot: str, kind: str, families: Sequence[str], rng: np.random.Gen
         # Springs given as known are exactly what they are said to be.
         richness=0.0 if known else float(rng.uniform(*RICHNESS)),
     )
+
+
+def _springs(joints: Sequence[str], rng: np.random.Generator) -> tuple[Cause, ...]:
+    """Return joints that give under a load, by how much being known."""
+    return tuple(
+        {
+            'effect': 'joint_compliance',
+            'joint': joint,
+            'compliance': float(rng.uniform(1e-5, 3e-5)),
+        }
+        for joint in joints
+    )
+
+
+def _far(rng: np.random.Generator) -> Array:
+    """Return a base as far from the instrument, in its frame, as trackers stand, (4, 4)."""
+    base, way = np.eye(4), rng.uniform(-np.pi, np.pi)
+    base[:3, :3] = Rotation.from_euler('z', rng.uniform(-np.pi, np.pi)).as_matrix()
+    base[:3, 3] = [*(rng.uniform(*DISTANCE) * np.array([np.cos(way), np.sin(way)])), -1.0]
+    return base
 
 
 def _torch(rng: np.random.Generator) -> Array:

@@ -50,6 +50,9 @@ SIZES: dict[str, tuple[str, ...]] = {
     'bearing_tilt': ('tilt',),
     'loaded_play': ('width',),
     'wear': ('rate',),
+    'pedestal_tilt': ('compliance',),
+    'hose_pull': ('tension',),
+    'refraction': ('warming',),
 }
 """The parameters of every cause that grow with it."""
 OUTSIDE = (
@@ -92,7 +95,7 @@ LEAST = {'servo_lag': 0.15, 'joint_compliance': 0.1}
 """The same for causes that the simulator cannot have any smaller: a servo or spring too stiff."""
 INSIDE = 0.8
 """Share of what a machine can have up to which causes are drawn: the estimate may be higher."""
-TWINS = {('bearing_tilt', 'tilt'): 'lean'}
+TWINS = {('bearing_tilt', 'tilt'): 'lean', ('hose_pull', 'tension'): 'force'}
 """What the twin calls the size of a cause, where it is another word."""
 RIPPLE_ORDERS = (1, 2, 3, 8, 20, 50, 80, 100)
 """Orders of ripple [1/turn]: eccentric wheels, teeth, and the waves of a strain wave gear."""
@@ -186,6 +189,9 @@ _POSITIVE = frozenset(
         'loaded_play',
         'friction',
         'hysteresis',
+        'pedestal_tilt',
+        'hose_pull',
+        'refraction',
     }
 )
 
@@ -276,6 +282,17 @@ def _hysteresis(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     return {'joint': _joint(robot, rng), 'amplitude': 3e-4, 'travel': travel}
 
 
+def _pedestal(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+    """Return a pedestal that is softer one way than the other, as brackets are."""
+    return {'compliance': (2e-6 * rng.uniform(0.3, 1.7, 2)).tolist()}
+
+
+def _hose(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+    """Return a hose from a column behind the arm, or from above it."""
+    hook = [rng.uniform(-0.6, 0.2), rng.uniform(-0.4, 0.4), rng.uniform(0.8, 1.8)]
+    return {'hook': [float(x) for x in hook], 'tension': 15.0, 'length': 1.2}
+
+
 _DRAWN: dict[str, Callable[..., Cause]] = {
     'joint_offset': _one('offset', 5e-4),
     'link_length': _one('da', 3e-4),
@@ -313,5 +330,8 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'dress_pack': _one('amplitude', 5e-4),
     'friction': _friction,
     'hysteresis': _hysteresis,
+    'pedestal_tilt': _pedestal,
+    'hose_pull': _hose,
+    'refraction': lambda robot, span, rng: {'warming': _vector(2.0, rng)},
     'wear': lambda robot, span, rng: {'rate': 1e-5, 'slower': float(span * rng.uniform(1.5, 4.0))},
 }

@@ -187,7 +187,8 @@ def _mixed(
 
 def _possible(real: Recording, align: Sequence[str]) -> list[str]:
     """Return the families that this bag can show."""
-    out = set(FAMILIES) - {'payload'} - {f'{frame}_pose' for frame in align}
+    out = set(FAMILIES) - {'payload', 'hose_pull', 'refraction'}
+    out -= {f'{frame}_pose' for frame in align}
     if real.joints.static:
         out -= MOVING
     if real.wrench is None or real.wrench_frame != 'tool':

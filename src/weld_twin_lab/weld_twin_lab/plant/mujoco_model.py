@@ -59,11 +59,17 @@ def load_from(robot: Entry, extra: list[tuple[float, np.ndarray]]) -> Load:
     return Load(mass, moment / mass if mass > 0.0 else np.zeros(3))
 
 
-def add_links(spec: mujoco.MjSpec, robot: Entry, arm: Arm, load: Load) -> list[mujoco.MjsBody]:
-    """Add the links, the tool and the payload, without joints; return the link bodies."""
+def add_links(
+    spec: mujoco.MjSpec,
+    robot: Entry,
+    arm: Arm,
+    load: Load,
+    foot: mujoco.MjsBody | None = None,
+) -> list[mujoco.MjsBody]:
+    """Add links, tool and payload on a foot or the floor, no joints; return the link bodies."""
     spec.option.gravity = list(robot.get('gravity', STANDARD_GRAVITY))
     at = exponentials.home(arm)
-    parent, before, bodies = spec.worldbody, screws.identity(), []
+    parent, before, bodies = foot or spec.worldbody, screws.identity(), []
     for i, pose in enumerate(at.links):
         parent = _add_body(parent, f'link{i}', screws.compose(screws.inverse(before), pose))
         before = pose
@@ -71,9 +77,9 @@ def add_links(spec: mujoco.MjSpec, robot: Entry, arm: Arm, load: Load) -> list[m
         bodies.append(parent)
     tool = _add_body(parent, 'tool', arm.tool)
     # the wrench acts at a body's centre of mass, so the tool needs one, at its tip
-    _weigh(tool, MASSLESS, np.zeros(3), 1e-9)
+    weigh(tool, MASSLESS, np.zeros(3), 1e-9)
     if load.mass > 0.0:
-        _weigh(
+        weigh(
             _add_body(tool, 'payload', screws.identity()),
             load.mass,
             load.com,
@@ -96,10 +102,11 @@ def _add_mass(body: mujoco.MjsBody, robot: Entry, i: int, reach: float) -> None:
     link = links[i] if i < len(links) else {}
     mass = max(float(link.get('mass', 0.0)), MASSLESS)
     inertia = mass * max(GYRATION * reach, SMALL) ** 2 + 1e-6
-    _weigh(body, mass, np.array(link.get('com', [0.0, 0.0, 0.0]), dtype=float), inertia)
+    weigh(body, mass, np.array(link.get('com', [0.0, 0.0, 0.0]), dtype=float), inertia)
 
 
-def _weigh(body: mujoco.MjsBody, mass: float, com: np.ndarray, inertia: float) -> None:
+def weigh(body: mujoco.MjsBody, mass: float, com: np.ndarray, inertia: float) -> None:
+    """Give a body its mass [kg], its centre (3,) [m] and its inertia about each axis [kg m^2]."""
     body.explicitinertial = True
     body.mass, body.ipos, body.inertia = mass, com, np.full(3, inertia)
 

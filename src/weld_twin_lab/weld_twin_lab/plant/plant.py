@@ -16,12 +16,23 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from . import drives, exponentials, lost_motion, outside_causes, rollout, screws, tree
+from . import (
+    drives,
+    exponentials,
+    hose,
+    line_of_sight,
+    lost_motion,
+    outside_causes,
+    rollout,
+    screws,
+    tree,
+)
 from . import textbook_effects as library
 from . import tracker as sensors
 from .compliance import Compliant
 from .entries import Entry
 from .exponentials import Arm
+from .pedestal import Pedestal
 from .plant_recording import Command, Course, PlantRecording
 from .screws import Motion
 from .textbook_effects import Causes
@@ -71,9 +82,18 @@ class _Cell:
         return np.asarray(motor + library.gearing(self.causes, motor))
 
     @cached_property
+    def pull(self) -> np.ndarray | None:
+        """The wrench on the tool there, hoses with it, shape (N, 6)."""
+        return self.with_hoses(self.geared, self.course.wrench(self.grid))
+
+    def with_hoses(self, q: np.ndarray, wrench: np.ndarray | None) -> np.ndarray | None:
+        """Return a wrench on the tool at positions q with what the hoses add to it."""
+        return hose.with_hoses(self.causes, self.arm, q, wrench, self.richness)
+
+    @cached_property
     def torque(self) -> np.ndarray:
         """The load torque there, shape (N, n)."""
-        return self.compliant.torque(self.geared, self.course.wrench(self.grid))
+        return self.compliant.torque(self.geared, self.pull)
 
     @cached_property
     def sprung(self) -> np.ndarray | float:
@@ -81,7 +101,24 @@ class _Cell:
         if self.compliant.rigid:
             return 0.0
         motor = CubicSpline(self.grid, self.geared)
-        return tree.moving(self.compliant, self.grid, motor, self.course.wrench(self.grid))
+        return tree.moving(self.compliant, self.grid, motor, self.pull)
+
+    @cached_property
+    def pedestal(self) -> Pedestal:
+        """What the arm stands on."""
+        return Pedestal(self.compliant, self.causes)
+
+    def leaned(self, t: np.ndarray) -> Motion:
+        """Return how the base has turned at true times (M,) [s], in its own frame."""
+        if self.pedestal.stiff:
+            return screws.identity()
+        command = self.course.command
+        if command.static:
+            q = command.q + library.gearing(self.causes, command.q)
+            at = np.searchsorted(command.t, t)
+            return self.pedestal.at_rest(q[at], self.course.wrench(t))
+        motor = CubicSpline(self.grid, self.geared)
+        return self.pedestal.moving(self.grid, motor, self.course.wrench(self.grid), t)
 
 
 def run(
@@ -176,12 +213,14 @@ def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
     lean = outside_causes.wobble(causes, motor)
     base, tool = library.frames(causes, arm)
     base = screws.compose(base, outside_causes.frame_error(causes, 'column_bend', since))
+    base = screws.compose(base, cell.leaned(t))
     tool = screws.compose(tool, outside_causes.frame_error(causes, 'tool_slip', since))
     tool = screws.compose(tool, library.worn(causes, since))
     flange = exponentials.flange(arm, exponentials.home(arm, rows), q, lean)
     pose = screws.compose(base, flange, tool)
     pose = library.yielding(causes, pose, cell.course.wrench(t))
-    return library.measured(causes, outside_causes.on_instrument(causes, pose, since), since)
+    pose = outside_causes.on_instrument(causes, pose, since)
+    return library.measured(causes, line_of_sight.seen(causes, pose, cell.richness), since)
 
 
 def _link_side(
@@ -203,9 +242,10 @@ def _at_rest(cell: _Cell, rng: np.random.Generator) -> np.ndarray:
     """Return what gives at every station, in the order they are visited, shape (N, n)."""
     command, compliant = cell.course.command, cell.compliant
     q = command.q + library.gearing(cell.causes, command.q)
-    give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, command.wrench)
+    wrench = cell.with_hoses(q, command.wrench)
+    give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, wrench)
     flaws = outside_causes.on_joints(
-        cell.causes, command.t, q, lambda: compliant.torque(q, command.wrench), rng
+        cell.causes, command.t, q, lambda: compliant.torque(q, wrench), rng
     )
     flaws += lost_motion.on_joints(cell.causes, command.t, q, cell.richness)
     return np.asarray(give + flaws)

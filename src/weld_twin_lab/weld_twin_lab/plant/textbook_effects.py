@@ -5,8 +5,8 @@ Effects that have a closed form: geometry as built, gearing, frames, the instrum
 
 The names and parameters are those of the interface (section 3). Effects that need physics are in
 `drives` (servo_lag, vibration) and in `tree` and `compliance` (backlash, joint_compliance,
-payload) and in `lost_motion` (friction, hysteresis); causes that no library knows are in
-`outside_causes`.
+payload), in `lost_motion` (friction, hysteresis), in `pedestal`, `hose` and `line_of_sight`
+(pedestal_tilt, hose_pull, refraction); causes that no library knows are in `outside_causes`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -50,6 +50,9 @@ LIBRARY = frozenset(ROW_EFFECTS) | {
     'friction',
     'hysteresis',
     'wear',
+    'pedestal_tilt',
+    'hose_pull',
+    'refraction',
 }
 
 

@@ -90,6 +90,8 @@ _BY_PROGRAM = (
     'joint_coupling',
     'joint_compliance',
     'bearing_tilt',
+    'pedestal_tilt',
+    'hose_pull',
     'joint_curve',
     'frame_curve',
 )
@@ -111,6 +113,7 @@ _MATTERS = {
     'time_delay': f'{_RECORDING}: its clocks',
     'clock_rate': f'{_RECORDING}: its clocks',
     'measurement_scale': f'{_RECORDING}: the scale of the instrument',
+    'refraction': f'{_RECORDING}: warm air bent the line of sight',
     'instrument_knock': f'{_RECORDING}: the instrument or the base was knocked',
 }
 """What a cause is a matter of where a controller has nothing to enter for it."""

@@ -251,6 +251,32 @@ def _measurement_scale(effect: Effect, robot: Robot) -> str:
     )
 
 
+def _pedestal_tilt(effect: Effect, robot: Robot) -> str:
+    x, y = np.asarray(effect.compliance) * 1e2  # type: ignore[attr-defined]
+    return (
+        'Stiffen the pedestal or its anchors: under 100 N m it leans by '
+        f'{number(float(np.degrees(x)))} deg about x of the base and by '
+        f'{number(float(np.degrees(y)))} deg about y; until then compensate the motion.'
+    )
+
+
+def _hose_pull(effect: Effect, robot: Robot) -> str:
+    x, y, z = (float(part) for part in np.asarray(effect.force))  # type: ignore[attr-defined]
+    return (
+        f'Lead the hose package so that it hangs free: it pulls the flange by ({number(x)}, '
+        f'{number(y)}, {number(z)}) N along x, y, z of the base, less '
+        f'{number(_value(effect, "stiffness"))} N for every metre away from it.'
+    )
+
+
+def _refraction(effect: Effect, robot: Robot) -> str:
+    each = ', '.join(number(float(v)) for v in np.asarray(effect.warming))  # type: ignore[attr-defined]
+    return (
+        'Stir the air along the line of sight, shield it from heat or stand the instrument '
+        f'nearer: the air warms by ({each}) K/m along x, y, z and bends it.'
+    )
+
+
 def _setup_step(effect: Effect, robot: Robot) -> str:
     return (
         f'Fasten the set-up: it moved by {frame(-effect.vector()[:6])} at '
@@ -331,6 +357,9 @@ _SENTENCES: dict[str, Sentence] = {
     'vibration': _vibration,
     'quantization': _quantization,
     'measurement_scale': _measurement_scale,
+    'pedestal_tilt': _pedestal_tilt,
+    'hose_pull': _hose_pull,
+    'refraction': _refraction,
     'setup_step': _setup_step,
     'setup_settling': _setup_settling,
     'joint_curve': _joint_curve,

@@ -16,6 +16,12 @@ _WAYS: dict[frozenset[str], str] = {
     'side, or trigger both recordings with one signal',
     frozenset({'backlash', 'friction'}): 'push the link to and fro while the motor holds: only '
     'play gives way',
+    frozenset({'joint_compliance', 'pedestal_tilt'}): 'put a level or a dial gauge on the base '
+    'while the arm moves',
+    frozenset(
+        {'hose_pull', 'payload'}
+    ): 'take the hose package off the flange, or weigh what hangs on it',
+    frozenset({'refraction', 'base_pose'}): 'measure from a second place of the instrument',
     frozenset({'joint_compliance', 'payload'}): 'weigh what hangs on the flange',
     frozenset({'link_offset'}): 'only their sum moves the tool, so mending either mends both',
     frozenset({'joint_offset'}): 'master one of the joints with its own gauge',

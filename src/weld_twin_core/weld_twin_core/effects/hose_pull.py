@@ -1,0 +1,75 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Hose pull: the hose package draws the flange towards where it is held, through the joints' springs.
+
+A hose is held at a column or by a spring balancer and pulls the flange with force - stiffness * p,
+p the flange in the base frame: the pull is `force` where the base stands, and a spring draws to
+force / stiffness. Without a stiffness it is a pull of one size and direction, as balancers with a
+tapered drum give it (engineerfix.com, how an overhead tool balancer works). These four numbers are
+linear, and any smooth pull is close to them over the reach of an arm.
+
+The pull is a load: joints yield to it by their compliance, as they do to a payload. So it shows
+only where the joints' springs are known, and it is told from a payload by what pulls sideways, and
+from the springs themselves because weights do not pull so. A torque of its own on each wrist joint
+would need numbers of its own for each, and over one joint's angle it would be a ripple of order
+one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arm.channels import Shift
+from ..arm.dynamics import point_force_torque
+from ..arm.vectors import components, pad
+from ..arrays import Array
+from .effect import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class HosePull(Effect):
+    """The flange is pulled by ``force`` less ``stiffness`` times its place, in the base frame."""
+
+    force: Value = (0.0, 0.0, 0.0)
+    stiffness: Value = 0.0
+
+    name = 'hose_pull'
+    depends_on = 'load'
+    place = 'load'
+    of = 'robot'
+    stage = Stage.LOAD
+    common = False
+    parameters = (
+        Parameter('force', 'N', size=3, typical=10.0),
+        Parameter('stiffness', 'N/m', typical=10.0),
+    )
+
+    def displace(self, view: View) -> Shift:
+        """Return the torque of the pull on the 'tau' channel of every joint."""
+        values = [*(self.number('force', k) for k in range(3)), self.number('stiffness')]
+        parts = _torques(view)
+        return {
+            ('tau', i): sum(value * part[i] for value, part in zip(values, parts, strict=True))
+            for i in range(view.robot.n)
+        }
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return d torque by each component of the force, and by the stiffness."""
+        return [{('tau', i): part[i] for i in range(view.robot.n)} for part in _torques(view)]
+
+
+def _torques(view: View) -> list[Array]:
+    """Return the joint torques of a force of one along each base axis, and of a stiffness of one."""
+    chain = view.frames
+    flange = components(chain.flange_point)
+    width = flange.ndim - 1
+    away = flange - pad(components(chain.base_point), width)
+    axes = [pad(components(chain.base_rotation[..., k]), width) for k in range(3)]
+    forces = [*(np.broadcast_to(axis, flange.shape) for axis in axes), -away]
+    return [point_force_torque(view.robot, chain, flange, force) for force in forces]

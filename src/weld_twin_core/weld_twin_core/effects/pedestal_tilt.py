@@ -1,0 +1,98 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Pedestal tilt: the base leans under the moment of the arm on it.
+
+Two springs hold it, about the base's x and its y: lean = compliance * moment, the moment that of
+the weights of links and payload and of the tool wrench about the base's origin. It follows the
+posture, where an error of the base pose stays as it is. A spring of the second joint bends the arm
+by nearly the same moment, but at the shoulder, and about its own axis only; the pedestal leans
+below it and both ways. Makers ask for a stiff foundation because of it: manual of an ABB IRB 4400,
+3HAC022032-001, p. 39 (easymanua.ls).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arm.channels import Channel, Shift
+from ..arm.dynamics import base_moment
+from ..arm.vectors import components, dot, pad
+from ..arrays import Array
+from .effect import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+CHANGED = 0.2
+"""Share of the largest moment by which it must change: with less, a lean is a base pose."""
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class PedestalTilt(Effect):
+    """The base leans about its x and its y by ``compliance`` times the moment about each."""
+
+    compliance: Value = (0.0, 0.0)
+
+    name = 'pedestal_tilt'
+    depends_on = 'load'
+    place = 'base'
+    of = 'robot'
+    stage = Stage.LINK
+    common = False
+    parameters = (Parameter('compliance', 'rad/(N m)', size=2, typical=2e-6),)
+    needs = frozenset({'load'})
+
+    def displace(self, view: View) -> Shift:
+        """Return the lean of the base; a positive compliance sags."""
+        x, y = (
+            {channel: self.number('compliance', k) * share for channel, share in part.items()}
+            for k, part in enumerate(_leans(view))
+        )
+        return {channel: x[channel] + y[channel] for channel in x}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the moment about each axis, as a turn of the base in the world."""
+        return list(_leans(view))
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """
+        Return why the data cannot show it: the moment has to change.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            None: it is of the whole robot.
+
+        """
+        reason = super().applicable(view, joint)
+        if reason is not None:
+            return reason
+        moment = np.stack(_moments(view))
+        change = np.linalg.norm(np.ptp(moment, axis=-1))
+        if change <= CHANGED * np.linalg.norm(moment, axis=0).max(initial=0.0):
+            return 'the moment on the pedestal hardly changes'
+        return None
+
+
+def _moments(view: View) -> tuple[Array, Array]:
+    """Return the moments about the base's x and y, each shape (..., N) [N m]."""
+    moment = base_moment(view.robot, view.frames, view.wrench, view.wrench_frame)
+    axes = view.frames.base_rotation
+    x, y = (dot(pad(components(axes[..., k]), moment.ndim - 1), moment) for k in range(2))
+    return x, y
+
+
+def _leans(view: View) -> tuple[dict[Channel, Array], dict[Channel, Array]]:
+    """Return the turn of the base in the world for a compliance of one about its x, and its y."""
+    axes = view.robot.T_world_base[:3, :2].T
+    x, y = (
+        {('base', 3 + k): axis[k] * moment for k in range(3)}
+        for axis, moment in zip(axes, _moments(view), strict=True)
+    )
+    return x, y

@@ -1,0 +1,117 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Refraction: the line of sight of a tracker bends where the air is warmer on one side.
+
+Light bends towards colder, denser air, with a curvature of the gradient of the refractive index
+over the index. Over a distance L across the gradient the target seems half of curvature * L^2 off,
+towards the warmth; along it, the light runs slower or faster than at the instrument. With r from
+the instrument to the target and gradient G, both together are
+``p -> p + BEND (r.r G / 2 - (G.r) r)``.
+
+The place of the instrument is the origin of the measuring frame unless it is given. Another place
+only adds a turn, a shift and a scale, as multiplying out shows, which a base pose and a scale of
+the instrument take up; what bends is the same. A frame whose origin is nearer than any instrument
+could stand is not the instrument's own, and with the place unknown nothing is considered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Real
+
+import numpy as np
+
+from ..arm.channels import Shift
+from ..arm.robot import Robot
+from ..arrays import Array
+from ..errors import ModelError
+from .effect import Effect
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+BEND = 7.86e-4 * 101.325 / 293.15**2
+"""By how much the refractive index of air falls [1/K], 9.27e-7 at 20 degC and 101.325 kPa:
+n = 1 + 7.86e-4 p / T with p in kPa, less what humidity does (emtoolbox.nist.gov, refractive index
+of air calculator, appendix B)."""
+NEAREST = 1.5
+"""Distance [m] that the tool keeps from an instrument: nearer, most arms could reach into it, and
+the origin is not the instrument's. The bundled arms reach 0.5 to 3 m from their base."""
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class Refraction(Effect):
+    """
+    Air that warms by ``warming`` [K/m] along each axis of the measuring frame bends the sight.
+
+    ``instrument`` is where the line of sight starts, three numbers [m] in the measuring frame;
+    left out, its origin.
+    """
+
+    warming: Value = (0.0, 0.0, 0.0)
+    instrument: Sequence[float] | None = None
+
+    name = 'refraction'
+    depends_on = 'place'
+    place = 'instrument'
+    of = 'robot'
+    stage = Stage.POSE
+    common = False
+    parameters = (Parameter('warming', 'K/m', size=3, typical=1.0),)
+    options = ('instrument',)
+
+    def check(self, robot: Robot) -> None:
+        """Refuse an instrument whose place is not three numbers."""
+        super().check(robot)
+        place = self.instrument
+        if place is not None and (
+            isinstance(place, str)
+            or len(place) != 3
+            or not all(isinstance(x, Real) for x in place)
+        ):
+            raise ModelError(f'refraction: instrument must be three numbers in m, got {place!r}')
+
+    def displace(self, view: View) -> Shift:
+        """Return how far off the target seems, on the pose."""
+        x, y, z = (
+            np.asarray(self.number('warming', k))[..., None] * seen
+            for k, seen in enumerate(self._seen(view))
+        )
+        total = x + y + z
+        return {('pose', j): total[..., j] for j in range(3)}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return how far off the target seems for one kelvin a metre along each axis."""
+        return [{('pose', j): seen[..., j] for j in range(3)} for seen in self._seen(view)]
+
+    def _seen(self, view: View) -> list[Array]:
+        """Return the shift for a gradient of one along each axis, each (..., N, 3) [m]."""
+        sight = view.frames.position - (0.0 if self.instrument is None else self.instrument)
+        across = 0.5 * (sight**2).sum(axis=-1)
+        return [
+            BEND * (across[..., None] * axis - sight[..., k, None] * sight)
+            for k, axis in enumerate(np.eye(3))
+        ]
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """
+        Return why the data cannot show it: it has to be known where the instrument stands.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            None: it is of the whole robot.
+
+        """
+        nearest = np.linalg.norm(view.frames.position, axis=-1).min(initial=np.inf)
+        if nearest < NEAREST:
+            return (
+                "the tool comes within 1.5 m of the measuring frame's origin, so that this is not "
+                'where an instrument stands'
+            )
+        return super().applicable(view, joint)

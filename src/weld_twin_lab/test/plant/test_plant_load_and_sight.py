@@ -1,0 +1,101 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Pedestals, hoses and lines of sight of the plant, against statics and optics by hand."""
+
+import numpy as np
+import pytest
+from plant_cells import UR5, dh_links, dh_positions, joint_displacement, record, stations, weave
+from scipy.spatial.transform import Rotation
+
+TILT = {'effect': 'pedestal_tilt', 'compliance': [1e-5, 3e-5]}
+HOSE = {'effect': 'hose_pull', 'hook': [-0.3, 0.2, 1.4], 'tension': 30.0, 'length': 1.2}
+SPRING = {'effect': 'joint_compliance', 'joint': 'j1', 'compliance': 1e-5}
+
+
+def leaned(robot, q):
+    """Return tool positions on a pedestal that has leaned by the weights at each posture."""
+    world = Rotation.from_quat(robot['base']['quat_xyzw'])
+    origin, out = np.array(robot['base']['xyz']), []
+    for row, straight in zip(q, dh_positions(robot, q), strict=True):
+        frames = dh_links(robot, row)
+        parts = [(f, link) for f, link in zip(frames, robot['links'], strict=True)]
+        tool = Rotation.from_quat(robot['tool']['quat_xyzw']).as_matrix()
+        held = np.vstack([np.c_[tool, robot['tool']['xyz']], [0.0, 0.0, 0.0, 1.0]])
+        parts.append((frames[-1] @ held, robot['payload']))
+        weighed = sum(part['mass'] * (frame @ [*part['com'], 1.0])[:3] for frame, part in parts)
+        moment = np.cross(weighed, robot['gravity'])
+        turn = Rotation.from_rotvec([1e-5 * moment[0], 3e-5 * moment[1], 0.0])
+        out.append(origin + (world * turn * world.inv()).apply(straight - origin))
+    return np.array(out)
+
+
+def test_a_pedestal_leans_by_the_moment_of_all_weights():
+    command = stations(UR5, 12)
+    got = record(UR5, [TILT], command, richness=0.0).position
+    straight = dh_positions(UR5, command.q)
+    moved = leaned(UR5, command.q) - straight
+    assert np.abs(moved).max() > 5e-4
+    assert np.abs(got - straight - moved).max() < 5e-3 * np.abs(moved).max()
+
+
+def test_a_moving_arm_shakes_its_pedestal_a_little():
+    command = weave(UR5, 4.0)
+    still, shaken = (
+        record(UR5, [TILT], command, richness=richness).position for richness in (0.0, 1.0)
+    )
+    size = np.abs(still - dh_positions(UR5, command.q)).max()
+    assert 1e-3 * size < np.abs(shaken - still).max() < 0.3 * size
+
+
+def test_a_hose_pulls_its_joint_by_the_work_it_does():
+    command, step = stations(UR5, 12), 1e-6 * np.eye(6)[1]
+    both, alone = (
+        joint_displacement(UR5, effects, command, 'j1', richness=0.0)
+        for effects in ([SPRING, HOSE], [SPRING])
+    )
+
+    def far(q):
+        return np.linalg.norm(dh_links(UR5, q)[-1][:3, 3] - HOSE['hook'])
+
+    for q, turned in zip(command.q, both - alone, strict=True):
+        tension = 30.0 * (1.0 + 1.0 * (far(q) / 1.2 - 1.0))
+        torque = -tension * (far(q + step) - far(q - step)) / 2e-6
+        assert turned == pytest.approx(1e-5 * torque, abs=2e-7)
+
+
+def test_a_slack_hose_pulls_nothing():
+    command = stations(UR5, 5)
+    loose = {**HOSE, 'length': 50.0}
+    got = record(UR5, [SPRING, loose], command, richness=0.0).position
+    np.testing.assert_allclose(
+        got, record(UR5, [SPRING], command, richness=0.0).position, atol=1e-8
+    )
+
+
+def test_a_line_of_sight_bends_as_the_maker_of_a_laser_says():
+    """Hamar Laser, Stealth series, appendix D: 0.008 in over 40 ft, at 3 K/m of still air."""
+    place = 12.192 * np.array([1.0, 0.0, 0.0])
+    far = {**UR5, 'base': {'xyz': (place - dh_positions(bare(), np.zeros((1, 6)))[0]).tolist()}}
+    bent = {'effect': 'refraction', 'warming': [0.0, 0.0, 3.0]}
+    command = stations(far, 1)
+    command = type(command)(command.t, np.zeros((1, 6)), static=True)
+    off = record(far, [bent], command, richness=0.0).position[0] - place
+    assert off[2] == pytest.approx(0.008 * 0.0254, rel=0.03)
+    np.testing.assert_allclose(off[:2], 0.0, atol=1e-8)
+
+
+def bare():
+    """Return the arm with its base at the origin of the world."""
+    return {key: value for key, value in UR5.items() if key != 'base'}
+
+
+def test_warmer_air_ahead_shortens_the_distance():
+    """Light runs faster there: half the gradient of the index times the distance squared."""
+    far = {**bare(), 'base': {'xyz': [6.0, 0.0, 0.0]}}
+    command = stations(far, 8)
+    sight = dh_positions(far, command.q)
+    bent = {'effect': 'refraction', 'warming': [0.3, 0.0, 0.0]}
+    got = record(far, [bent], command, richness=0.0).position
+    shorter = np.linalg.norm(sight, axis=1) - np.linalg.norm(got, axis=1)
+    along = sight[:, 0] * np.linalg.norm(sight, axis=1)
+    assert shorter == pytest.approx(0.5 * 9.27e-7 * 0.3 * along, rel=1e-2)

@@ -225,7 +225,7 @@ def hose_pull(cell):
 def refraction(cell):
     """Half the square of the way across the gradient to the warmth; as much nearer along it."""
 
-    less = 7.86e-4 * 101.325 * (1.0 / 292.15 - 1.0 / 294.15) / 2.0
+    less = 7.86e-4 * 101.325 * (1.0 / 293.14 - 1.0 / 293.16) / 0.02
 
     def move(pose):
         sight, warming = pose[:3, 3] - [-4.0, 1.0, 0.0], np.array([100.0, -200.0, 300.0])

@@ -129,7 +129,7 @@ def not_told(problem: Problem) -> tuple[str, ...]:
     return tuple(
         name
         for name, kind in REGISTRY.items()
-        if (kind.fitted_with == 'base' and not problem.placed) or kind.depends_on in NO_CONTACT
+        if (kind.place == 'base' and not problem.placed) or kind.depends_on in NO_CONTACT
     )
 
 

@@ -88,7 +88,7 @@ class _Cell:
 
     def with_hoses(self, q: np.ndarray, wrench: np.ndarray | None) -> np.ndarray | None:
         """Return a wrench on the tool at positions q with what the hoses add to it."""
-        return hose.with_hoses(self.causes, self.arm, q, wrench, self.richness)
+        return hose.with_hoses(self.causes, self.arm, q, wrench)
 
     @cached_property
     def torque(self) -> np.ndarray:

@@ -288,9 +288,10 @@ def _pedestal(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
 
 
 def _hose(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    """Return a hose from a column behind the arm, or from above it."""
-    hook = [rng.uniform(-0.6, 0.2), rng.uniform(-0.4, 0.4), rng.uniform(0.8, 1.8)]
-    return {'hook': [float(x) for x in hook], 'tension': 15.0, 'length': 1.2}
+    """Return a hose from above the arm, out of its reach."""
+    reach = float(np.hypot(robot.a, robot.d).sum())
+    hook = [rng.uniform(-0.4, 0.4), rng.uniform(-0.4, 0.4), rng.uniform(1.0, 1.5)]
+    return {'hook': [reach * float(x) for x in hook], 'tension': 15.0, 'length': reach}
 
 
 _DRAWN: dict[str, Callable[..., Cause]] = {

@@ -60,6 +60,8 @@ def _seen(item: Entry, target: np.ndarray, uneven: float) -> np.ndarray:
 
 Air = tuple[np.ndarray, float, float]
 """Which way it gets warmer, by how much [K/m], and how unevenly [1/m]."""
+State = tuple[np.ndarray, ...]
+"""Place of a ray, its direction times the index, its optical length so far."""
 
 
 def _index(r: np.ndarray, air: Air) -> tuple[np.ndarray, np.ndarray]:
@@ -75,15 +77,15 @@ def _index(r: np.ndarray, air: Air) -> tuple[np.ndarray, np.ndarray]:
 def _ray(way: np.ndarray, length: np.ndarray, air: Air) -> tuple[np.ndarray, np.ndarray]:
     """Return where rays of a length end, (M, 3), and their optical lengths, (M, 1)."""
 
-    def change(state: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    def change(state: State) -> State:
         n, gradient = _index(state[0], air)
         return state[1] / n, gradient, n
 
-    def ahead(state: tuple[np.ndarray, ...], by: tuple[np.ndarray, ...], h: np.ndarray) -> tuple:
+    def ahead(state: State, by: State, h: np.ndarray) -> State:
         return tuple(a + h * b for a, b in zip(state, by, strict=True))
 
     start = np.zeros_like(way)
-    state: tuple[np.ndarray, ...] = (start, way * _index(start, air)[0], np.zeros_like(length))
+    state: State = (start, way * _index(start, air)[0], np.zeros_like(length))
     h = length / STEPS
     for _ in range(STEPS):
         a = change(state)

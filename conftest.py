@@ -4,12 +4,16 @@
 
 import os
 import shutil
+import sys
 from functools import cache
 
 import pytest
 
 # One core is enough for arrays of this size, and the test machine has other work.
 os.environ.setdefault('OMP_NUM_THREADS', '1')
+# The tests start hundreds of processes; without files of bytecode each compiles all it imports.
+os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
+sys.dont_write_bytecode = False
 
 CELLS = 'cells'
 

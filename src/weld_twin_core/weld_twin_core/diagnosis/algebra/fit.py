@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,14 +165,47 @@ def fit(
 
     """
     prior = effect_precision(model) if precision is None else precision
-    here, damping = _Point.at(problem, model, scale, prior), DAMPING
-    columns, names = design(problem, model, scale)
+    here = descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
+    information, _ = here.normal_equations
+    names = here.columns[1]
+    return Fit(here.model, here.residual, information, names, coordinates(here.model))
+
+
+class Point(Protocol):
+    """A place on the way of a fit: what it costs, which way is down, and the place a step away."""
+
+    @property
+    def cost(self) -> float:
+        """Return what is to become small."""
+
+    @property
+    def normal_equations(self) -> tuple[Array, Array]:
+        """Return normal matrix (P, P) and right-hand side (P,) of a step, the priors included."""
+
+    def stepped(self: P, step: Array) -> P:
+        """Return the place a step, shape (P,), away."""
+
+
+P = TypeVar('P', bound=Point)
+
+
+def descended(start: P, iterations: int, tolerance: float) -> P:
+    """
+    Return the place that Levenberg and Marquardt lead to.
+
+    Parameters
+    ----------
+    start : Point
+    iterations : int
+    tolerance : float
+        Stops when the cost falls by less than this share.
+
+    """
+    here, damping = start, DAMPING
     for _ in range(iterations):
-        normal, right = here.normal_equations(columns)
         there = None
         while damping < DAMPED:
-            trial = stepped(problem, here.model, solve_scaled(normal, right, damping))
-            there = _Point.at(problem, trial, scale, prior)
+            there = here.stepped(solve_scaled(*here.normal_equations, damping))
             if there.cost <= here.cost:
                 break
             there, damping = None, max(damping * 100.0, 1e-6)
@@ -179,16 +213,18 @@ def fit(
             break
         gain = (here.cost - there.cost) / max(here.cost, 1e-300)
         here, damping = there, max(damping * 0.01, DAMPING)
-        columns, names = design(problem, here.model, scale)
         if gain < tolerance:
             break
-    information, _ = here.normal_equations(columns)
-    return Fit(here.model, here.residual, information, names, coordinates(here.model))
+    return here
 
 
-class _Point(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Point:
     """A model on the way of a fit: its whitened residual, its priors, and its cost."""
 
+    problem: Problem
+    scale: Scale
+    prior: Array
     model: Model
     residual: Array
     ridge: Array
@@ -216,12 +252,26 @@ class _Point(NamedTuple):
         frames, off = frame_prior(problem, model)
         ridge = np.concatenate([frames, prior])
         x = np.concatenate([off, coordinates(model)])
-        return cls(model, residual, ridge, x, float(residual @ residual + ridge @ x**2))
+        cost = float(residual @ residual + ridge @ x**2)
+        return cls(problem, scale, prior, model, residual, ridge, x, cost)
 
-    def normal_equations(self, columns: Array) -> tuple[Array, Array]:
+    @cached_property
+    def columns(self) -> tuple[Array, list[str]]:
+        """Return the whitened columns, shape (P, rows), and their names."""
+        return design(self.problem, self.model, self.scale)
+
+    @cached_property
+    def normal_equations(self) -> tuple[Array, Array]:
         """Return normal matrix and right-hand side of a step, the priors included."""
+        columns, _ = self.columns
         right = columns @ self.residual - self.ridge * self.x
         return columns @ columns.T + np.diag(self.ridge), right
+
+    def stepped(self, step: Array) -> _Point:
+        """Return the model after a step of frames and coordinates."""
+        return _Point.at(
+            self.problem, stepped(self.problem, self.model, step), self.scale, self.prior
+        )
 
 
 def solve_scaled(normal: Array, right: Array, damping: float) -> Array:

@@ -19,7 +19,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +38,8 @@ MOST_ROWS = 3000
 """Rows that the frames are found on: far more than their numbers need, few enough to be quick."""
 ROUNDS = 15
 """Steps of each refinement; there is no test of convergence."""
+TOGETHER = 16
+"""Trials that are taken at once: enough to share the steps, few enough for the processor's cache."""
 REACHES = (0.1, 0.4)
 """Lengths [m] of the tool vectors tried where only positions were measured."""
 
@@ -51,16 +53,33 @@ def initial_frames(problem: Problem, model: Model) -> Model:
     """
     few = problem.thinned(MOST_ROWS)
     tracks = [_track(few, model, k) for k in range(len(few.recordings))]
-    if not problem.align or _gap(tracks, model) < NEAR:
-        return model
+    best = attempted(tracks, model, problem.align)
+    return model if best is None else refined(few, best)
+
+
+def attempted(tracks: list[Track], model: Model, align: frozenset[str]) -> Model | None:
+    """
+    Return the model with frames that are near, not yet refined; None where they are already.
+
+    Parameters
+    ----------
+    tracks : list of Track
+        One for every recording.
+    model : Model
+    align : frozenset of str
+        Frames that may move.
+
+    """
+    if not align or _gap(tracks, model) < NEAR:
+        return None
     best = model
-    for attempt in _attempts(problem.align):
+    for attempt in _attempts(align):
         found = attempt(tracks, model)
         if _gap(tracks, found) < _gap(tracks, best):
             best = found
         if _gap(tracks, best) < NEAR:
             break
-    return refined(few, best)
+    return best
 
 
 def rough_frames(problem: Problem, model: Model, *, thorough: bool = False) -> Model:
@@ -79,6 +98,29 @@ def rough_frames(problem: Problem, model: Model, *, thorough: bool = False) -> M
     """
     tracks = [_track(problem, model, k) for k in range(len(problem.recordings))]
     return _base_and_tool(tracks, model, REACHES if thorough else ())
+
+
+def rough_together(
+    trials: Sequence[tuple[list[Track], Model]], *, thorough: bool = False
+) -> list[Model]:
+    """
+    Return the same of many trials at once: tracks of as many samples, all turned or none.
+
+    Parameters
+    ----------
+    trials : sequence of list of Track, and Model
+        One track for every recording.
+    thorough : bool
+        As for `rough_frames`.
+
+    """
+    reaches = REACHES if thorough else ()
+    out: list[Model] = []
+    for first in range(0, len(trials), TOGETHER):
+        some = trials[first : first + TOGETHER]
+        tracks = [Track.side_by_side(each) for each in zip(*(own for own, _ in some), strict=True)]
+        out += _bases_and_tools(tracks, [model for _, model in some], reaches)
+    return out
 
 
 def refined(problem: Problem, model: Model) -> Model:
@@ -194,48 +236,74 @@ def _tool_vector(
 def _base_and_tool(
     tracks: list[Track], model: Model, reaches: tuple[float, ...] = REACHES
 ) -> Model:
-    tool = model.robot.T_flange_tool
+    one = [Track.side_by_side([track]) for track in tracks]
+    return _bases_and_tools(one, [model], reaches)[0]
+
+
+def _bases_and_tools(
+    tracks: list[Track], models: Sequence[Model], reaches: tuple[float, ...]
+) -> list[Model]:
+    """Return every trial's model; the tracks have the axis of trials in front."""
+    tools = np.stack([model.robot.T_flange_tool for model in models])
+    turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
     if all(track.rotation is not None for track in tracks):
-        turn, vectors = _tool_rotation(tracks, tool[:3, :3]), tool[None, :3, 3]
+        turn = _tool_rotations(tracks, turn)
     else:
         ways = np.concatenate([np.eye(3), -np.eye(3)])
-        tried = [tool[:3, 3], *(reach * way for reach in reaches for way in ways)]
-        turn, vectors = tool[:3, :3], np.array(tried)
-    bases, tool = in_turn(tracks, model.bases, turn, vectors)
-    return replace(model, bases=bases, robot=model.robot.with_frames(tool=tool))
+        tried = np.concatenate([np.zeros((0, 3)), *(reach * ways for reach in reaches)])
+        others = np.broadcast_to(tried, (len(models), *tried.shape))
+        vectors = np.concatenate([vectors, others], axis=1)
+    starts = [np.stack(each) for each in zip(*(model.bases for model in models), strict=True)]
+    bases, tools = in_turn(tracks, starts, turn, vectors)
+    return [
+        replace(
+            model,
+            bases=tuple(base[k] for base in bases),
+            robot=model.robot.with_frames(tool=tools[k]),
+        )
+        for k, model in enumerate(models)
+    ]
 
 
-def _tool_rotation(tracks: list[Track], start: Array) -> Array:
+def _tool_rotations(tracks: list[Track], start: Array) -> Array:
     """
-    Return the tool rotation common to all recordings, whatever their bases.
+    Return the tool rotation of every trial common to all recordings, whatever their bases.
 
     With y the entries of R_tool^T, recording k leaves a squared gap of
     M - y' C_k C_k' y / M where C_k is the sum of kron(R_measured', R_flange').
     """
-    rotation = start
-    weights: list[Array] = [np.ones(len(track.position)) for track in tracks]
+    trials = len(start)
+    rotation, unclear = start, np.zeros(trials, dtype=bool)
+    weights: list[Array] = [np.ones(track.position.shape[:2]) for track in tracks]
     for _ in range(ROUNDS):
-        total = np.zeros((9, 9))
+        total = np.zeros((trials, 9, 9))
         for track, weight in zip(tracks, weights, strict=True):
-            product = np.einsum('m,mki,mlj->ijkl', weight, track.turns, track.turn)
-            kron = product.reshape(9, 9)
-            total += kron @ kron.T / weight.sum()
+            flat = (*track.position.shape[:2], 9)
+            seen = weight[..., None] * track.turns.reshape(flat)
+            product = np.swapaxes(seen, 1, 2) @ track.turn.reshape(flat)
+            # From rows ki and columns lj to rows ij and columns kl.
+            kron = product.reshape(trials, 3, 3, 3, 3).transpose(0, 2, 4, 1, 3)
+            kron = kron.reshape(trials, 9, 9)
+            total += kron @ np.swapaxes(kron, 1, 2) / weight.sum(axis=1)[:, None, None]
         size, vectors = np.linalg.eigh(total)
-        if size[-2] > (1.0 - 1e-5) * size[-1]:
-            return start
-        transpose = vectors[:, -1].reshape(3, 3)
-        rotation = nearest_rotation(transpose.T * np.sign(np.linalg.det(transpose)))
+        unclear |= size[:, -2] > (1.0 - 1e-5) * size[:, -1]
+        transpose = vectors[..., -1].reshape(trials, 3, 3)
+        sign = np.sign(np.linalg.det(transpose))[:, None, None]
+        rotation = nearest_rotation(np.swapaxes(transpose, 1, 2) * sign)
         weights = [_turn_weight(track, rotation) for track in tracks]
-    return rotation
+    return np.where(unclear[:, None, None], start, rotation)
 
 
 def _turn_weight(track: Track, tool: Array) -> Array:
-    """Return least-absolute weights of the samples' turns, with the base that fits best."""
-    turned = track.turn @ tool
-    weight: Array = np.ones(len(turned))
+    """Return least-absolute weights (T, M) of the samples' turns, with the base that fits best."""
+    turned = track.turn @ tool[:, None]
+    samples = turned.shape[:2]
+    products = (track.turns @ np.swapaxes(turned, -1, -2)).reshape(*samples, 9)
+    weight: Array = np.ones(samples)
     for _ in range(3):
-        base = nearest_rotation(np.einsum('m,mik,mjk', weight, track.turns, turned))
-        weight = 1.0 / np.maximum(chord(track.turns, base @ turned), FLOOR / LEVER)
+        moment = (weight[:, None] @ products).reshape(-1, 3, 3)
+        base = nearest_rotation(moment)
+        weight = 1.0 / np.maximum(chord(track.turns, base[:, None] @ turned), FLOOR / LEVER)
     return weight
 
 

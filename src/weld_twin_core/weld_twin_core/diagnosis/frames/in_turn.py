@@ -4,11 +4,13 @@
 Base frames and tool vector found alternately, from many tool vectors at once.
 
 For a given tool each base follows in closed form (Kabsch), for given bases the tool vector is
-linear. A start may end beside the best, so several are tried; all of them take each step together.
+linear. A start may end beside the best, so several are tried; all of them take each step together,
+and so do several trials, each with tracks of its own: axes are trials T, starts S, samples M.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,32 +26,36 @@ STEPS = 3
 
 
 class Bases(NamedTuple):
-    """The base frame of one recording for every start: rotations (S, 3, 3), origins (S, 3)."""
+    """The base frame of one recording for every start: rotations (T, S, 3, 3), origins (T, S, 3)."""
 
     rotation: Array
     origin: Array
 
 
 def in_turn(
-    tracks: list[Track], bases: tuple[Array, ...], turn: Array, vectors: Array
+    tracks: Sequence[Track], bases: Sequence[Array], turn: Array, vectors: Array
 ) -> tuple[tuple[Array, ...], Array]:
     """
-    Return the base frames and the tool that leave the least median gap.
+    Return the base frames, each (T, 4, 4), and the tools, (T, 4, 4), of the least median gaps.
 
     Parameters
     ----------
-    tracks : list of Track
-    bases : tuple of array, each shape (4, 4)
+    tracks : sequence of Track
+        One for every recording; its arrays begin with the axis of trials.
+    bases : sequence of array, each shape (T, 4, 4)
         Where the base of every recording is believed to be.
-    turn : array, shape (3, 3)
+    turn : array, shape (T, 3, 3)
         Rotation of the tool, which stays as it is.
-    vectors : array, shape (S, 3) [m]
+    vectors : array, shape (T, S, 3) [m]
         Tool vectors to start from.
 
     """
-    count = len(vectors)
+    starts = vectors.shape[:2]
     found = [
-        Bases(np.repeat(b[None, :3, :3], count, axis=0), np.repeat(b[None, :3, 3], count, axis=0))
+        Bases(
+            np.broadcast_to(b[:, None, :3, :3], (*starts, 3, 3)),
+            np.broadcast_to(b[:, None, :3, 3], (*starts, 3)),
+        )
         for b in bases
     ]
     for _ in range(ROUNDS):
@@ -57,65 +63,81 @@ def in_turn(
         vectors = _vectors(tracks, found, turn, vectors)
     found = [_based(*pair, turn, vectors, ROUNDS) for pair in zip(tracks, found, strict=True)]
     gaps = [_gaps(*pair, turn, vectors) for pair in zip(tracks, found, strict=True)]
-    best = int(np.median(np.concatenate(gaps, axis=1), axis=1).argmin())
-    frames = tuple(transform(base.rotation[best], base.origin[best]) for base in found)
-    return frames, transform(turn, vectors[best])
+    best = np.median(np.concatenate(gaps, axis=2), axis=2).argmin(axis=1)
+    each = np.arange(len(best)), best
+    frames = tuple(transform(base.rotation[each], base.origin[each]) for base in found)
+    return frames, transform(turn, vectors[each])
 
 
 def _reached(track: Track, vectors: Array) -> Array:
-    """Return where the tool is in the base, shape (S, M, 3) [m]."""
-    return np.asarray(track.point + np.einsum('mij,sj->smi', track.turn, vectors))
+    """Return where the tool is in the base, shape (T, S, M, 3) [m]."""
+    trials, samples = track.turn.shape[:2]
+    flat = vectors @ np.swapaxes(track.turn.reshape(trials, samples * 3, 3), 1, 2)
+    return np.asarray(track.point[:, None] + flat.reshape(trials, -1, samples, 3))
+
+
+def _turned(track: Track, turn: Array) -> Array:
+    """Return how the tool is turned in the base, shape (T, M, 3, 3)."""
+    return np.asarray(track.turn @ turn[:, None])
 
 
 def _based(track: Track, start: Bases, turn: Array, vectors: Array, rounds: int) -> Bases:
     """Return the base of one recording for given tools."""
     base, reached = start, _reached(track, vectors)
-    weight = np.ones(reached.shape[:2])
+    position = track.position[:, None]
+    weight = np.ones(reached.shape[:3])
     turns = None
     if track.rotation is not None:
-        turned = np.swapaxes(track.turn @ turn, 1, 2)
-        turns = LEVER**2 * (track.rotation @ turned).reshape(-1, 9)
+        turned = np.swapaxes(_turned(track, turn), -1, -2)
+        turns = LEVER**2 * (track.rotation @ turned).reshape(*turned.shape[:2], 9)
     for _ in range(rounds):
-        weight = weight / weight.sum(axis=1, keepdims=True)
+        weight = weight / weight.sum(axis=2, keepdims=True)
         middle = weight @ track.position
-        centre = np.einsum('sm,smi->si', weight, reached)
-        seen = (track.position - middle[:, None]) * weight[..., None]
-        moment = np.swapaxes(seen, 1, 2) @ (reached - centre[:, None])
+        centre = (weight[..., None, :] @ reached)[..., 0, :]
+        seen = (position - middle[..., None, :]) * weight[..., None]
+        moment = np.swapaxes(seen, -1, -2) @ (reached - centre[..., None, :])
         if turns is not None:
-            moment = moment + (weight @ turns).reshape(-1, 3, 3)
-        size = np.linalg.norm(moment, axis=(1, 2))[:, None, None]
+            moment = moment + (weight @ turns).reshape(moment.shape)
+        size = np.linalg.norm(moment, axis=(-2, -1))[..., None, None]
         rotation = nearest_rotation(moment + TIE * size * start.rotation)
-        base = Bases(rotation, middle - np.einsum('sij,sj->si', rotation, centre))
-        weight = 1.0 / np.maximum(_gaps(track, base, turn, vectors), FLOOR)
+        base = Bases(rotation, middle - (rotation @ centre[..., None])[..., 0])
+        weight = 1.0 / np.maximum(_gaps(track, base, turn, vectors, reached), FLOOR)
     return base
 
 
-def _gaps(track: Track, base: Bases, turn: Array, vectors: Array) -> Array:
-    """Return how far every sample is off, position and turn together, shape (S, M) [m]."""
-    there = _reached(track, vectors) @ np.swapaxes(base.rotation, 1, 2) + base.origin[:, None]
-    off = np.sqrt(((track.position - there) ** 2).sum(axis=2))
+def _gaps(
+    track: Track, base: Bases, turn: Array, vectors: Array, reached: Array | None = None
+) -> Array:
+    """Return how far every sample is off, position and turn together, shape (T, S, M) [m]."""
+    reached = _reached(track, vectors) if reached is None else reached
+    there = reached @ np.swapaxes(base.rotation, -1, -2) + base.origin[..., None, :]
+    off = np.sqrt(((track.position[:, None] - there) ** 2).sum(axis=-1))
     if track.rotation is None:
         return np.asarray(off)
-    apart = track.rotation - base.rotation[:, None] @ (track.turn @ turn)
-    return np.asarray(off + LEVER * np.sqrt(0.5 * (apart**2).sum(axis=(2, 3))))
+    turned = base.rotation[:, :, None] @ _turned(track, turn)[:, None]
+    apart = track.rotation[:, None] - turned
+    return np.asarray(off + LEVER * np.sqrt(0.5 * (apart**2).sum(axis=(-2, -1))))
 
 
-def _vectors(tracks: list[Track], bases: list[Bases], turn: Array, start: Array) -> Array:
-    """Return the tool vectors for given base rotations, their origins left open, (S, 3) [m]."""
+def _vectors(tracks: Sequence[Track], bases: list[Bases], turn: Array, start: Array) -> Array:
+    """Return the tool vectors for given base rotations, their origins left open, (T, S, 3) [m]."""
     normal, right, total = 0.0, 0.0, 0.0
     for track, base in zip(tracks, bases, strict=True):
-        weight = 1.0 / np.maximum(_gaps(track, base, turn, start), FLOOR)
-        whole = weight.sum(axis=1)
-        share = weight / whole[:, None]
-        # In base axes the columns are the flange's rotations, whose squares are the unit matrix.
+        trials, samples = track.turn.shape[:2]
         there = _reached(track, start)
-        left = track.position @ base.rotation - there
-        mean = (share @ track.turn.reshape(-1, 9)).reshape(-1, 3, 3)
-        middle = np.einsum('sm,smi->si', share, left)
-        pull = np.einsum('sm,mki,smk->si', share, track.turn, left, optimize=True)
-        own = np.eye(3) - np.swapaxes(mean, 1, 2) @ mean
-        normal = normal + whole[:, None, None] * own
-        right = right + whole[:, None] * (pull - np.einsum('ski,sk->si', mean, middle))
+        weight = 1.0 / np.maximum(_gaps(track, base, turn, start, there), FLOOR)
+        whole = weight.sum(axis=2)
+        share = weight / whole[..., None]
+        # In base axes the columns are the flange's rotations, whose squares are the unit matrix.
+        left = track.position[:, None] @ base.rotation - there
+        mean = (share @ track.turn.reshape(trials, samples, 9)).reshape(*share.shape[:2], 3, 3)
+        pulled = share[..., None] * left
+        middle = pulled.sum(axis=2)
+        columns = track.turn.reshape(trials, samples * 3, 3)
+        pull = pulled.reshape(*share.shape[:2], samples * 3) @ columns
+        back = np.swapaxes(mean, -1, -2)
+        normal = normal + whole[..., None, None] * (np.eye(3) - back @ mean)
+        right = right + whole[..., None] * (pull - (back @ middle[..., None])[..., 0])
         total = total + whole
-    system = normal + TIE * np.asarray(total)[:, None, None] * np.eye(3)
+    system = normal + TIE * np.asarray(total)[..., None, None] * np.eye(3)
     return np.asarray(start + np.linalg.solve(system, np.asarray(right)[..., None])[..., 0])

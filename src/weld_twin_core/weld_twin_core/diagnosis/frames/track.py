@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ TIE = 1e-6
 @dataclass(frozen=True, eq=False)
 class Track:
     """
-    One recording for alignment.
+    One recording for alignment, or the same recording in several trials, their axis in front.
 
     ``position`` (M, 3) and ``rotation`` (M, 3, 3) or None were measured, ``point`` and ``turn``
     are those of the flange in the base frame.
@@ -31,6 +32,17 @@ class Track:
     rotation: Array | None
     point: Array
     turn: Array
+
+    @classmethod
+    def side_by_side(cls, trials: Sequence[Track]) -> Track:
+        """Return trials of one recording as one, where all have turns or none has."""
+        turns = [trial.rotation for trial in trials if trial.rotation is not None]
+        return cls(
+            np.stack([trial.position for trial in trials]),
+            np.stack(turns) if turns else None,
+            np.stack([trial.point for trial in trials]),
+            np.stack([trial.turn for trial in trials]),
+        )
 
     def gap(self, base: Array, tool: Array) -> Array:
         """Return how far each sample is off, position and turn together, shape (M,) [m]."""
@@ -55,5 +67,5 @@ def nearest_rotation(matrix: Array) -> Array:
 
 
 def chord(first: Array, second: Array) -> Array:
-    """Return 2 sin(angle / 2) of the turns between rotations, shape (M,): small ones' angle."""
-    return np.asarray(np.linalg.norm(first - second, axis=(1, 2)) / np.sqrt(2.0))
+    """Return 2 sin(angle / 2) of the turns between rotations, shape (..., M): small ones' angle."""
+    return np.asarray(np.linalg.norm(first - second, axis=(-2, -1)) / np.sqrt(2.0))

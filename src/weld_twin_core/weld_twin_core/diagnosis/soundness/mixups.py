@@ -15,7 +15,6 @@ from ...arrays import Array
 from ...effects.joint_offset import JointOffset
 from ...effects.plausible import plausible
 from ..algebra.problem import Model
-from ..frames.alignment import initial_frames, refined
 from .evidence import Case, Finding, Mistake, length, listed
 from .limits import (
     BESIDE,
@@ -33,7 +32,7 @@ from .limits import (
 )
 from .mending import base_turned, frames_fitted
 from .other_links import GIVE_ITS_MODEL, other_links
-from .snapshot import Arm, Snapshot, gap
+from .snapshot import Arm, Snapshot, rough_models
 from .suspicions import Suspicion, doubles, robots, suspicions
 
 
@@ -44,11 +43,11 @@ def mixups(case: Case) -> Sequence[Finding]:
     shot = case.snapshot
     arm = shot.arm()
     if arm.off < 1.0:
-        return _frames(case, gap(shot.problem, shot.model)) or _links(case, shot, arm)
+        return _frames(case, shot.gap(shot.model)) or _links(case, shot, arm)
     found, rest = _unravelled(shot, arm, case.problem.align)
     if found:
         return [Finding.of(_mistake(each, arm.gap, rest.gap)) for each in found]
-    return _beyond(case, shot, arm) or _frames(case, gap(shot.problem, shot.model))
+    return _beyond(case, shot, arm) or _frames(case, shot.gap(shot.model))
 
 
 # Mix-ups ---------------------------------------------------------------------------------------
@@ -113,18 +112,21 @@ def _best(
     tried = [(suspicion, shot.mended(suspicion.mend)) for suspicion in tries]
     if not tried:  # one joint, and nothing that could be swapped with it
         return None, shot, before
-    fitted: list[tuple[Suspicion, Snapshot, Arm]] = []
+    fitted: dict[int, tuple[Suspicion, Snapshot, Arm]] = {}
+    shots = [trial for _, trial in tried]
     # Without orientations a quick fit may end beside the tool vector: then from many starts.
     for thorough in (False,) if shot.turned else (False, True):
-        rough = [trial.rough_gap(thorough=thorough) * trial.collapsed for _, trial in tried]
+        models = rough_models(shots, thorough=thorough)
+        rough = [s.gap(m) * s.collapsed for s, m in zip(shots, models, strict=True)]
         for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
-            fitted.append((*tried[k], tried[k][1].arm()))
-        least = min(arm.off * trial.collapsed for _, trial, arm in fitted)
+            if k not in fitted:
+                fitted[k] = (*tried[k], shots[k].arm())
+        least = min(arm.off * trial.collapsed for _, trial, arm in fitted.values())
         if least < before.off / EXPLAINED:
             break
     if least > WORTH * before.off:
         return None, shot, before
-    alike = [each for each in fitted if WORTH * each[2].off * each[1].collapsed <= least]
+    alike = [each for each in fitted.values() if WORTH * each[2].off * each[1].collapsed <= least]
     gaps = [each[1].gap_with(align) for each in alike] if len(alike) > 1 else [0.0]
     first = int(np.argmin(gaps))
     others = [
@@ -149,9 +151,8 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
     for more in ({'base'}, {'tool'}, {'base', 'tool'}):
         if not more - given:
             continue
-        problem = replace(shot.problem, align=given | more)
-        model = refined(problem, initial_frames(problem, shot.model))
-        left = gap(problem, model)
+        model = shot.aligned(given | more)
+        left = shot.gap(model)
         if left < UNEXPLAINED:
             if _plausible(shot.robot, model):
                 return ()
@@ -258,7 +259,7 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
         )
         return [Finding.of(Mistake('other', (), words, remedy, None))]
     # Links and zeros bend to whatever else is wrong; only what explains the gap is believed.
-    if arm.gap > LARGE or arm.gap > gap(shot.problem, shot.framed()) / EXPLAINED or case.slips:
+    if arm.gap > LARGE or arm.gap > shot.gap(shot.framed()) / EXPLAINED or case.slips:
         return ()
     worst = int(arm.strain.argmax())
     effect = arm.model.found[worst]

@@ -22,7 +22,6 @@ from ...effects.tool_pose import ToolPose
 from ..algebra.fit import fit, robust_scale
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale
-from ..frames.alignment import initial_frames, refined
 from .evidence import Mistake, length
 from .limits import LARGE, LINKS_APART, LINKS_EXPLAIN, SIBLING
 from .snapshot import FRAMES, Snapshot, gap
@@ -69,11 +68,7 @@ def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Mistake, float] 
 
 
 def _framed(shot: Snapshot, problem: Problem) -> Model:
-    if problem.align == FRAMES:
-        return shot.framed()
-    if not problem.align:
-        return shot.model
-    return refined(problem, initial_frames(problem, shot.model))
+    return shot.framed() if problem.align == FRAMES else shot.aligned(problem.align)
 
 
 def _of_joints(shot: Snapshot, kinds: Sequence[type[Effect]]) -> list[Effect]:

@@ -13,14 +13,17 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
-from ...effects.joint_offset import JointOffset
-from ...effects.link_length import LinkLength
-from ...effects.link_offset import LinkOffset
-from ...effects.link_twist import LinkTwist
 from ...recording import JointMotion, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
-from ..frames.alignment import initial_frames, refined, rough_frames
+from ..frames.alignment import (
+    attempted,
+    initial_frames,
+    refined,
+    rough_frames,
+    rough_together,
+)
+from ..frames.track import Track
 from .limits import (
     BEYOND,
     LARGE,
@@ -34,6 +37,7 @@ from .limits import (
     UNLIKE,
 )
 from .mending import Given, Mend, measured
+from .postures import KINDS, Postures
 
 __all__ = ['FRAMES', 'Arm', 'Snapshot', 'gap', 'measured', 'snapshot']
 
@@ -83,10 +87,14 @@ class Snapshot:
 
         Whatever is shrunk to a point leaves no gap: that explains nothing.
         """
-        twins = [
-            self.model.twin(k).poses(recording, measured(recording).t).position
-            for k, recording in enumerate(self.recordings)
-        ]
+        if self.postures is None:
+            twins = [
+                self.model.twin(k).poses(recording, measured(recording).t).position
+                for k, recording in enumerate(self.recordings)
+            ]
+        else:
+            reached = self.postures.at(self.model).reached.T
+            twins = [reached[part] for part in self.postures.parts]
         return max(1.0, _spread(twins) / (UNLIKE * max(self.spread, 1e-12)))
 
     def shrunk(self, before: Snapshot) -> float:
@@ -105,45 +113,75 @@ class Snapshot:
         low, high = self.robot.lower - BEYOND, self.robot.upper + BEYOND
         return bool(((reads >= low) & (reads <= high)).all())
 
-    def rough_gap(self, *, thorough: bool = False) -> float:
-        """Return the median gap [m] after a quick fit of both frames; thorough: many starts."""
-        return gap(self.problem, rough_frames(self.problem, self.model, thorough=thorough))
+    @cached_property
+    def postures(self) -> Postures | None:
+        """Return the stations for fits of all errors of an arm at once, where they can be so."""
+        return Postures.of(self.recordings, self.model)
+
+    def gap(self, model: Model) -> float:
+        """Return the median gap [m] that a model leaves."""
+        return gap(self.problem, model) if self.postures is None else self.postures.at(model).gap
+
+    def rough(self, *, thorough: bool = False) -> Model:
+        """Return the model after a quick fit of both frames; thorough: from many starts."""
+        return self._roughly.get(thorough) or rough_models([self], thorough=thorough)[0]
+
+    @cached_property
+    def _roughly(self) -> dict[bool, Model]:
+        return {}
+
+    def refined(self, align: frozenset[str], start: Model) -> Model:
+        """Return the model after a robust fit of some frames."""
+        problem = replace(self.problem, align=align)
+        if self.postures is None:
+            return refined(problem, start)
+        model = start.with_found(())
+        for _ in range(3):
+            scale = robust_scale(problem, self.postures.at(model).residuals)
+            model = self.postures.fitted(model, align, scale)
+        return model.with_found(start.found)
+
+    def aligned(self, align: frozenset[str]) -> Model:
+        """Return the model with only these frames fitted."""
+        if not align:
+            return self.model
+        if self.postures is None:
+            problem = replace(self.problem, align=align)
+            return refined(problem, initial_frames(problem, self.model))
+        near = attempted(self.postures.tracks, self.model, align)
+        return self.refined(align, self.model if near is None else self.refined(align, near))
 
     def gap_with(self, align: frozenset[str]) -> float:
         """Return the median gap [m] with only these frames fitted."""
-        problem = replace(self.problem, align=align)
-        if not align:
-            return gap(problem, self.model)
-        return gap(problem, refined(problem, initial_frames(problem, self.model)))
+        return self.gap(self.aligned(align))
 
     def framed(self) -> Model:
         """Return the model with both frames fitted."""
-        starts = (self.model, rough_frames(self.problem, self.model, thorough=True))
-        trials = [refined(self.problem, start) for start in starts]
-        return min(trials, key=lambda model: gap(self.problem, model))
+        starts = (self.model, self.rough(thorough=True))
+        return min((self.refined(FRAMES, start) for start in starts), key=self.gap)
 
     def arm(self) -> Arm:
         """Return the frames and a plausible arm that fit best, and how far off they leave it."""
-        kinds = [
-            (JointOffset, OFFSET_SPREAD, OFFSET_MOST),
-            (LinkLength, LINK_SPREAD, LINK_MOST),
-            (LinkOffset, LINK_SPREAD, LINK_MOST),
-            (LinkTwist, TWIST_SPREAD, TWIST_MOST),
-        ]
-        errors, spread, most = [], [], []
-        for kind, usual, bound in kinds:
-            for name, slides in zip(self.robot.joint_names, self.robot.prismatic, strict=True):
-                straight = bool(slides) and kind is JointOffset
-                errors.append(kind(name))
-                spread.append(LINK_SPREAD if straight else usual)
-                most.append(LINK_MOST if straight else bound)
-        trial = self.framed().with_found(tuple(errors))
-        precision = np.array(spread) ** -2.0
+        usual = (OFFSET_SPREAD, LINK_SPREAD, LINK_SPREAD, TWIST_SPREAD)
+        bounds = (OFFSET_MOST, LINK_MOST, LINK_MOST, TWIST_MOST)
+        spread, most = np.repeat(usual, self.robot.n), np.repeat(bounds, self.robot.n)
+        straight = np.flatnonzero(self.robot.prismatic)
+        spread[straight], most[straight] = LINK_SPREAD, LINK_MOST
+        errors = [kind(name) for kind in KINDS for name in self.robot.joint_names]
+        trial, precision = self.framed().with_found(tuple(errors)), spread**-2.0
         for _ in range(3):
-            scale = robust_scale(self.problem, self.problem.residuals(trial), self.soft)
-            trial = fit(self.problem, trial, scale, precision, iterations=6).model
-        strain = np.abs([float(e.vector()[0]) for e in trial.found]) / np.array(most)
-        return Arm(trial, gap(self.problem, trial), strain)
+            trial = self._bent(trial, precision)
+        strain = np.abs([float(e.vector()[0]) for e in trial.found]) / most
+        return Arm(trial, self.gap(trial), strain)
+
+    def _bent(self, trial: Model, precision: Array) -> Model:
+        """Return the model after a robust fit of both frames and the errors that it has."""
+        if self.postures is None:
+            problem = self.problem
+            scale = robust_scale(problem, problem.residuals(trial), self.soft)
+            return fit(problem, trial, scale, precision, iterations=6).model
+        scale = robust_scale(self.problem, self.postures.at(trial).residuals, self.soft)
+        return self.postures.fitted(trial, FRAMES, scale, precision, iterations=6)
 
     @property
     def soft(self) -> Scale:
@@ -209,6 +247,34 @@ def gap(problem: Problem, model: Model) -> float:
     """Return the median distance between measured and twin [m]."""
     parts = problem.residuals(model)
     return float(np.median(np.concatenate([np.linalg.norm(p[:3], axis=0) for p in parts])))
+
+
+def rough_models(shots: Sequence[Snapshot], *, thorough: bool = False) -> list[Model]:
+    """
+    Return every snapshot's model after a quick fit of both frames; those of a shape at once.
+
+    Parameters
+    ----------
+    shots : sequence of Snapshot
+    thorough : bool
+        Whether the fit starts from many tools.
+
+    """
+    shapes: dict[tuple[object, ...], list[tuple[Snapshot, list[Track]]]] = {}
+    for shot in shots:
+        own = shot.postures
+        if own is None:
+            model = rough_frames(shot.problem, shot.model, thorough=thorough)
+            shot._roughly[thorough] = model
+        else:
+            key = (shot.turned, *(part.stop for part in own.parts))
+            shapes.setdefault(key, []).append((shot, own.tracks))
+    for alike in shapes.values():
+        trials = [(tracks, shot.model) for shot, tracks in alike]
+        for (shot, _), model in zip(alike, rough_together(trials, thorough=thorough), strict=True):
+            # Where orientations were measured there is one start.
+            shot._roughly.update(dict.fromkeys((thorough, thorough or shot.turned), model))
+    return [shot._roughly[thorough] for shot in shots]
 
 
 def _spread(parts: Sequence[Array]) -> float:

@@ -293,7 +293,8 @@ def _frame_column(robot: Robot, chain: Frames, name: str, i: int, shift: Shift) 
     if name == 'tool' and i < 3:
         return _slide_column(components(chain.flange_rotation[..., i]), components(chain.position))
     error = _six(shift, name)
-    axis = left_jacobian(np.zeros(3) if error is None else error[..., 3:])[..., i - 3]
+    turns = np.eye(3) if error is None else left_jacobian(error[..., 3:])
+    axis = turns[..., i - 3]
     if name == 'base':
         axis = np.broadcast_to(axis, samples + (3,))
         point = np.broadcast_to(chain.base_point, samples + (3,))

@@ -40,6 +40,17 @@ class Body(NamedTuple):
     radius: Array
     link: Array
 
+    @property
+    def long(self) -> Array:
+        """Return which capsules have a length in any posture, shape (S,), bool."""
+        span = np.linalg.norm((self.end - self.start).reshape(-1, self.link.size, 3), axis=2)
+        return np.asarray(span.max(axis=0, initial=0.0) > SHORT)
+
+    def of(self, which: Array) -> Body:
+        """Return some of the capsules; ``which`` has shape (S,), bool."""
+        ends = self.start[..., which, :], self.end[..., which, :]
+        return Body(*ends, self.radius[which], self.link[which])
+
 
 def body(robot: Robot, q: Array) -> Body:
     """
@@ -51,12 +62,16 @@ def body(robot: Robot, q: Array) -> Body:
     q : array, shape (..., n) [rad or m]
 
     """
+    whole = _whole(robot, q)
+    return whole.of(whole.long)
+
+
+def _whole(robot: Robot, q: Array) -> Body:
+    """Return every line from base to tool as a capsule, those without a length too."""
     points, link = _line(robot, frames(robot, np.asarray(q, dtype=float)))
-    start, end = points[..., :-1, :], points[..., 1:, :]
-    long = np.linalg.norm((end - start).reshape(-1, link.size, 3), axis=2).max(axis=0) > SHORT
     whole = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
     radius = np.where(link == robot.n, TORCH, THICK * whole)
-    return Body(start[..., long, :], end[..., long, :], radius[long], link[long])
+    return Body(points[..., :-1, :], points[..., 1:, :], radius, link)
 
 
 def _line(robot: Robot, chain: Frames) -> tuple[Array, Array]:
@@ -89,16 +104,14 @@ def clearances(shape: Body) -> Array:
 
     """
     share = np.linspace(0.0, 1.0, PLACES)[:, None]
+    along = shape.start[..., None, :] * (1.0 - share) + shape.end[..., None, :] * share
     out = []
     for i, j in combinations(range(shape.link.size), 2):
         if abs(int(shape.link[i]) - int(shape.link[j])) < 2:
             continue
-        one, other = (
-            shape.start[..., k, None, :] * (1.0 - share) + shape.end[..., k, None, :] * share
-            for k in (i, j)
-        )
-        gap = np.linalg.norm(one[..., :, None, :] - other[..., None, :, :], axis=-1)
-        out.append(gap.min(axis=(-1, -2)) - shape.radius[i] - shape.radius[j])
+        gap = along[..., i, :, None, :] - along[..., j, None, :, :]
+        square = (gap**2).sum(axis=-1).min(axis=(-1, -2))
+        out.append(np.sqrt(square) - shape.radius[i] - shape.radius[j])
     empty = np.zeros((*shape.start.shape[:-2], 0))
     return np.stack(out, axis=-1) if out else empty
 
@@ -118,21 +131,59 @@ def free(robot: Robot, q: Array, seen: Array, box: Array | None = None) -> Array
         upright stays above its foot, or above the lowest place that it was at.
 
     """
-    known, asked = body(robot, seen), body(robot, q)
-    usual = clearances(known).min(axis=0)
-    good = (clearances(asked) >= np.minimum(usual, 0.0) - ALIKE).all(axis=-1)
-    ends = np.concatenate([asked.start[:, asked.link > 0], asked.end], axis=1)
-    if box is not None:
-        return np.asarray(good & ((ends >= box[0]) & (ends <= box[1])).all(axis=(1, 2)))
-    up = (
-        -robot.T_world_base[:3, :3]
-        @ robot.gravity
-        / max(float(np.linalg.norm(robot.gravity)), 1e-9)
-    )
-    if up @ robot.T_world_base[:3, 2] < 0.99:
-        return np.asarray(good)
-    foot = min(float(robot.T_world_base[:3, 3] @ up), _lowest(known.end @ up).min())
-    return np.asarray(good & (_lowest(ends @ up) >= foot))
+    return Space(robot, seen, box).free(q)
+
+
+class Space:
+    """
+    Where an arm has room, asked again and again; see `free`.
+
+    Parameters
+    ----------
+    robot : Robot
+    seen : array, shape (K, n) [rad or m]
+    box : array, shape (2, 3), optional [m]
+
+    """
+
+    def __init__(self, robot: Robot, seen: Array, box: Array | None = None) -> None:
+        self._robot, self._box = robot, box
+        self._known = _whole(robot, seen)
+        self._usual: dict[bytes, Array] = {}
+        gravity = robot.T_world_base[:3, :3] @ robot.gravity
+        self._up = -gravity / max(float(np.linalg.norm(robot.gravity)), 1e-9)
+        known = self._known.of(self._known.long)
+        standing = float(robot.T_world_base[:3, 3] @ self._up)
+        self._foot = min(standing, _lowest(known.end @ self._up).min())
+
+    def free(self, q: Array) -> Array:
+        """
+        Return which postures are free, shape (N,), bool.
+
+        Parameters
+        ----------
+        q : array, shape (N, n) [rad or m]
+
+        """
+        whole = _whole(self._robot, q)
+        long = whole.long | self._known.long
+        asked = whole.of(long)
+        near = np.minimum(self._as_usual(long), 0.0) - ALIKE
+        good = (clearances(asked) >= near).all(axis=-1)
+        ends = np.concatenate([asked.start[:, asked.link > 0], asked.end], axis=1)
+        if self._box is not None:
+            inside = (ends >= self._box[0]) & (ends <= self._box[1])
+            return np.asarray(good & inside.all(axis=(1, 2)))
+        if self._up @ self._robot.T_world_base[:3, 2] < 0.99:
+            return np.asarray(good)
+        return np.asarray(good & (_lowest(ends @ self._up) >= self._foot))
+
+    def _as_usual(self, long: Array) -> Array:
+        """Return how near these capsules came in the postures that were seen, shape (pairs,)."""
+        key = long.tobytes()
+        if key not in self._usual:
+            self._usual[key] = clearances(self._known.of(long)).min(axis=0)
+        return self._usual[key]
 
 
 def _lowest(heights: Array) -> Array:

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...arm.clearance import free
+from ...arm.clearance import Space
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...errors import DataError
@@ -65,6 +65,7 @@ class Room:
         q = np.concatenate([r.joints.q for r in problem.recordings])
         self._robot, self._limits = robot, limits
         self._seen = q[np.linspace(0, len(q) - 1, min(len(q), 50)).round().astype(int)]
+        self._space = Space(robot, self._seen, limits.box)
         middle = np.median(problem.recordings[0].joints.q, axis=0)
         self.home = q[int(np.argmin(np.abs(q - middle).sum(axis=1)))]
         inset = np.where(np.isfinite(robot.upper - robot.lower), INSET, 0.0)
@@ -97,7 +98,7 @@ class Room:
 
     def free(self, q: Array) -> Array:
         """Return which postures, shape (N, n), are free, shape (N,), bool."""
-        return free(self._robot, q, self._seen, self._limits.box)
+        return self._space.free(q)
 
     def passed(self, q: Array) -> bool:
         """Return whether a motion that was recorded may be made again: it was free; in the box?"""
@@ -119,7 +120,7 @@ class Room:
         unit = halton(self._robot.n, skip + DRAWN * count)[skip:]
         q = self.low + unit * (self.high - self.low)
         some = q[np.flatnonzero(self.free(q))[: 2 * count]]
-        kept = some[[self.way([self.home, place]) for place in some]][:count]
+        kept = some[self._ways(np.broadcast_to(self.home, some.shape), some)][:count]
         if len(kept) >= min(count, 4) or self._limits.box is not None:
             return np.asarray(np.concatenate([kept, self.home[None]]) if len(kept) < 4 else kept)
         # Hardly anything is free: stay near to where the arm was.
@@ -127,17 +128,21 @@ class Room:
 
     def way(self, stops: Sequence[Array]) -> bool:
         """Return whether the straight ways of the joints from stop to stop are free."""
+        places = np.array(stops)
+        return bool(self._ways(places[:-1], places[1:]).all())
+
+    def _ways(self, start: Array, end: Array) -> Array:
+        """Return which straight ways, between postures of shape (K, n) each, are free, (K,)."""
         share = np.linspace(0.0, 1.0, CHECKED + 1)[:, None]
-        ways = [a + share * (b - a) for a, b in pairwise(stops)]
-        return bool(self.free(np.concatenate(ways)).all())
+        places = start[:, None] + share * (end - start)[:, None]
+        good = self.free(places.reshape(-1, self._robot.n))
+        return np.asarray(good.reshape(len(start), CHECKED + 1).all(axis=1))
 
     def linked(self, q: Array) -> Array:
         """Return stations with a stop at home wherever the straight way to the next is not free."""
         out = [q[0]]
-        for place in q[1:]:
-            if not self.way([out[-1], place]):
-                out.append(self.home)
-            out.append(place)
+        for place, good in zip(q[1:], self._ways(q[:-1], q[1:]), strict=True):
+            out += [place] if good else [self.home, place]
         return np.array(out)
 
     def travel(self, stops: Sequence[Array], speed: float) -> JointMotion:

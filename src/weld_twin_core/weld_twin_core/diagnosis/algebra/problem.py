@@ -307,13 +307,14 @@ class Problem:
         if 'tool' in self.align:
             names += [f'tool.{j}' for j in range(6)]
         parts = []
-        first = {k: group[0] for group in self.stands for k in group}
+        groups = [('base', group) for group in self.stands if 'base' in self.align]
+        groups += [('tool', tuple(range(len(features))))] * ('tool' in self.align)
+        rows, samples = self.rows, self.samples
         for k, maker in enumerate(features):
-            block = np.zeros((len(names), self.rows[k], self.samples[k]))
-            for p, name in enumerate(names):
-                kind, _, j = name.partition('.')
-                if kind == f'base {first.get(k)}' or kind == 'tool':
-                    block[p] = self.seen(k, maker.column((kind.split()[0], int(j))))
+            block = np.zeros((len(names), rows[k], samples[k]))
+            for p, (kind, group) in enumerate(groups):
+                for j in range(6 if k in group else 0):
+                    block[6 * p + j] = self.seen(k, maker.column((kind, j)))
             parts.append(np.concatenate([block, *self._change_columns(k, maker)]))
         sizes = [change.effect.coordinates().size for change in self.changes]
         names += [f'change {i}.{j}' for i, size in enumerate(sizes) for j in range(size)]

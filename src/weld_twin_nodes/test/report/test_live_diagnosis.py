@@ -93,7 +93,7 @@ def test_a_bag_played_again_starts_a_new_window():
 
 
 def test_a_job_runs_elsewhere_while_the_caller_goes_on():
-    worker, job = Worker(), Job(filled().recording(least=3.0), load('ur5'))
+    worker, job = Worker(), Job(filled(duration=4.0).recording(least=3.0), load('ur5'))
     worker.start(job)
     assert worker.busy and worker.take() is None  # the caller is back before the answer
     while worker.busy:

@@ -166,7 +166,7 @@ class Space:
 
         """
         whole = _whole(self._robot, q)
-        long = whole.long | self._known.long
+        long = np.logical_or(whole.long, self._known.long)
         asked = whole.of(long)
         near = np.minimum(self._as_usual(long), 0.0) - ALIKE
         good = (clearances(asked) >= near).all(axis=-1)

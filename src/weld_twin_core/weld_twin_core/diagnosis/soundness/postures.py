@@ -180,7 +180,7 @@ class Place:
     def _tip(self) -> Array:
         """Return the tool point in base axes, shape (3, M) [m]."""
         _, point, turn = self._chain
-        return (point + turn @ self.tool[:3, 3]).T
+        return np.asarray((point + turn @ self.tool[:3, 3]).T)
 
     def _in_world(self, columns: Array) -> Array:
         """Turn vectors in base axes, shape (..., 3, M), into world axes."""

@@ -30,6 +30,8 @@ from .many.fitted_together import fitted_together
 from .predicting.allowed import allowed
 from .result import Diagnosis
 from .soundness import Examined, Given, examine, refuse_reused
+from .stability.repeated import repeated
+from .stability.steadied import steadied
 from .trust.signs import signs_of_answer
 from .unseen.held_out_shrink import held_out_shrink
 from .unseen.leftover_structure import structure
@@ -153,6 +155,7 @@ def _explained(
     holdout = examined.mended(holdout)
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
     found, least = parted_elsewhere(found, holdout, beliefs)
+    found, stability = steadied(found, repeated(found), beliefs)
     evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least)
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict, beliefs)
@@ -165,7 +168,18 @@ def _explained(
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
     return answer(
-        found, unseen, evidence, verdict, shrink, examined, posterior, signs, rival, places, limits
+        found,
+        unseen,
+        evidence,
+        verdict,
+        shrink,
+        examined,
+        posterior,
+        signs,
+        rival,
+        places,
+        limits,
+        stability,
     )
 
 

@@ -204,6 +204,40 @@ class Family:
 
 
 @dataclass(frozen=True)
+class CameBack:
+    """
+    How often a cause was named again where the search saw only half of the data.
+
+    Attributes
+    ----------
+    times, of : int
+        Halves on which it was, itself or what is told as alike, and halves that would show it.
+    instead : tuple of (Site, int)
+        What was named where it was not, and on how many halves.
+
+    """
+
+    times: int
+    of: int
+    instead: tuple[tuple[Site, int], ...] = ()
+
+    @property
+    def share(self) -> float:
+        """Return the share of the halves on which it came back."""
+        return self.times / self.of
+
+    @property
+    def bound(self) -> float:
+        """Return how far to believe that it comes back the next time, by the rule of succession."""
+        return (self.times + 1.0) / (self.of + 2.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of ``came_back``."""
+        instead = [{'effect': s.effect, 'joint': s.joint, 'times': n} for s, n in self.instead]
+        return {'times': self.times, 'of': self.of, 'instead': instead}
+
+
+@dataclass(frozen=True)
 class Cause:
     """
     What is certain of one cause, level by level, most probable first.
@@ -222,6 +256,8 @@ class Cause:
     members : tuple of int
         The effects of the model that stand for it, as `Model.found` counts them; none where
         nothing that can be carried over stands for it.
+    came_back : CameBack or None
+        How often the search names it again on halves of the data; None where no half can tell.
 
     """
 
@@ -231,6 +267,7 @@ class Cause:
     share: float
     share_ci90: tuple[float, float]
     members: tuple[int, ...] = ()
+    came_back: CameBack | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.causes``."""
@@ -242,6 +279,7 @@ class Cause:
             ],
             'share': self.share,
             'share_ci90': list(self.share_ci90),
+            'came_back': None if self.came_back is None else self.came_back.as_dict(),
         }
 
 

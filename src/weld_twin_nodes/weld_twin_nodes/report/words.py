@@ -156,6 +156,16 @@ def cause_words(cause: Cause) -> str:
     return f'{where}, depending on {listed([DEPENDENCES.get(o, o) for o in on])}'
 
 
+def halves_words(cause: Cause) -> str | None:
+    """Return how often a cause comes back on halves of the data; None where it always does."""
+    told = cause.came_back
+    if told is None or told.times == told.of:
+        return None
+    others = [site_name(site) for site, _ in told.instead[:_NAMED]]
+    instead = f'; in the others, {listed(others, "or")} came in its place' if others else ''
+    return f'Looked for again in halves of the data, it is found in {told.times} of {told.of}{instead}.'
+
+
 def someplace(cause: Cause) -> str:
     """Return a cause without a name as a heading: where it sits and what it depends on."""
     where = place_name(cause.place[0][0]) if cause.place else 'a place not found'

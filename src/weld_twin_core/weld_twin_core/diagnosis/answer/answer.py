@@ -18,6 +18,7 @@ from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
 from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
+from ..stability.steadied import Stability, bounded
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
 from ..trust.trusted import trusted
@@ -44,6 +45,7 @@ def answer(
     rival: Curved | None = None,
     placing: FreeForm | None = None,
     limits: Limits | None = None,
+    stability: Stability | None = None,
 ) -> Diagnosis:
     """
     Return the diagnosis.
@@ -68,9 +70,13 @@ def answer(
         What tells place and dependence of an unknown gap.
     limits : Limits, optional
         What the next experiment may cost, and where it has to stay.
+    stability : Stability or None
+        What halves of the data say of the names.
 
     """
-    verdict, told, shares, own = _trusted(found, unseen, evidence, verdict, signs, rival, placing)
+    verdict, told, shares, own = _trusted(
+        found, unseen, evidence, verdict, signs, rival, placing, stability
+    )
     effects = named_effects(found, unseen, verdict)
     return Diagnosis(
         gap=gap(found, evidence.floor),
@@ -120,6 +126,7 @@ def _trusted(
     signs: Mapping[str, float],
     rival: Curved | None,
     placing: FreeForm | None,
+    stability: Stability | None,
 ) -> tuple[Verdict, tuple[Cause, ...], Shares, Signs]:
     """Return the verdict and the causes as far as they can be trusted, shares, and all signs."""
     told, shares = causes(
@@ -133,6 +140,7 @@ def _trusted(
         ),
     )
     verdict, told = trusted(verdict, told, known, usual_trust())
+    verdict, told = bounded(verdict, told, stability, found.work.beliefs)
     return verdict, tuple(covering(cause) for cause in told), shares, known
 
 

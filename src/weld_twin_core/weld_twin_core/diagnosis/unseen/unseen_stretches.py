@@ -196,7 +196,7 @@ class Unseen:
     @cached_property
     def _spans(self) -> list[Rows]:
         """Return the rows of every stretch."""
-        return _rows_of(self.labels)
+        return rows_of(self.labels)
 
     @cached_property
     def _total(self) -> Array:
@@ -302,7 +302,7 @@ class Base:
 
 def _sums(columns: Array, targets: Array, labels: Array) -> tuple[Array, Array]:
     """Return the normal equations of every part, and their right-hand sides."""
-    spans = _rows_of(labels)
+    spans = rows_of(labels)
     normals = np.empty((len(spans), columns.shape[0], columns.shape[0]))
     for normal, rows in zip(normals, spans, strict=True):
         part = columns[:, rows]
@@ -310,7 +310,7 @@ def _sums(columns: Array, targets: Array, labels: Array) -> tuple[Array, Array]:
     return normals, np.array([columns[:, rows] @ targets[:, rows].T for rows in spans])
 
 
-def _rows_of(labels: Array) -> list[Rows]:
+def rows_of(labels: Array) -> list[Rows]:
     """Return the rows of every label, a slice each where they lie together."""
     if (np.diff(labels) >= 0).all():
         bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))

@@ -55,7 +55,7 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
         return _of_families(case)
     if not evidence.slots:
         return _of_nothing(case)
-    sets = tuple(_leaders(slot, case.beliefs) for slot in evidence.slots)
+    sets = tuple(leaders(slot, case.beliefs) for slot in evidence.slots)
     open_ends: tuple[str, ...] = ()
     if not case.carries and evidence.least is not None:
         # Another member of a set may carry over where the one in the model does not: no sign of a
@@ -104,7 +104,7 @@ def _of_families(case: Weighed) -> Verdict:
     families = []
     for told in case.evidence.families or ():
         members = tuple(item for item in told.members if item[1] > beliefs.member_least_m)
-        named = told.returns(beliefs.family_worth) >= beliefs.family_returns
+        named = told.returns(beliefs.family_worth) >= beliefs.returns
         if members:
             families.append(Family(told.effect, named, told.rms_m, members))
     families.sort(key=lambda family: -family.rms_m)
@@ -223,8 +223,16 @@ def _unknown_confidence(case: Weighed) -> float:
     return float(np.clip(least + case.left, least, most))
 
 
-def _leaders(slot: tuple[Rival, ...], beliefs: Beliefs) -> tuple[Site, ...]:
-    """Return the leader alone when it is sure, else all worth naming, the simplest first."""
+def leaders(slot: tuple[Rival, ...], beliefs: Beliefs) -> tuple[Site, ...]:
+    """
+    Return the leader alone when it is sure, else all worth naming, the simplest first.
+
+    Parameters
+    ----------
+    slot : tuple of Rival
+    beliefs : Beliefs
+
+    """
     if slot[0].probability >= beliefs.sure:
         return (slot[0].site,)
     listed = dict.fromkeys(r.site for r in slot if r.probability >= beliefs.listed)

@@ -1,0 +1,150 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What follows where a name does not come back: no name alone is sure, and what came instead is told.
+
+A name that comes back on enough halves is left as it is. Of another, belief is shared as the halves
+share it: among what is named and what came in its place. What came to nothing stays unbelieved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from ..algebra.fit import fit
+from ..beliefs import Beliefs
+from ..hypotheses.rivals import Rival, nats_in_place
+from ..hypotheses.search import Search
+from ..hypotheses.selection import fitted_with, implausible
+from ..result import CameBack, Cause, Site
+from ..trust.trusted import NAMING
+from ..verdict.decision import Verdict, leaders
+from .repeated import Repeated
+
+
+@dataclass(frozen=True, eq=False)
+class Stability:
+    """
+    What halves of the data say of the names.
+
+    Attributes
+    ----------
+    again : Repeated
+        The search on halves.
+    came_back : mapping from Site to CameBack
+        Of the effects found, each with what was told as alike before halves were asked.
+
+    """
+
+    again: Repeated
+    came_back: Mapping[Site, CameBack]
+
+
+def steadied(
+    found: Search, again: Repeated | None, beliefs: Beliefs
+) -> tuple[Search, Stability | None]:
+    """
+    Return what was found with the rivals of every slot as likely as halves of the data say.
+
+    Parameters
+    ----------
+    found : Search
+    again : Repeated or None
+        The search on halves; None changes nothing.
+    beliefs : Beliefs
+
+    """
+    if again is None:
+        return found, None
+    slots, came = [], {}
+    for effect, slot in zip(found.final.model.found, found.slots, strict=False):
+        site, named = Site(effect.name, effect.site), leaders(slot, beliefs)
+        told = again.came_back(site, named)
+        if told is not None:
+            came[site] = told
+            if told.share < beliefs.returns:
+                slot = _shared(found, again, slot, site, named, told, beliefs)
+        slots.append(slot)
+    slots += found.slots[len(slots) :]
+    return replace(found, slots=tuple(slots)), Stability(again, came)
+
+
+def _shared(
+    found: Search,
+    again: Repeated,
+    slot: tuple[Rival, ...],
+    site: Site,
+    named: Sequence[Site],
+    told: CameBack,
+    beliefs: Beliefs,
+) -> tuple[Rival, ...]:
+    """Return a slot whose probabilities are shares of halves."""
+    # What the model holds stays listed, however seldom it comes back.
+    own = max(told.share, 1.0 - beliefs.sure)
+    mass = sum(r.probability for r in slot if r.site in named)
+    out = [replace(r, probability=r.probability * own / mass) for r in slot if r.site in named]
+    came = [(s, n) for s, n in told.instead if n >= beliefs.listed * told.of]
+    whole = max(sum(n for _, n in came), told.of - told.times, 1)
+    for other, times in came:
+        rival = next((r for r in slot if r.site == other), None) or _fitted(
+            found, again, site, other
+        )
+        if rival is not None:
+            out.append(replace(rival, probability=(1.0 - own) * times / whole))
+    return tuple(sorted(out, key=lambda rival: -rival.probability))
+
+
+def _fitted(found: Search, again: Repeated, site: Site, other: Site) -> Rival | None:
+    """Return another effect fitted in the place of one found."""
+    model, work = found.small.model, found.work
+    k = [Site(e.name, e.site) for e in model.found].index(site)
+    effect = next(own.effect for own in again.candidates if own.site == other)
+    rest = fit(work.problem, model.without(k), work.scale, None, 4)
+    tried = fitted_with(work, rest.model, effect)
+    if implausible(tried.model):
+        return None
+    return Rival(other, nats_in_place(rest, tried, found.effective(found.small)), tried)
+
+
+def bounded(
+    verdict: Verdict, causes: Sequence[Cause], stability: Stability | None, beliefs: Beliefs
+) -> tuple[Verdict, tuple[Cause, ...]]:
+    """
+    Return verdict and causes believed no further than they come back, and how often that is.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    causes : sequence of Cause
+    stability : Stability or None
+        None changes nothing.
+    beliefs : Beliefs
+
+    """
+    if stability is None:
+        return verdict, tuple(causes)
+    out, most = [], 1.0
+    for cause in causes:
+        site = next((s for s, _ in cause.name if s in stability.came_back), None)
+        alike = [group for group in verdict.sets if site in group]
+        if site is None or not alike:
+            out.append(cause)
+            continue
+        name = cause.name
+        most_of_it = _most(stability.again.came_back(site, alike[0]), beliefs)
+        if most_of_it < 1.0:
+            less = min(1.0, most_of_it / max(sum(p for _, p in name), 1e-9))
+            name = tuple((s, p * less) for s, p in name)
+        most = min(most, most_of_it)
+        out.append(replace(cause, name=name, came_back=stability.came_back[site]))
+    if verdict.status in NAMING:
+        verdict = replace(verdict, confidence=min(verdict.confidence, most))
+    return verdict, tuple(out)
+
+
+def _most(told: CameBack | None, beliefs: Beliefs) -> float:
+    """Return how far to believe names at the most that come back so often."""
+    if told is None or told.times == told.of:
+        return 1.0
+    return told.bound if told.share < beliefs.returns else min(told.bound, beliefs.unsteady)

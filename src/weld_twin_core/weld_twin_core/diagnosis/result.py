@@ -206,12 +206,13 @@ class Family:
 @dataclass(frozen=True)
 class CameBack:
     """
-    How often a cause was named again where the search saw only half of the data.
+    How often a cause was named again on parts of the data.
 
     Attributes
     ----------
     times, of : int
-        Halves on which it was, itself or what is told as alike, and halves that would show it.
+        Halves of the data on which it was, itself or what is told as alike, and halves that would
+        show it. Of many small errors: parts left out in turn that miss it, and all parts.
     instead : tuple of (Site, int)
         What was named where it was not, and on how many halves.
 
@@ -257,7 +258,7 @@ class Cause:
         The effects of the model that stand for it, as `Model.found` counts them; none where
         nothing that can be carried over stands for it.
     came_back : CameBack or None
-        How often the search names it again on halves of the data; None where no half can tell.
+        How often it is named again on halves of the data; None where too few can tell.
 
     """
 

@@ -36,7 +36,7 @@ from .switches import (
     trusted,
 )
 from .to_do import TOGETHER
-from .words import DEPENDENCES, halves_words, parameter_word, place_name
+from .words import DEPENDENCES, again_words, parameter_word, place_name
 from .words import cause as named
 
 _TRIVIAL = 1e-4
@@ -132,7 +132,7 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
     name = cause_name(diagnosis, cause)
     entries = [
         ('How sure', _sure(cause)),
-        ('In halves of the data', halves_words(cause)),
+        ('Comes back', again_words(cause, many=bool(diagnosis.families))),
         ('Value', _values(diagnosis, cause)),
         ('Stands on', _commanded(diagnosis, cause)),
         ('Effect on the seam', _effect(diagnosis, k)),

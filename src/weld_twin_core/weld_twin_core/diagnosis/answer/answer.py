@@ -18,7 +18,7 @@ from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
 from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
-from ..stability.steadied import Stability, bounded
+from ..stability.steadied import Stability, bounded, of_families
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
 from ..trust.trusted import trusted
@@ -141,6 +141,8 @@ def _trusted(
     )
     verdict, told = trusted(verdict, told, known, usual_trust())
     verdict, told = bounded(verdict, told, stability, found.work.beliefs)
+    if evidence.families is not None:
+        told = of_families(told, evidence.families, found.work.beliefs)
     return verdict, tuple(covering(cause) for cause in told), shares, known
 
 

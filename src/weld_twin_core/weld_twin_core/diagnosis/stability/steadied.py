@@ -17,6 +17,7 @@ from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival, nats_in_place
 from ..hypotheses.search import Search
 from ..hypotheses.selection import fitted_with, implausible
+from ..many.weighed_families import WeighedFamily
 from ..result import CameBack, Cause, Site
 from ..trust.trusted import NAMING
 from ..verdict.decision import Verdict, leaders
@@ -148,3 +149,32 @@ def _most(told: CameBack | None, beliefs: Beliefs) -> float:
     if told is None or told.times == told.of:
         return 1.0
     return told.bound if told.share < beliefs.returns else min(told.bound, beliefs.unsteady)
+
+
+def of_families(
+    causes: Sequence[Cause], families: Sequence[WeighedFamily], beliefs: Beliefs
+) -> tuple[Cause, ...]:
+    """
+    Return causes of many small errors with how often their families come back.
+
+    Each part of the recordings is left out in turn; a family comes back where it is missed there.
+    Of several families in one cause the one that comes back least is told.
+
+    Parameters
+    ----------
+    causes : sequence of Cause
+    families : sequence of WeighedFamily
+    beliefs : Beliefs
+
+    """
+    came = {
+        own.effect: CameBack(sum(g > beliefs.family_worth for g in own.growths), len(own.growths))
+        for own in families
+        if own.growths
+    }
+    out = []
+    for cause in causes:
+        own = [came[s.effect] for s, _ in cause.name if s.effect in came]
+        least = min(own, key=lambda told: told.share, default=None)
+        out.append(replace(cause, came_back=least))
+    return tuple(out)

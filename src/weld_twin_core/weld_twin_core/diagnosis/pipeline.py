@@ -167,20 +167,8 @@ def _explained(
     found = _held(found, examined.given.robot)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
-    return answer(
-        found,
-        unseen,
-        evidence,
-        verdict,
-        shrink,
-        examined,
-        posterior,
-        signs,
-        rival,
-        places,
-        limits,
-        stability,
-    )
+    told = (signs, rival, places, limits, stability)
+    return answer(found, unseen, evidence, verdict, shrink, examined, posterior, *told)
 
 
 def _held(found: Search, robot: Robot) -> Search:

@@ -92,9 +92,6 @@ def answer(
         next_experiment=next_step(found, verdict, limits, rival),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         model=found.final.model,
-        traces=traces(found),
-        absent=found.library.absent | dict.fromkeys(not_told(found.problem), NOT_TOLD),
-        recordings=found.problem.recordings,
         families=verdict.families,
         evidence=evidence,
         posterior=posterior,
@@ -147,9 +144,12 @@ def _trusted(
 
 
 def _compared(found: Search, examined: Examined) -> dict[str, Any]:
-    """Return what recordings say of each other, and what the checks say of that."""
+    """Return the recordings, what they say of each other, and what the checks say of that."""
     named = examined.given.may_change
     return {
+        'recordings': found.problem.recordings,
+        'traces': traces(found),
+        'absent': found.library.absent | dict.fromkeys(not_told(found.problem), NOT_TOLD),
         'checks': (*examined.checks, *untold_check(found, named)),
         'changed': changed(found, named),
         'may_change': named,

@@ -60,13 +60,14 @@ def reselected(table: Tableau, prices: Prices) -> Mask:
         if not _swapped(table, prices):
             break
         _stepwise(table, prices)
-    return table.taken.copy()
+    return np.array(table.taken)
 
 
 def _stepwise(table: Tableau, prices: Prices) -> None:
     """Let candidates come and go until none of either is left."""
     for _ in range(MOVES):
-        if not (_entered(table, prices) | _left(table, prices)):
+        entered = _entered(table, prices)
+        if not (_left(table, prices) or entered):
             break
 
 

@@ -45,11 +45,11 @@ class Tableau:
     """
 
     def __init__(self, normal: Array, parts: Sequence[slice], size: Array) -> None:
-        self.table = normal / (size[:, :, None] * size[:, None])
+        self.table: Array = normal / (size[:, :, None] * size[:, None])
         inner = np.arange(normal.shape[1] - 1)
         self.table[:, inner, inner] += SINGULAR
         self.parts = tuple(parts)
-        self.taken = np.zeros((normal.shape[0], len(self.parts)), bool)
+        self.taken: Mask = np.zeros((normal.shape[0], len(self.parts)), bool)
 
     @property
     def rss(self) -> Array:

@@ -103,6 +103,7 @@ def test_anybody_can_enter_and_a_failure_is_told(case, truth, tmp_path):
     program = tmp_path / 'method.py'
     program.write_text(
         'import json, sys\n'
+        'open(sys.argv[0] + ".asked", "a").write("once\\n")\n'
         'rows = open(sys.argv[1] + "/ask_times.csv").read().split()[1:]\n'
         'open(sys.argv[2] + "/predicted.csv", "w").write("x,y,z\\n" + "0,0,0\\n" * len(rows))\n'
         'said = {"causes": [], "unknown": 1.0, "none": 0.0}\n'
@@ -114,11 +115,18 @@ def test_anybody_can_enter_and_a_failure_is_told(case, truth, tmp_path):
         f'broken={sys.executable} -c 1/0 {{case}} {{out}}',
     ]
     methods = commands(['never_knows'], entered)
-    runs = run_all(folder.parent, ['one'], methods, tmp_path / 'out', {'one': 80}, lambda _: None)
+    asked = folder.parent, ['one'], methods, tmp_path / 'out', {'one': 80}, lambda _: None
+    runs = run_all(*asked)
     assert runs['mine']['one'].answer.unknown == 1.0
+    assert runs['never_knows']['one'].answer.unknown == 1.0
     assert runs['broken']['one'].trouble == 'ZeroDivisionError: division by zero'
     told = page(runs, {'one': truth}, '')
     assert '| mine | 1 of 1 |' in told and '| broken | 0 of 1 |' in told
+    again = run_all(*asked)
+    assert program.with_name('method.py.asked').read_text() == 'once\n'
+    assert {name: said['one'].seconds for name, said in again.items()} == {
+        name: said['one'].seconds for name, said in runs.items()
+    }
 
 
 @pytest.mark.parametrize('text', ['mine', 'mine=run {case}', '=run {case} {out}'])

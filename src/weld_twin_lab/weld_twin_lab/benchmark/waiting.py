@@ -77,7 +77,14 @@ JOBS = (
         'stations',
         once=True,
     ),
+    Job(
+        'diagnose one hour of motion',
+        (*_CLI, 'diagnose', '{data}', '--robot', 'ur5', '--out', '{out}'),
+        'hour',
+        once=True,
+    ),
     Job('read ten minutes of bag (111,000 messages)', ('-c', _READ, '{data}'), 'minutes'),
+    Job('read an hour of bag (666,000 messages)', ('-c', _READ, '{data}'), 'hour', once=True),
     Job(
         'import a table of 100,000 rows',
         (*_CLI, 'import', '{data}', '--robot', 'ur5', '--out', '{out}'),
@@ -86,6 +93,11 @@ JOBS = (
     Job(
         'sensitivity study with page',
         (*_CLI, 'sensitivity', '--robot', 'ur5', '--workers', '1', '--out', '{out}'),
+        once=True,
+    ),
+    Job(
+        'claims of the paper, 7 robots x 3 seams',
+        (*_CLI, 'sensitivity', '--claims', '--workers', '1', '--out', '{out}'),
         once=True,
     ),
     Job(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import Backlash, JointOffset, LinkLength, TransmissionRipple
 from weld_twin_core.effects.effect import Effect
@@ -33,7 +34,7 @@ def made(name: str, folder: Path) -> Path:
     Parameters
     ----------
     name : str
-        'motion', 'minutes', 'stations' or 'table'.
+        One of `MAKERS`.
     folder : Path
 
     """
@@ -43,7 +44,8 @@ def made(name: str, folder: Path) -> Path:
     return place
 
 
-def _moving(seconds: float) -> Recording:
+def moving(seconds: float) -> Recording:
+    """Return a UR5 with play in its elbow, followed by a camera system for so long [s]."""
     robot = load('ur5')
     t = np.arange(round(seconds * JOINT_RATE) + 1) / JOINT_RATE
     at = 0.003 + np.arange(round(seconds * POSE_RATE)) / POSE_RATE
@@ -51,13 +53,23 @@ def _moving(seconds: float) -> Recording:
     way = smooth_motion(robot, 2)[0] + 0.3 * np.sin(t[:, None] * np.arange(1.0, 7.0) / 5.0)
     commanded = Recording('motion', JointMotion(t, way))
     play = Backlash('elbow_joint', width=5e-4)
-    return _seen(commanded, 'ur5', [play], at)
+    return seen(commanded, robot, [play], at)
 
 
-def _seen(commanded: Recording, robot: str, effects: list[Effect], at: Array) -> Recording:
-    """Return a recording with what a twin with effects and noise would measure."""
+def seen(commanded: Recording, robot: Robot, effects: list[Effect], at: Array) -> Recording:
+    """
+    Return a recording with what a twin with effects and noise would measure.
+
+    Parameters
+    ----------
+    commanded : Recording
+    robot : Robot
+    effects : list of Effect
+    at : array, shape (M,) [s]
+
+    """
     rng = np.random.default_rng(7)
-    poses = Twin(load(robot), effects).poses(commanded, at)
+    poses = Twin(robot, effects).poses(commanded, at)
     position = poses.position + rng.normal(scale=NOISE, size=poses.position.shape)
     tilt = rng.normal(scale=TURN_NOISE, size=(at.size, 3))
     skew = np.cross(np.eye(3), tilt[:, None, :])
@@ -67,17 +79,18 @@ def _seen(commanded: Recording, robot: str, effects: list[Effect], at: Array) ->
 
 
 def _motion(place: Path) -> None:
-    write_recording(place, _moving(60.0), load('ur5'))
+    write_recording(place, moving(60.0), load('ur5'))
 
 
 def _minutes(place: Path) -> None:
-    write_recording(place, _moving(600.0), load('ur5'))
+    write_recording(place, moving(600.0), load('ur5'))
 
 
-def _stations(place: Path) -> None:
+def stations(count: int) -> Recording:
+    """Return so many stations of a UR10 with errors of its geometry and of its gears."""
     robot, rng = load('ur10'), np.random.default_rng(11)
-    t = np.arange(float(STATIONS))
-    q = rng.uniform(-2.5, 2.5, (STATIONS, robot.n))
+    t = np.arange(float(count))
+    q = rng.uniform(-2.5, 2.5, (count, robot.n))
     orders = np.array([1.0, 2.0, 3.0, 5.0, 8.0, 13.0])
     effects: list[Effect] = [
         LinkLength('shoulder_lift_joint', da=2e-4),
@@ -88,7 +101,15 @@ def _stations(place: Path) -> None:
         ),
     ]
     commanded = Recording('stations', JointMotion(t, q, static=True))
-    write_recording(place, _seen(commanded, 'ur10', effects, t), robot)
+    return seen(commanded, robot, effects, t)
+
+
+def _stations(place: Path) -> None:
+    write_recording(place, stations(STATIONS), load('ur10'))
+
+
+def _hour(place: Path) -> None:
+    write_recording(place, moving(3600.0), load('ur5'))
 
 
 def _table(place: Path) -> None:
@@ -101,4 +122,10 @@ def _table(place: Path) -> None:
     np.savetxt(place, rows, delimiter=',', header=head, comments='', fmt='%.6f')
 
 
-MAKERS = {'motion': _motion, 'minutes': _minutes, 'stations': _stations, 'table': _table}
+MAKERS = {
+    'motion': _motion,
+    'minutes': _minutes,
+    'hour': _hour,
+    'stations': _stations,
+    'table': _table,
+}

@@ -4,21 +4,22 @@
 
 from __future__ import annotations
 
-import os
+import json
 import shlex
-import subprocess
+import shutil
 import sys
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import layout
 from .open_form import Answer, read_answer, write_case
+from .processes import Cold, Ended, Starter, Warm
 
 ENTRANTS = (
     'weld_twin',
@@ -30,10 +31,8 @@ ENTRANTS = (
     'never_knows',
 )
 """Methods of the repository, a file each in `entrants`."""
-LIMIT = 300.0
-"""Seconds an answer may take; a fit that has not ended by then has lost its way."""
-_KIB = 1024 if sys.platform != 'darwin' else 1
-"""What the system counts memory in [bytes]."""
+RUN = 'run.json'
+"""What a run took, beside its answer: a contest that was stopped goes on from there."""
 
 
 @dataclass(frozen=True)
@@ -91,16 +90,16 @@ def opened(cases: Path, truths: Path, out: Path) -> list[str]:
     return names
 
 
-def commands(names: list[str], entered: list[str]) -> dict[str, list[str]]:
+def commands(names: list[str], entered: list[str]) -> dict[str, Starter]:
     """
-    Return the command of every method, with {case} and {out} in it.
+    Return what starts every method on a case.
 
     Parameters
     ----------
     names : list of str
-        Of `ENTRANTS`.
+        Of `ENTRANTS`; what they import is loaded once for all cases.
     entered : list of str
-        Others, as NAME=COMMAND.
+        Others, as NAME=COMMAND with {case} and {out} in it; started anew for every case.
 
     Raises
     ------
@@ -108,61 +107,62 @@ def commands(names: list[str], entered: list[str]) -> dict[str, list[str]]:
         There is no such entrant, or a command does not say where case and answer go.
 
     """
-    out: dict[str, list[str]] = {}
+    out: dict[str, Starter] = {}
     for name in names:
         if name not in ENTRANTS:
             raise DataError(f'no entrant is called {name!r}; there are {", ".join(ENTRANTS)}')
-        out[name] = [sys.executable, '-m', __package__, name, '{case}', '{out}']
+        out[name] = Warm([sys.executable, '-m', str(__package__), name])
     for text in entered:
         name, _, command = text.partition('=')
         if not name or '{case}' not in command or '{out}' not in command:
             raise DataError(f'--enter takes NAME=COMMAND with {{case}} and {{out}}, got {text!r}')
-        out[name] = shlex.split(command)
+        out[name] = Cold(shlex.split(command))
     return out
 
 
 def run_all(
     cases: Path,
     names: list[str],
-    methods: Mapping[str, list[str]],
+    methods: Mapping[str, Starter],
     out: Path,
     counts: Mapping[str, int],
     tell: Callable[[str], None],
 ) -> dict[str, dict[str, Run]]:
-    """Return what every method said of every case, by method and case; all take turns."""
+    """
+    Return what every method said of every case, by method and case; all take turns.
+
+    A method that has been run on a case is not run again: ``out`` keeps what came of it.
+    """
     runs: dict[str, dict[str, Run]] = {method: {} for method in methods}
-    for name in names:
-        for method, words in methods.items():
-            place = out / method / name
-            runs[method][name] = _one(words, cases / name, place, counts[name])
-        tell(name)
+    try:
+        for name in names:
+            for method, starter in methods.items():
+                place = out / method / name
+                if not (place / RUN).exists():
+                    _start(starter, cases / name, place)
+                runs[method][name] = _kept(place, counts[name])
+            tell(name)
+    finally:
+        for starter in methods.values():
+            starter.close()
     return runs
 
 
-def _one(words: list[str], case: Path, place: Path, count: int) -> Run:
-    place.mkdir(parents=True, exist_ok=True)
-    filled = [word.format(case=case, out=place) for word in words]
-    with (place / 'said.txt').open('w', encoding='utf-8') as said:
-        process = subprocess.Popen(filled, stdout=said, stderr=subprocess.STDOUT)
-        used = _waited(process)
-    if process.returncode != 0:
-        lines = (place / 'said.txt').read_text(encoding='utf-8').strip().splitlines()
-        return Run(None, *used, lines[-1] if lines else f'exit code {process.returncode}')
+def _start(starter: Starter, case: Path, place: Path) -> None:
+    """Have a case answered, and keep what that took."""
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir(parents=True)
+    ended = starter.run(case, place)
+    write_text(place / RUN, json.dumps(ended._asdict(), indent=1) + '\n')
+
+
+def _kept(place: Path, count: int) -> Run:
+    """Return what came of a run; an answer out of form is none."""
+    ended = Ended(**json.loads((place / RUN).read_text(encoding='utf-8')))
+    used = ended.seconds, ended.memory_bytes
+    if ended.trouble:
+        return Run(None, *used, ended.trouble)
     try:
         return Run(read_answer(place, count), *used)
     except DataError as error:
         return Run(None, *used, str(error))
-
-
-def _waited(process: subprocess.Popen[bytes]) -> tuple[float, int]:
-    """Wait for a process, end it at the limit; return its processor time [s] and memory [bytes]."""
-    end = time.monotonic() + LIMIT
-    while True:
-        done, status, used = os.wait4(process.pid, os.WNOHANG)
-        if done:
-            process.returncode = os.waitstatus_to_exitcode(status)
-            return used.ru_utime + used.ru_stime, used.ru_maxrss * _KIB
-        if time.monotonic() > end:
-            process.kill()
-            end = float('inf')
-        time.sleep(0.02)

@@ -4,12 +4,20 @@
 
 Puts cases of `weld-twin blind make` into an open form, has every method answer them in a process
 of its own, and scores the answers. Anybody's method can enter: --enter NAME='COMMAND {case} {out}'.
+With --ur5 and --ur10, stations of two measured arms are asked, too. A run that was stopped goes on:
+what is in --out is not made again. Remove the directory of a method to have it answer anew.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ...contest.arms import Errors
+    from ...contest.processes import Starter
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,38 +31,67 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--enter', action='append', default=[], metavar='NAME=COMMAND', help='a further method'
     )
+    parser.add_argument('--ur5', metavar='DIR', help='holds grid.csv, random.csv')
+    parser.add_argument('--ur10', metavar='DIR', help='holds series_c_random_poses.csv')
     parser.add_argument('--out', required=True, metavar='DIR')
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the contest and print the table."""
+    """Run the contest and print the tables."""
     import json
 
     from weld_twin_msgs_py.files.whole_files import write_text
 
+    from ...contest import course
+
+    out = Path(args.out)
+    listed = [name.strip() for name in args.entrants.split(',') if name.strip()]
+    methods = course.commands(listed or list(course.ENTRANTS), args.enter)
+    content, text = _sealed(args, methods)
+    if args.ur5 and args.ur10:
+        content['arms_mean_m'], more = _arms(args, methods)
+        text += '\n' + more
+    write_text(out / 'contest.json', json.dumps(content, indent=1) + '\n', overwrite=True)
+    write_text(out / 'contest.md', text, overwrite=True)
+    print(text, end='')
+    return 0
+
+
+def _sealed(args: argparse.Namespace, methods: dict[str, Starter]) -> tuple[dict[str, Any], str]:
+    """Return what all methods are worth on the sealed cases, and the table."""
     from ...contest import course, scores
     from ...contest.entrants.never_knows import answer as silent
     from ...contest.open_form import read_case
 
     cases, truths, out = Path(args.cases), Path(args.truths), Path(args.out)
     names = course.opened(cases, truths, out / 'cases')[: args.first or None]
-    listed = [name.strip() for name in args.entrants.split(',') if name.strip()]
-    methods = course.commands(listed or list(course.ENTRANTS), args.enter)
     known = {name: read_case(out / 'cases' / name) for name in names}
     truth = {
         name: scores.sealed(cases, truths, name, silent(case).predicted)
         for name, case in known.items()
     }
     counts = {name: case.times.size for name, case in known.items()}
-    runs = course.run_all(out / 'cases', names, methods, out / 'answers', counts, print)
-    text = scores.page(runs, truth, f'{len(names)} cases.')
+    runs = course.run_all(out / 'cases', names, methods, out / 'answers', counts, _tell)
     found = {method: scores.summary(said, truth) for method, said in runs.items()}
     troubles = {
         method: {name: run.trouble for name, run in said.items() if run.trouble}
         for method, said in runs.items()
     }
     content = {'methods': found, 'troubles': troubles, 'cases': names}
-    write_text(out / 'contest.json', json.dumps(content, indent=1) + '\n', overwrite=True)
-    write_text(out / 'contest.md', text, overwrite=True)
-    print(text, end='')
-    return 0
+    return content, scores.page(runs, truth, f'{len(names)} cases.')
+
+
+def _arms(args: argparse.Namespace, methods: dict[str, Starter]) -> tuple[Errors, str]:
+    """Return the mean errors of all methods on the measured arms, and the table."""
+    from ...contest import arms, course
+
+    place, out = Path(args.out) / 'arms', Path(args.out) / 'arm_answers'
+    measured = arms.arm_cases(Path(args.ur5), Path(args.ur10), place)
+    counts = {name: len(rows) for name, rows in measured.items()}
+    runs = course.run_all(place, list(measured), methods, out, counts, _tell)
+    found = arms.lefts(runs, measured)
+    return found, arms.arm_table(found, list(measured))
+
+
+def _tell(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,113 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Cases from two measured arms: from few stations or a small region to half of all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arrays import Array
+from weld_twin_core.recording import Recording
+from weld_twin_msgs_py.files.markdown import table
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.yaml_file import yaml_text
+
+from ..real_robots.data import tables
+from ..transfer.plain import plain_fit
+from ..transfer.splits import Split, splits
+from ..transfer.study import HOME
+from .course import Run
+from .open_form import write_case
+
+KINDS = ('n30', 'wrist_10deg', 'octant_0', 'odd')
+"""Splits that are asked: few stations, two narrow regions that are asked about outside, and half
+of all."""
+MEASURED = 'measured.json'
+"""Where the tool was at the times asked for, beside the cases and not in them."""
+ALIGN = frozenset({'base', 'tool'})
+Errors = dict[str, dict[str, float]]
+"""Mean errors [m] by method and case."""
+
+
+def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
+    """
+    Write the cases of both arms; return what was measured where they ask, (M, 3) [m], by name.
+
+    Nobody measured base and tool frame; the nominal arm's are fitted on the stations of the case,
+    the same for all methods. They are told as frames that are not known.
+
+    Parameters
+    ----------
+    ur5, ur10 : Path
+        Directories of the published tables; see docs/real_robots.md.
+    out : Path
+        Cases that are there already are left as they are.
+
+    Raises
+    ------
+    DataError
+        A table is missing or cannot be read.
+
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    if (out / MEASURED).exists():
+        kept = json.loads((out / MEASURED).read_text(encoding='utf-8'))
+        return {name: np.array(rows) for name, rows in kept.items()}
+    found: dict[str, Array] = {}
+    for robot, directory in (('ur5', ur5), ('ur10', ur10)):
+        stations = tables(robot, directory)[0].recording
+        for split in splits(robot, stations, HOME[robot]):
+            if split.kind in KINDS:
+                found[split.name] = _written(split, out / split.name)
+    content = {name: rows.tolist() for name, rows in found.items()}
+    write_text(out / MEASURED, json.dumps(content) + '\n')
+    return found
+
+
+def _written(split: Split, folder: Path) -> Array:
+    """Write a case; return what it asks for. Where a region was left, it is asked outside of it."""
+    ask = split.inside if split.outside is None else split.outside
+    assert ask is not None
+    assert ask.measured is not None
+    framed = plain_fit(split.train, catalog.load(split.robot), (), ALIGN)
+    robot = framed.robot.with_frames(base=framed.bases[0])
+    with TemporaryDirectory() as place:
+        file = Path(place) / 'robot.yaml'
+        write_text(file, yaml_text(robot.to_mapping()))
+        said = {'align': sorted(ALIGN), 'exclude': [], 'known': ''}
+        write_case(folder, file, (_places(split.train), ask), said)
+    return np.asarray(ask.measured.position)
+
+
+def _places(recording: Recording) -> Recording:
+    """Return the recording without orientations: few methods can use them."""
+    assert recording.measured is not None
+    return recording.with_measured(replace(recording.measured, rotation=None))
+
+
+def lefts(runs: Mapping[str, Mapping[str, Run]], measured: Mapping[str, Array]) -> Errors:
+    """Return the mean error [m] of every method on every case that it answered."""
+    return {
+        method: {
+            name: float(np.linalg.norm(measured[name] - run.answer.predicted, axis=1).mean())
+            for name, run in said.items()
+            if run.answer is not None
+        }
+        for method, said in runs.items()
+    }
+
+
+def arm_table(found: Mapping[str, Mapping[str, float]], names: list[str]) -> str:
+    """Return mean errors in millimetres, a row for each method, in Markdown."""
+    rows: list[list[object]] = [['method', *names]]
+    for method, errors in found.items():
+        told = [f'{1e3 * errors[name]:.3f}' if name in errors else '-' for name in names]
+        rows.append([method, *told])
+    return table(*rows)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..arm.chain import forward
 from ..arm.robot import Robot
@@ -217,6 +216,9 @@ def _finer(t: Array, position: Array) -> tuple[Array, Array]:
     share = np.arange(FINER) / FINER
     steps = np.diff(t)
     dense = (t[:-1, None] + steps[:, None] * share).ravel()
+    # Loaded here: a fifth of all imports of a diagnosis, and few motions come back to their start.
+    from scipy.interpolate import CubicSpline
+
     points: Array = CubicSpline(t, position)(dense)
     points[np.repeat(steps > GAP * np.median(steps), FINER)] = np.nan
     return dense, points

@@ -23,6 +23,9 @@ from .resampling import Picker
 from .stages import Evaluation, load_torque
 from .twin import Twin
 
+Remembered = tuple[bytes, str, bytes]
+"""Instants looked at, effect and its parameters to the last digit."""
+
 
 class Features:
     """
@@ -34,13 +37,23 @@ class Features:
         Where the features are taken: its effects act, the ones asked about come on top.
     recording : Recording
     at : array, shape (M,) [s]
+    remembered : dict, optional
+        Keeps what effects with memory make of the commanded motion, which no frame and no other
+        effect changes. Features of one recording at other models may share it.
 
     """
 
-    def __init__(self, twin: Twin, recording: Recording, at: Array) -> None:
+    def __init__(
+        self,
+        twin: Twin,
+        recording: Recording,
+        at: Array,
+        remembered: dict[Remembered, list[Shift]] | None = None,
+    ) -> None:
         self.twin = twin
         self.recording = recording
         self.at = at
+        self._remembered = {} if remembered is None else remembered
         self._columns: dict[Channel, Array] = {}
 
     @cached_property
@@ -74,12 +87,28 @@ class Features:
 
     def shifts(self, effect: Effect, atoms: bool = True) -> list[Shift]:
         """Return the effect's linear features (or fit-coordinate derivatives) at the stamps."""
-        if effect.stage in (Stage.SERVO, Stage.PLAY):
-            view = self.joint_view
-            found = effect.atoms(view) if atoms else effect.coordinate_shifts(view)
-            pick = Picker(self.recording.joints, self.run.view.t).pick
-            return [{key: pick(value) for key, value in shift.items()} for shift in found]
-        return effect.atoms(self.view) if atoms else effect.coordinate_shifts(self.view)
+        if effect.stage not in (Stage.SERVO, Stage.PLAY):
+            return effect.atoms(self.view) if atoms else effect.coordinate_shifts(self.view)
+        if not atoms:
+            return self._picked(effect.coordinate_shifts(self.joint_view))
+        key = self._clock, repr(effect), effect.vector().tobytes()
+        if key not in self._remembered:
+            self._remembered[key] = self._picked(effect.atoms(self.joint_view))
+        return self._remembered[key]
+
+    def _picked(self, found: Sequence[Shift]) -> list[Shift]:
+        """Return shifts on the joint clock at the stamps of the measurements."""
+        pick = self._picker.pick
+        return [{key: pick(value) for key, value in shift.items()} for shift in found]
+
+    @cached_property
+    def _picker(self) -> Picker:
+        return Picker(self.recording.joints, self.run.view.t)
+
+    @cached_property
+    def _clock(self) -> bytes:
+        """Return the instants of the measurements, as a key: a delay in the twin shifts them."""
+        return self.run.view.t.tobytes()
 
     def columns(self, effect: Effect, atoms: bool = True) -> Array:
         """Return the effect's features as pose changes, shape (K, 6, M)."""

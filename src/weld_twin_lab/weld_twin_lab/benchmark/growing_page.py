@@ -22,7 +22,9 @@ Points = Sequence[Mapping[str, float]]
 MB = 1e6
 
 
-def measured(only: Sequence[str], tell: Callable[[str], None]) -> dict[str, list[dict[str, float]]]:
+def measured(
+    only: Sequence[str], tell: Callable[[str], None]
+) -> dict[str, list[dict[str, float]]]:
     """
     Return what every size of every piece of work costs.
 

@@ -11,13 +11,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ...arm.channels import Shift
 from ...arm.rotation import angle_between
 from ...arrays import Array
 from ...contacts import Unknowns, places, unknowns
 from ...effects.effect import Effect
 from ...errors import DataError, ModelError
 from ...recording import Measurements, Recording
-from ...twin.features import Features
+from ...twin.features import Features, Remembered
 from .model import Anchor, Change, Model, Scale
 from .row_layout import by_sample
 
@@ -262,11 +263,16 @@ class Problem:
             if other is model:
                 return makers
         makers = [
-            Features(model.twin(k), r, _measured(r).t) for k, r in enumerate(self.recordings)
+            Features(model.twin(k), r, _measured(r).t, self._remembered[k])
+            for k, r in enumerate(self.recordings)
         ]
         self._lately[1:] = self._lately[:1]
         self._lately[:1] = [(model, makers)]
         return makers
+
+    @cached_property
+    def _remembered(self) -> list[dict[Remembered, list[Shift]]]:
+        return [{} for _ in self.recordings]
 
     @cached_property
     def _lately(self) -> list[tuple[Model, list[Features]]]:

@@ -12,7 +12,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -70,13 +71,18 @@ class Folds:
             The fold that each row belongs to.
 
         """
-        names = np.unique(labels)
-        parts = [(columns[:, labels == n], target[labels == n]) for n in names]
-        return cls(
-            np.stack([c @ c.T for c, _ in parts]),
-            np.stack([c @ t for c, t in parts]),
-            np.array([t @ t for _, t in parts]),
-        )
+        # Rows that lie together are looked at where they are; others are copied, fold by fold.
+        together = bool((np.diff(labels) >= 0).all())
+        ends = np.searchsorted(labels, np.append(np.unique(labels), labels[-1] + 1))
+        rows: list[Any] = [slice(a, b) for a, b in pairwise(ends)] if together else []
+        rows = rows or [labels == n for n in np.unique(labels)]
+        normals = np.empty((len(rows), len(columns), len(columns)))
+        rights = np.empty((len(rows), len(columns)))
+        for part, normal, right in zip(rows, normals, rights, strict=True):
+            own = columns[:, part]
+            np.matmul(own, own.T, out=normal)
+            np.matmul(own, target[part], out=right)
+        return cls(normals, rights, np.array([target[part] @ target[part] for part in rows]))
 
     def errors(self, index: Index, precision: Array) -> Array:
         """Return the squared error on every fold of the columns fitted on the others, (B,)."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..frames.track import nearest_rotation
@@ -71,20 +72,19 @@ def lag(
     middle = float(stamps.mean())
     coarse = max(COARSE, most / 300.0) if wide else COARSE
     grid = np.arange(-most, most + coarse, coarse)
-    costs = [_misfit(seen, _along(path, joints, stamps - late)) for late in grid]
-    start = Lag(_nearest(grid, np.array(costs)), 0.0, middle)
+    costs = _misfits(seen, _along(path, joints, stamps - grid[:, None]))
+    start = Lag(_nearest(grid, costs), 0.0, middle)
     constant = _polished(start, joints, path, stamps, seen, free=1)
     drifting = _polished(constant, joints, path, stamps, seen, free=2)
-    left = [
-        _misfit(seen, _along(path, joints, stamps - trial.at(stamps)))
-        for trial in (Lag(0.0, 0.0, middle), constant, drifting)
-    ]
+    trials = (Lag(0.0, 0.0, middle), constant, drifting)
+    late = np.stack([trial.at(stamps) for trial in trials])
+    left = [float(v) for v in _misfits(seen, _along(path, joints, stamps - late))]
     best, after = (drifting, left[2]) if left[2] < APART * left[1] else (constant, left[1])
     return best._replace(before=left[0], after=after)
 
 
 def _along(path: Array, joints: Array, t: Array) -> Array:
-    return np.stack([np.interp(t, joints, p) for p in path.T], axis=1)
+    return np.stack([np.interp(t, joints, p) for p in path.T], axis=-1)
 
 
 def _nearest(lags: Array, costs: Array) -> float:
@@ -110,22 +110,40 @@ def _polished(start: Lag, joints: Array, path: Array, t: Array, seen: Array, fre
     return now
 
 
-def _misfit(seen: Array, path: Array) -> float:
-    """Return the RMS gap after the best turn and shift, without the worst samples."""
-    turn, keep = _aligned(seen, path)
-    off = _centred(seen, keep) - _centred(path, keep) @ turn.T
-    return float(np.sqrt((off[keep] ** 2).sum(axis=1).mean()))
+def _misfits(seen: Array, paths: Array) -> Array:
+    """
+    Return the RMS gap to each of several paths, (L,).
+
+    That is after the best turn and shift, without the worst samples. ``seen`` is (M, 3), ``paths``
+    (L, M, 3).
+    """
+    turn, keep = _aligned(seen, paths)
+    square = (_off(seen, paths, turn, keep) ** 2).sum(axis=-1)
+    return np.asarray(np.sqrt((square * keep).sum(axis=-1) / keep.sum(axis=-1)))
 
 
-def _aligned(seen: Array, path: Array) -> tuple[Array, Array]:
-    """Return the turn from path to measurements, and which samples agree with it best."""
-    keep = np.ones(len(seen), dtype=bool)
+def _aligned(seen: Array, path: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """
+    Return the turn from a path to measurements, and which samples agree with it best.
+
+    For a path (..., M, 3) the turn is (..., 3, 3), the samples are (..., M).
+    """
+    keep = np.ones(path.shape[:-1], dtype=bool)
     for _ in range(2):
-        turn = nearest_rotation(_centred(seen, keep)[keep].T @ _centred(path, keep)[keep])
-        off = np.linalg.norm(_centred(seen, keep) - _centred(path, keep) @ turn.T, axis=1)
-        keep = off <= np.quantile(off, KEPT)
+        here = _centred(path, keep) * keep[..., None]
+        turn = nearest_rotation(np.swapaxes(_centred(seen, keep), -1, -2) @ here)
+        off = np.linalg.norm(_off(seen, path, turn, keep), axis=-1)
+        keep = off <= np.quantile(off, KEPT, axis=-1, keepdims=True)
     return turn, keep
 
 
-def _centred(points: Array, keep: Array) -> Array:
-    return np.asarray(points - points[keep].mean(axis=0))
+def _off(seen: Array, path: Array, turn: Array, keep: NDArray[np.bool_]) -> Array:
+    """Return what is left of the measurements after the best turn and shift of a path."""
+    return np.asarray(_centred(seen, keep) - _centred(path, keep) @ np.swapaxes(turn, -1, -2))
+
+
+def _centred(points: Array, keep: NDArray[np.bool_]) -> Array:
+    """Return points (..., M, 3) about the mean of those kept, (..., M)."""
+    some = keep[..., None]
+    middle = (points * some).sum(axis=-2, keepdims=True) / some.sum(axis=-2, keepdims=True)
+    return np.asarray(points - middle)

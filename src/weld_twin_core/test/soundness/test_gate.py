@@ -155,6 +155,20 @@ def test_what_gave_way_is_dated_and_named_as_a_cause(ur5, rng, kind):
     assert found.shrink.rms_after_m < 0.2 * found.shrink.rms_before_m
 
 
+def test_what_gave_way_in_one_of_several_recordings_is_told_where_nothing_explains_it(ur5, rng):
+    entry = {**SLIPS['joint_slipped'][0], 'time': 60.5}
+    plain = recorded(ur5, stations(ur5, rng), rng, name='plain')
+    bad = recorded(ur5, stations(ur5, rng), rng, effects_from_list([entry], ur5), name='bad')
+    found = examine(Given((plain, bad), ur5, frozenset()))
+    assert found.posed is not None and not found.unsound
+    problem, model = found.posed
+    (item,) = found.torn(problem, model).unsound
+    assert (item.kind, item.at, item.applied) == ('joint_slipped', ('elbow_joint',), False)
+    # A model that leaves no step, as where play that the load turns over only looked like one.
+    explained = replace(problem, recordings=(plain, replace(plain, name='bad')))
+    assert found.torn(explained, model) is found
+
+
 def test_where_the_tool_never_turns_a_knock_and_a_jump_are_told_as_alike(ur5, rng):
     q = np.array(stations(ur5, rng).q)
     q[:, [0, 4, 5]] = [0.3, -1.5, 0.2]

@@ -148,6 +148,9 @@ def _explained(
     found = fitted_together(found, exclude, beliefs, progress)
     found = settled_between(found, examined.given.may_change, beliefs)
     found = with_structural_aliases(found, exclude, beliefs)
+    examined = examined.torn(found.problem, found.final.model)
+    if examined.posed is None:
+        return refusal(examined)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     leftover = structure(unseen, found.final.model, beliefs)
     progress('looked for what is left')

@@ -1,27 +1,31 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Sealed cells one after the other, each kept as soon as it is done."""
+"""Sealed cells, several at a time, each kept as soon as it is done."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.task_pool import Runner, Task
 
-from ..blind.deck import Lot, lots
+from ..blind.deck import lots
 from .goals import page, summary
 
 RESULTS, TABLE, PARTS = 'investigate.json', 'investigate.md', 'parts'
-SCHEMA = 'weld_twin/investigate/1'
+SCHEMA = 'weld_twin/investigate/2'
 KINDS = ('single', 'double', 'triple')
 """Cases with their causes in the library: of the others no experiment can make anybody sure."""
 MOST_DRAWN = 40
 """Cells drawn for each that is wanted: most are diagnosed rightly from a poor motion."""
+BATCH = 8
+"""Cells drawn at a time: a run that has to end in between ends after some, whatever came of them."""
 Tell = Callable[[str], None]
 
 
@@ -29,9 +33,12 @@ def study(
     out: Path,
     seed: int,
     wanted: int,
+    runner: Runner,
+    engine: str,
     tell: Tell = lambda text: None,
     *,
     alone: bool = False,
+    minutes: float = float('inf'),
 ) -> dict[str, Any]:
     """
     Investigate sealed cells that poor motions leave open, and write the results.
@@ -39,84 +46,86 @@ def study(
     Parameters
     ----------
     out : Path
-        Keeps a file for every cell drawn; a run that was interrupted goes on from there.
     seed : int
         Decides the cells.
     wanted : int
         Cells that poor motions leave open.
+    runner : Runner
+        Keeps what came of every cell drawn; a run that was interrupted goes on from there.
+    engine : str
+        Tells the results of one version of the core from those of another.
     tell : callable
         Told what is being done.
     alone : bool
-        Leave out what is usual practice; a later run without this word adds it.
+        Leave out what is usual practice.
+    minutes : float
+        No further cells are begun after so long; what there is is written.
 
     """
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
+    end = time.monotonic() + 60.0 * minutes
+    drawn: list[dict[str, Any]] = []
     cases: list[dict[str, Any]] = []
-    drawn = 0
-    for number, lot in enumerate(lots(seed, MOST_DRAWN * wanted, KINDS)):
-        if len(cases) == wanted:
+    for tasks in _batches(seed, wanted, engine, alone):
+        drawn += runner.run(tasks)
+        cases = [entry for entry in drawn if entry['open']][:wanted]
+        tell(f'{len(drawn)} drawn, {len(cases)} left open at first')
+        if len(cases) == wanted or time.monotonic() > end:
             break
-        drawn += 1
-        entry = _kept(out, seed, number, lot, tell)
-        if not entry['open']:
-            continue
-        cases.append({**entry, **_beside(out, seed, number, lot, entry, alone=alone)})
     result = {
         'schema': SCHEMA,
         'version': __version__,
+        'engine': engine,
         'seed': seed,
-        'drawn': drawn,
+        'drawn': drawn.index(cases[-1]) + 1 if len(cases) == wanted else len(drawn),
         'summary': summary(cases),
         'cases': cases,
     }
+    out.mkdir(parents=True, exist_ok=True)
     write_text(out / RESULTS, json.dumps(result, indent=1) + '\n', overwrite=True)
     write_text(out / TABLE, page(result), overwrite=True)
     return result
 
 
-def _kept(out: Path, seed: int, number: int, lot: Lot, tell: Tell) -> dict[str, Any]:
-    path = out / PARTS / f'{seed}-{number:04d}.json'
-    if not path.exists():
-        entry = _investigated(lot, seed, number)
-        tell(f'{number}: {entry.get("end", "not open")}')
-        write_text(path, json.dumps(entry, indent=1) + '\n')
-    kept: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-    return kept
+def _batches(seed: int, wanted: int, engine: str, alone: bool) -> Iterator[list[Task]]:
+    most = MOST_DRAWN * wanted
+    for begin in range(0, most, BATCH):
+        numbers = range(begin, min(begin + BATCH, most))
+        yield [Task(investigated_cell, (seed, k, engine, alone), f'cell {k}') for k in numbers]
 
 
-def _beside(
-    out: Path, seed: int, number: int, lot: Lot, entry: dict[str, Any], *, alone: bool
-) -> dict[str, Any]:
-    """Return what usual practice leads to, kept in a file of its own; empty where it was left out."""
-    path = out / PARTS / f'{seed}-{number:04d}-beside.json'
-    if not path.exists():
-        if alone:
-            return {}
-        from ..blind.simulator import require_simulator
+def investigated_cell(seed: int, number: int, engine: str, alone: bool) -> dict[str, Any]:
+    """
+    Return what came of one cell, in plain values; the simulator is loaded where it is needed.
 
-        require_simulator()
-        from .sealed_cell import SealedCell
-        from .trial import beside
+    Parameters
+    ----------
+    seed, number : int
+        Decide the cell.
+    engine : str
+        Only tells the results of one version of the core from those of another.
+    alone : bool
+        Leave out what is usual practice.
 
-        told = beside(SealedCell(lot, seed, number), entry)
-        write_text(path, json.dumps(told, indent=1) + '\n')
-    kept: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-    return kept
-
-
-def _investigated(lot: Lot, seed: int, number: int) -> dict[str, Any]:
-    """Return what came of one cell; the simulator is loaded where it is needed."""
+    """
     from ..blind.simulator import require_simulator
 
     require_simulator()
     from .sealed_cell import SealedCell
-    from .trial import looped, poor_at_first
+    from .trial import beside, looped, poor_at_first
 
+    begun = time.process_time()
     try:
-        cell = SealedCell(lot, seed, number)
+        cell = SealedCell(lots(seed, number + 1, KINDS)[number], seed, number)
     except TwinError as error:
         return {'open': False, 'why': str(error)}
+    made = time.process_time()
     first = poor_at_first(cell)
+    spent = {'making': made - begun, 'first': time.process_time() - made}
     if first is None:
-        return {'open': False, 'why': 'right from the first'}
-    return {'open': True, **looped(cell, *first)}
+        return {'open': False, 'why': 'right from the first', 'spent': spent}
+    entry = looped(cell, *first)
+    spent['loop'] = time.process_time() - begun - sum(spent.values())
+    if not alone:
+        entry |= beside(cell, entry)
+        spent['beside'] = time.process_time() - begun - sum(spent.values())
+    return {'open': True, **entry, 'spent': spent}

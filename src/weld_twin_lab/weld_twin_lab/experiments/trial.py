@@ -82,7 +82,7 @@ def _left(minutes: float, visit: float = VISIT) -> Limits:
 
 def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Return the first diagnosis and what it is worth; None where it is right or finds a mistake."""
-    found, why = answered(cell, cell.first(), [], _left(MINUTES))
+    found, why = answered(cell, cell.first, [], _left(MINUTES))
     first = said(cell, found, why)
     wrong = first['status'] in ('ambiguous', 'unknown') or not first['right']
     # What cannot be told apart by any motion is no question for an experiment.
@@ -103,7 +103,7 @@ def looped(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any])
         The same in short.
 
     """
-    rounds, end, answer = investigated(cell, cell.first(), found, dict(first))
+    rounds, end, answer = investigated(cell, cell.first, found, dict(first))
     return {
         'name': cell.name,
         'seal': cell.seal,
@@ -129,7 +129,7 @@ def beside(cell: SealedCell, entry: Mapping[str, Any]) -> dict[str, Any]:
         As `looped` returned it.
 
     """
-    start = cell.first()
+    start = cell.first
     spent = max(float(entry['minutes']), 1.0)
     count = max(int(60.0 * spent / STAY), 1)
     others = {

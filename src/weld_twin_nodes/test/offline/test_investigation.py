@@ -21,6 +21,7 @@ from weld_twin_nodes.report.investigation_page import investigation_page
 
 SPRING = {'effect': 'joint_compliance', 'joint': 'elbow_joint'}
 ZERO = {'effect': 'joint_offset', 'joint': 'elbow_joint'}
+ELSE = {'effect': 'backlash', 'joint': 'wrist_1_joint'}
 
 
 def stations(count=12, sigma=36.0, cost=3.0):
@@ -166,9 +167,6 @@ def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path):
         recordings(state)
 
 
-ELSE = {'effect': 'backlash', 'joint': 'wrist_1_joint'}
-
-
 @pytest.mark.parametrize(
     ('together', 'alone', 'believed', 'closed'),
     [
@@ -197,6 +195,14 @@ ELSE = {'effect': 'backlash', 'joint': 'wrist_1_joint'}
             False,
         ),
         (found('ambiguous'), found('ambiguous'), 0, False),
+        # Some motion parts what is named beside each other; or none does, and only others are asked.
+        (found(wanted=stations()), found(wanted=stations()), 0, False),
+        (
+            found(wanted={**stations(), 'between': [[SPRING], [ELSE]]}),
+            found(wanted={**stations(), 'between': [[SPRING], [ELSE]]}),
+            0,
+            True,
+        ),
         # What was knocked between two recordings is sound in each.
         (found('unsound', confidence=None), found('unknown', groups=()), 1, False),
     ],

@@ -222,8 +222,19 @@ def _unsound(found: Mapping[str, Any]) -> bool:
 
 
 def _open_ends(found: Mapping[str, Any]) -> bool:
-    """Return whether causes are left that some motion would part."""
-    return found['verdict']['status'] == 'ambiguous' and not _inseparable(found)
+    """
+    Return whether causes are named beside each other that some motion would part.
+
+    What can be parted among those named is asked first. So an experiment that asks something else
+    found no motion for it.
+    """
+    wanted = found.get('next_experiment')
+    if found['verdict']['status'] != 'ambiguous' or wanted is None:
+        return found['verdict']['status'] == 'ambiguous'
+    sides = [{(e['effect'], e.get('joint')) for e in side} for side in wanted.get('between') or ()]
+    groups = [{(e['effect'], e.get('joint')) for e in group} for group in _sets(found)]
+    open_ = len(sides) == 2 and any(sides[0] & group and sides[1] & group for group in groups)
+    return open_ and not _inseparable(found)
 
 
 def third_wanted(together: Mapping[str, Any], alone: Mapping[str, Any] | None) -> bool:
@@ -263,8 +274,12 @@ def _inseparable(found: Mapping[str, Any]) -> bool:
 
 def _named(found: Mapping[str, Any]) -> list[list[tuple[str, str]]]:
     """Return the sites of every cause, in an order of their own."""
-    groups = found['verdict'].get('indistinguishable') or []
+    groups = _sets(found)
     return sorted(sorted((e['effect'], e.get('joint') or '') for e in group) for group in groups)
+
+
+def _sets(found: Mapping[str, Any]) -> Sequence[Sequence[Mapping[str, Any]]]:
+    return found['verdict'].get('indistinguishable') or ()
 
 
 def believed(found: Mapping[str, Any]) -> dict[str, Any]:

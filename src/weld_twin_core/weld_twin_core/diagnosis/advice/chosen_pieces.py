@@ -28,6 +28,9 @@ counts fewer independent samples than are foreseen. With 1.5, two experiments th
 by 9 and 12 standard deviations did not."""
 LEAST = 75.0
 """Time [s] of an experiment at least: what nobody thought of shows only where there is room for it."""
+NAMED = 3.0
+"""Weight of what parts explanations that a verdict names beside each other, against what parts one of
+them from others: that question is put to whoever reads the verdict. A judgement."""
 GAIN = 0.05
 """A further piece has to add this share to the decision."""
 
@@ -111,6 +114,7 @@ def planned(
     limits: Limits,
     option: Candidate,
     now: Side,
+    named: int = 1,
 ) -> Plan | None:
     """
     Return the best pieces of a measurement; None where none of them fits into the minutes.
@@ -123,10 +127,13 @@ def planned(
     option : Candidate
     now : Side
         What the alternatives say of the data at hand.
+    named : int
+        So many of the alternatives, the first ones, are named by the verdict.
 
     """
     room = 60.0 * min(limits.minutes - option.set_up, limits.moving)
-    if option.whole and sum(piece.seconds for piece in option.pieces) > room:
+    whole = option.whole and sum(piece.seconds for piece in option.pieces) > room
+    if whole or not _open(option, [], room):
         return None
     told = normals(problem, model, alternatives, scale, option, now)
     before = told.before()
@@ -138,14 +145,14 @@ def planned(
         more = _open(option, chosen, room - spent)
         if not more or (spent >= LEAST and _enough(gains)):
             break
-        pick, found, gained = _next(told, before, chosen, more, option)
+        pick, found, gained = _next(told, before, chosen, more, option, named)
         if spent >= LEAST and gained < (1.0 + GAIN) * score:
             break
         chosen.append(pick)
         gains, score = found, max(score, gained)
     if not chosen:
         return None
-    plan = _plan(option, chosen, score, before, gains)
+    plan = _plan(option, chosen, score, before, gains, named)
     # Stops on the way take time as well.
     while plan.robot_minutes * 60.0 > room and len(plan.chosen) > 1 and not option.whole:
         plan = replace(plan, chosen=plan.chosen[:-1])
@@ -158,8 +165,10 @@ def _plan(
     score: float,
     before: Mapping[Pair, float],
     gains: Mapping[Pair, float],
+    named: int,
 ) -> Plan:
-    best = max(gains, key=lambda pair: gains[pair])
+    first = {pair: gain for pair, gain in gains.items() if _is_named(pair, named) and gain > NOTHING}
+    best = max(first or gains, key=lambda pair: gains[pair])
     apart = sum(gain for gain in gains.values() if gain > NOTHING)
     known = _mean(before, best)
     decided = known >= MARGIN * DECIDES
@@ -179,6 +188,7 @@ def _next(
     chosen: Sequence[int],
     more: Sequence[int],
     option: Candidate,
+    named: int,
 ) -> tuple[int, dict[Pair, float], float]:
     """Return the piece that adds most for its time, what pairs gain with it, and the score."""
     after = told.added(chosen, more)
@@ -195,14 +205,19 @@ def _next(
         ]
         table[one, other] = 0.5 * (ways[0] + ways[1])
     scores = np.zeros(len(more))
-    for values in table.values():
-        scores += np.where(values > NOTHING, np.minimum(values, MARGIN * DECIDES), 0.0)
+    for pair, values in table.items():
+        weight = NAMED if _is_named(pair, named) else 1.0
+        scores += weight * np.where(values > NOTHING, np.minimum(values, MARGIN * DECIDES), 0.0)
     # While nothing shows yet, what comes nearest to it.
     nearest = sum((values for values in table.values()), np.zeros(len(more)))
     seconds = np.array([option.pieces[k].seconds for k in more])
     worth = scores + 1e-3 * nearest - 1e-6 * seconds
     best = int(np.argmax(worth))
     return more[best], {pair: float(v[best]) for pair, v in table.items()}, float(scores[best])
+
+
+def _is_named(pair: Pair, named: int) -> bool:
+    return max(pair) < named
 
 
 def _enough(gains: Mapping[Pair, float]) -> bool:

@@ -37,6 +37,7 @@ def next_experiment(
     limits: Limits | None = None,
     *,
     closed: bool = True,
+    named: int = 1,
 ) -> dict[str, Any] | None:
     """
     Return the measurement to make next, as plain numbers and strings.
@@ -53,6 +54,8 @@ def next_experiment(
     closed : bool
         Whether one of the alternatives is believed to be true. Where no motion parts them, this
         is then said; otherwise the data are widened.
+    named : int
+        So many of the alternatives, the first ones, are named by the verdict: to part these comes first.
 
     Returns
     -------
@@ -72,7 +75,7 @@ def next_experiment(
     options = list(candidates(problem, model, limits, asked))
     if len(alternatives) < 2:
         return _entry(widening(problem, options, limits), _UNKNOWN, model)
-    plans, skipped = _plans(problem, model, alternatives, scale, limits, options)
+    plans, skipped = _plans(problem, model, alternatives, scale, limits, options, named)
     if not plans:
         return None
     best = max(plan.score for plan in plans)
@@ -103,13 +106,14 @@ def _plans(
     scale: Scale,
     limits: Limits,
     options: Sequence[Candidate],
+    named: int,
 ) -> tuple[list[Plan], list[str]]:
     """Return the best of every kind of measurement, and what could not be foreseen."""
     now = at_hand(problem, model, alternatives, scale)
     plans, skipped = [], []
     for option in options:
         try:
-            plan = planned(problem, model, alternatives, scale, limits, option, now)
+            plan = planned(problem, model, alternatives, scale, limits, option, now, named)
         except TwinError as error:
             # Data of another kind may lack what an explanation needs; the others still count.
             skipped.append(f'{option.kind}: {error}')

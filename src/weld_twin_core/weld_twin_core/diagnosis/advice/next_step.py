@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from scipy.special import ndtr
 
 from ...effects import REGISTRY
 from ...effects.effect import Effect
+from ..algebra.independent_rows import effective_share
+from ..algebra.problem import Scale
 from ..hypotheses.choices import ranking
 from ..hypotheses.search import Search
 from ..levels.curved import Curved
@@ -69,6 +72,7 @@ def next_step(
     if verdict.status in ('identified', 'none') and verdict.confidence >= SURE:
         return None
     listed = [found.small.model.found, *_in_place(found, verdict, named=True)]
+    named = len(listed)
     if found.problem.untracked:
         if verdict.status in ('identified', 'none'):
             return None
@@ -81,7 +85,7 @@ def next_step(
         room = Room(found.work.problem, found.small.model.robot, limits)
         shapes = without_names(found, rival, room.low, room.high)
         if verdict.status == 'unknown' and verdict.confidence >= NAMELESS:
-            listed = [*shapes, *listed]
+            listed, named = [*shapes, *listed], 1
         else:
             listed += shapes[:1]
         listed += _in_place(found, verdict, named=False)
@@ -90,11 +94,28 @@ def next_step(
         found.work.problem,
         found.small.model,
         listed[:MOST],
-        found.work.scale,
+        _as_weighed(found),
         limits,
         closed=closed,
+        named=min(named, MOST),
     )
     return None if wanted is None else {**wanted, 'promise': promise(verdict, wanted)}
+
+
+def _as_weighed(found: Search) -> Scale:
+    """
+    Return the noise, as much larger as rows count less in a diagnosis.
+
+    A large effect whose formula errs a little leaves something that any other may pick up, so what
+    is learned beside it counts less (`effective_rows`). That neighbours in time say the same is taken
+    into account where pieces of motion are foreseen.
+    """
+    fit, problem, scale = found.small, found.work.problem, found.work.scale
+    apart = effective_share(fit.residual, problem.rows, problem.samples) * fit.residual.size
+    wider = float(np.sqrt(max(apart / max(found.effective(fit), 1e-9), 1.0)))
+    return replace(
+        scale, position=wider * scale.position, orientation=wider * scale.orientation
+    )
 
 
 def promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:

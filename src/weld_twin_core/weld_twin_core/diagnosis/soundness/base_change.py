@@ -5,8 +5,8 @@ What a base frame that changes with time would explain, beyond everything that d
 
 Residuals of an arm follow its pose, and poses follow time, so any motion looks a little like a
 change of the frame. Constant frames and a first-order model of the whole arm (geometry, springs,
-play, lag of every joint) and of the instrument's scale are therefore projected out before a change
-in time is tried.
+play, loops of lost motion, lag of every joint) and of the instrument's scale are therefore projected
+out before a change in time is tried.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
+from ...effects.hysteresis import SLIDING, Hysteresis
+from ...effects.loaded_play import SHARES
 from ...effects.measurement_scale import MeasurementScale
 from ...twin.features import Features
 from ..algebra.fit import HUBER
@@ -34,6 +36,8 @@ DEAD = 1e-18
 """Share of the largest squared column below which a column is rounding."""
 LOOSE = (3e-3, 1e-2)
 """Prior spread of the arm's own errors [m, rad]."""
+LOOPS = (0.02, 0.1)
+"""Travels [rad] over which loops of lost motion close, between a gap and a tenth of a turn."""
 UNIT_OFF = 1e-3
 """Prior spread of the instrument's unit of length: half of what is plausible at all."""
 
@@ -280,11 +284,29 @@ def _arm(maker: Features, rows: int) -> Array:
         signals = [np.sin(view.q[:, i]), np.cos(view.q[:, i]), view.q[:, i]]
         signals += [view.shift[('tau', i)], view.qd[:, i], np.sign(view.qd[:, i])]
         side = np.sign(np.gradient(view.q[:, i])) if view.static else 0.0 * view.q[:, i]
-        for signal in (*signals, side):
+        for signal in (*signals, side, *_abrupt(maker, i)):
             # A joint that rests in one recording and moves in another has the same columns in both.
             spread = float(np.abs(signal).max())
             out.append(joint * (signal / spread if spread > 1e-9 else 0.0 * signal))
     return np.stack(out)
+
+
+def _abrupt(maker: Features, i: int) -> list[Array]:
+    """
+    Return what a joint does that looks like a step for a while, arrays (M,) of any size.
+
+    Play falls over where the load changes sides, and loops of lost motion close soon after a turn.
+    """
+    view, name = maker.view, maker.twin.robot.joint_names[i]
+    pull = view.shift[('tau', i)]
+    most = max(float(np.abs(pull).max()), 1e-9)
+    # A load that stays on one side is as good as constant, and there already.
+    out = [pull / np.hypot(pull, share * most) for share in SHARES]
+    if view.static:  # loops have closed
+        return [*out, *(0.0 * pull for _ in LOOPS)]
+    unit = SLIDING if maker.twin.robot.prismatic[i] else 1.0
+    loops = [Hysteresis(name, 0.0, travel * unit) for travel in LOOPS]
+    return [*out, *(np.asarray(maker.shifts(loop)[0]['q', i]) for loop in loops)]
 
 
 def _scaled(maker: Features, rows: int) -> Array:

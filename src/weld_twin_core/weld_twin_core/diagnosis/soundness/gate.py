@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+
 from ...effects.effect import Effect
 from ...recording import Recording
 from ..algebra.problem import Model, Problem
@@ -24,7 +26,8 @@ from ..frames.places import tracked_part
 from ..result import Check, Unsound
 from .checks import CHECKS
 from .evidence import Case, Mistake
-from .mending import Given
+from .limits import ENDS
+from .mending import Given, measured
 from .slips import Slip
 from .streams import streams, velocities_checked
 from .touches import touches
@@ -51,7 +54,8 @@ class Examined:
     mistakes : tuple of Mistake
         Those that were undone.
     slips : tuple of Slip
-        What gave way at an instant: causes that ``posed`` offers the search.
+        What seems to have given way at an instant. Of one recording these are causes that ``posed``
+        offers the search; of several see `torn`.
 
     """
 
@@ -67,6 +71,37 @@ class Examined:
         kept = {effect.key for effect in found}
         own = [_told(slip, self.given) for slip in self.slips if slip.effect().key in kept]
         return (*self.unsound, *own)
+
+    def torn(self, problem: Problem, model: Model) -> Examined:
+        """
+        Return the same, unsound where something gave way in one of several recordings.
+
+        A slip counts one time for all recordings, so no search can weigh one of them against the
+        library. It is told only where what the library explains still leaves it: loops of lost
+        motion and play that the load turns over look like steps until they are fitted.
+
+        Parameters
+        ----------
+        problem : Problem
+        model : Model
+            What the library explains best.
+
+        """
+        if len(problem.recordings) < 2 or not self.slips:
+            return self
+        left = Case(problem, model).slips
+        kept = [slip for slip in self.slips if any(_same(slip, other, problem) for other in left)]
+        if not kept:
+            return self
+        mistakes = [_undated(slip, problem) for slip in kept]
+        told = tuple(Check('data and set-up', 'unsound', m.sentence) for m in mistakes)
+        unsound = tuple(Unsound(m.kind, m.at, m.sentence, m.remedy, False, m.alike) for m in mistakes)
+        return replace(
+            self,
+            posed=None,
+            checks=(*told, *self.checks),
+            unsound=(*self.unsound, *unsound),
+        )
 
     def mended(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
         """Return other recordings of the same cell after the same corrections."""
@@ -149,7 +184,9 @@ class _Look(NamedTuple):
         """Return the problem with what gave way, and the model with what was undone."""
         if self.posed is None:
             return None
-        problem = replace(self.posed[0], dated=tuple(slip.effect() for slip in self.dated))
+        alone = len(self.posed[0].recordings) == 1
+        dated = tuple(slip.effect() for slip in self.dated) if alone else ()
+        problem = replace(self.posed[0], dated=dated)
         return problem, replace(self.posed[1], mended=tuple(m.sentence for m in mistakes))
 
 
@@ -193,8 +230,6 @@ def _checked(
         if mistakes:
             return out, mistakes, ()
         out += [Check(name, f.level, f.sentence) for f in found] or [Check(name, 'ok', passed)]
-    if len(problem.recordings) > 1:
-        return out, [_undated(slip, problem) for slip in case.slips], ()
     return out, [], tuple(case.slips)
 
 
@@ -202,6 +237,13 @@ def _told(slip: Slip, given: Given) -> Unsound:
     recording = given.recordings[slip.recording]
     sentence = slip.sentence(recording)
     return Unsound(slip.kind, slip.at, sentence, slip.remedy, applied=True, alike=slip.alike)
+
+
+def _same(slip: Slip, other: Slip, problem: Problem) -> bool:
+    """Return whether two steps of one recording are as near as one instant can be told."""
+    t = measured(problem.recordings[slip.recording]).t
+    near = abs(slip.time - other.time) <= ENDS * float(np.ptp(t))
+    return slip.recording == other.recording and near
 
 
 def _undated(slip: Slip, problem: Problem) -> Mistake:

@@ -167,7 +167,9 @@ def _plan(
     gains: Mapping[Pair, float],
     named: int,
 ) -> Plan:
-    first = {pair: gain for pair, gain in gains.items() if _is_named(pair, named) and gain > NOTHING}
+    first = {
+        pair: gain for pair, gain in gains.items() if _is_named(pair, named) and gain > NOTHING
+    }
     best = max(first or gains, key=lambda pair: gains[pair])
     apart = sum(gain for gain in gains.values() if gain > NOTHING)
     known = _mean(before, best)

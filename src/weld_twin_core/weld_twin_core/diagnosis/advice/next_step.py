@@ -113,9 +113,7 @@ def _as_weighed(found: Search) -> Scale:
     fit, problem, scale = found.small, found.work.problem, found.work.scale
     apart = effective_share(fit.residual, problem.rows, problem.samples) * fit.residual.size
     wider = float(np.sqrt(max(apart / max(found.effective(fit), 1e-9), 1.0)))
-    return replace(
-        scale, position=wider * scale.position, orientation=wider * scale.orientation
-    )
+    return replace(scale, position=wider * scale.position, orientation=wider * scale.orientation)
 
 
 def promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:

@@ -95,7 +95,9 @@ class Examined:
             return self
         mistakes = [_undated(slip, problem) for slip in kept]
         told = tuple(Check('data and set-up', 'unsound', m.sentence) for m in mistakes)
-        unsound = tuple(Unsound(m.kind, m.at, m.sentence, m.remedy, False, m.alike) for m in mistakes)
+        unsound = tuple(
+            Unsound(m.kind, m.at, m.sentence, m.remedy, False, m.alike) for m in mistakes
+        )
         return replace(
             self,
             posed=None,

@@ -37,10 +37,10 @@ from ..blind.seal import text_digest
 from ..plant.tracker import Tracker
 
 FOLLOWING, STATES = 30.0, 62.5
-"""Rates [Hz] of an instrument that follows the tool, and of the joint states beside it. Twice as many say
-hardly more, for neighbours err alike, and a diagnosis then takes longer."""
+"""Rates [Hz] of an instrument that follows the tool, and of the joint states beside it. Twice as many
+say hardly more, for neighbours err alike, and a diagnosis then takes longer."""
 SECONDS = (12.0, 25.0)
-"""Shortest and longest first recording [s], where the arm moves: what is poor stays poor, longer or not."""
+"""Shortest and longest first recording [s], where the arm moves: what is poor stays poor."""
 STAY = 15.0
 """A station with the way to it [s], as experiments are planned."""
 

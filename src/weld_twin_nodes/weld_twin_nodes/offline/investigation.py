@@ -230,7 +230,7 @@ def _open_ends(found: Mapping[str, Any]) -> bool:
     """
     wanted = found.get('next_experiment')
     if found['verdict']['status'] != 'ambiguous' or wanted is None:
-        return found['verdict']['status'] == 'ambiguous'
+        return bool(found['verdict']['status'] == 'ambiguous')
     sides = [{(e['effect'], e.get('joint')) for e in side} for side in wanted.get('between') or ()]
     groups = [{(e['effect'], e.get('joint')) for e in group} for group in _sets(found)]
     open_ = len(sides) == 2 and any(sides[0] & group and sides[1] & group for group in groups)

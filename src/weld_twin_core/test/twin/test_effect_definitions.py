@@ -171,6 +171,12 @@ def wear(cell):
     cell.tool = cell.robot.T_flange_tool @ worn
 
 
+def link_warm_up(cell):
+    warmth = 1.0 - np.exp(-cell.elapsed / 2.0)
+    for key in ('a', 'd'):
+        cell.table[key, 2] = 1e-3 * warmth * getattr(cell.robot, key)[2]
+
+
 def drift(cell):
     def move(pose):
         out = pose.copy()
@@ -282,6 +288,7 @@ DEFINITIONS = {
     'payload': ({'mass': 1.5, 'com': SMALL * 50}, payload),
     'cartesian_compliance': ({'compliance': [1e-4, 2e-4, 3e-4]}, cartesian_compliance),
     'thermal_growth': ({'coefficient': 2e-4}, thermal_growth),
+    'link_warm_up': ({'joint': 'j2', 'strain': 1e-3, 'warming_time': 2.0}, link_warm_up),
     'drift': ({'xyz_rate': SMALL}, drift),
     'loaded_play': ({'joint': 'j1', 'width': 2e-3, 'torque': 5.0}, loaded_play),
     'bearing_tilt': ({'joint': 'j0', 'lean': [2e-3, 1e-3, 0.0, 3e-3]}, bearing_tilt),
@@ -296,7 +303,7 @@ DEFINITIONS = {
     'measurement_noise': ({'sigma': 1e-3}, nothing),
 }
 IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay', 'clock_rate'}
-LOST_MOTION = {'friction', 'hysteresis'}
+LOST_MOTION = {'friction', 'hysteresis', 'gear_ratio_by_direction'}
 """Tested in test_lost_motion."""
 
 
@@ -526,6 +533,26 @@ def test_effects_of_motion_leave_stations_alone(arm, make_recording, name):
     moving = REGISTRY[name]('j1', *(0.1 for _ in REGISTRY[name].parameters))
     found = Twin(arm, (moving,)).poses(recording)
     np.testing.assert_array_equal(found.position, Twin(arm).poses(recording).position)
+
+
+def test_a_link_that_follows_a_temperature_grows_as_it_does(arm, make_recording):
+    recording = make_recording(arm)
+    one = effect('link_warm_up', joint='j2', strain=2e-3, follows=[20.0, 10.0])
+    same = effect('thermal_growth', coefficient=2e-4, links=['j2'])
+    poses = [Twin(arm, (each,)).poses(recording).position for each in (one, same)]
+    np.testing.assert_allclose(*poses, atol=1e-12)
+    assert one.on == 'temperature' and len(one.fitted()) == 1
+    for wrong in ([20.0], [20.0, 0.0], 'warm'):
+        with pytest.raises(ModelError, match='follows must be'):
+            effect('link_warm_up', joint='j2', follows=wrong).check(arm)
+
+
+def test_stations_that_are_only_counted_show_no_warm_up(arm, make_recording):
+    stations, kind = make_recording(arm, 30, static=True), REGISTRY['link_warm_up']
+    counted = JointMotion(np.arange(30.0), stations.joints.q, static=True)
+    for motion, reason in ((stations.joints, None), (counted, 'the stations carry no times')):
+        view = Twin(arm).evaluate(Recording('stations', motion)).view
+        assert kind.applicable(view, 'j2') == reason
 
 
 def test_a_warm_up_curve_stands_in_for_a_temperature(arm, make_recording):

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects import Friction, Hysteresis, effect_from_mapping, effects_from_list
+from weld_twin_core.effects import (
+    Friction,
+    GearRatioByDirection,
+    Hysteresis,
+    effect_from_mapping,
+    effects_from_list,
+)
 from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
@@ -156,3 +162,30 @@ def test_features_stand_for_an_instance(arm, make_recording, entry, coefficients
     total = sum(c * atom['q', 2] for c, atom in zip(coefficients, effect.atoms(view), strict=True))
     if coefficients[0] > 0.0:
         np.testing.assert_allclose(found.displace(view)['q', 2], total, atol=1e-15)
+
+
+def test_a_gear_whose_flanks_differ_turns_further_one_way(arm):
+    path = np.r_[0.2, 0.5, 1.0, 0.9, 0.1, -0.8, -0.8, -0.7999, -0.2]
+    way, expected = 0.0, []
+    for before, now in zip(np.r_[path[0], path], path, strict=False):
+        # From one flank to the other it takes 0.4 mrad.
+        way = min(max(way + (now - before) / 2e-4, -1.0), 1.0)
+        expected.append(0.5 * 4e-3 * way * now)
+    found = under(arm, GearRatioByDirection('j2', 4e-3, 4e-4), swung(path))
+    np.testing.assert_allclose(found, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ('path', 'shown'),
+    [
+        (np.sin(np.linspace(0.0, 9.0, 200)), True),
+        (np.linspace(0.0, 2.0, 200), False),
+        # To and fro about one place it is play.
+        (1.5 + 0.05 * np.sin(np.linspace(0.0, 9.0, 200)), False),
+        # Up on one side of zero and down on the other it is a ratio and play.
+        (np.r_[np.linspace(0.0, 1.0, 99), np.linspace(1.0, 0.99, 99)], False),
+    ],
+)
+def test_a_ratio_by_direction_is_looked_for_where_the_joint_went_both_ways(arm, path, shown):
+    view = Twin(arm).joint_view(swung(path))
+    assert bool(list(GearRatioByDirection.seeds(view, 'j2'))) is shown

@@ -27,6 +27,7 @@ from .effect import Effect, MemoryEffect
 from .frame_curve import FrameCurve
 from .friction import Friction
 from .gear_ratio import GearRatio
+from .gear_ratio_by_direction import GearRatioByDirection
 from .hose_pull import HosePull
 from .hysteresis import Hysteresis
 from .instrument_knock import InstrumentKnock
@@ -38,6 +39,7 @@ from .joint_slip import JointSlip
 from .link_length import LinkLength
 from .link_offset import LinkOffset
 from .link_twist import LinkTwist
+from .link_warm_up import LinkWarmUp
 from .loaded_play import LoadedPlay
 from .measurement_noise import MeasurementNoise
 from .measurement_scale import MeasurementScale
@@ -71,6 +73,7 @@ __all__ = [
     'FrameCurve',
     'Friction',
     'GearRatio',
+    'GearRatioByDirection',
     'HosePull',
     'Hysteresis',
     'InstrumentKnock',
@@ -82,6 +85,7 @@ __all__ = [
     'LinkLength',
     'LinkOffset',
     'LinkTwist',
+    'LinkWarmUp',
     'LoadedPlay',
     'MeasurementNoise',
     'MeasurementScale',

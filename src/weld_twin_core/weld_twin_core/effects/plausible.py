@@ -86,6 +86,19 @@ TABLE: dict[tuple[str, str], Plausible] = {
         'derived: tooth numbers are exact, what is left is belts and scales of encoders; one tooth '
         'in fifty is the coarsest wrong ratio',
     ),
+    ('gear_ratio_by_direction', 'difference'): _even(
+        1e-3,
+        2e-2,
+        'derived: as gear_ratio; at a radian from zero the flanks are then as far apart as the play '
+        'of a gear that is broken',
+    ),
+    ('gear_ratio_by_direction', 'travel'): Plausible(
+        1e-3,
+        1e-6,
+        2e-3,
+        'derived: teeth change flanks as friction builds up; a longer travel is '
+        'a loop of the gear, hysteresis',
+    ),
     ('joint_coupling', 'ratio'): _even(
         1e-3,
         2e-2,
@@ -180,6 +193,19 @@ TABLE: dict[tuple[str, str], Plausible] = {
         7.2e-5,
         'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K, cast iron by 11e-6 (amesweb.info); '
         'range derived: an arm may warm up three times as much as the place of the sensor',
+    ),
+    ('link_warm_up', 'strain'): Plausible(
+        2.4e-4,
+        -2.4e-4,
+        1.2e-3,
+        'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K (amesweb.info); range derived: beside its '
+        'motor a link gets 50 K warmer than it was, or 10 K cooler where a fan blows',
+    ),
+    ('link_warm_up', 'warming_time'): Plausible(
+        np.inf,
+        1.0,
+        2e4,
+        'derived: no metal warms within a second; beyond five hours it is the hall',
     ),
     ('drift', 'xyz_rate'): _even(
         5e-6,

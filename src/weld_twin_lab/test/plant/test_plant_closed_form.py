@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from plant_cells import UR5, dh_pose, dh_positions, record, stations, weave
 
+from weld_twin_lab.plant.textbook_effects import heated
+
 
 def _shifted(command, joint, delta):
     q = command.q.copy()
@@ -69,6 +71,35 @@ def test_drift_starts_at_the_first_stamp():
     got = record(UR5, [{'effect': 'drift', 'xyz_rate': [1e-6, -2e-6, 0.0]}], command)
     want = dh_positions(UR5, command.q) + np.outer(command.t - 100.0, [1e-6, -2e-6, 0.0])
     assert np.allclose(got.position, want, atol=1e-12)
+
+
+def test_a_gear_by_direction_turns_further_one_way():
+    command = stations(UR5, 10)
+    ratio = {'effect': 'gear_ratio_by_direction', 'joint': 'j1', 'difference': 2e-3}
+    got = record(UR5, [ratio], command, richness=0.0)
+    q = command.q[:, 1]
+    assert np.allclose(
+        got.position,
+        _shifted(command, 1, 1e-3 * np.sign(np.diff(q, prepend=q[0])) * q),
+        atol=1e-8,
+    )
+
+
+def test_a_link_that_a_motor_heats_nears_its_length_as_still_air_lets_it():
+    t = np.array([0.0, 0.1, 1.0, 5.0, 60.0])
+    warm = heated(10.0 * t, 10.0)
+    assert warm[0] == pytest.approx(0.0, abs=1e-6) and warm[-1] == pytest.approx(1.0, abs=1e-5)
+    # At first nothing is lost; near the end a quarter more than in proportion.
+    assert warm[1] == pytest.approx(0.1, rel=0.04)
+    assert np.abs(warm - (1.0 - np.exp(-t))).max() < 0.06
+    command = stations(UR5, 5)
+    grown = {'effect': 'link_warm_up', 'joint': 'j2', 'strain': 1e-3, 'warming_time': 3.0}
+    got = record(UR5, [grown], command)
+    for q, share, position in zip(
+        command.q, heated(command.t - command.t[0], 3.0), got.position, strict=True
+    ):
+        built = {'j2': {key: 1e-3 * share * UR5['joints'][2][key] for key in ('a', 'd')}}
+        assert np.allclose(position, dh_pose(UR5, q, built)[:3, 3], atol=1e-12)
 
 
 def test_measurement_scale():

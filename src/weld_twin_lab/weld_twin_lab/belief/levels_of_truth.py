@@ -38,6 +38,7 @@ ALSO: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     'drift': (('base', 'instrument'), ('time',)),
     'payload': (('load', 'tool'), ('load',)),
     'clock_rate': (('clock',), ('time', 'speed')),
+    'gear_ratio_by_direction': ((HERE,), ('direction', 'angle')),
     'hose_pull': (('load', 'tool'), ('load',)),
 }
 """The same for causes in the library whose place has more than one right word."""

@@ -24,6 +24,7 @@ SIZES: dict[str, tuple[str, ...]] = {
     'base_pose': ('xyz', 'rotvec'),
     'tool_pose': ('xyz', 'rotvec'),
     'gear_ratio': ('scale',),
+    'gear_ratio_by_direction': ('difference',),
     'transmission_ripple': ('amplitude',),
     'joint_coupling': ('ratio',),
     'backlash': ('width',),
@@ -34,6 +35,7 @@ SIZES: dict[str, tuple[str, ...]] = {
     'time_delay': ('delay',),
     'clock_rate': ('rate',),
     'thermal_growth': ('coefficient',),
+    'link_warm_up': ('strain',),
     'drift': ('xyz_rate',),
     'vibration': ('gain',),
     'quantization': ('step',),
@@ -70,6 +72,7 @@ MOVING = frozenset(
         'servo_lag',
         'time_delay',
         'clock_rate',
+        'link_warm_up',
         'vibration',
         'friction_wander',
         'stick_slip',
@@ -97,6 +100,8 @@ INSIDE = 0.8
 """Share of what a machine can have up to which causes are drawn: the estimate may be higher."""
 TWINS = {('bearing_tilt', 'tilt'): 'lean', ('hose_pull', 'tension'): 'force'}
 """What the twin calls the size of a cause, where it is another word."""
+LONG = 0.1
+"""Length [m] from which the growth of a link shows."""
 RIPPLE_ORDERS = (1, 2, 3, 8, 20, 50, 80, 100)
 """Orders of ripple [1/turn]: eccentric wheels, teeth, and the waves of a strain wave gear."""
 
@@ -181,6 +186,7 @@ _POSITIVE = frozenset(
         'cartesian_compliance',
         'servo_lag',
         'thermal_growth',
+        'link_warm_up',
         'vibration',
         'quantization',
         'payload',
@@ -255,6 +261,12 @@ def _vibration(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     }
 
 
+def _warm_up(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+    long = np.flatnonzero(np.hypot(robot.a, robot.d) > LONG)
+    joint = robot.joint_names[int(rng.choice(long))]
+    return {'joint': joint, 'strain': 3e-4, 'warming_time': float(span * rng.uniform(0.2, 0.8))}
+
+
 def _tilt(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     return {'joint': _joint(robot, rng), 'tilt': 3e-4, 'phase': float(rng.uniform(-3.1, 3.1))}
 
@@ -303,6 +315,7 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'base_pose': _frame(3e-4, 5e-4),
     'tool_pose': _frame(3e-4, 1e-3),
     'gear_ratio': _one('scale', 5e-4),
+    'gear_ratio_by_direction': _one('difference', 1e-3),
     'transmission_ripple': _ripple,
     'joint_coupling': _coupling,
     'backlash': _one('width', 6e-4),
@@ -313,6 +326,7 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'time_delay': _whole('delay', 0.006),
     'clock_rate': _whole('rate', 2e-5),
     'thermal_growth': _whole('coefficient', 3e-5),
+    'link_warm_up': _warm_up,
     'drift': lambda robot, span, rng: {'xyz_rate': _vector(1e-5, rng)},
     'vibration': _vibration,
     'quantization': _one('step', 6e-4),

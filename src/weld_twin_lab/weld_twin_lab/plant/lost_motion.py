@@ -11,6 +11,9 @@ hysteresis
     Tooth contacts side by side (Iwan): each is a spring behind a dry slider, and they let go one
     after the other, the last after twice the travel. A reversal has to bend each of them back, so
     small swings make small closed loops.
+gear_ratio_by_direction
+    Two flanks, each cut on a circle of its own that is a little off the axis: the nearer the end of
+    the travel, the less the ratio is off. Teeth cross one after the other, the last after `CROSSED`.
 """
 
 import numpy as np
@@ -25,6 +28,11 @@ CREEP, STILL = 0.05, 1e-3
 """Time [s] in which bristles at rest let go, and the speed [rad/s] that is none."""
 LOOP = 0.004
 """Lag [s] of a loop that yields to friction."""
+CROSSED = 1.5e-4
+"""Half the travel [rad] after which the last of the teeth is on the other flank."""
+ROUND = 4.0
+"""Radius [rad] of the curve that the error of a flank follows."""
+HERE = frozenset({'friction', 'hysteresis', 'gear_ratio_by_direction'})
 CONTACTS = 10
 """Tooth contacts; their shares are alike and their travels evenly spread."""
 
@@ -50,7 +58,16 @@ def on_joints(causes: Causes, t: np.ndarray, q: np.ndarray, richness: float) -> 
     for item in causes.of('hysteresis'):
         i = causes.joint(item['joint'])
         out[:, i] -= float(item['amplitude']) * _contacts(q[:, i], float(item['travel']))
+    for item in causes.of('gear_ratio_by_direction'):
+        i = causes.joint(item['joint'])
+        out[:, i] += 0.5 * float(item['difference']) * _flanks(q[:, i], richness)
     return out
+
+
+def _flanks(q: np.ndarray, richness: float) -> np.ndarray:
+    """Return the error of the flank in contact, over that of the ratio, shape (N,) [rad]."""
+    bend = ROUND / max(richness, 1e-3)
+    return np.asarray(_contacts(q, 0.5 * CROSSED) * bend * np.sin(q / bend))
 
 
 def _rubbing(t: np.ndarray, q: np.ndarray, uneven: float, richness: float) -> np.ndarray:

@@ -255,7 +255,7 @@ def _in_motion(
     cell: _Cell, rng: np.random.Generator
 ) -> Callable[[np.ndarray], np.ndarray | float]:
     """Return what gives as a function of time."""
-    flaws = outside_causes.JOINT_LEVEL | {'friction', 'hysteresis'}
+    flaws = outside_causes.JOINT_LEVEL | lost_motion.HERE
     flawed = any(item['effect'] in flaws for item in cell.causes.items)
     if cell.compliant.rigid and not flawed:
         return lambda _: 0.0

@@ -5,14 +5,16 @@ Effects that have a closed form: geometry as built, gearing, frames, the instrum
 
 The names and parameters are those of the interface (section 3). Effects that need physics are in
 `drives` (servo_lag, vibration) and in `tree` and `compliance` (backlash, joint_compliance,
-payload), in `lost_motion` (friction, hysteresis), in `pedestal`, `hose` and `line_of_sight`
-(pedestal_tilt, hose_pull, refraction); causes that no library knows are in `outside_causes`.
+payload), in `lost_motion` (friction, hysteresis, gear_ratio_by_direction), in `pedestal`, `hose` and
+`line_of_sight` (pedestal_tilt, hose_pull, refraction); causes that no library knows are in
+`outside_causes`.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import odeint
 
 from . import screws
 from .entries import Entry
@@ -42,6 +44,7 @@ LIBRARY = frozenset(ROW_EFFECTS) | {
     'time_delay',
     'clock_rate',
     'thermal_growth',
+    'link_warm_up',
     'drift',
     'vibration',
     'quantization',
@@ -49,6 +52,7 @@ LIBRARY = frozenset(ROW_EFFECTS) | {
     'measurement_noise',
     'friction',
     'hysteresis',
+    'gear_ratio_by_direction',
     'wear',
     'pedestal_tilt',
     'hose_pull',
@@ -143,7 +147,24 @@ def rows_as_built(causes: Causes, arm: Arm, t: np.ndarray, temperature: np.ndarr
         growth = float(item['coefficient']) * warm_up(item, t, temperature)
         factor = 1.0 + growth[:, None] * np.array(warm, dtype=float)
         rows = rows._replace(a=rows.a * factor, d=rows.d * factor)
+    for item in causes.of('link_warm_up'):
+        own = np.eye(len(arm.names))[causes.joint(item['joint'])]
+        factor = 1.0 + float(item['strain']) * np.outer(
+            heated(t, float(item['warming_time'])), own
+        )
+        rows = rows._replace(a=rows.a * factor, d=rows.d * factor)
     return rows
+
+
+def heated(t: np.ndarray, warming_time: float) -> np.ndarray:
+    """
+    Return how warm a motor's heat has made a link, 1 in the end, shape (len(t),).
+
+    Still air takes the more heat the warmer the link is, by the power 5/4: y' = 1 - y^(5/4).
+    """
+    times, place = np.unique(t / warming_time, return_inverse=True)
+    warm = odeint(lambda y, _: 1.0 - max(y[0], 0.0) ** 1.25, 0.0, np.r_[-1e-9, times])
+    return np.asarray(warm[1:, 0][place])
 
 
 def gearing(causes: Causes, q: np.ndarray) -> np.ndarray:

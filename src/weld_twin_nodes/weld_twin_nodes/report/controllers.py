@@ -101,6 +101,7 @@ _RECORDING = 'the robot is not at fault, but how it was recorded'
 _MATTERS = {
     'backlash': _GEAR,
     'hysteresis': _GEAR,
+    'gear_ratio_by_direction': _GEAR,
     'loaded_play': _GEAR,
     'friction': "a matter of the joint's gear, bearings and grease",
     'servo_lag': "a matter of the drive's gains and feed-forward",
@@ -108,6 +109,7 @@ _MATTERS = {
     'quantization': 'a matter of the encoder',
     'cartesian_compliance': 'a matter of stiffness and of the force at the tool',
     'thermal_growth': 'a matter of warming up, or of the temperature in the cell',
+    'link_warm_up': 'a matter of warming up',
     'drift': 'a matter of what the frame stands on, or of the temperature',
     'setup_settling': 'a matter of how the set-up is held',
     'time_delay': f'{_RECORDING}: its clocks',

@@ -25,7 +25,14 @@ _BY_UNIT = {
     '-': (1.0, ''),
 }
 """Factor from SI and the unit that people read, by the unit of the parameter ..."""
-_BY_NAME = {'phase': (1.0, 'rad'), 'scale': (1e6, 'ppm'), 'ratio': (1e6, 'ppm')}
+_BY_NAME = {
+    'phase': (1.0, 'rad'),
+    'scale': (1e6, 'ppm'),
+    'ratio': (1e6, 'ppm'),
+    'difference': (1e6, 'ppm'),
+    'strain': (1e6, 'ppm'),
+    'warming_time': (1.0, 's'),
+}
 """... or by its name, where the unit alone does not tell."""
 UNCHANGED = 0.005
 """Share of a gap below which it counts as the same."""

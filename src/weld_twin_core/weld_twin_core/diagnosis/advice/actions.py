@@ -87,6 +87,16 @@ def _gear_ratio(effect: Effect, robot: Robot) -> str:
     )
 
 
+def _gear_ratio_by_direction(effect: Effect, robot: Robot) -> str:
+    difference = _value(effect, 'difference')
+    more, less = ('up', 'down') if difference > 0.0 else ('down', 'up')
+    return (
+        f'Compensate the gear of {effect.site} by direction, or approach seams from one side: on '
+        f'the way {more} it turns {size(difference * 100.0)} % of its angle further than on the '
+        f'way {less}.'
+    )
+
+
 def _ripple(effect: Effect, robot: Robot) -> str:
     amplitude = np.atleast_1d(np.asarray(effect.amplitude))  # type: ignore[attr-defined]
     order = np.atleast_1d(np.asarray(effect.order))  # type: ignore[attr-defined]
@@ -220,6 +230,14 @@ def _thermal_growth(effect: Effect, robot: Robot) -> str:
     )
 
 
+def _link_warm_up(effect: Effect, robot: Robot) -> str:
+    grown = _value(effect, 'strain') * 1e3
+    return (
+        f'Warm {effect.site} up before welding, or compensate its link while it warms: it grows by '
+        f'{number(grown)} mm per m.'
+    )
+
+
 def _drift(effect: Effect, robot: Robot) -> str:
     rate = np.asarray(effect.xyz_rate) * 3.6e6  # type: ignore[attr-defined]
     each = ', '.join(number(float(v)) for v in rate)
@@ -338,6 +356,7 @@ _SENTENCES: dict[str, Sentence] = {
     'base_pose': _base_pose,
     'tool_pose': _tool_pose,
     'gear_ratio': _gear_ratio,
+    'gear_ratio_by_direction': _gear_ratio_by_direction,
     'transmission_ripple': _ripple,
     'joint_coupling': _joint_coupling,
     'backlash': _backlash,
@@ -353,6 +372,7 @@ _SENTENCES: dict[str, Sentence] = {
     'time_delay': _time_delay,
     'clock_rate': _clock_rate,
     'thermal_growth': _thermal_growth,
+    'link_warm_up': _link_warm_up,
     'drift': _drift,
     'vibration': _vibration,
     'quantization': _quantization,

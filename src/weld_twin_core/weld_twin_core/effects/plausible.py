@@ -290,6 +290,9 @@ PRISMATIC: dict[tuple[str, str], Plausible] = {
     ('friction', 'travel'): Plausible(
         1e-4, 1e-7, 2e-4, 'derived: rolling guides bend by micrometres to a tenth of a millimetre'
     ),
+    ('gear_ratio_by_direction', 'travel'): Plausible(
+        1e-4, 1e-7, 2e-4, 'derived: as the travel of friction'
+    ),
     ('hysteresis', 'amplitude'): Plausible(
         2e-5, 0.0, 1e-3, 'derived: guides and nuts lose hundredths of a millimetre'
     ),

@@ -227,6 +227,7 @@ def _chosen(
         model = now.model
         if crowded or names(model) == before:
             break
+        del work  # or two libraries would be held at once
         work, now, bare = _workspace(small, model, exclude, beliefs)
     return _Chosen(work, now, bare, crowded, tuple(refused))
 

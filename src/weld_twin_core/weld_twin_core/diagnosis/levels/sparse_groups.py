@@ -10,7 +10,7 @@ counts is the squared error on stretches of time, and on regions of posture, tha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -166,6 +166,7 @@ def choosing(
     Parameters
     ----------
     groups : list of Group
+        Their columns become parts of one array here, so that none is held twice.
     fixed : array, shape (F, rows)
         Whitened columns always fitted.
     fixed_precision : array, shape (F,)
@@ -178,9 +179,11 @@ def choosing(
     size = np.sqrt(np.maximum((fixed**2).mean(axis=1), 1e-300))
     columns = np.concatenate([fixed / size[:, None], *(g.columns for g in groups)])
     at, places = fixed.shape[0], []
-    for group in groups:
-        places.append(np.arange(at, at + group.columns.shape[0]))
-        at += group.columns.shape[0]
+    for k, group in enumerate(groups):
+        end = at + group.columns.shape[0]
+        places.append(np.arange(at, end))
+        groups[k] = replace(group, columns=columns[at:end])
+        at = end
     folds = [Folds.of(columns, target, labels) for labels in ways]
     # Frames that the data hardly show move freely; a trace of ridge keeps the algebra whole.
     held = np.maximum(fixed_precision / size**2, 1e-6 * target.size)

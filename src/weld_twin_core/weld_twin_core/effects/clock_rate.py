@@ -27,7 +27,7 @@ class ClockRate(Effect):
     of = 'robot'
     stage = Stage.CLOCK
     common = False
-    parameters = (Parameter('rate', 's/s', typical=1e-5, lower=-0.1, upper=0.1, idealised=0.03),)
+    parameters = (Parameter('rate', 's/s', typical=1e-5, lower=-0.5, upper=0.5, idealised=0.03),)
     needs = frozenset({'velocity', 'time'})
 
     def displace(self, view: View) -> Shift:

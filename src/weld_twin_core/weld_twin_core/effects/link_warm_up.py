@@ -48,7 +48,7 @@ class LinkWarmUp(Effect):
     common = False
     parameters = (
         Parameter('strain', '-', typical=1e-4, idealised=0.05),
-        Parameter('warming_time', 's', typical=60.0, lower=1.0, linear=False, idealised=0.1),
+        Parameter('warming_time', 's', typical=60.0, lower=0.1, linear=False, idealised=0.1),
     )
     options = ('follows',)
     needs = frozenset({'time'})

@@ -24,7 +24,6 @@ SIZES: dict[str, tuple[str, ...]] = {
     'base_pose': ('xyz', 'rotvec'),
     'tool_pose': ('xyz', 'rotvec'),
     'gear_ratio': ('scale',),
-    'gear_ratio_by_direction': ('difference',),
     'transmission_ripple': ('amplitude',),
     'joint_coupling': ('ratio',),
     'backlash': ('width',),
@@ -33,9 +32,7 @@ SIZES: dict[str, tuple[str, ...]] = {
     'payload': ('mass',),
     'servo_lag': ('time_constant',),
     'time_delay': ('delay',),
-    'clock_rate': ('rate',),
     'thermal_growth': ('coefficient',),
-    'link_warm_up': ('strain',),
     'drift': ('xyz_rate',),
     'vibration': ('gain',),
     'quantization': ('step',),
@@ -55,6 +52,9 @@ SIZES: dict[str, tuple[str, ...]] = {
     'pedestal_tilt': ('compliance',),
     'hose_pull': ('tension',),
     'refraction': ('warming',),
+    'gear_ratio_by_direction': ('difference',),
+    'clock_rate': ('rate',),
+    'link_warm_up': ('strain',),
 }
 """The parameters of every cause that grow with it."""
 OUTSIDE = (
@@ -315,7 +315,6 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'base_pose': _frame(3e-4, 5e-4),
     'tool_pose': _frame(3e-4, 1e-3),
     'gear_ratio': _one('scale', 5e-4),
-    'gear_ratio_by_direction': _one('difference', 1e-3),
     'transmission_ripple': _ripple,
     'joint_coupling': _coupling,
     'backlash': _one('width', 6e-4),
@@ -324,9 +323,7 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'payload': _payload,
     'servo_lag': _one('time_constant', 0.008),
     'time_delay': _whole('delay', 0.006),
-    'clock_rate': _whole('rate', 2e-5),
     'thermal_growth': _whole('coefficient', 3e-5),
-    'link_warm_up': _warm_up,
     'drift': lambda robot, span, rng: {'xyz_rate': _vector(1e-5, rng)},
     'vibration': _vibration,
     'quantization': _one('step', 6e-4),
@@ -349,4 +346,7 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'hose_pull': _hose,
     'refraction': lambda robot, span, rng: {'warming': _vector(2.0, rng)},
     'wear': lambda robot, span, rng: {'rate': 1e-5, 'slower': float(span * rng.uniform(1.5, 4.0))},
+    'gear_ratio_by_direction': _one('difference', 1e-3),
+    'clock_rate': _whole('rate', 2e-5),
+    'link_warm_up': _warm_up,
 }

@@ -18,7 +18,8 @@ from ..recording import JointMotion
 from .inverse import PathSolution, solve_path
 from .inverse.newton import chain_jacobian, least_step, polish, pose_error
 from .paths import Path, SeamFrames, Torch
-from .profiles import MOST_SAMPLES, Profile, Timing, named
+from .profiles import Profile, Timing, named
+from .sample_count import MOST_SAMPLES
 
 _DIFFERENCE = 1e-6
 """Arc length [m] over which the pose is differentiated."""

@@ -31,12 +31,7 @@ from scipy.interpolate import PPoly
 from ..arrays import Array
 from ..errors import PathError
 from .paths.seam_path import positive
-
-MOST_SAMPLES = 2_000_000
-"""
-Samples a motion may have: four and a half hours at 125 Hz, half an hour at 1 kHz. Planning takes
-2.6 to 3.2 kB for each with six and seven joints, so these take 6 GB at most.
-"""
+from .sample_count import MOST_SAMPLES, refuse_endless
 
 
 class Timing(NamedTuple):
@@ -88,29 +83,6 @@ class Profile(ABC):
             np.where(moving, law(inside), length),
             np.where(moving, law(inside, 1), 0.0),
             np.where(moving, law(inside, 2), 0.0),
-        )
-
-
-def refuse_endless(duration: float, dt: float, most: int = MOST_SAMPLES) -> None:
-    """
-    Refuse a motion of more samples than make sense.
-
-    Parameters
-    ----------
-    duration, dt : float [s]
-    most : int
-
-    Raises
-    ------
-    PathError
-        It would have more samples than that.
-
-    """
-    if not duration <= most * dt:
-        raise PathError(
-            f'the motion would take {duration / dt:.3g} samples, and {most:,} are the most; lower '
-            'the rate, raise the speed, or keep the seam away from a singular posture, where the '
-            'joints slow it down'
         )
 
 

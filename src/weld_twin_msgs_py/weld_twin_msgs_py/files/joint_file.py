@@ -13,7 +13,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.profiles import refuse_endless
+from weld_twin_core.motion.sample_count import refuse_endless
 from weld_twin_core.recording import JointMotion
 
 from .whole_files import write_text

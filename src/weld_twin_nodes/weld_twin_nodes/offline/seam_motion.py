@@ -13,7 +13,8 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.paths import KINDS, default_seam, from_mapping
 from weld_twin_core.motion.planned_motion import Plan, plan
-from weld_twin_core.motion.profiles import Profile, named, refuse_endless
+from weld_twin_core.motion.profiles import Profile, named
+from weld_twin_core.motion.sample_count import refuse_endless
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.files.joint_file import read_joint_motion, through_stations
 from weld_twin_msgs_py.files.path_file import read_path

@@ -19,7 +19,6 @@ from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
-from weld_twin_msgs_py.tables import write_touches
 
 from ..offline.exports import write_all
 from ..offline.where_it_holds import where_it_holds
@@ -65,6 +64,8 @@ def write_results(
         if file == NEXT:
             write_joint_motion(directory / file, wanted['motion'], wanted['sentence'])
         else:
+            from weld_twin_msgs_py.tables import write_touches  # loads much that few need
+
             write_touches(directory / file, wanted['motion'])
         diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': file})
     write_text(directory / PAGE, report_page(diagnosis, inputs, sheet))

@@ -2,12 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many small errors on stations that say little: what is fitted, and what is left alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.hypotheses.search import search
+from weld_twin_core.diagnosis.many.fitted_together import fitted_together
 from weld_twin_core.diagnosis.many.small_errors import many_small
 from weld_twin_core.effects import REGISTRY, LinkTwist, TransmissionRipple
 
@@ -106,3 +110,51 @@ def test_a_search_never_makes_an_effect_outside_its_bounds(robot, name):
         count = len(seed.coordinates())
         for sign in (1.0, -1.0):
             seed.from_atoms(sign * 1e-4 * np.ones(count)).check(robot)
+
+
+PLANE = 20
+"""Stations that are measured before joint 1 is turned on."""
+FIRST = 3 * PLANE
+"""Stations that are fitted on; the same arm is measured on after a break of two hours."""
+BREAK = 7200.0
+"""Of two hours [s]."""
+
+
+def plane_by_plane(robot, seed):
+    """Return an arm of many small errors on three planes, and on twenty more after a break."""
+    rng = np.random.default_rng(seed)
+    count = FIRST + 20 * PLANE
+    q = MIDDLE + rng.uniform(-1.0, 1.0, (count, 6)) * [0.02, 0.5, 0.5, 0.5, 0.5, 0.5]
+    q[:, 0] += 0.17 * (np.arange(count) // PLANE)
+    t = 5.0 * np.arange(count) + BREAK * (np.arange(count) >= FIRST)
+    kinds = [REGISTRY[name] for name in GEOMETRY[:4]]
+    errors = [kind(j, 1e-4 * rng.standard_normal()) for kind in kinds for j in robot.joint_names]
+    errors.append(TransmissionRipple(robot.joint_names[0], 1e-4, 1.0, 0.0))
+    commanded = wt.Recording('planes', wt.JointMotion(t, q, static=True))
+    measured = wt.Twin(robot, errors).poses(commanded, t).position
+    measured = measured + 2e-5 * rng.standard_normal(measured.shape)
+    parts = (slice(0, FIRST), slice(FIRST, count))
+    return [
+        wt.Recording('part', wt.JointMotion(t[k], q[k], static=True)).with_measured(
+            wt.Measurements(t[k], measured[k])
+        )
+        for k in parts
+    ]
+
+
+def test_a_creep_that_stands_in_for_postures_visited_in_order_is_left_out(robot):
+    """What joint 1 does as it turns on looks like a creep; the creep would go on over the break."""
+    first, rest = plane_by_plane(robot, seed=52)
+    problem, start = aligned([first], robot, 'base', ())
+    without = [name for name in REGISTRY if name not in (*GEOMETRY, 'drift')]
+    found = search(problem, start, without, Beliefs(), lambda text: None)
+
+    def told(worth):
+        beliefs = replace(Beliefs(), family_worth=worth)
+        model = fitted_together(found, without, beliefs, lambda text: None).final.model
+        return {effect.name for effect in model.found}, off(model, rest)
+
+    names, error = told(Beliefs().family_worth)
+    creeping, worse = told(-1.0)
+    assert 'drift' in creeping - names
+    assert error < 0.8 * worse

@@ -18,7 +18,7 @@ def said(robot, **entry):
     [
         (
             {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 4.2e-4},
-            ['Re-master elbow_joint by -0.0241 deg (-0.420 mrad)'],
+            ['Re-master elbow_joint by -0.0241 deg: it stands +0.0241 deg from'],
         ),
         (
             {'effect': 'link_length', 'joint': 'shoulder_lift_joint', 'da': 6e-4},
@@ -27,23 +27,33 @@ def said(robot, **entry):
         ({'effect': 'link_twist', 'joint': 'elbow_joint', 'dalpha': -1e-3}, ['-0.0573 deg']),
         (
             {'effect': 'tool_pose', 'xyz': [1e-3, 0.0, -2e-3], 'rotvec': [0.0, 0.01, 0.0]},
-            ['by +1.000 mm along x, -2.000 mm along z and +0.5730 deg about y;'],
+            [
+                'by +1.000 mm along axis x, -2.000 mm along axis z of the flange and '
+                '+0.5730 deg about axis y of the tool;'
+            ],
+        ),
+        (
+            {'effect': 'base_pose', 'xyz': [0.0, 2e-4, 0.0], 'rotvec': [0.0, 0.0, 9e-4]},
+            [
+                'by +0.200 mm along axis y of the measuring frame and +0.0516 deg about axis z of '
+                'the base. If it was right when it was measured'
+            ],
         ),
         ({'effect': 'payload', 'mass': 2.1}, ['Enter a payload of 2.10 kg in place of 0.00 kg']),
         (
             {'effect': 'backlash', 'joint': 'shoulder_lift_joint', 'width': 5e-4},
-            ['Service the gear of shoulder_lift_joint', '0.500 mrad'],
+            ['Service the gear of shoulder_lift_joint', 'has 0.0286 deg of'],
         ),
         (
             {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4, 'form': 'coast'},
-            ['elbow_joint always from one side', 'coasts across 0.0286 deg (0.500 mrad)', 'ahead'],
+            ['elbow_joint always from one side', 'coasts across 0.0286 deg of play', 'ahead'],
         ),
         ({'effect': 'time_delay', 'delay': 0.0123}, ['Fix the clock', '12.3 ms late']),
         ({'effect': 'time_delay', 'delay': -0.0123}, ['12.3 ms early']),
         ({'effect': 'clock_rate', 'rate': -3e-5}, ['30.0 ppm slow', '0.108 s in an hour']),
         (
             {'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 2e-5},
-            ['+0.115 deg under 100 N m', '5e+04 N m/rad'],
+            ['+0.115 deg under 100 N m', 'a stiffness of 50.0 kN m/rad'],
         ),
         ({'effect': 'drift', 'xyz_rate': [1e-6, 0.0, 0.0]}, ['(+3.60, 0, 0) mm per hour']),
         (
@@ -65,6 +75,18 @@ def said(robot, **entry):
 def test_the_number_and_the_unit_are_those_to_enter(ur5, entry, parts):
     sentence = said(ur5, **entry)
     assert all(part in sentence for part in parts), sentence
+
+
+def test_nothing_is_told_in_milliradians_or_with_an_exponent(ur5):
+    for name, kind in REGISTRY.items():
+        where = {'joint': 'elbow_joint'} if kind.of in ('joint', 'link') else {}
+        more = {'source': 'wrist_1_joint'} if name == 'joint_coupling' else {}
+        sizes = {
+            p.name: p.typical if p.size < 2 else [p.typical] * p.size for p in kind.parameters
+        }
+        if kind.__module__.startswith('weld_twin_core') and not name.endswith(('curve', 'noise')):
+            sentence = said(ur5, effect=name, **where, **more, **sizes)
+            assert 'mrad' not in sentence and 'e-0' not in sentence and 'e+0' not in sentence
 
 
 def test_every_effect_of_the_library_has_its_own_sentence_but_noise(ur5):

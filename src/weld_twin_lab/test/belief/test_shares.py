@@ -10,47 +10,57 @@ import pytest
 
 from weld_twin_lab.belief.rows import read_rows
 from weld_twin_lab.belief.share_cover import told_and_true
+from weld_twin_lab.belief.share_trial import true_shares
+from weld_twin_lab.blind.blind_cell import deviation, draw_cell, take
+from weld_twin_lab.blind.making import Case
 from weld_twin_nodes.cli import main
 
-CASES = Path(__file__).parents[4] / 'docs' / 'results' / 'belief' / 'cases.jsonl'
+RESULTS = Path(__file__).parents[4] / 'docs' / 'results'
+TABLES = [RESULTS / 'belief' / 'cases.jsonl', RESULTS / 'shares' / 'shares.jsonl']
 
 
-def row(share_ci90, ratios, gap):
-    sites = [['backlash', f'joint_{k}'] for k in range(len(ratios))]
+def row(share_ci90, ratio):
     name = [{'effect': 'backlash', 'joint': 'joint_0', 'probability': 0.9}]
     return {
         'error': '',
         'poor': False,
-        'truth': {'align': [], 'ratios': ratios, 'sites': sites},
-        'signs': {'gap': gap},
+        'truth': {'align': [], 'ratios': [ratio], 'sites': [['backlash', 'joint_0']]},
         'verdict': {'causes': [{'name': name, 'share_ci90': share_ci90}]},
     }
 
 
-@pytest.mark.parametrize(
-    ('interval', 'ratios', 'held'),
-    [
-        ((0.85, 0.95), [3.0], [True]),
-        ((0.5, 0.6), [3.0], [False]),
-        ((0.4, 0.5), [3.0, 3.0], [True]),
-    ],
-)
-def test_a_share_is_the_square_of_its_cause_in_the_whole(interval, ratios, held):
-    gap = 0.5 * np.log10(sum(r**2 for r in ratios) + 1.0)
-    assert [item.held for item in told_and_true([row(interval, ratios, gap)])] == held
+@pytest.mark.parametrize(('interval', 'held'), [((0.85, 0.95), [True]), ((0.5, 0.6), [False])])
+def test_the_share_of_one_cause_is_its_square_in_the_whole(interval, held):
+    assert [item.held for item in told_and_true([row(interval, 3.0)])] == held
 
 
-def test_causes_that_overlap_have_no_shares_to_be_held():
-    assert not list(told_and_true([row((0.4, 0.5), [3.0, 3.0], np.log10(3.0))]))
+def test_causes_that_overlap_share_what_they_move_together():
+    cell = draw_cell('ur5', 'free', ('joint_offset',), np.random.default_rng(1))
+    ride = take(cell, 'free', 15.0, np.random.default_rng(2))
+    one, other = ({'effect': 'joint_offset', 'joint': cell.robot.joint_names[k], 'offset': size}
+                  for k, size in ((1, 1e-3), (2, 8e-4)))  # fmt: skip
+    case = Case(None, cell, [one, other], [], [], (), ride, ride, ride, False)
+    whole = deviation(cell, [one, other], ride)
+    size = (whole**2).sum(axis=-1).mean() + cell.noise**2
+    shares = true_shares(case)
+    assert sum(shares) == pytest.approx(1.0 - cell.noise**2 / size, abs=2e-3)
+    alone = [(deviation(cell, [cause], ride) ** 2).sum(axis=-1).mean() / size
+             for cause in (one, other)]  # fmt: skip
+    # They turn the arm the same way, so each moves the tool along with the other.
+    assert all(share > square + 0.05 for share, square in zip(shares, alone, strict=True))
 
 
 def test_ninety_per_cent_intervals_cover_the_true_share_in_85_to_95_of_100_cases():
-    held = [item.held for item in told_and_true(read_rows(CASES))]
-    assert len(held) > 200
-    assert 0.85 <= np.mean(held) <= 0.95
+    every = [item for table in TABLES for item in told_and_true(read_rows(table))]
+    several = [item.held for item in every if item.causes > 1]
+    assert len(every) > 300 and len(several) > 60
+    assert 0.85 <= np.mean([item.held for item in every]) <= 0.95
+    assert 0.85 <= np.mean(several) <= 0.95
 
 
 def test_the_command_prints_the_table(capsys):
-    assert main(['lab', 'shares', str(CASES)]) == 0
+    assert main(['lab', 'shares', *map(str, TABLES)]) == 0
     told = capsys.readouterr().out
-    assert re.search(r'\| all \| \d+ \| \d+ % \|', told) and '| 1 |' in told
+    assert re.search(r'\| all \| \d+ \| \d+ % \|', told)
+    assert all(f'| {count} |' in told for count in (1, 2, 3))
+    assert main(['lab', 'shares', '--cases', '3']) == 2

@@ -10,10 +10,6 @@ from typing import Any, NamedTuple
 from weld_twin_core.diagnosis.levels.causes import covering
 from weld_twin_core.diagnosis.result import Cause
 
-ADD_UP = 0.05
-"""Part by which the squares of several causes and of the noise may miss the squared gap: causes that
-overlap more than that have no share of their own."""
-
 
 class Held(NamedTuple):
     """How many causes the case has, and whether the interval of one of them holds its share."""
@@ -29,35 +25,42 @@ def told_and_true(rows: Iterable[Mapping[str, Any]]) -> Iterator[Held]:
     Parameters
     ----------
     rows : iterable of mapping
-        As `rows.read_rows` gives them.
+        As `rows.read_rows` gives them: of `share_trial`, or of belief. The latter say how large
+        each cause is alone, which is its share where it is the only one.
 
     """
     for row in rows:
-        truth = row['truth'] if not row.get('error') else {}
-        ratios = truth.get('ratios')
-        if not ratios or row['poor'] or truth['align']:
+        if row.get('error'):
             continue
-        # A ratio is that of the cause to the noise, as RMS of the whole deviation.
-        whole = sum(ratio**2 for ratio in ratios) + 1.0
-        if len(ratios) > 1 and not _adds_up(row, whole):
-            continue
-        true = {
-            tuple(site): ratio**2 / whole
-            for site, ratio in zip(truth['sites'], ratios, strict=False)
-        }
-        for cause in row['verdict']['causes']:
-            first = [(n['effect'], n['joint']) for n in cause['name']][:1]
-            if first and first[0] in true:
-                yield Held(len(ratios), _holds(cause['share_ci90'], true[first[0]]))
+        if 'shares' in row:
+            yield from _of_several(row)
+        else:
+            yield from _of_one(row)
 
 
-def _adds_up(row: Mapping[str, Any], whole: float) -> bool:
-    gap = row['signs'].get('gap')
-    return gap is not None and abs(10.0 ** (2.0 * gap) / whole - 1.0) <= ADD_UP
+def _of_several(row: Mapping[str, Any]) -> Iterator[Held]:
+    true = row['shares']
+    for cause in row['told']:
+        if cause['site'] in true:
+            low, high = cause['share_ci90']
+            yield Held(len(true), low <= true[cause['site']] <= high)
+
+
+def _of_one(row: Mapping[str, Any]) -> Iterator[Held]:
+    truth = row['truth']
+    ratios = truth.get('ratios')
+    if not ratios or len(ratios) > 1 or row['poor'] or truth['align']:
+        return
+    # A ratio is that of the cause to the noise, as RMS of the whole deviation.
+    true = ratios[0] ** 2 / (ratios[0] ** 2 + 1.0)
+    for cause in row['verdict']['causes']:
+        first = [(n['effect'], n['joint']) for n in cause['name']][:1]
+        if first == [tuple(truth['sites'][0])]:
+            yield Held(1, _holds(cause['share_ci90'], true))
 
 
 def _holds(interval: Iterable[float], true: float) -> bool:
-    # Tables have what stretches tell; the answer adds what they share.
+    # Tables of belief have what stretches tell; the answer adds what they share.
     low, high = covering(Cause((), (), (), true, tuple(interval))).share_ci90  # type: ignore[arg-type]
     return low <= true <= high
 

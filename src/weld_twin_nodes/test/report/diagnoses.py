@@ -222,7 +222,7 @@ def backlash():
         [effect],
         [effect],
         [moving(robot), moving(robot, 'weave')],
-        actions=('Service the gear of elbow_joint: its play of 1.2 mrad is the gap.',),
+        actions=('Service the gear of elbow_joint: its play of 0.069 deg is the gap.',),
     )
 
 

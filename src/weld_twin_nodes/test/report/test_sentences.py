@@ -135,6 +135,7 @@ def test_what_is_certain_and_largest_is_to_be_done_first():
         effects=(*case.effects, sure),
         actions=(*case.actions, 'Set the clock right.'),
         causes=tuple(causes),
+        contributions=None,
     )
     first, second, third = worth_doing(both)
     assert first == 'Set the clock right.'

@@ -244,7 +244,7 @@ def test_a_value_is_told_in_degrees_first():
 
 def test_the_maker_of_the_controller_is_told_by_the_robot_or_by_the_user():
     assert '$MAMES' in report_page(THREE)
-    assert 'DMR_GRP' in report_page(THREE, sheet=Sheet(brand='fanuc'))
+    assert 'MSTR POS' in report_page(THREE, sheet=Sheet(brand='fanuc'))
     assert 'not checked against a manual' in report_page(THREE)
     assert set(CHOICES) == set(BRANDS)
     assert brand_of('Motoman MA1440') == 'yaskawa' and brand_of('my_arm') is None

@@ -16,7 +16,7 @@ from ..history.entry import Entry
 from ..history.runs import NEWEST, Run, Runs
 from ..report.charts import Axis
 from ..report.html import Child, Html, document, section, table, tag
-from ..report.quantities import millimetres, odds
+from ..report.quantities import counted, millimetres, odds
 from ..report.words import cause
 from .control_chart import control_chart
 
@@ -82,10 +82,10 @@ def cell_page(
 def _span(entries: Sequence[Entry]) -> str:
     """Return how many diagnoses there are, and of when."""
     count = len(entries)
-    if count == 1:
-        return f'1 diagnosis, {entries[0].at.date()}'
+    told = counted(count, 'diagnosis', 'diagnoses')
+    first, last = entries[0].at.date(), entries[-1].at.date()
     more = 'the last ' if count == NEWEST else ''
-    return f'{more}{count} diagnoses, {entries[0].at.date()} to {entries[-1].at.date()}'
+    return f'{more}{told}, {first}' + (f' to {last}' if last != first else '')
 
 
 def _headline(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> str:

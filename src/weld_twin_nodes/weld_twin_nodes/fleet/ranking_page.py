@@ -10,7 +10,7 @@ from typing import Any
 from ..history.database import Database
 from ..history.runs import Run, Runs
 from ..report.html import Child, Html, document, section, table, tag
-from ..report.quantities import millimetres
+from ..report.quantities import counted, millimetres
 from .cell_page import STYLE, causes_of, troubles_section
 
 ROWS = 500
@@ -52,9 +52,7 @@ def ranking_page(database: Database, link: Callable[[str], str], ways: Html | No
 
 def _span(rows: Sequence[Mapping[str, Any]]) -> str:
     count = sum(row['diagnoses'] for row in rows)
-    cells = 'cell' if len(rows) == 1 else 'cells'
-    diagnoses = 'diagnosis' if count == 1 else 'diagnoses'
-    return f'{len(rows)} {cells}, {count} {diagnoses}'
+    return f'{counted(len(rows), "cell")}, {counted(count, "diagnosis", "diagnoses")}'
 
 
 def _headline(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -89,7 +87,7 @@ def _cells(rows: Sequence[Mapping[str, Any]], link: Callable[[str], str]) -> Htm
     heads = ('cell', 'verdict', 'gap', 'left', 'causes', 'last change', 'recorded', 'robot')
     lead = 'The newest diagnosis of each cell, the largest gap first.'
     if len(rows) > ROWS:
-        lead += f' {len(rows) - ROWS} cells with smaller gaps are left out.'
+        lead += f' {counted(len(rows) - ROWS, "cell")} with smaller gaps left out.'
     told = [_row(row, link) for row in rows[:ROWS]]
     return section('Cells', table(heads, told), id_='cells', lead=lead)
 

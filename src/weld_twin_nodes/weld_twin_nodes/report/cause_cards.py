@@ -14,13 +14,15 @@ from weld_twin_core.effects.servo_lag import ServoLag
 from weld_twin_core.metrics.conformity import Rule
 
 from .acceptance import WORDS
+from .belief import sure_entry
 from .cause_levels import LEVEL_HEADS, level_row, spreads
 from .charts import Axis, Line, chart
 from .controllers import BRANDS, correction
 from .curve_plot import curve_figure
 from .directions import components, rms_words, sides_words
 from .html import Child, Html, joined, section, table, tag
-from .quantities import DEGREES, ends_to, millimetres, odds, parameter_rows, percent, turned
+from .mending import left_without, look_at, taken_by_curve, warning
+from .quantities import DEGREES, counted, ends_to, millimetres, parameter_rows, percent, turned
 from .remainder import places, remainder
 from .seam_view import seen_at
 from .switches import (
@@ -30,14 +32,13 @@ from .switches import (
     as_it_is,
     cause_name,
     drawn,
-    squares,
     static,
     switches,
     trusted,
 )
 from .to_do import TOGETHER
-from .words import DEPENDENCES, again_words, parameter_word, place_name
 from .words import cause as named
+from .words import again_words, parameter_word, unnamed
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
@@ -66,7 +67,7 @@ def causes_cards(diagnosis: Diagnosis, brand: str | None, rule: Rule) -> Html | 
         id_='cards',
         lead='Shares are of the squared gap, on data not used for fitting; the interval holds the '
         f'true share with 90\N{NO-BREAK SPACE}%. All shares, with what is left and the noise, add up '
-        f'to 100\N{NO-BREAK SPACE}%.{_against(diagnosis, shown)}',
+        f'to 100\N{NO-BREAK SPACE}%.{_against(diagnosis, shown)}{_curves(diagnosis, shown)}',
     )
 
 
@@ -97,6 +98,24 @@ def _against(diagnosis: Diagnosis, shown: list[int]) -> str:
     )
 
 
+def _curves(diagnosis: Diagnosis, shown: list[int]) -> str:
+    """Return why a place holds more than its curve takes off, where that is so."""
+    if all(taken_by_curve(diagnosis, k) is None for k in shown):
+        return ''
+    return (
+        ' What a place holds, its own motion tells; a curve stands for it only as well as curves '
+        'can, so it takes off less. Figures and pictures further down are with the curve.'
+    )
+
+
+def _by_curve(diagnosis: Diagnosis, k: int) -> str | None:
+    """Return how much of its share the curve of a cause without a name takes off unseen data."""
+    taken = taken_by_curve(diagnosis, k)
+    if taken is None:
+        return None
+    return f'; its curve takes off {percent(taken, places(diagnosis))}'
+
+
 def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     """Return one row for each cause, for what is left and for the noise: a whole of 100 %."""
     causes = diagnosis.causes
@@ -104,7 +123,7 @@ def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     decimals = places(diagnosis)
     for rank, k in enumerate(shown, 1):
         value, ends = ends_to(decimals, causes[k].share, *causes[k].share_ci90)
-        told = f'{value} ({ends})'
+        told = f'{value} ({ends}){_by_curve(diagnosis, k) or ""}'
         rows.append(
             (f'{rank}. {cause_name(diagnosis, causes[k])}', causes[k].share, told, 'cause')
         )
@@ -131,14 +150,14 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
     cause = diagnosis.causes[k]
     name = cause_name(diagnosis, cause)
     entries = [
-        ('How sure', _sure(cause)),
+        ('How sure', sure_entry(diagnosis, cause)),
         ('Comes back', again_words(cause, many=bool(diagnosis.families))),
         ('Value', _values(diagnosis, cause)),
         ('Stands on', _commanded(diagnosis, cause)),
         ('Effect on the seam', _effect(diagnosis, k)),
-        ('If mended', _mended(diagnosis, k, rule)),
-        ('What to do', _action(diagnosis, cause)),
-        *_at_the_controller(diagnosis, cause, brand),
+        ('With its curve' if unnamed(cause) else 'If mended', _mended(diagnosis, k, rule)),
+        ('What to do', _action(diagnosis, k)),
+        *_at_the_controller(diagnosis, k, brand),
     ]
     pairs = [part for head, text in entries if text for part in (tag('dt', head), tag('dd', text))]
     return tag(
@@ -147,7 +166,8 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
         tag(
             'p',
             tag('b', percent(cause.share, places(diagnosis))),
-            ' of the gap',
+            ' of the squared gap',
+            _by_curve(diagnosis, k),
             class_='share',
         ),
         _box(diagnosis, k),
@@ -165,21 +185,6 @@ def _box(diagnosis: Diagnosis, k: int) -> Html | None:
             box = tag('input', type='checkbox', data_switch=at, checked='')
             return tag('label', box, ' take as mended', class_='one-switch')
     return None
-
-
-def _sure(cause: Cause) -> str:
-    place = [(place_name(at), p) for at, p in cause.place]
-    parts = [_list('place', place)]
-    parts.append(_list('depends on', [(DEPENDENCES.get(on, on), p) for on, p in cause.dependence]))
-    names = [(named(s.effect, None), p) for s, p in cause.name if 'curve' not in s.effect]
-    parts.append(_list('name', names) or 'the library has no name for it')
-    return '; '.join(part for part in parts if part) + '.'
-
-
-def _list(head: str, told: list[tuple[str, float]]) -> str:
-    if not told:
-        return ''
-    return f'{head} {", ".join(f"{name} ({odds(p)})" for name, p in told[:3])}'
 
 
 def _effects(diagnosis: Diagnosis, cause: Cause) -> list[Effect]:
@@ -267,47 +272,36 @@ def _along(diagnosis: Diagnosis, k: int, run: int, good: np.ndarray, worst: int)
 
 def _mended(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:
     """Return the gap that would be left if only this were mended, and whether that passes."""
-    products = np.array(squares(diagnosis))
-    for at, switch in enumerate(switches(diagnosis)):
-        if switch.members == (k,):
-            on = np.ones(products.shape[0])
-            before = np.sqrt(on @ products @ on)
-            on[1 + at] = 0.0
-            left = np.sqrt(max(float(on @ products @ on), 0.0))
-            most = _most_without(diagnosis, k)
-            verdict = rule.judged(most)
-            word = '' if verdict is None else f': {WORDS[verdict]}'
-            return joined(
-                [
-                    f'RMS {"falls" if left < before else "rises"} from '
-                    f'{millimetres(1e-3 * before)} to {millimetres(1e-3 * left)}, '
-                    f'the largest is then {millimetres(most)}',
-                    tag('span', word, class_=f'mark {verdict}', data_alone=f'{1e3 * most:.6f}'),
-                    '.',
-                ]
-            )
-    return None
+    left = left_without(diagnosis, k)
+    if left is None:
+        return None
+    verdict = rule.judged(left.largest_after)
+    word = '' if verdict is None else f': {WORDS[verdict]}'
+    alone = f'{1e3 * left.largest_after:.6f}'
+    return joined(
+        [
+            f'RMS {"falls" if left.rms_after < left.rms else "rises"} from '
+            f'{millimetres(left.rms)} to {millimetres(left.rms_after)}, the largest '
+            f'{"grows" if left.grows else "goes"} from {millimetres(left.largest)} to '
+            f'{millimetres(left.largest_after)}',
+            tag('span', word, class_=f'mark {verdict}', data_alone=alone),
+            '.',
+        ]
+    )
 
 
-def _most_without(diagnosis: Diagnosis, k: int) -> float:
-    """Return the largest deviation [m] without one cause, all others as they are."""
-    told = diagnosis.contributions
-    if told is None:
-        return 0.0
-    rests = [
-        (as_it_is(diagnosis, run) - parts[k])[trusted(diagnosis, run)]
-        for run, parts in enumerate(told.parts)
-    ]
-    return max((float(np.linalg.norm(r, axis=1).max(initial=0.0)) for r in rests), default=0.0)
-
-
-def _action(diagnosis: Diagnosis, cause: Cause) -> Html | str | None:
+def _action(diagnosis: Diagnosis, k: int) -> Html | str | None:
+    cause = diagnosis.causes[k]
     effects = _effects(diagnosis, cause)[:_VALUES]
     if diagnosis.families and len(effects) > 1:
         return TOGETHER
-    sentences = list(dict.fromkeys(actions(effects, diagnosis.model.robot)))
-    if not sentences:
+    if not effects:
         return 'Measure as told under "What to measure next".' if cause.name else None
+    if unnamed(cause):
+        sentences = look_at(diagnosis, k)
+    else:
+        told = dict.fromkeys(actions(effects, diagnosis.model.robot))
+        sentences = [*told, *filter(None, [warning(diagnosis, k)])]
     if alternatives(diagnosis, cause):
         one = named(effects[0].name, effects[0].site)
         sentences = [
@@ -320,12 +314,15 @@ def _action(diagnosis: Diagnosis, cause: Cause) -> Html | str | None:
 
 
 def _at_the_controller(
-    diagnosis: Diagnosis, cause: Cause, brand: str | None
+    diagnosis: Diagnosis, k: int, brand: str | None
 ) -> list[tuple[str, str | None]]:
+    cause = diagnosis.causes[k]
     effects = _effects(diagnosis, cause)
     head = 'At the controller' if brand is None else f'At the {BRANDS[brand]} controller'
     if not effects:
         return [(head, 'Nothing can be entered before the cause is known.')]
+    if unnamed(cause) and warning(diagnosis, k):
+        return [(head, 'Nothing is to be entered: the curve makes the worst spot worse.')]
     return [(head, correction(effects[0], brand))]
 
 
@@ -372,7 +369,7 @@ def _smaller(rest: list[Cause]) -> Html | None:
     rows = [level_row(cause) for cause in rest]
     return tag(
         'details',
-        tag('summary', f'{len(rest)} smaller causes'),
+        tag('summary', counted(len(rest), 'smaller cause')),
         table(LEVEL_HEADS, rows, 'levels'),
         class_='detail',
     )

@@ -9,9 +9,8 @@ import numpy as np
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Site
 
 from .quantities import odds, with_ends
-from .words import DEPENDENCES, place_name, site_name
+from .words import CURVES, DEPENDENCES, place_name, site_name, unnamed
 
-_CURVES = ('joint_curve', 'frame_curve')
 LEVEL_HEADS = ('Share of the gap', 'Where', 'Depends on', 'Name')
 
 
@@ -31,8 +30,8 @@ def _alternatives(told: list[tuple[str, float]]) -> str:
 
 
 def _names(cause: Cause) -> str:
-    named = [(site, p) for site, p in cause.name if site.effect not in _CURVES]
-    if not named:
+    named = [(site, p) for site, p in cause.name if site.effect not in CURVES]
+    if unnamed(cause):
         return 'none that the library knows; its curve is below' if cause.name else 'none'
     return _alternatives([(site_name(site), p) for site, p in named])
 

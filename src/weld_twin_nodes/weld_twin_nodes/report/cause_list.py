@@ -11,7 +11,8 @@ from weld_twin_core.effects import REGISTRY
 
 from .family_table import families_table
 from .html import Child, Html, bars, joined, section, table, tag
-from .quantities import MISSING, change, millimetres, odds, parameter_rows
+from .quantities import MISSING, change, millimetres, parameter_rows
+from .untried import reason_and_joints, untried
 from .words import carries_curves, cause, found_name, in_words, listed, parameter_word, site_name
 
 _CANDIDATES = 6
@@ -26,8 +27,23 @@ _STAND_IN = (
     'No effect is named. These imitate the unknown cause together; figures and pictures that say '
     'after are with them.'
 )
+_GROUP = 'A group for every cause: what was found, and what else it could be. '
+_RIVALS = (
+    'They are weighed against each other only, as if one of them had to be it; how sure it is '
+    'stands on the card.'
+)
+_ALIKE = 1.5
+"""Ratio of probabilities below which two candidates are told as alike."""
+_HARDLY = 1000.0
+"""Ratio of probabilities that is told at most."""
 _ABOVE = 1.5
 """Ratio to the noise floor above which what remains is not at its level."""
+_NONE = (
+    'Nothing: in these recordings no other effect looks like one of those named. How sure each is '
+    'stands on its card.',
+    'Nothing of what could be tried. How sure each is stands on its card.',
+)
+"""What is said where nothing looks alike: where all effects were tried, and where some could not be."""
 _STILL = 'hardly moves'
 _ENOUGH = (
     'Each effect needs a motion of its own kind to show, so joints that move enough for one can '
@@ -64,31 +80,44 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
     """Return the hypotheses for every cause, the most probable first."""
     if not diagnosis.candidates:
         return None
-    slots = _slots(diagnosis.candidates)
+    groups = slots(diagnosis.candidates)
     parts: list[Html] = []
-    for slot in slots[:_SLOTS]:
-        parts.append(bars([_candidate(diagnosis, c) for c in slot[:_CANDIDATES]], 'wide'))
-    more = len(diagnosis.candidates) - sum(len(s[:_CANDIDATES]) for s in slots[:_SLOTS])
+    for slot in groups[:_SLOTS]:
+        best = slot[0].probability
+        parts.append(bars([_candidate(diagnosis, c, best) for c in slot[:_CANDIDATES]], 'wide'))
+    more = len(diagnosis.candidates) - sum(len(s[:_CANDIDATES]) for s in groups[:_SLOTS])
     note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
     if not diagnosis.effects:
         title = 'What fits best, though no cause is named'
         lead = _INSTEAD if carries_curves(diagnosis) else _STAND_IN
     else:
-        title = 'Candidates and their probabilities'
-        lead = 'A group for every cause: what was found, and what else it could be.'
-    told = tag('p', lead, class_='note') if len(slots) > 1 or not diagnosis.effects else None
+        title = 'Candidates against each other'
+        lead = f'{_GROUP if len(groups) > 1 else ""}{_RIVALS}'
+    told = tag('p', lead, class_='note')
     return joined([tag('h3', title), told, *parts, note])
 
 
-def _candidate(diagnosis: Diagnosis, c: Candidate) -> tuple[str, float, str]:
-    """Return label, length and text of a bar; what only stands in has no probability."""
+def _candidate(diagnosis: Diagnosis, c: Candidate, best: float) -> tuple[str, float, str]:
+    """Return label, length and text of a bar; what only stands in is not compared."""
     left = f'leaves {millimetres(c.rms_after_m)} ({change(c.shrink)})'
     if not diagnosis.effects:
         return site_name(c.site), c.shrink, left
-    return site_name(c.site), c.probability, f'{odds(c.probability)} · {left}'
+    return site_name(c.site), c.probability / max(best, 1e-12), f'{rivalry(c, best)} · {left}'
 
 
-def _slots(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+def rivalry(candidate: Candidate, best: float) -> str:
+    """Return how likely a candidate is against the likeliest: how sure that is stands elsewhere."""
+    times = best / max(candidate.probability, 1e-12)
+    if times == 1.0:
+        return 'the likeliest'
+    if times < _ALIKE:
+        return 'as likely'
+    if times > _HARDLY:
+        return f'more than {_HARDLY:.0f} times less likely'
+    return f'{times:.2g} times less likely' if times < 10.0 else f'{times:.0f} times less likely'
+
+
+def slots(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
     """Return the hypotheses cause by cause: within one, probabilities do not rise."""
     out: list[list[Candidate]] = []
     for c in candidates:
@@ -111,11 +140,7 @@ def _sets(diagnosis: Diagnosis) -> Html | None:
         return joined(
             [
                 title,
-                tag(
-                    'p',
-                    'Nothing: in these recordings no other effect looks like one of those named. '
-                    'How sure each is stands on its card.',
-                ),
+                tag('p', f'{_NONE[bool(untried(diagnosis))]} {untried(diagnosis)}'.rstrip()),
             ]
         )
     items = [
@@ -152,9 +177,8 @@ def _absent(diagnosis: Diagnosis) -> Html | None:
 
 def _left_out(effect: str, why: str, diagnosis: Diagnosis) -> tuple[str, str]:
     """Return an effect by its name in words, with the joints that the reason ends with."""
-    reason, _, last = why.rpartition(' (')
-    joints = last.rstrip(')').split(', ')
-    if set(joints) <= set(diagnosis.model.robot.joint_names):
+    reason, joints = reason_and_joints(why, diagnosis)
+    if joints:
         if 'source' in getattr(REGISTRY.get(effect), 'options', ()):
             reason = reason.replace('the joint hardly', 'the joint beside it hardly')
         return cause(effect, listed(joints)), reason

@@ -11,8 +11,11 @@ window.charts = (() => {
   const drawn = [];
   let told = false;
 
+  // Micrometres are the last that a length is read to; of all else three digits.
+  const LAST = { mm: 3, s: 2 };
   function value(axis, digits) {
-    return (chart, v) => (v == null ? '–' : `${Number(v.toPrecision(digits))} ${axis.unit}`.trim());
+    const short = (v) => (axis.unit in LAST ? v.toFixed(LAST[axis.unit]) : Number(v.toPrecision(digits)));
+    return (chart, v) => (v == null ? '–' : `${short(v)} ${axis.unit}`.trim());
   }
 
   function series(line, axis) {
@@ -23,7 +26,7 @@ window.charts = (() => {
       paths: line.points ? () => null : undefined,
       dash: line.dashed ? [6, 4] : undefined,
       points: { show: line.points || line.marked, size: 5, fill: () => colour(line.colour) },
-      value: value(axis, 4),
+      value: value(axis, 3),
     };
   }
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from weld_twin_core.effects.effect import Effect
 
 BRANDS = {
@@ -30,26 +32,31 @@ _KINDS = {
 }
 _PROGRAM = 'It takes no such value: correct the points of the program (weld-twin correct-program).'
 _PLACES = {
-    ('kuka', 'zero'): 'Start-up > Master: master the axis again; its zero lies in $MAMES.',
+    ('kuka', 'zero'): 'Start-up > Master: master the axis again; its zero lies in $MAMES, in '
+    'degrees.',
     ('kuka', 'base'): 'Start-up > Calibrate > Base: change BASE_DATA[n], or $ROBROOT of the cell.',
     ('kuka', 'tool'): 'Start-up > Calibrate > Tool: change TOOL_DATA[n].',
     ('kuka', 'load'): 'Start-up > Calibrate > Tool > Payload data: change LOAD_DATA[n].',
-    ('abb', 'zero'): 'Calibration > Calib. parameters: edit the motor calibration offset, which '
-    'counts radians of the motor, or fine-calibrate the axis.',
+    ('abb', 'zero'): 'Calibration > Calib. parameters: fine-calibrate the axis, or edit its motor '
+    'calibration offset. That counts radians of the motor: {radians} rad at the joint times the '
+    'ratio of its gear.',
     ('abb', 'base'): 'Change wobj.uframe of the work object, or Base Frame in the topic Motion.',
     ('abb', 'tool'): 'Change tframe of the tooldata.',
     ('abb', 'load'): 'Change the loaddata, or run LoadIdentify.',
-    ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master; the count lies in '
-    '$DMR_GRP[1].$MASTER_COUN.',
+    ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master: as MSTR POS of the axis '
+    'enter what it reads now {degrees} deg, then EXEC. That is in degrees; the controller counts '
+    'pulses from it by itself.',
     ('fanuc', 'base'): 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
     ('fanuc', 'tool'): 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
     ('fanuc', 'load'): 'MENU > SYSTEM > Motion: change the payload schedule.',
-    ('yaskawa', 'zero'): 'ROBOT > HOME POSITION: change the absolute data of the axis, in pulses.',
+    ('yaskawa', 'zero'): 'ROBOT > HOME POSITION: change the absolute data of the axis by {size} '
+    'deg. It counts pulses: turn the axis by 10 deg, read how many pulses that was, and divide.',
     ('yaskawa', 'base'): 'ROBOT > USER COORDINATE: teach or change the user frame.',
     ('yaskawa', 'tool'): 'ROBOT > TOOL: change X, Y, Z, Rx, Ry, Rz of the tool file.',
     ('yaskawa', 'load'): 'ROBOT > TOOL: change weight and centre of gravity of the tool file.',
-    ('ur', 'zero'): 'Zeros stand as delta_theta in calibration.conf of the controller; a service '
-    'engineer changes them by a new kinematic calibration.',
+    ('ur', 'zero'): 'Zeros stand as delta_theta, in radians ({radians} rad here), in '
+    'calibration.conf of the controller; a service engineer changes them by a new kinematic '
+    'calibration.',
     ('ur', 'model'): 'It stands as a delta of the link in calibration.conf of the controller; a '
     'service engineer changes it by a new kinematic calibration.',
     ('ur', 'base'): 'Installation > Features: change the feature that the program moves in.',
@@ -81,7 +88,20 @@ def correction(effect: Effect, brand: str | None) -> str | None:
     place = _PLACES.get((brand, str(kind)))
     if place is None:
         return _PROGRAM
+    place = place.format(**_off(effect))
     return f'{place} {UNCHECKED}' if ' > ' in place else place
+
+
+def _off(effect: Effect) -> dict[str, str]:
+    """Return how far a joint stands off, in the units that controllers ask for."""
+    angle = float(getattr(effect, 'offset', 0.0))
+    degrees = np.degrees(angle)
+    sign = 'plus' if angle >= 0.0 else 'minus'
+    return {
+        'degrees': f'{sign} {abs(degrees):.4f}',
+        'size': f'{abs(degrees):.4f}',
+        'radians': f'{abs(angle):.6f}',
+    }
 
 
 _BY_PROGRAM = (

@@ -12,7 +12,9 @@ from weld_twin_core.diagnosis.result import Diagnosis, Site
 from weld_twin_msgs_py.files.input_files import InputFile
 
 from .html import Child, Html, joined, section, table, tag
+from .quantities import counted
 from .to_do import made_for
+from .untried import untried
 from .words import in_words, listed, open_sets, site_name
 
 _APART = (
@@ -20,6 +22,11 @@ _APART = (
     *('changes', 'promise'),
 )
 """What programs need of a measurement, or the page says in words."""
+_ENOUGH = (
+    'No further measurement is needed for this verdict.',
+    'Between what was tried, no further measurement is needed.',
+)
+"""What is said where none is proposed: all effects were tried, or some could not be."""
 _ORDER = {'unsound': 0, 'warning': 1, 'note': 2, 'ok': 3}
 """What needs attention comes first."""
 
@@ -32,7 +39,8 @@ def next_section(diagnosis: Diagnosis) -> Html:
     elif diagnosis.status in ('ambiguous', 'unknown'):
         content = tag('p', 'No measurement that would decide has been found.')
     else:
-        content = tag('p', 'No further measurement is needed for this verdict.')
+        text = f'{_ENOUGH[bool(untried(diagnosis))]} {untried(diagnosis)}'.rstrip()
+        content = tag('p', text)
     return section('What to measure next', content, id_='next')
 
 
@@ -55,6 +63,11 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     told = {'sentence', 'reason', *_APART}
     cost, sigma = wanted.get('cost'), wanted.get('expected_separation_sigma')
     rest = {key: value for key, value in wanted.items() if key not in told}
+    if wanted.get('motion'):
+        rest['as a program'] = (
+            'weld-twin export-program next_experiment.yaml writes it in the language of the '
+            'controller, with a sheet on how to load it'
+        )
     if cost:
         rest['takes'] = f'about {cost:.0f} min'
     if sigma:
@@ -123,13 +136,36 @@ def checks_section(diagnosis: Diagnosis) -> Html:
         for recording in diagnosis.recordings
         for note in recording.notes
     ]
-    found = tag('ul', *items, *notes, class_='checks')
+    found = tag('ul', *items, *_left_out(diagnosis), *notes, class_='checks')
     return section(
         'Are the data sound',
         found if items or notes else tag('p', 'Nothing stood out.'),
         id_='checks',
         lead='Looked at before any cause was.',
     )
+
+
+def _left_out(diagnosis: Diagnosis) -> list[Html]:
+    """Return how many samples the figures leave out though the instrument is not at fault."""
+    out = []
+    for recording, good in zip(diagnosis.recordings, diagnosis.traces.trusted, strict=False):
+        count = int((~good).sum())
+        if count:
+            verb = 'lies' if count == 1 else 'lie'
+            text = (
+                f'{count} of {counted(good.size, "sample")} of {recording.name} {verb} far from '
+                'what the fitted model says. They count little in the fit, and figures and '
+                'pictures are without them. They need not be slips of the instrument: a motion '
+                'that no effect describes looks like this too.'
+            )
+            out.append(
+                tag(
+                    'li',
+                    tag('span', 'note', class_='level note'),
+                    tag('span', tag('b', 'left out'), ' ', text),
+                )
+            )
+    return out
 
 
 def inputs_section(inputs: Sequence[InputFile]) -> Html:

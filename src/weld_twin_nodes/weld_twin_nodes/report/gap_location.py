@@ -8,14 +8,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.diagnosis.result import Cause, Diagnosis
+from weld_twin_core.effects import REGISTRY
 
 from .directions import components, sides_words, worst
 from .html import Html, bars, joined, section, tag
 from .quantities import millimetres, percent, seconds
 from .remainder import SEEN, places, remainder
 from .seam_view import at_rest, seen_at
-from .switches import as_it_is
+from .switches import alternatives, as_it_is
 from .words import DEPENDENCES, REGIMES, listed, place_name
 
 _STRIP = (
@@ -24,6 +25,10 @@ _STRIP = (
     'RMS gap of stations, and their numbers. ▼ the worst by RMS.',
 )
 """What stands under the stretches of a motion, and of stations at rest."""
+_WHERE = ('the seam', 'the stations')
+_EVEN = 1.25
+"""Ratio of the worst stretch to the best below which neither stands out: that much a dozen short
+stretches of one motion differ by for no other reason than posture and noise."""
 _HALF = 0.5
 """Probability from which one name is enough."""
 _OPEN = 3
@@ -54,7 +59,15 @@ def _places(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
     """Return the shares of the causes by place, then what is left and the noise."""
     if not diagnosis.causes:
         return [(name, share, percent(share)) for name, share in diagnosis.where.joints]
-    return _summed([(c.place, c.share, place_name) for c in diagnosis.causes], diagnosis)
+    return _summed([(_at(diagnosis, c), c.share, place_name) for c in diagnosis.causes], diagnosis)
+
+
+def _at(diagnosis: Diagnosis, cause: Cause) -> Sequence[tuple[str, float]]:
+    """Return the places of a cause; where several causes fit alike, theirs, and none is surer."""
+    alike = alternatives(diagnosis, cause)
+    own = [site.joint or getattr(REGISTRY.get(site.effect), 'place', None) for site in alike]
+    places = list(dict.fromkeys(place for place in own if place not in (None, 'joint')))
+    return [(place, _HALF / len(places)) for place in places] or cause.place
 
 
 def _dependences(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
@@ -104,8 +117,9 @@ def _whole(diagnosis: Diagnosis) -> str:
     rest = [
         f'{percent(share, places(diagnosis))} is {name}' for name, share in remainder(diagnosis)
     ]
+    held = 'The causes explain' if diagnosis.effects else 'What could be placed holds'
     return (
-        f'The causes explain {percent(told, places(diagnosis))} of the squared gap; '
+        f'{held} {percent(told, places(diagnosis))} of the squared gap; '
         f'{listed(rest)}. So a place can be certain and still hold less than the whole.'
     )
 
@@ -135,30 +149,40 @@ def _part(title: str, content: Html) -> Html:
 
 
 def _map(diagnosis: Diagnosis) -> Html | None:
+    """Return the map without columns in which nothing stands, and which those are."""
     where = diagnosis.where
     if not where.map_shares:
         return None
-    heads = [tag('th', tag('span', name), scope='col') for name in where.map_regressors]
-    heads.append(tag('th', tag('span', 'at the cursor'), scope='col', class_='now'))
+    shares = np.array(where.map_shares)
+    full = [k for k in range(shares.shape[1]) if (shares[:, k] >= _VISIBLE).any()]
     rows = []
     robot = diagnosis.model.robot
-    for i, (name, shares) in enumerate(zip(robot.joint_names, where.map_shares, strict=True)):
-        cells = [_cell(share) for share in shares]
+    for i, name in enumerate(robot.joint_names):
+        cells = [_cell(float(shares[i, k])) for k in full]
         unit = 'mm' if robot.prismatic[i] else '°'
         cells.append(tag('td', '', data_joint=i, data_unit=unit, class_='now'))
         rows.append(tag('tr', tag('th', name, scope='row'), *cells))
-    head = tag(
-        'thead',
-        tag('tr', tag('th', 'Joint', tag('span', ' [%]', class_='narrow'), scope='col'), *heads),
-    )
-    return tag(
+    whole = tag(
         'div',
-        tag('table', head, tag('tbody', *rows), class_='map'),
+        tag('table', _heads([where.map_regressors[k] for k in full]), tag('tbody', *rows),
+            class_='map'),
         class_='scroll',
         tabindex='0',
         role='region',
         aria_label='Share by joint and regressor',
-    )
+    )  # fmt: skip
+    empty = [name for k, name in enumerate(where.map_regressors) if k not in full]
+    blank = 'A cell is blank below 0.5 %.' if full else ''
+    none = f'No joint alone could explain 0.5 % by {listed(empty, "or")}.' if empty else ''
+    note = ' '.join(filter(None, [blank, none]))
+    return joined([whole, tag('p', note, class_='note') if note else None])
+
+
+def _heads(names: Sequence[str]) -> Html:
+    heads = [tag('th', tag('span', name), scope='col') for name in names]
+    heads.append(tag('th', tag('span', 'at the cursor'), scope='col', class_='now'))
+    first = tag('th', 'Joint', tag('span', ' [%]', class_='narrow'), scope='col')
+    return tag('thead', tag('tr', first, *heads))
 
 
 def _cell(share: float) -> Html:
@@ -201,18 +225,27 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
     # Contacts have a table of their own, and no time.
     if len(path) < 2 or diagnosis.contacts is not None:
         return None
-    largest = max(*(rms for *_, rms in path), 1e-12)
+    sizes = [rms for *_, rms in path]
+    largest = max(*sizes, 1e-12)
+    even = largest < _EVEN * max(min(sizes), 1e-12)
     strips: dict[int, list[Html]] = {}
     run, last = 0, path[0][0]
     for told in path:
         run, last = _run_of(diagnosis, told, run, last), told[0]
-        strips.setdefault(run, []).append(_stretch(diagnosis, run, told, largest))
+        strips.setdefault(run, []).append(_stretch(diagnosis, run, told, largest, even))
+    where = _WHERE[at_rest(diagnosis)]
+    spread = f'{millimetres(min(sizes))} to {millimetres(largest)} RMS'
+    note = (
+        f'Evenly along {where}: {spread}, so no stretch stands out.'
+        if even
+        else _STRIP[at_rest(diagnosis)]
+    )
     return _part(
         'Along the recording',
         tag(
             'div',
             *(tag('ol', *cells, class_='strip') for cells in strips.values()),
-            tag('p', _STRIP[at_rest(diagnosis)], class_='note'),
+            tag('p', note, class_='note'),
         ),
     )
 
@@ -230,10 +263,14 @@ def _run_of(
 
 
 def _stretch(
-    diagnosis: Diagnosis, run: int, told: tuple[float, float, float, float], largest: float
+    diagnosis: Diagnosis,
+    run: int,
+    told: tuple[float, float, float, float],
+    largest: float,
+    even: bool,
 ) -> Html:
     start, end, share, rms = told
-    most = rms >= largest
+    most = rms >= largest and not even
     stamps = diagnosis.traces.t[run] if run < len(diagnosis.traces.t) else np.zeros(0)
     zero = float(stamps[0]) if stamps.size else 0.0
     when = f'{start - zero:.1f} to {seconds(end - zero)}'

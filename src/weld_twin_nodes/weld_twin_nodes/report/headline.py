@@ -11,8 +11,9 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.recording import Recording
 
 from ..offline.where_it_holds import where_it_holds
+from .belief import together
 from .html import Html, tag
-from .quantities import left_of, millimetres, milliradians, odds, small_turn, turns_only
+from .quantities import counted, left_of, millimetres, odds, small_turn, turns_only
 from .to_do import worth_doing
 from .words import STATUS, mended, verdict
 
@@ -95,13 +96,19 @@ def _figures(diagnosis: Diagnosis) -> Html:
         (
             'Gap',
             millimetres(gap.rms_m),
-            f'RMS of {gap.samples} samples; {millimetres(gap.max_m)} at most',
+            f'RMS of {counted(gap.samples, "sample")}; {millimetres(gap.max_m)} at most',
         ),
         ('Left over', millimetres(shrink.rms_after_m), _left(diagnosis)),
         ('Noise floor', millimetres(gap.noise_floor_m), 'what the data cannot resolve'),
     ]
     if diagnosis.status in _SURE_OF:
-        rows.append(('Confidence', odds(diagnosis.confidence), _SURE_OF[diagnosis.status]))
+        rows.append(
+            (
+                'Confidence',
+                odds(diagnosis.confidence),
+                f'{_SURE_OF[diagnosis.status]}{together(diagnosis)}',
+            )
+        )
     if gap.orientation_rms_rad is not None:
         rows.append(('Orientation', small_turn(gap.orientation_rms_rad), _turned(diagnosis)))
     cells = [
@@ -123,11 +130,10 @@ def _left(diagnosis: Diagnosis) -> str:
 
 
 def _turned(diagnosis: Diagnosis) -> str:
-    gap, left = diagnosis.gap.orientation_rms_rad, diagnosis.shrink.orientation_rad
-    told = f'RMS gap ({milliradians(gap)})'
+    left = diagnosis.shrink.orientation_rad
     if left is None or not diagnosis.effects:
-        return told
-    return f'{told}; {small_turn(left[1])} left over'
+        return 'RMS gap'
+    return f'RMS gap; {small_turn(left[1])} left over'
 
 
 def _actions(diagnosis: Diagnosis) -> Html | None:

@@ -13,13 +13,17 @@ from weld_twin_core.diagnosis.result import Diagnosis, Shrink
 from weld_twin_core.effects import Effect, Parameter
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 
+DEGREES = 180.0 / pi
+"""Degrees in a radian."""
+_PULL = 100.0
+"""Torque [N m] that a yielding is told under: what an arm's own links load a joint with."""
 _BY_UNIT = {
     'm': (1e3, 'mm'),
     'rad': (1e3, 'mrad'),
     's': (1e3, 'ms'),
     'm/s': (1e6, 'µm/s'),
     '1/K': (1e6, 'ppm/K'),
-    'rad/(N m)': (1e6, 'µrad/(N m)'),
+    'rad/(N m)': (_PULL * DEGREES, f'° under {_PULL:.0f} N m'),
     'm/N': (1e6, 'µm/N'),
     's/s': (1e6, 'ppm'),
     '-': (1.0, ''),
@@ -43,8 +47,6 @@ _NARROW = 0.02
 """Width of an interval below which whole per cents would make its ends the same."""
 _SMALL = 0.1
 """Share below which whole per cents have only one digit."""
-DEGREES = 180.0 / pi
-"""Degrees in a radian."""
 _UNREAD = 5e-4
 """Angle [degrees] that is left over and that nobody reads: it would be 0.000."""
 _SEEN = 2.0
@@ -140,6 +142,11 @@ def odds(probability: float) -> str:
     return percent(min(max(probability, 1e-9), 1.0 - 1e-9))
 
 
+def counted(count: int, one: str, many: str | None = None) -> str:
+    """Return '1 cell' or '3 cells'."""
+    return f'{count} {one if count == 1 else many or f"{one}s"}'
+
+
 def seconds(value: float) -> str:
     """Return a time as '12.3 s'."""
     return f'{value:.1f} s' if abs(value) < 1000.0 else f'{value:.0f} s'
@@ -148,7 +155,7 @@ def seconds(value: float) -> str:
 def uncertain(value: float, std: float | None, factor: float = 1.0, unit: str = '') -> str:
     """Return '0.500 ± 0.012 mrad': two digits of the error, the value to the same place."""
     value = factor * value
-    tail = unit if unit == '°' else f' {unit}' if unit else ''
+    tail = unit if unit.startswith('°') else f' {unit}' if unit else ''
     if std is None or not isfinite(std) or std <= 0.0:
         return f'{_signed(f"{value:.4g}")}{tail}'
     std = factor * std

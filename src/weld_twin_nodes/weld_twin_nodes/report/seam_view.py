@@ -10,7 +10,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .charts import Axis, Line, chart
 from .html import Html, joined, section, tag
-from .quantities import MISSING, millimetres
+from .quantities import MISSING, counted, millimetres
 from .switches import along, as_it_is, drawn, parted, static, switches, trusted
 
 _LINE = (
@@ -156,7 +156,7 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     title = recording.name if recording is not None else f'recording {k + 1}'
     outliers = int((~trusted(diagnosis, k)).sum())
     if outliers:
-        title += f' ({outliers} outlier{"s"[: outliers > 1]} not drawn)'
+        title += f' ({counted(outliers, "sample")} left out: see the data)'
     return chart(title, along(diagnosis, k)[index], lines, axes, key=f'run{k}', from_zero=True)
 
 

@@ -24,7 +24,8 @@ def shrink_section(diagnosis: Diagnosis) -> Html:
         leftover(diagnosis),
         id_='shrink',
         lead='RMS gap as each effect is put into the twin in turn, each stretch of the recordings '
-        'predicted from the others.',
+        'predicted from the others. At each step the effects that are in are fitted anew, so one can '
+        'take up a part of another: a card, which leaves the others as they are, may say otherwise.',
     )
 
 

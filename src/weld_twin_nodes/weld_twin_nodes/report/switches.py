@@ -14,8 +14,8 @@ from weld_twin_core.diagnosis.result import Cause, Diagnosis, Site
 from weld_twin_core.recording import Recording
 
 from .charts import thinned
+from .words import CURVES, listed, site_name, someplace
 from .words import cause as called
-from .words import listed, site_name, someplace
 
 MOST = 8
 """Causes with a switch of their own; the others share one."""
@@ -24,7 +24,6 @@ _POINTS = 6000
 """Points of all recordings and lines together: half a megabyte on the page."""
 _NAMED = 3
 """Names in a heading; more are counted."""
-_CURVES = ('joint_curve', 'frame_curve')
 
 
 class Switch(NamedTuple):
@@ -36,7 +35,7 @@ class Switch(NamedTuple):
 
 def cause_name(diagnosis: Diagnosis, cause: Cause) -> str:
     """Return a cause as a heading: every name it may have, or its place where it has none."""
-    named = [site for site, _ in cause.name if site.effect not in _CURVES]
+    named = [site for site, _ in cause.name if site.effect not in CURVES]
     if not named:
         return someplace(cause)
     if diagnosis.families and len(named) > 1:

@@ -15,10 +15,11 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from ..offline.where_it_holds import where_it_holds
 from .cause_levels import LEVEL_HEADS, level_row
+from .cause_list import rivalry, slots
 from .changed_section import CHANGED_HEADS, changed_rows, nothing_changed
 from .contact_clouds import contacts_told
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
-from .quantities import change, millimetres, odds, parameter_rows
+from .quantities import change, millimetres, parameter_rows
 from .to_do import worth_doing
 from .words import STATUS, found_name, listed, mended, site_name, verdict
 
@@ -122,16 +123,19 @@ def _print_levels(diagnosis: Diagnosis, console: Console) -> None:
 
 
 def _print_candidates(diagnosis: Diagnosis, console: Console) -> None:
-    rows = [
-        [
-            site_name(item.site),
-            odds(item.probability),
-            millimetres(item.rms_after_m),
-            change(item.shrink),
+    rows = []
+    for slot in slots(diagnosis.candidates):
+        rows += [
+            [
+                site_name(item.site),
+                rivalry(item, slot[0].probability),
+                millimetres(item.rms_after_m),
+                change(item.shrink),
+            ]
+            for item in slot
         ]
-        for item in diagnosis.candidates[:_MOST]
-    ]
-    _print_table(console, 'candidates', ('effect', 'probability', 'gap left', 'change'), rows)
+    heads = ('effect', 'against the likeliest', 'gap left', 'change')
+    _print_table(console, 'candidates', heads, rows[:_MOST])
 
 
 def _print_table(

@@ -11,7 +11,8 @@ from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.advice.inseparable import ELSE, way
 from weld_twin_core.diagnosis.result import Diagnosis, Site
 
-from .words import found_name, listed, open_sets, open_sites, site_name, site_of
+from .mending import look_at, warning
+from .words import found_name, listed, open_sets, open_sites, site_name, site_of, unnamed
 
 _LARGEST = 3
 """Actions told; the others are counted."""
@@ -29,8 +30,10 @@ def worth_doing(diagnosis: Diagnosis) -> list[str]:
         more = len(diagnosis.actions) - _LARGEST
         smaller = f'{more} smaller ones are in diagnosis.json.'
         return [TOGETHER, *diagnosis.actions[:_LARGEST], smaller]
-    if diagnosis.status != 'ambiguous' or len(diagnosis.actions) != len(diagnosis.effects):
+    if len(diagnosis.actions) != len(diagnosis.effects) or diagnosis.families:
         return list(diagnosis.actions)
+    if diagnosis.status != 'ambiguous':
+        return _mending(diagnosis)
     settled = _settled(diagnosis)
     mending = _mending(diagnosis)
     first = [mending[k] for k in settled]
@@ -74,24 +77,41 @@ def made_for(wanted: Mapping[str, Any] | None, group: Sequence[Site]) -> bool:
 
 
 def _mending(diagnosis: Diagnosis) -> list[str]:
-    """Return what mends each effect; of those that stand in an open set, under a condition."""
+    """
+    Return what mends each effect; of those that stand in an open set, under a condition.
+
+    Where mending one alone makes the worst spot worse, that is said beside it.
+    """
     unsure = open_sites(diagnosis)
+    found = [Site(effect.name, effect.site) for effect in diagnosis.model.found]
+    held = {found[m]: k for k, c in enumerate(diagnosis.causes) for m in c.members
+            if m < len(found)}  # fmt: skip
     out = []
-    for found, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
-        if site_of(found) in unsure:
-            action = f'Should it be {found_name(found)}: {action[:1].lower()}{action[1:]}'
-        out.append(action)
+    for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
+        if site_of(named) in unsure:
+            action = f'Should it be {found_name(named)}: {action[:1].lower()}{action[1:]}'
+        worse = warning(diagnosis, held[site_of(named)]) if site_of(named) in held else ''
+        out.append(f'{action} {worse}'.rstrip())
     return out
 
 
 def _looking(diagnosis: Diagnosis) -> list[str]:
     """Return where to look, and what to measure, while no cause has a name."""
-    members = [k for cause in diagnosis.causes for k in cause.members]
-    held = [diagnosis.model.found[k] for k in members if k < len(diagnosis.model.found)]
-    told = list(dict.fromkeys(actions(held[:_LARGEST], diagnosis.model.robot)))
+    told = [_at(diagnosis, k) for k in range(len(diagnosis.causes))[:_LARGEST]]
+    told = [text for text in told if text]
     if diagnosis.next_experiment is not None:
         told.append(f'Measure what {_proposed(diagnosis)} proposes, and diagnose all together.')
     return told
+
+
+def _at(diagnosis: Diagnosis, k: int) -> str:
+    """Return where to look for a cause, or what mends it where it has a name of its own."""
+    cause = diagnosis.causes[k]
+    if unnamed(cause):
+        return ' '.join(look_at(diagnosis, k))
+    found = diagnosis.model.found
+    held = [found[m] for m in cause.members if m < len(found)]
+    return ' '.join(actions(held, diagnosis.model.robot))
 
 
 def _proposed(diagnosis: Diagnosis) -> str:

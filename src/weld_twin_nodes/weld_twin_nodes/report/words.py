@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
 
-from .quantities import both_angles, millimetres, odds, percent, turns_only
+from .quantities import STAYS, both_angles, millimetres, odds, percent, turns_only
 
 CAUSES = {
     'joint_offset': 'zero offset',
@@ -102,6 +102,8 @@ DEPENDENCES = {
     'time': 'the time',
     'place': 'the place in the workspace',
 }
+CURVES = ('joint_curve', 'frame_curve')
+"""What stands where nothing has a name."""
 _EFFECT = re.compile(rf'\b({"|".join(name for name in CAUSES if "_" in name)})\b')
 """Names as files have them, which a sentence may bring along."""
 _NAMED = 3
@@ -130,6 +132,11 @@ def in_words(reason: str, sites: Iterable[Site]) -> str:
         reason = reason.replace(str(site), site_name(site))
     reason = _EFFECT.sub(lambda found: CAUSES[found[0]], reason)
     return f'{reason[:1].upper()}{reason[1:].rstrip(".")}.'
+
+
+def unnamed(cause: Cause) -> bool:
+    """Tell whether no effect of the library is named for a cause."""
+    return all(site.effect in CURVES for site, _ in cause.name)
 
 
 def place_name(at: str) -> str:
@@ -278,7 +285,7 @@ def carries_curves(diagnosis: Diagnosis) -> bool:
     """Return whether the twin carries curves in place of effects with a name."""
     # Beside many small errors a curve is one of them, and stands for no cause.
     alone = not diagnosis.families
-    return alone and any(e.name in ('joint_curve', 'frame_curve') for e in diagnosis.model.found)
+    return alone and any(e.name in CURVES for e in diagnosis.model.found)
 
 
 def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
@@ -287,12 +294,16 @@ def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
     shrink = diagnosis.shrink
     first = (
         f'The gap of {millimetres(diagnosis.gap.rms_m)} comes mostly from '
-        f'{cause_words(cause)} ({percent(cause.share)} of it); no effect in the library'
-        f'{_without(diagnosis)} explains it.'
+        f'{cause_words(cause)}; no effect in the library{_without(diagnosis)} explains it.'
+    )
+    before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)
+    change = (
+        f'A curve in its place takes {percent(1.0 - shrink.ratio)} off: {before} shrinks to {after}'
+        if shrink.ratio < STAYS
+        else f'No curve in its place takes it off: {before} becomes {after}'
     )
     second = (
-        f'With its curve in the twin, {millimetres(shrink.rms_before_m)} shrinks to '
-        f'{millimetres(shrink.rms_after_m)} on data not used for fitting; the noise floor is '
+        f'{change} on data not used for fitting; the noise floor is '
         f'{millimetres(diagnosis.gap.noise_floor_m)}.'
     )
     return first, second

@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...arm.robot import Robot
+from ...arrays import Array
 from ...effects.effect import Effect
-from .readable import frame, metres, number, radians, size
+from .readable import frame, metres, number, radians, size, turn
 
 Sentence = Callable[[Effect, Robot], str]
 
@@ -69,13 +70,24 @@ def _row(parameter: str, key: str, words: str) -> Sentence:
     return sentence
 
 
+_OF_THE_BASE = 'of the base'
+"""A frame that moves turns about axes through its own origin."""
+
+
+def _of_the_base(step: Array) -> str:
+    return frame(step, 'of the measuring frame', _OF_THE_BASE)
+
+
 def _base_pose(effect: Effect, robot: Robot) -> str:
-    moved = frame(effect.vector())
-    return f'Correct the base frame by {moved}; check the bolts of the pedestal if it was right.'
+    moved = _of_the_base(effect.vector())
+    return (
+        f'Correct the base frame by {moved}. If it was right when it was measured, the arm has '
+        'moved: check the bolts of its foot.'
+    )
 
 
 def _tool_pose(effect: Effect, robot: Robot) -> str:
-    moved = frame(effect.vector())
+    moved = frame(effect.vector(), 'of the flange', 'of the tool')
     return f'Correct the tool centre point by {moved}; a bent torch looks like this too.'
 
 
@@ -124,43 +136,43 @@ def _backlash(effect: Effect, robot: Robot) -> str:
     if effect.form == 'coast':  # type: ignore[attr-defined]
         return (
             f'Approach stations with {effect.site} always from one side, or preload its gear: '
-            f'where it stops it coasts across {radians(_value(effect, "width"))} of play and '
+            f'where it stops it coasts across {turn(_value(effect, "width"))} of play and '
             'rests ahead of its command.'
-        ).replace('+', '')
+        )
     return (
-        f'Service the gear of {effect.site}: it has {radians(_value(effect, "width"))} of play; '
+        f'Service the gear of {effect.site}: it has {turn(_value(effect, "width"))} of play; '
         'until then approach seams from one side.'
-    ).replace('+', '')
+    )
 
 
 def _hysteresis(effect: Effect, robot: Robot) -> str:
     return (
         f'Compensate the lost motion of {effect.site}, or approach seams from one side: it trails '
-        f'by {radians(_value(effect, "amplitude"))} once it has turned '
-        f'{radians(3.0 * _value(effect, "travel"))} one way; see to its gear if that grows.'
-    ).replace('+', '')
+        f'by {turn(_value(effect, "amplitude"))} once it has turned '
+        f'{turn(3.0 * _value(effect, "travel"))} one way; see to its gear if that grows.'
+    )
 
 
 def _friction(effect: Effect, robot: Robot) -> str:
     return (
         f'Give the controller of {effect.site} feed-forward against friction, and see to its '
-        f'lubrication: in motion it trails by {radians(_value(effect, "windup"))}.'
-    ).replace('+', '')
+        f'lubrication: in motion it trails by {turn(_value(effect, "windup"))}.'
+    )
 
 
 def _loaded_play(effect: Effect, robot: Robot) -> str:
     return (
         f'Service or preload the gear of {effect.site}: its load lays it on one flank or the other '
-        f'of {radians(_value(effect, "width"))} of play.'
-    ).replace('+', '')
+        f'of {turn(_value(effect, "width"))} of play.'
+    )
 
 
 def _bearing_tilt(effect: Effect, robot: Robot) -> str:
     lean = float(np.linalg.norm(np.asarray(effect.lean)))  # type: ignore[attr-defined]
     return (
-        f'Look at the bearing of {effect.site}: its axis leans by {radians(lean)} once per turn; '
+        f'Look at the bearing of {effect.site}: its axis leans by {turn(lean)} once per turn; '
         'compensate the poses until it is replaced.'
-    ).replace('+', '')
+    )
 
 
 def _wear(effect: Effect, robot: Robot) -> str:
@@ -173,10 +185,14 @@ def _wear(effect: Effect, robot: Robot) -> str:
 
 def _joint_compliance(effect: Effect, robot: Robot) -> str:
     compliance = _value(effect, 'compliance')
-    stiffness = f'{1.0 / compliance:.3g} N m/rad' if compliance > 0.0 else 'no physical stiffness'
+    stiffness = (
+        f'a stiffness of {size(1e-3 / compliance)} kN m/rad'
+        if compliance > 0.0
+        else 'which no spring does'
+    )
     return (
-        f'Compensate the spring of {effect.site}: it yields '
-        f'{number(np.degrees(compliance * 1e2))} deg under 100 N m ({stiffness}).'
+        f'Compensate the yielding of {effect.site} under load: {radians(compliance * 1e2)} under '
+        f'100 N m, {stiffness}.'
     )
 
 
@@ -258,8 +274,8 @@ def _vibration(effect: Effect, robot: Robot) -> str:
 def _quantization(effect: Effect, robot: Robot) -> str:
     return (
         f'Read {effect.site} with a finer encoder or more digits: it is rounded to '
-        f'{radians(_value(effect, "step"))}.'
-    ).replace('+', '')
+        f'{turn(_value(effect, "step"))}.'
+    )
 
 
 def _measurement_scale(effect: Effect, robot: Robot) -> str:
@@ -297,14 +313,14 @@ def _refraction(effect: Effect, robot: Robot) -> str:
 
 def _setup_step(effect: Effect, robot: Robot) -> str:
     return (
-        f'Fasten the set-up: it moved by {frame(-effect.vector()[:6])} at '
+        f'Fasten the set-up: it moved by {_of_the_base(-effect.vector()[:6])} at '
         f'{_value(effect, "time"):.4g} s; measure what came before and after apart.'
     )
 
 
 def _setup_settling(effect: Effect, robot: Robot) -> str:
     return (
-        f'Let the set-up settle before measuring: it started {frame(effect.vector()[:6])} from '
+        f'Let the set-up settle before measuring: it started {_of_the_base(effect.vector()[:6])} from '
         'where it ended.'
     )
 
@@ -315,35 +331,36 @@ def _joint_slip(effect: Effect, robot: Robot) -> str:
     far = f'{size * 1e3:+.3g} mm' if robot.prismatic[at] else radians(size)
     return (
         f'See to the belt, coupling and encoder of {effect.site}: it slipped by {far} at '
-        f'{_value(effect, "time"):.4g}; then master it again.'
+        f't = {_value(effect, "time"):.4g}; then master it again.'
     )
 
 
 def _tool_slip(effect: Effect, robot: Robot) -> str:
     return (
-        f'Fasten the tool or the reflector: it moved by {frame(effect.vector()[:6])} at '
-        f'{_value(effect, "time"):.4g}; measure its centre point again.'
+        f'Fasten the tool or the reflector: it moved by '
+        f'{frame(effect.vector()[:6], "of the flange", "of the tool")} at '
+        f't = {_value(effect, "time"):.4g}; measure its centre point again.'
     )
 
 
 def _instrument_knock(effect: Effect, robot: Robot) -> str:
     return (
-        f'Fasten the instrument and the base: one moved by {frame(effect.vector()[:6])} at '
-        f'{_value(effect, "time"):.4g}; measure what came before and after apart.'
+        f'Fasten the instrument and the base: one moved by {_of_the_base(effect.vector()[:6])} at '
+        f't = {_value(effect, "time"):.4g}; measure what came before and after apart.'
     )
 
 
 def _joint_curve(effect: Effect, robot: Robot) -> str:
     return (
         f'Look at {effect.site}: it is off by a curve over the {effect.on} that no known effect '
-        'gives; until that is found, compensate the motion with the curve.'
+        'gives.'
     )
 
 
 def _frame_curve(effect: Effect, robot: Robot) -> str:
     return (
         f'Look at the {effect.at}: it moves over the {effect.on} in a way that no known effect '
-        'gives; until that is found, compensate the motion with the curve.'
+        'gives.'
     )
 
 

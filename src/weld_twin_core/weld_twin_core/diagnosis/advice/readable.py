@@ -36,21 +36,36 @@ def metres(value: float) -> str:
 
 
 def radians(value: float) -> str:
-    """Return a signed angle [rad] in degrees and mrad."""
-    return f'{number(np.degrees(value))} deg ({number(value * 1e3)} mrad)'
+    """Return a signed angle [rad] in degrees."""
+    return f'{number(np.degrees(value))} deg'
 
 
-def frame(step: Array) -> str:
-    """Return a displacement [m] and a turn [rad] of a frame, shape (6,), in mm and degrees."""
+def turn(value: float) -> str:
+    """Return an angle [rad] in degrees without its sign."""
+    return f'{size(np.degrees(value))} deg'
+
+
+def frame(step: Array, shifted: str, turned: str) -> str:
+    """
+    Return a displacement [m] and a turn [rad] of a frame, shape (6,), in mm and degrees.
+
+    Parameters
+    ----------
+    step : array, shape (6,) [m, rad]
+    shifted, turned : str
+        Whose axes they are along and about, such as 'of the measuring frame'.
+
+    """
     moved = _axes(np.asarray(step[:3]) * 1e3, LEAST_MM, 'mm along', 3)
-    turned = _axes(np.degrees(step[3:]), LEAST_DEG, 'deg about', 4)
-    return ' and '.join(filter(None, [moved, turned])) or 'less than 0.005 mm'
+    about = _axes(np.degrees(step[3:]), LEAST_DEG, 'deg about', 4)
+    told = [f'{moved} {shifted}' if moved else '', f'{about} {turned}' if about else '']
+    return ' and '.join(filter(None, told)) or 'less than 0.005 mm'
 
 
 def _axes(values: Array, least: float, words: str, places: int) -> str:
     """Return the parts that are worth entering, each with its axis."""
     parts = [
-        f'{value:+.{places}f} {words} {axis}'
+        f'{value:+.{places}f} {words} axis {axis}'
         for value, axis in zip(values.tolist(), 'xyz', strict=True)
         if abs(value) >= least
     ]

@@ -26,6 +26,7 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_nodes.fleet.ranking_page import ranking_page
     from weld_twin_nodes.offline.content_hash import digest
     from weld_twin_nodes.offline.output_directory import new_directory
+    from weld_twin_nodes.report.quantities import counted
 
     def file(cell: str) -> str:
         return f'cell_{digest(cell)[:16]}.html'
@@ -35,5 +36,5 @@ def run(args: argparse.Namespace) -> int:
         for cell in cells:
             write_text(place / file(cell), cell_page(database, cell, INDEX))
         write_text(place / INDEX, ranking_page(database, file))
-    print(f'{args.out}/{INDEX}: {len(cells)} cells')
+    print(f'{args.out}/{INDEX}: {counted(len(cells), "cell")}')
     return 0

@@ -40,6 +40,7 @@ def run(args: argparse.Namespace) -> int:
         since,
     )
     from weld_twin_nodes.history.tracking import DAY, changed
+    from weld_twin_nodes.report.quantities import counted
 
     limits = _limits(args.limit)
     with opened(args) as database:
@@ -57,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({'cell': args.cell, 'diagnoses': len(seen), 'changes': rows}, indent=2))
         return 0
     if not found:
-        print(f'{args.cell}: nothing changed by more than chance in {len(seen)} diagnoses')
+        many = counted(len(seen), 'diagnosis', 'diagnoses')
+        print(f'{args.cell}: nothing changed by more than chance in {many}')
     for change, told in zip(found, ahead, strict=True):
         print(f'{args.cell}: {sentence(change)}')
         if told is not None:

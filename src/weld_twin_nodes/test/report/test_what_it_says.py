@@ -1,0 +1,201 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the sheet says holds together: one figure for one thing, and what is not known is said."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import diagnoses
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis.result import Candidate, Check, Site, Where
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_nodes.report import report_page
+from weld_twin_nodes.report.belief import belief_of
+from weld_twin_nodes.report.controllers import correction
+from weld_twin_nodes.report.diagnosis_page import Sheet
+from weld_twin_nodes.report.mending import left_without
+from weld_twin_nodes.report.quantities import counted
+from weld_twin_nodes.report.to_do import worth_doing
+from weld_twin_nodes.report.words import verdict
+
+PLAY = diagnoses.backlash()
+CIRCLE = diagnoses.circle()
+
+
+def plain(text):
+    return re.sub(r'\s+', ' ', re.sub('<[^>]+>', ' ', text))
+
+
+def part(page, start, end):
+    return plain(page[page.index(start) : page.index(end)])
+
+
+def unknown(size):
+    """Return play that a curve over the angle stands for, by so much at the ends of the angle."""
+    robot = load('kuka_kr6_r900')
+    seam = [diagnoses.moving(robot, 'circle')]
+    ends = [float(end(seam[0].joints.q[:, 2])) for end in (np.min, np.max)]
+    play = {'effect': 'backlash', 'joint': 'joint_a3', 'width': 8e-4}
+    curve = {'effect': 'joint_curve', 'joint': 'joint_a3', 'values': [-size, size], 'knots': ends}
+    case = diagnoses.diagnosis('unknown', robot, [play], [curve], seam, effects=())
+    cause = replace(
+        case.causes[0],
+        dependence=(('direction', 0.8),),
+        share=0.97,
+        share_ci90=(0.7, 1.0),
+    )
+    return replace(case, causes=(cause,))
+
+
+def test_of_an_unknown_cause_the_headline_has_what_is_taken_off_unseen_data_and_nothing_else():
+    case = unknown(1e-4)
+    first, second = map(plain, verdict(case))
+    assert '97 %' not in first and 'depending on the direction of motion' in first
+    gone = round(100 * (1 - case.shrink.ratio))
+    assert f'takes {gone} % off' in second or 'No curve in its place' in second
+    page = report_page(case)
+    taken = 100 * (1 - case.shrink.ratio**2)
+    told = part(page, 'bars wide shares', 'class="cards"')
+    assert re.search(r'97 % \(70 to 100 %\); its curve takes off [<\d]', told)
+    figure = float(re.search(r'its curve takes off (?:< )?(\d+) %', told)[1])
+    assert figure == pytest.approx(max(taken, 0.0), abs=1.0)
+    assert 'With its curve' in part(page, 'class="cards"', 'id="seam"')
+
+
+@pytest.mark.parametrize('size', [-8e-4, 1e-4])
+def test_a_curve_that_makes_the_worst_spot_worse_is_never_advised(size):
+    case = unknown(size)
+    worse = left_without(case, 0)
+    told = ' '.join(worth_doing(case))
+    assert ('Do not correct programs by its curve' in told) is (
+        worse.largest_after > 1.02 * worse.largest
+    )
+    assert 'Look at joint_a3, at gear, belt and bearing' in told
+    if size < 0.0:
+        card = part(report_page(case), 'class="cards"', 'id="seam"')
+        assert 'the curve makes the worst spot worse' in card and 'can be corrected' not in card
+
+
+def test_a_named_cause_whose_mending_alone_makes_it_worse_is_to_be_mended_with_the_others():
+    two = [
+        {'effect': 'joint_offset', 'joint': 'joint_a2', 'offset': 8e-4},
+        {'effect': 'joint_offset', 'joint': 'joint_a3', 'offset': -8e-4},
+    ]
+    robot = load('kuka_kr6_r900')
+    seam = [diagnoses.moving(robot, 'circle')]
+    case = diagnoses.diagnosis('identified', robot, two, two, seam, actions=('One.', 'Two.'))
+    grows = [left_without(case, k).grows for k in (0, 1)]
+    told = ['mend it together with the others' in text for text in worth_doing(case)]
+    assert told == grows and any(grows)
+
+
+def test_a_cause_has_one_figure_of_belief_and_no_part_is_less_sure_than_the_whole():
+    cause = replace(PLAY.causes[0], name=((Site('backlash', 'elbow_joint'), 0.76),))
+    case = replace(PLAY, causes=(cause,), confidence=0.96)
+    assert belief_of(case, cause) == 0.96
+    card = report_page(case)
+    card = card[card.index('How sure') : card.index('<dt>Value')]
+    seen = plain(re.sub('<details.*?</details>', '', card, flags=re.DOTALL))
+    assert re.findall(r'\d+ %', seen) == ['96 %'] and 'that it is backlash of elbow_joint' in seen
+
+
+def test_the_whole_says_why_it_is_less_sure_than_its_parts():
+    causes = tuple(
+        replace(c, name=((c.name[0][0], p),))
+        for c, p in zip(CIRCLE.causes, (0.98, 0.9, 0.8), strict=True)
+    )
+    top = part(report_page(replace(CIRCLE, causes=causes, confidence=0.7)), 'Confidence', '</dl>')
+    assert 'All at once is less likely than each alone: 98 %, 90 %, 80 %' in top
+    even = replace(CIRCLE, causes=causes, confidence=0.98)
+    assert 'less likely than each' not in part(report_page(even), 'Confidence', '</dl>')
+
+
+def test_of_causes_that_fit_alike_the_figure_is_that_of_the_set():
+    case = diagnoses.ambiguous()
+    names = tuple((site, 0.32) for site in case.indistinguishable[0])
+    case = replace(case, confidence=0.48, causes=(replace(case.causes[0], name=names),))
+    card = part(report_page(case), 'How sure', '<dt>Value')
+    assert '64 % that it is one of these; which of them is open.' in card
+    places = part(report_page(case), 'By place', 'By what it depends on')
+    assert 'joint_a1 or the base' in places
+
+
+def test_rivals_are_weighed_against_each_other_without_a_second_figure_of_belief():
+    rivals = [Candidate(Site(name, 'joint_a1'), p, 1e-4, 0.5)
+              for name, p in (('joint_offset', 0.49), ('axis_parallelism', 0.48),
+                              ('friction', 0.02), ('backlash', 1e-6))]  # fmt: skip
+    page = report_page(replace(diagnoses.ambiguous(), candidates=tuple(rivals)))
+    told = part(page, 'Candidates against each other', 'cannot tell apart')
+    for words in ('the likeliest', 'as likely', '24 times less', 'more than 1000 times less'):
+        assert words in told
+    assert '49 %' not in told
+
+
+def test_where_rivals_could_not_be_tried_nothing_is_said_to_be_settled():
+    assert 'Nothing: in these recordings no other effect' in report_page(PLAY)
+    still = {'friction': 'the joint hardly moves (wrist_1_joint)', 'drift': 'excluded by the user'}
+    page = plain(report_page(replace(PLAY, absent=still)))
+    assert 'no other effect looks like' not in page and 'No further measurement' not in page
+    assert page.count('wrist_1_joint hardly moves, so friction could not be tried there') == 2
+    assert 'Drift of the frame was not tried, as asked.' in page
+
+
+def test_samples_left_out_are_told_as_that_beside_an_instrument_without_outliers():
+    good = [np.ones(len(t), bool) for t in PLAY.traces.t]
+    good[0][:18] = False
+    fine = Check('outliers', 'ok', 'No measurement lies far off the rest.')
+    case = replace(PLAY, checks=(fine,), traces=replace(PLAY.traces, trusted=tuple(good)))
+    page = plain(report_page(case))
+    assert 'seam_run (18 samples left out: see the data)' in page
+    assert 'left out 18 of' in page and 'outliers not drawn' not in page
+
+
+@pytest.mark.parametrize(
+    ('brand', 'told'),
+    [
+        ('fanuc', 'enter what it reads now plus 0.0687 deg'),
+        ('abb', '0.001198 rad at the joint times the ratio of its gear'),
+        ('yaskawa', 'by 0.0687 deg. It counts pulses'),
+        ('ur', '0.001198 rad here'),
+        ('kuka', '$MAMES, in degrees'),
+    ],
+)
+def test_what_a_controller_asks_for_is_told_in_its_unit(brand, told):
+    zero = effect_from_mapping({'effect': 'joint_offset', 'joint': 'j5', 'offset': 1.1984e-3})
+    assert told in correction(zero, brand) and 'MASTER_COUN' not in correction(zero, brand)
+
+
+def test_the_table_of_joints_has_no_empty_columns():
+    shares = np.zeros((6, len(diagnoses.REGRESSORS)))
+    shares[2, 3] = 0.4
+    where = replace(PLAY.where, map_shares=tuple(map(tuple, shares)))
+    page = report_page(replace(PLAY, where=where))
+    heads = re.findall('scope="col">(.*?)</th>', page[page.index('class="map"') :])
+    assert [plain(h).strip() for h in heads[:2]] == ['Joint [%]', 'reversal']
+    assert page.count('data-joint=') == 6 and 'acceleration' not in heads
+    assert 'No joint alone could explain 0.5 % by constant, angle, low order' in plain(page)
+
+
+def test_stretches_that_are_nearly_equal_are_told_as_even():
+    def told(sizes):
+        path = tuple((float(k), k + 1.0, 0.1, 1e-3 * v) for k, v in enumerate(sizes))
+        where: Where = replace(PLAY.where, path=path)
+        return plain(report_page(replace(PLAY, where=where)))
+
+    assert 'Evenly along the seam: 0.310 mm to 0.350 mm RMS' in told([0.31, 0.35, 0.33])
+    assert 'Evenly' not in told([0.31, 0.55, 0.33])
+
+
+def test_one_is_no_plural():
+    assert [counted(k, 'cell') for k in (0, 1, 2)] == ['0 cells', '1 cell', '2 cells']
+    assert counted(1, 'diagnosis', 'diagnoses') == '1 diagnosis'
+
+
+def test_the_first_screen_has_degrees_and_no_milliradians():
+    page = report_page(replace(CIRCLE, actions=()), sheet=Sheet())
+    assert 'mrad' not in part(page, 'id="verdict"', 'id="acceptance"')

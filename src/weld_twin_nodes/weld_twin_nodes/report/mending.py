@@ -1,0 +1,121 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What mending one cause leaves, and where that would make the seam worse."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .quantities import STAYS, millimetres
+from .switches import as_it_is, squares, switches, trusted
+from .words import DEPENDENCES, place_name, unnamed
+
+_GROWS = 1.02
+"""Ratio of the largest deviation after to before from which it is told as grown: less than that is
+a matter of which sample has the largest noise."""
+_APART = 0.02
+"""Share of the squared gap by which a curve may fall short of its place before both are told."""
+_LOOK = {
+    'constant': 'its zero and its frame',
+    'angle': 'its gear and encoder',
+    'direction': 'gear, belt and bearing, for play and friction',
+    'speed': 'gains and feed-forward of its drive, and the clocks',
+    'acceleration': 'what is loose or soft',
+    'load': 'what yields: gear, bearing, mount',
+    'temperature': 'what grows warm',
+    'time': 'what creeps, slips or wears',
+    'place': 'the instrument and its line of sight',
+}
+"""Where a fitter looks first when a cause has no name, by what it depends on."""
+
+
+class Left(NamedTuple):
+    """RMS and largest deviation [m], as it is and with one cause mended."""
+
+    rms: float
+    rms_after: float
+    largest: float
+    largest_after: float
+
+    @property
+    def grows(self) -> bool:
+        """Tell whether the worst spot gets worse."""
+        return self.largest_after > _GROWS * self.largest
+
+
+def left_without(diagnosis: Diagnosis, k: int) -> Left | None:
+    """Return what is left with cause ``k`` alone mended; None where it cannot be thought away."""
+    told = diagnosis.contributions
+    for at, switch in enumerate(switches(diagnosis)):
+        if switch.members == (k,) and told is not None:
+            products = np.array(squares(diagnosis))
+            on = np.ones(products.shape[0])
+            before = np.sqrt(on @ products @ on)
+            on[1 + at] = 0.0
+            after = np.sqrt(max(float(on @ products @ on), 0.0))
+            most = [0.0, 0.0]
+            for run, parts in enumerate(told.parts):
+                whole, good = as_it_is(diagnosis, run), trusted(diagnosis, run)
+                for i, left in enumerate((whole, whole - parts[k])):
+                    size = float(np.linalg.norm(left[good], axis=1).max(initial=0.0))
+                    most[i] = max(most[i], size)
+            return Left(1e-3 * float(before), 1e-3 * float(after), *most)
+    return None
+
+
+def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
+    """
+    Return the share of the squared gap that the curve of a cause without a name takes off.
+
+    None where the cause has a name, or where its curve takes off what its place holds.
+    """
+    cause = diagnosis.causes[k]
+    left = left_without(diagnosis, k) if unnamed(cause) else None
+    if left is None:
+        return None
+    taken = max(1.0 - (left.rms_after / max(left.rms, 1e-300)) ** 2, 0.0)
+    return taken if taken < cause.share - _APART else None
+
+
+def warning(diagnosis: Diagnosis, k: int) -> str:
+    """Return that mending a cause makes the worst spot of the seam worse; nothing where not."""
+    left = left_without(diagnosis, k)
+    if left is None or not left.grows:
+        return ''
+    told = f'the largest deviation would grow from {_both(left)}'
+    if unnamed(diagnosis.causes[k]):
+        return f'Do not correct programs by its curve: {told}.'
+    return f'Not this alone: {told}; mend it together with the others.'
+
+
+def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
+    """Return where to look for a cause without a name, and whether its curve helps so long."""
+    cause = diagnosis.causes[k]
+    where = place_name(cause.place[0][0]) if cause.place else 'the whole cell'
+    first = f'Look at {where}: no known effect gives what is found there.'
+    if cause.dependence:
+        on = cause.dependence[0][0]
+        first = (
+            f'Look at {where}, at {_LOOK.get(on, "all that moves")} first: what is found there '
+            f'depends on {DEPENDENCES.get(on, on)}, and no known effect gives it.'
+        )
+    left = left_without(diagnosis, k)
+    if left is None:
+        return [first]
+    if left.grows:
+        return [first, warning(diagnosis, k)]
+    if left.rms_after > STAYS * left.rms:
+        return [first, 'Its curve takes hardly anything off: do not correct programs by it.']
+    return [
+        first,
+        'Until that is found, programs can be corrected by its curve (weld-twin correct-program): '
+        f'the largest deviation goes from {_both(left)}.',
+    ]
+
+
+def _both(left: Left) -> str:
+    return f'{millimetres(left.largest)} to {millimetres(left.largest_after)}'

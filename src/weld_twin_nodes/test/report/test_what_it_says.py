@@ -56,8 +56,7 @@ def test_of_an_unknown_cause_the_headline_has_what_is_taken_off_unseen_data_and_
     case = unknown(1e-4)
     first, second = map(plain, verdict(case))
     assert '97 %' not in first and 'depending on the direction of motion' in first
-    gone = round(100 * (1 - case.shrink.ratio))
-    assert f'takes {gone} % off' in second or 'No curve in its place' in second
+    assert '%' not in second and 'on data not used for fitting' in second
     page = report_page(case)
     taken = 100 * (1 - case.shrink.ratio**2)
     told = part(page, 'bars wide shares', 'class="cards"')
@@ -73,7 +72,7 @@ def test_a_curve_that_makes_the_worst_spot_worse_is_never_advised(size):
     worse = left_without(case, 0)
     told = ' '.join(worth_doing(case))
     assert ('Do not correct programs by its curve' in told) is (
-        worse.largest_after > 1.02 * worse.largest
+        worse.largest_after > 1.02 * worse.largest or worse.rms_after > 1.005 * worse.rms
     )
     assert 'Look at joint_a3, at gear, belt and bearing' in told
     if size < 0.0:
@@ -89,7 +88,8 @@ def test_a_named_cause_whose_mending_alone_makes_it_worse_is_to_be_mended_with_t
     robot = load('kuka_kr6_r900')
     seam = [diagnoses.moving(robot, 'circle')]
     case = diagnoses.diagnosis('identified', robot, two, two, seam, actions=('One.', 'Two.'))
-    grows = [left_without(case, k).grows for k in (0, 1)]
+    both = [left_without(case, k) for k in (0, 1)]
+    grows = [left.grows or left.rises for left in both]
     told = ['mend it together with the others' in text for text in worth_doing(case)]
     assert told == grows and any(grows)
 

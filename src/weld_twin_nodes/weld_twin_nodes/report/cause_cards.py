@@ -100,11 +100,15 @@ def _against(diagnosis: Diagnosis, shown: list[int]) -> str:
 
 def _curves(diagnosis: Diagnosis, shown: list[int]) -> str:
     """Return why a place holds more than its curve takes off, where that is so."""
-    if all(taken_by_curve(diagnosis, k) is None for k in shown):
+    first = next((k for k in shown if taken_by_curve(diagnosis, k) is not None), None)
+    left = None if first is None else left_without(diagnosis, first)
+    if left is None:
         return ''
+    value = percent(1.0 - (left.rms_after / left.rms) ** 2)
     return (
         ' What a place holds, its own motion tells; a curve stands for it only as well as curves '
-        'can, so it takes off less. Figures and pictures further down are with the curve.'
+        f'can, so it takes off less. {value} of the square off is {percent(left.rms_after / left.rms)} '
+        'of the RMS left; figures and pictures further down are with the curve.'
     )
 
 

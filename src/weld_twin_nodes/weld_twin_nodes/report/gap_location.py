@@ -87,8 +87,8 @@ def _summed(
 ) -> list[tuple[str, float, str]]:
     """Return shares by what is most probable of each cause; with the rest they make a whole."""
     sums: dict[str, float] = {}
-    for alternatives, share, word in told:
-        name = _likely(alternatives, word)
+    for beliefs, share, word in told:
+        name = _likely(beliefs, word)
         sums[name] = sums.get(name, 0.0) + share
     rows = sorted(sums.items(), key=lambda item: -item[1])
     rows = [row for row in rows if row[1] >= SEEN] + list(remainder(diagnosis))

@@ -10,7 +10,7 @@ import numpy as np
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from .quantities import STAYS, millimetres
+from .quantities import STAYS, UNCHANGED, millimetres
 from .switches import as_it_is, squares, switches, trusted
 from .words import DEPENDENCES, place_name, unnamed
 
@@ -45,6 +45,11 @@ class Left(NamedTuple):
     def grows(self) -> bool:
         """Tell whether the worst spot gets worse."""
         return self.largest_after > _GROWS * self.largest
+
+    @property
+    def rises(self) -> bool:
+        """Tell whether the whole gets worse."""
+        return self.rms_after > (1.0 + UNCHANGED) * self.rms
 
 
 def left_without(diagnosis: Diagnosis, k: int) -> Left | None:
@@ -84,9 +89,13 @@ def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
 def warning(diagnosis: Diagnosis, k: int) -> str:
     """Return that mending a cause makes the worst spot of the seam worse; nothing where not."""
     left = left_without(diagnosis, k)
-    if left is None or not left.grows:
+    if left is None or not (left.grows or left.rises):
         return ''
-    told = f'the largest deviation would grow from {_both(left)}'
+    told = (
+        f'the largest deviation would grow from {_both(left)}'
+        if left.grows
+        else f'the RMS would rise from {millimetres(left.rms)} to {millimetres(left.rms_after)}'
+    )
     if unnamed(diagnosis.causes[k]):
         return f'Do not correct programs by its curve: {told}.'
     return f'Not this alone: {told}; mend it together with the others.'
@@ -106,7 +115,7 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
     left = left_without(diagnosis, k)
     if left is None:
         return [first]
-    if left.grows:
+    if left.grows or left.rises:
         return [first, warning(diagnosis, k)]
     if left.rms_after > STAYS * left.rms:
         return [first, 'Its curve takes hardly anything off: do not correct programs by it.']

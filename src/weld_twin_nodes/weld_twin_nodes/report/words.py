@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
 
-from .quantities import STAYS, both_angles, millimetres, odds, percent, turns_only
+from .quantities import STAYS, both_angles, millimetres, odds, turns_only
 
 CAUSES = {
     'joint_offset': 'zero offset',
@@ -298,7 +298,7 @@ def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
     )
     before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)
     change = (
-        f'A curve in its place takes {percent(1.0 - shrink.ratio)} off: {before} shrinks to {after}'
+        f'With a curve in its place, {before} shrinks to {after}'
         if shrink.ratio < STAYS
         else f'No curve in its place takes it off: {before} becomes {after}'
     )

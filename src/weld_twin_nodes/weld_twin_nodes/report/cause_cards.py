@@ -37,8 +37,8 @@ from .switches import (
     trusted,
 )
 from .to_do import TOGETHER
-from .words import cause as named
 from .words import again_words, parameter_word, unnamed
+from .words import cause as named
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""

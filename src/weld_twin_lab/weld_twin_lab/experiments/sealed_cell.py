@@ -34,11 +34,10 @@ from ..blind.making import Case, draw_case
 from ..blind.poor_motion import WAYS
 from ..blind.recorded_motion import RATE, Motion
 from ..blind.seal import text_digest
-from ..plant.tracker import Tracker
 
 FOLLOWING, STATES = 30.0, 62.5
-"""Rates [Hz] of an instrument that follows the tool, and of the joint states beside it. Twice as many
-say hardly more, for neighbours err alike, and a diagnosis then takes longer."""
+"""Rates [Hz] of an instrument that follows the tool in an experiment, and of the joint states beside it.
+Twice as many say hardly more, for neighbours err alike, and a diagnosis then takes longer."""
 SECONDS = (12.0, 25.0)
 """Shortest and longest first recording [s], where the arm moves: what is poor stays poor."""
 STAY = 15.0
@@ -75,7 +74,7 @@ class SealedCell:
         self.name = f'{seed}-{number:04d}'
         # Few stations are poor; of a path there is no few.
         self.poor = str(rng.choice([w for w in WAYS if w != 'few' or lot.motion == 'stations']))
-        self._case: Case = _slower(draw_case(lot, rng, SECONDS, poor=self.poor))
+        self._case: Case = draw_case(lot, rng, SECONDS, poor=self.poor)
         self._changed: dict[str, SetUpChange] = {}
         self._salt = int(rng.integers(2**62))
         self.robot: Robot = self._case.cell.robot
@@ -111,8 +110,10 @@ class SealedCell:
         """
         rng = np.random.default_rng([seed, *name.encode()])
         cell = self._case.cell
-        if self.still and not motion.static:
-            cell = replace(cell, tracker=_following(cell.tracker))
+        if not motion.static:
+            # The same where an instrument that follows had to be set up first.
+            slower = replace(cell.tracker, rate=FOLLOWING, joint_rate=STATES)
+            cell = replace(cell, tracker=slower)
         if changed:
             self._changed[name] = set_up_change(changed)
             cell = replace(cell, robot=_changed(cell.robot, self._changed[name]))
@@ -158,17 +159,6 @@ class SealedCell:
     def judged(self, found: Mapping[str, Any]) -> Judged:
         """Return what a diagnosis is worth."""
         return judge(self.opened(), found)
-
-
-def _slower(case: Case) -> Case:
-    """Return the case with what follows the arm at the rates that are recorded here."""
-    if case.cell.tracker.rate is None:
-        return case
-    return replace(case, cell=replace(case.cell, tracker=_following(case.cell.tracker)))
-
-
-def _following(tracker: Tracker) -> Tracker:
-    return replace(tracker, rate=FOLLOWING, joint_rate=STATES)
 
 
 def _changed(robot: Robot, change: SetUpChange) -> Robot:

@@ -203,6 +203,7 @@ def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path):
             0,
             True,
         ),
+        (found(wanted=stations(sigma=0.5)), found(wanted=stations(sigma=0.5)), 0, True),
         # What was knocked between two recordings is sound in each.
         (found('unsound', confidence=None), found('unknown', groups=()), 1, False),
     ],

@@ -226,11 +226,14 @@ def _open_ends(found: Mapping[str, Any]) -> bool:
     Return whether causes are named beside each other that some motion would part.
 
     What can be parted among those named is asked first. So an experiment that asks something else
-    found no motion for it.
+    found no motion for it; nor did one that would part nothing.
     """
     wanted = found.get('next_experiment')
     if found['verdict']['status'] != 'ambiguous' or wanted is None:
         return bool(found['verdict']['status'] == 'ambiguous')
+    sigma = wanted['expected_separation_sigma']
+    if sigma is not None and sigma < NOTHING:
+        return False
     sides = [{(e['effect'], e.get('joint')) for e in side} for side in wanted.get('between') or ()]
     groups = [{(e['effect'], e.get('joint')) for e in group} for group in _sets(found)]
     open_ = len(sides) == 2 and any(sides[0] & group and sides[1] & group for group in groups)

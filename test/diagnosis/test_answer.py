@@ -62,7 +62,7 @@ ANSWERS = {
     'parallel': ((('link_offset', 'joint', 'elbow_joint', 'dd', 4e-4),), {}),
     'unknown': (
         (('backlash', 'joint', 'elbow_joint', 'width', 1.5e-3),),
-        {'exclude': ('backlash', 'friction', 'hysteresis')},
+        {'exclude': ('backlash', 'friction', 'hysteresis', 'gear_ratio_by_direction')},
     ),
     'points': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {'orientation': False}),
     'stations': (

@@ -277,17 +277,16 @@ class Place:
 
     def stepped(self, step: Array, align: frozenset[str]) -> Place:
         """Return the place after a step of frames and errors, in the order of `columns`."""
-        at, bases, tool = 0, list(self.bases), self.tool
+        frames = len(self.bases) * ('base' in align) + ('tool' in align)
+        moves = step[: 6 * frames].reshape(frames, 6)
+        turns = rotation_matrix(moves[:, 3:])
+        bases, tool = list(self.bases), self.tool
         if 'base' in align:
             for k, base in enumerate(bases):
-                turn = rotation_matrix(step[at + 3 : at + 6])
-                bases[k] = transform(turn @ base[:3, :3], base[:3, 3] + step[at : at + 3])
-                at += 6
+                bases[k] = transform(turns[k] @ base[:3, :3], base[:3, 3] + moves[k, :3])
         if 'tool' in align:
-            turn = rotation_matrix(step[at + 3 : at + 6])
-            tool = transform(tool[:3, :3] @ turn, tool[:3, 3] + step[at : at + 3])
-            at += 6
-        return replace(self, bases=tuple(bases), tool=tool, errors=self.errors + step[at:])
+            tool = transform(tool[:3, :3] @ turns[-1], tool[:3, 3] + moves[-1, :3])
+        return replace(self, bases=tuple(bases), tool=tool, errors=self.errors + step[6 * frames :])
 
     def model(self, before: Model) -> Model:
         """Return a model with these frames and errors."""

@@ -286,7 +286,9 @@ class Place:
                 bases[k] = transform(turns[k] @ base[:3, :3], base[:3, 3] + moves[k, :3])
         if 'tool' in align:
             tool = transform(tool[:3, :3] @ turns[-1], tool[:3, 3] + moves[-1, :3])
-        return replace(self, bases=tuple(bases), tool=tool, errors=self.errors + step[6 * frames :])
+        return replace(
+            self, bases=tuple(bases), tool=tool, errors=self.errors + step[6 * frames :]
+        )
 
     def model(self, before: Model) -> Model:
         """Return a model with these frames and errors."""

@@ -188,7 +188,9 @@ def _run(words: Sequence[str], place: Path, written: Path) -> Cost | None:
     """Return what one command costs; None where it fails."""
     shutil.rmtree(written, ignore_errors=True)
     filled = [word.replace('{data}', str(place)).replace('{out}', str(written)) for word in words]
-    quiet = {key: value for key, value in os.environ.items() if key != 'PYTHONPATH'}
+    # An installed program is compiled once, whatever the shell of this run says of that.
+    odd = ('PYTHONPATH', 'PYTHONDONTWRITEBYTECODE')
+    quiet = {key: value for key, value in os.environ.items() if key not in odd}
     start = time.perf_counter()
     process = subprocess.Popen(
         filled, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=quiet

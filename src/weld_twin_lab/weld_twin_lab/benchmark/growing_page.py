@@ -87,7 +87,7 @@ def page(found: Mapping[str, Points]) -> str:
                 f'{twice(points, "bytes"):.2f}',
             )
         )
-    return '# How the cost grows\n\n`weld-twin lab growth`, one thread.\n\n' + table(*rows)
+    return table(*rows)
 
 
 def draw(found: Mapping[str, Points], path: Path) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -124,12 +125,12 @@ class Distribution:
     @property
     def mean(self) -> float:
         """Return the mean within the bounds."""
-        return float(self.values(_MIDPOINTS).mean())
+        return _moments(self)[0]
 
     @property
     def std(self) -> float:
         """Return the standard deviation within the bounds."""
-        return float(self.values(_MIDPOINTS).std())
+        return _moments(self)[1]
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the keys of a tolerance file."""
@@ -182,3 +183,10 @@ def _below_triangle(value: float, low: float, mode: float, high: float) -> float
 
 _MIDPOINTS = (np.arange(2000) + 0.5) / 2000.0
 """Probabilities at which mean and deviation are summed."""
+
+
+@lru_cache(maxsize=1024)
+def _moments(one: Distribution) -> tuple[float, float]:
+    """Return mean and standard deviation; a study asks for those of its tolerances at every step."""
+    values = one.values(_MIDPOINTS)
+    return float(values.mean()), float(values.std())

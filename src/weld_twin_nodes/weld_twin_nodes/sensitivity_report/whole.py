@@ -9,20 +9,18 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core import sensitivity
-from weld_twin_core.arrays import Array
 from weld_twin_core.metrics.deviation import root_mean_square
 from weld_twin_core.sensitivity import (
     MorrisDesign,
     Outcomes,
     SobolDesign,
     Study,
-    Tolerance,
     ToleranceStack,
 )
 
 from ..offline.task_pool import Runner, Task
 from .setting import RECORDED, Setting, recorded_deviations
-from .work import local, placement, profiles, run_all, sweeps
+from .work import Job, local, placement, profiles, run_all, sweeps
 
 SCHEMA = 'weld_twin/sensitivity/1'
 OUTPUTS = ('d_norm', 'across_m', 'stickout_m')
@@ -33,9 +31,10 @@ def run_study(setting: Setting, runner: Runner) -> dict[str, Any]:
     """Return everything the study finds."""
     out: dict[str, Any] = {'schema': SCHEMA, 'setting': setting.describe(), 'motions': {}}
     designs = {name: _Designs(setting, name) for name in setting.studies}
-    pieces = _pieces(setting, runner)
+    asked = _pieces(setting)
     jobs = {k: v for name, d in designs.items() for k, v in d.jobs(setting.studies[name]).items()}
-    found = run_all(runner, jobs)
+    found, done = run_all(runner, jobs, list(asked.values()))
+    pieces = dict(zip(asked, done, strict=True))
     for name, design in designs.items():
         out['motions'][name] = {
             'local': pieces[name, 'local'],
@@ -53,13 +52,10 @@ def run_study(setting: Setting, runner: Runner) -> dict[str, Any]:
     return out
 
 
-def _pieces(setting: Setting, runner: Runner) -> dict[tuple[str, str], Any]:
-    """Return the results of the tasks that are one piece each."""
+def _pieces(setting: Setting) -> dict[tuple[str, str], Task]:
+    """Return the tasks that are one piece each, the longest first."""
     tasks: dict[tuple[str, str], Task] = {}
     tolerances = setting.tolerances
-    for name, study in setting.studies.items():
-        tasks[name, 'local'] = Task(local, (study, tolerances), f'{name}: local')
-        tasks[name, 'sweeps'] = Task(sweeps, (study, tolerances), f'{name}: sweeps')
     if setting.path is not None:
         seam = setting.robot, setting.path, tolerances
         tasks['', 'placement'] = Task(
@@ -68,7 +64,10 @@ def _pieces(setting: Setting, runner: Runner) -> dict[tuple[str, str], Any]:
             'placement',
         )
         tasks['', 'profiles'] = Task(profiles, seam, 'profiles')
-    return dict(zip(tasks, runner.run(list(tasks.values())), strict=True))
+    for name, study in setting.studies.items():
+        tasks[name, 'local'] = Task(local, (study, tolerances), f'{name}: local')
+        tasks[name, 'sweeps'] = Task(sweeps, (study, tolerances), f'{name}: sweeps')
+    return tasks
 
 
 class _Designs:
@@ -99,17 +98,19 @@ class _Designs:
     def _label(self, what: str) -> str:
         return f'{self._motion}: {what}'
 
-    def jobs(self, study: Study) -> dict[str, tuple[Study, tuple[Tolerance, ...], Array]]:
+    def jobs(self, study: Study) -> dict[str, Job]:
         """Return probabilities to run, by label."""
         effort, tolerances = self._setting.effort, self._setting.tolerances
         units = {f'Sobol by {by}': design.samples() for by, design in self._sobol.items()}
         units['Morris'] = self._morris.samples()
         stack = sensitivity.probabilities(effort.runs, len(tolerances), effort.seed)
         units['stack'] = stack
-        out = {self._label(what): (study, tolerances, unit) for what, unit in units.items()}
+        out: dict[str, Job] = {
+            self._label(what): (study, tolerances, unit, None) for what, unit in units.items()
+        }
         for effect in self._effects:
             halved = sensitivity.scaled(tolerances, {effect: 0.5})
-            out[self._label(f'{effect} halved')] = study, halved, stack
+            out[self._label(f'{effect} halved')] = study, tolerances, stack, halved
         return out
 
     def results(self, found: dict[str, tuple[Outcomes, float]]) -> dict[str, Any]:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -35,10 +36,20 @@ def _model(study: Study, tolerances: tuple[Tolerance, ...]) -> Model:
     return _models[key]
 
 
-def run_block(study: Study, tolerances: tuple[Tolerance, ...], unit: Array) -> dict[str, Any]:
-    """Return what the runs at probabilities (D, P) come to, and how exact the model is."""
+def run_block(
+    study: Study,
+    tolerances: tuple[Tolerance, ...],
+    unit: Array,
+    drawn: tuple[Tolerance, ...] | None = None,
+) -> dict[str, Any]:
+    """
+    Return what the runs at probabilities (D, P) come to, and how exact the model is.
+
+    ``drawn`` are narrower tolerances of the same errors that the runs are drawn from: the model of
+    the wider ones holds for them.
+    """
     model = _model(study, tolerances)
-    found = model.at_probabilities(unit)
+    found = model(sensitivity.draws_at(drawn or tolerances, unit))
     return {'model_error': model.error, **found._asdict()}
 
 
@@ -95,30 +106,38 @@ def claim_case(robot: Robot, seam: str, seed: int) -> dict[str, float]:
     return measure_case(robot, default_seam(robot, seam), seed)
 
 
+Job = tuple[Study, tuple[Tolerance, ...], Array, tuple[Tolerance, ...] | None]
+"""A study, its tolerances, probabilities (D, P) of its runs, and what they are drawn from if from
+narrower ones."""
+
+
 def run_all(
-    runner: Runner, jobs: dict[str, tuple[Study, tuple[Tolerance, ...], Array]]
-) -> dict[str, tuple[Outcomes, float]]:
+    runner: Runner, jobs: dict[str, Job], pieces: Sequence[Task] = ()
+) -> tuple[dict[str, tuple[Outcomes, float]], list[Any]]:
     """
-    Return what the runs of every job come to, and the largest error of its model.
+    Return what the runs of every job come to with the largest error of its model, and the pieces.
 
     Parameters
     ----------
     runner : Runner
-    jobs : mapping
-        From a label to a study, its tolerances and the probabilities (D, P) of its runs.
+    jobs : mapping from label to Job
+    pieces : sequence of Task
+        Begun first, the longest in front: what is left for the end is short then.
 
     """
-    tasks, owners = [], []
-    for label, (study, tolerances, unit) in jobs.items():
+    tasks, owners = list(pieces), []
+    for label, (study, tolerances, unit, drawn) in jobs.items():
         for start in range(0, len(unit), BLOCK):
             block = unit[start : start + BLOCK]
             text = f'{label}: runs {start} to {start + len(block)}'
-            tasks.append(Task(run_block, (study, tolerances, block), text))
+            tasks.append(Task(run_block, (study, tolerances, block, drawn), text))
             owners.append(label)
     parts: dict[str, list[dict[str, Any]]] = {label: [] for label in jobs}
-    for label, result in zip(owners, runner.run(tasks), strict=True):
+    results = runner.run(tasks)
+    for label, result in zip(owners, results[len(pieces) :], strict=True):
         parts[label].append(result)
-    return {label: (_joined(found), found[0]['model_error']) for label, found in parts.items()}
+    found = {label: (_joined(own), own[0]['model_error']) for label, own in parts.items()}
+    return found, results[: len(pieces)]
 
 
 def _joined(parts: list[dict[str, Any]]) -> Outcomes:

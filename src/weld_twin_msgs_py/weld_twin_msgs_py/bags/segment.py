@@ -111,6 +111,18 @@ class _Writer(Writer):
         StoragePlugin.MCAP: _McapWriter,
     }
 
+    def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
+        """Write a message as it is; a segment knows its connections, and asks nothing again."""
+        if not self.storage:
+            super().write(connection, timestamp, data)
+            return
+        self.storage.write(connection, timestamp, data)
+        self.counts[connection.id] += 1
+        if timestamp < self.min_timestamp:
+            self.min_timestamp = timestamp
+        if timestamp > self.max_timestamp:
+            self.max_timestamp = timestamp
+
 
 class Channel(NamedTuple):
     """

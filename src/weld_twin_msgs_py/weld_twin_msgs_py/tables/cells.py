@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -87,8 +88,12 @@ class Cells:
             A cell is no number; the message names line and column.
 
         """
+        column = self.column(name)
+        if self.decimal != ',':
+            with suppress(ValueError):  # as all columns are that are plain numbers
+                return np.array(list(map(float, column)))
         out = np.empty(len(self.rows))
-        for k, text in enumerate(self.column(name)):
+        for k, text in enumerate(column):
             if text.lower() in _EMPTY:
                 out[k] = np.nan
                 continue
@@ -199,8 +204,9 @@ def _excel(lines: list[str]) -> str | None:
 
 def _from_header(lines: list[str], delimiter: str, said: list[str]) -> list[str]:
     """Return the lines with those before the header emptied: titles, dates, names of jobs."""
-    rows = [(k, row) for k, row in enumerate(csv.reader(lines, delimiter=delimiter)) if row]
-    first = _header_at([len(row) for _, row in rows[:_LOOK]])
+    filled = ((k, row) for k, row in enumerate(csv.reader(lines, delimiter=delimiter)) if row)
+    rows = list(islice(filled, _LOOK))
+    first = _header_at([len(row) for _, row in rows])
     if not first:
         return lines
     start = rows[first][0]

@@ -63,6 +63,15 @@ def test_a_cause_that_lives_in_one_half_is_found_in_that_half_alone(made):
     assert taken.tolist() == [[True, True], [False, True]]
 
 
+def test_a_candidate_that_repeats_what_was_taken_is_worth_nothing(made):
+    columns, target = made
+    columns[2] = columns[0] + 1e-9 * columns[2]
+    columns[3] = columns[1]
+    table = tableau(columns, target, SPANS)
+    table.sweep(np.arange(2), 0)
+    assert table.worth()[:, 0].all() and not table.worth()[:, 1].any()
+
+
 def test_a_search_from_what_is_there_ends_where_one_from_nothing_does(made):
     prices = Prices(np.array([ROWS, ROWS]), np.array([2.0, 2.0]), np.zeros(2), 6.0)
     full = tableau(*made, SPANS)

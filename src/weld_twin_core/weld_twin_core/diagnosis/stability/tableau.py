@@ -25,6 +25,13 @@ from ..algebra.gram import Index
 SINGULAR = 1e-9
 """Added to the diagonal of ones: a column that others repeat to this share carries nothing new."""
 
+REPEATED = 3.0 * SINGULAR
+"""
+Part of a column's square left beside those taken from which it is worth anything.
+
+What others repeat has left what was added, and swept in it would make rounding of the rest.
+"""
+
 Mask = NDArray[np.bool_]
 
 
@@ -57,8 +64,15 @@ class Tableau:
         return np.maximum(self.table[:, -1, -1], 1e-300)
 
     def worth(self) -> Array:
-        """Return what every candidate takes off, or would leave if it went, shape (H, U)."""
-        out = [_quadratic(self.table[:, s, s], self.table[:, s, -1]) for s in self.parts]
+        """
+        Return what every candidate takes off, or would leave if it went, shape (H, U).
+
+        One whose columns those taken repeat takes nothing off: what is left of them is rounding.
+        """
+        out = [
+            _quadratic(self.table[:, s, s], self.table[:, s, -1], self.taken[:, u])
+            for u, s in enumerate(self.parts)
+        ]
         return np.stack(out, axis=1)
 
     def sweep(self, rows: Index, which: int) -> None:
@@ -87,10 +101,13 @@ class Tableau:
         self.taken[rows, which] = sign > 0.0
 
 
-def _quadratic(square: Array, pull: Array) -> Array:
-    """Return the size of b' A^-1 b for many small systems, shape (H,)."""
+def _quadratic(square: Array, pull: Array, taken: Mask) -> Array:
+    """Return the size of b' A^-1 b for many small systems, shape (H,); 0 where A is no more."""
     if pull.shape[1] == 1:
-        return np.asarray(np.abs(pull[:, 0] ** 2 / square[:, 0, 0]))
-    return np.asarray(
-        np.abs((pull * np.linalg.solve(square, pull[..., None])[..., 0]).sum(axis=1))
-    )
+        left = taken | (square[:, 0, 0] > REPEATED)
+        size = np.abs(pull[:, 0] ** 2 / np.where(left, square[:, 0, 0], 1.0))
+        return np.asarray(np.where(left, size, 0.0))
+    left = taken | (np.linalg.eigvalsh(square)[:, 0] > REPEATED)
+    safe = np.where(left[:, None, None], square, np.eye(pull.shape[1]))
+    size = np.abs((pull * np.linalg.solve(safe, pull[..., None])[..., 0]).sum(axis=1))
+    return np.asarray(np.where(left, size, 0.0))

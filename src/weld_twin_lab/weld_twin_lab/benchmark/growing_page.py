@@ -20,6 +20,7 @@ from .growing import KINDS
 
 Points = Sequence[Mapping[str, float]]
 MB = 1e6
+"""Bytes; what memory is told in."""
 
 
 def measured(

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Causes outside the library: each does what its line in the table says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plant_cells import (
@@ -70,6 +72,18 @@ def test_loaded_play_follows_the_load():
     load = np.array([gravity_torque(UR5, q)[1] for q in command.q])
     sure = np.abs(load) > 0.3 * np.abs(load).max()
     assert moved[sure] == pytest.approx(5e-4 * np.sign(load[sure]), rel=0.01)
+
+
+def test_what_friction_holds_is_the_same_in_every_recording_where_it_is_given():
+    whole = stations(UR5, 15)
+    part = replace(whole, t=whole.t[:4], q=whole.q[:4])
+    gear = {'effect': 'loaded_play', **CASES['loaded_play']}
+    for given, alike in (({'torque': 5.0}, True), ({}, False)):
+        first, again = (
+            joint_displacement(UR5, [{**gear, **given}], command, 'j1')
+            for command in (whole, part)
+        )
+        assert np.allclose(first[:4], again, atol=1e-9) is alike
 
 
 def test_bearing_tilt_is_no_row_error():

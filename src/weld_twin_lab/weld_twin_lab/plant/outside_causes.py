@@ -14,7 +14,7 @@ Causes beside the textbook: most of them no library knows, and a diagnosis shoul
 | column_bend | rotvec rad, time_constant s | the base leans over as the column warms up |
 | stick_slip | joint, amplitude rad | the link sticks, then jumps after the motor |
 | friction_wander | joint, amplitude rad, time_constant s | lost motion of wandering size |
-| loaded_play | joint, width rad | the gear lies on the flank its load pulls it to |
+| loaded_play | joint, width rad, torque N m | the gear lies on the flank its load pulls it to |
 | dress_pack | joint, amplitude rad | a hose pulls, harder towards the ends of the joint's range |
 
 Times count from the recording's first stamp.
@@ -35,7 +35,7 @@ SLOW = 0.01
 HIGH_SPOT = 0.1
 """Share of the lean of a bearing that comes twice per turn."""
 FLANK_TORQUE = 0.1
-"""Share of the largest load at which the flank is certain."""
+"""Share of the recording's largest load at which the flank is certain, where no torque is given."""
 JOINT_LEVEL = frozenset({'stick_slip', 'friction_wander', 'loaded_play', 'dress_pack'})
 OUTSIDE = JOINT_LEVEL | {
     'bearing_tilt',
@@ -80,7 +80,7 @@ def on_joints(
             out[:, i] += float(item['amplitude']) * level * np.tanh(rate / SLOW)
         elif item['effect'] == 'loaded_play':
             load = torque()[:, i]
-            sure = FLANK_TORQUE * np.abs(load).max() + 1e-12
+            sure = float(item.get('torque') or FLANK_TORQUE * np.abs(load).max()) + 1e-12
             out[:, i] += 0.5 * float(item['width']) * np.tanh(load / sure)
         else:
             middle, reach = np.mean(q[:, i]), np.ptp(q[:, i]) / 2.0 + 1e-12

@@ -21,6 +21,8 @@ from .growing import KINDS
 Points = Sequence[Mapping[str, float]]
 MB = 1e6
 """Bytes; what memory is told in."""
+MANY = 1e5
+"""Sizes up to this span so many decades that they are drawn by their logarithm."""
 
 
 def measured(
@@ -64,10 +66,9 @@ def _point(name: str, size: float) -> dict[str, float]:
 
 
 def twice(points: Points, key: str) -> float:
-    """Return by what twice the largest size would multiply a cost, from the last two points."""
-    a, b = points[-2], points[-1]
-    slope = np.log(b[key] / a[key]) / np.log(b['size'] / a['size'])
-    return float(2.0**slope)
+    """Return by what twice the largest size would multiply a cost: a line through the last three."""
+    size, spent = (np.log([point[name] for point in points[-3:]]) for name in ('size', key))
+    return float(2.0 ** np.polyfit(size, spent, 1)[0])
 
 
 def page(found: Mapping[str, Points]) -> str:
@@ -97,24 +98,30 @@ def draw(found: Mapping[str, Points], path: Path) -> None:
 
     matplotlib.use('Agg')
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     across = 4
     down = -(-len(found) // across)
     figure = Figure(figsize=(3.4 * across, 2.9 * down), layout='constrained', dpi=110)
-    frames = figure.subplots(down, across, squeeze=False).flat
-    for frame in list(frames)[len(found) :]:
+    frames = list(figure.subplots(down, across, squeeze=False).flat)
+    for frame in frames[len(found) :]:
         frame.remove()
     for axes, (name, points) in zip(frames, found.items(), strict=False):
         size = [point['size'] for point in points]
-        axes.plot(size, [p['seconds'] for p in points], 'o-', ms=4, color='C0', label='time [s]')
+        axes.plot(size, [p['seconds'] for p in points], 'o-', ms=4, color='C0')
         other = axes.twinx()
         other.plot(size, [p['bytes'] / MB for p in points], 's--', ms=4, color='C1')
-        axes.plot([], [], 's--', ms=4, color='C1', label='memory [MB]')
         axes.set(xlabel=name)
-        for frame in (axes, other):
-            frame.set_ylim(bottom=0.0)
-        if max(size) > 1e5:
-            axes.set(xscale='log', yscale='log', ylim=(None, None))
+        other.set_ylim(0.0, 1.1 * other.get_ylim()[1])
+        if max(size) >= MANY:
+            axes.set(xscale='log', yscale='log')
+        else:
+            axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
         axes.grid(alpha=0.3)
-        axes.legend(frameon=False, loc='upper left')
+    lines = (
+        Line2D([], [], color='C0', marker='o'),
+        Line2D([], [], color='C1', ls='--', marker='s'),
+    )
+    names = ('processor time [s], left', 'memory [MB], right')
+    figure.legend(lines, names, loc='outside upper center', ncols=2, frameon=False)
     figure.savefig(path)

@@ -178,7 +178,7 @@ def test_the_table_of_joints_has_no_empty_columns():
     heads = re.findall('scope="col">(.*?)</th>', page[page.index('class="map"') :])
     assert [plain(h).strip() for h in heads[:2]] == ['Joint [%]', 'reversal']
     assert page.count('data-joint=') == 6 and 'acceleration' not in heads
-    assert 'No joint alone could explain 0.5 % by constant, angle, low order' in plain(page)
+    assert 'No joint alone could explain 0.5 % by constant, angle of low order, angle of high order' in plain(page)
 
 
 def test_stretches_that_are_nearly_equal_are_told_as_even():

@@ -171,7 +171,9 @@ def _map(diagnosis: Diagnosis) -> Html | None:
         role='region',
         aria_label='Share by joint and regressor',
     )  # fmt: skip
-    empty = [name for k, name in enumerate(where.map_regressors) if k not in full]
+    empty = [
+        name.replace(', ', ' of ') for k, name in enumerate(where.map_regressors) if k not in full
+    ]
     blank = 'A cell is blank below 0.5 %.' if full else ''
     none = f'No joint alone could explain 0.5 % by {listed(empty, "or")}.' if empty else ''
     note = ' '.join(filter(None, [blank, none]))

@@ -66,6 +66,33 @@ def test_of_an_unknown_cause_the_headline_has_what_is_taken_off_unseen_data_and_
     assert 'With its curve' in part(page, 'class="cards"', 'id="seam"')
 
 
+def test_a_place_that_is_not_likelier_than_not_is_never_told_alone():
+    case = unknown(1e-4)
+    places = (('joint_a5', 0.29), ('joint_a6', 0.29), ('joint_a4', 0.28))
+    cause = replace(case.causes[0], place=places, dependence=(('constant', 0.33),))
+    case = replace(case, causes=(cause,))
+    told = 'joint_a5 or joint_a6'
+    assert f'comes mostly from {told};' in verdict(case)[0]
+    assert (
+        f'Look at {told}, at zeros and frames first: what is found there is constant'
+        in (worth_doing(case)[0])
+    )
+    assert f'that it sits at {told}.' in report_page(case)
+
+
+def test_what_takes_most_off_unseen_data_leads_though_another_place_has_the_larger_share():
+    two = [{'effect': 'servo_lag', 'joint': f'joint_a{k}', 'time_constant': t}
+           for k, t in ((2, 6e-3), (3, 1e-3))]  # fmt: skip
+    robot = load('kuka_kr6_r900')
+    case = diagnoses.diagnosis('identified', robot, two, two, [diagnoses.moving(robot, 'circle')])
+    causes = [replace(c, share=share, name=())
+              for c, share in zip(case.causes, (0.33, 0.66), strict=True)]  # fmt: skip
+    case = replace(case, causes=tuple(causes[::-1]), effects=(), status='unknown',
+                   contributions=replace(case.contributions, parts=tuple(
+                       p[::-1] for p in case.contributions.parts)))  # fmt: skip
+    assert worth_doing(case)[0].startswith('Look at joint_a2, at gains and feed-forward')
+
+
 @pytest.mark.parametrize('size', [-8e-4, 1e-4])
 def test_a_curve_that_makes_the_worst_spot_worse_is_never_advised(size):
     case = unknown(size)
@@ -178,7 +205,10 @@ def test_the_table_of_joints_has_no_empty_columns():
     heads = re.findall('scope="col">(.*?)</th>', page[page.index('class="map"') :])
     assert [plain(h).strip() for h in heads[:2]] == ['Joint [%]', 'reversal']
     assert page.count('data-joint=') == 6 and 'acceleration' not in heads
-    assert 'No joint alone could explain 0.5 % by constant, angle of low order, angle of high order' in plain(page)
+    assert (
+        'No joint alone could explain 0.5 % by constant, angle of low order, angle of high order'
+        in plain(page)
+    )
 
 
 def test_stretches_that_are_nearly_equal_are_told_as_even():

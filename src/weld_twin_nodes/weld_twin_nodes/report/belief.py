@@ -9,7 +9,7 @@ from weld_twin_core.diagnosis.result import Cause, Diagnosis
 from .html import Html, tag
 from .quantities import odds
 from .switches import alternatives, cause_name
-from .words import CURVES, DEPENDENCES, cause, place_name, site_name
+from .words import CURVES, DEPENDENCES, cause, leading, likely, place_name, site_name
 
 _LISTED = 3
 """Places, dependences or names told of a level."""
@@ -28,7 +28,7 @@ def belief_of(diagnosis: Diagnosis, cause: Cause) -> float | None:
     """
     named = {site: p for site, p in cause.name if site.effect not in CURVES}
     if not named:
-        return cause.place[0][1] if cause.place else None
+        return sum(p for _, p in leading(cause.place)) if cause.place else None
     alike = alternatives(diagnosis, cause)
     own = sum(named.get(site, 0.0) for site in alike) if alike else max(named.values())
     whole = diagnosis.confidence if diagnosis.status in ('identified', 'ambiguous') else 0.0
@@ -42,7 +42,7 @@ def belief_lines(diagnosis: Diagnosis, cause: Cause) -> list[str]:
         return []
     named = [site for site, _ in cause.name if site.effect not in CURVES]
     if not named:
-        return [f'{odds(sure)} that it sits at {place_name(cause.place[0][0])}.', *_on(cause)]
+        return [f'{odds(sure)} that it sits at {likely(cause.place)}.', *_on(cause)]
     if alternatives(diagnosis, cause):
         return [f'{odds(sure)} that it is one of these; which of them is open.']
     if diagnosis.families and len(named) > 1:
@@ -54,7 +54,8 @@ def _on(cause: Cause) -> list[str]:
     if not cause.dependence:
         return ['What it depends on was not found.']
     on, p = cause.dependence[0]
-    return [f'{odds(p)} that it depends on {DEPENDENCES.get(on, on)}; the library has no name.']
+    how = 'is constant' if on == 'constant' else f'depends on {DEPENDENCES.get(on, on)}'
+    return [f'{odds(p)} that it {how}; the library has no name for it.']
 
 
 def sure_entry(diagnosis: Diagnosis, cause: Cause) -> Html | None:

@@ -17,7 +17,7 @@ from .quantities import millimetres, percent, seconds
 from .remainder import SEEN, places, remainder
 from .seam_view import at_rest, seen_at
 from .switches import alternatives, as_it_is
-from .words import DEPENDENCES, REGIMES, listed, place_name
+from .words import DEPENDENCES, HALF, REGIMES, likely, listed, place_name
 
 _STRIP = (
     'RMS gap of each stretch, and its time. ▼ the worst stretch by RMS. Framed: the one that '
@@ -29,10 +29,6 @@ _WHERE = ('the seam', 'the stations')
 _EVEN = 1.25
 """Ratio of the worst stretch to the best below which neither stands out: that much a dozen short
 stretches of one motion differ by for no other reason than posture and noise."""
-_HALF = 0.5
-"""Probability from which one name is enough."""
-_OPEN = 3
-"""Alternatives named together."""
 _VISIBLE = 0.005
 """Share below which a cell of the map stays empty: it would read 0."""
 
@@ -67,7 +63,7 @@ def _at(diagnosis: Diagnosis, cause: Cause) -> Sequence[tuple[str, float]]:
     alike = alternatives(diagnosis, cause)
     own = [site.joint or getattr(REGISTRY.get(site.effect), 'place', None) for site in alike]
     places = list(dict.fromkeys(place for place in own if place not in (None, 'joint')))
-    return [(place, _HALF / len(places)) for place in places] or cause.place
+    return [(place, HALF / len(places)) for place in places] or cause.place
 
 
 def _dependences(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
@@ -88,23 +84,11 @@ def _summed(
     """Return shares by what is most probable of each cause; with the rest they make a whole."""
     sums: dict[str, float] = {}
     for beliefs, share, word in told:
-        name = _likely(beliefs, word)
+        name = likely(beliefs, word) or 'not found'
         sums[name] = sums.get(name, 0.0) + share
     rows = sorted(sums.items(), key=lambda item: -item[1])
     rows = [row for row in rows if row[1] >= SEEN] + list(remainder(diagnosis))
     return [(name, share, percent(share, places(diagnosis))) for name, share in rows]
-
-
-def _likely(alternatives: Sequence[tuple[str, float]], word: Callable[[str], str]) -> str:
-    """Return the most probable; two or three where the first alone is not likely enough."""
-    names: list[str] = []
-    sure = 0.0
-    for name, probability in alternatives[:_OPEN]:
-        if sure > _HALF:
-            break
-        names.append(word(name))
-        sure += probability
-    return listed(list(dict.fromkeys(names)), 'or') or 'not found'
 
 
 def _whole(diagnosis: Diagnosis) -> str:

@@ -12,7 +12,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .quantities import STAYS, UNCHANGED, millimetres
 from .switches import as_it_is, squares, switches, trusted
-from .words import DEPENDENCES, place_name, unnamed
+from .words import DEPENDENCES, likely, unnamed
 
 _GROWS = 1.02
 """Ratio of the largest deviation after to before from which it is told as grown: less than that is
@@ -20,10 +20,10 @@ a matter of which sample has the largest noise."""
 _APART = 0.02
 """Share of the squared gap by which a curve may fall short of its place before both are told."""
 _LOOK = {
-    'constant': 'its zero and its frame',
-    'angle': 'its gear and encoder',
+    'constant': 'zeros and frames',
+    'angle': 'gear and encoder',
     'direction': 'gear, belt and bearing, for play and friction',
-    'speed': 'gains and feed-forward of its drive, and the clocks',
+    'speed': 'gains and feed-forward of the drive, and the clocks',
     'acceleration': 'what is loose or soft',
     'load': 'what yields: gear, bearing, mount',
     'temperature': 'what grows warm',
@@ -104,13 +104,14 @@ def warning(diagnosis: Diagnosis, k: int) -> str:
 def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
     """Return where to look for a cause without a name, and whether its curve helps so long."""
     cause = diagnosis.causes[k]
-    where = place_name(cause.place[0][0]) if cause.place else 'the whole cell'
+    where = likely(cause.place) or 'the whole cell'
     first = f'Look at {where}: no known effect gives what is found there.'
     if cause.dependence:
         on = cause.dependence[0][0]
+        how = 'is constant' if on == 'constant' else f'depends on {DEPENDENCES.get(on, on)}'
         first = (
             f'Look at {where}, at {_LOOK.get(on, "all that moves")} first: what is found there '
-            f'depends on {DEPENDENCES.get(on, on)}, and no known effect gives it.'
+            f'{how}, and no known effect gives it.'
         )
     left = left_without(diagnosis, k)
     if left is None:

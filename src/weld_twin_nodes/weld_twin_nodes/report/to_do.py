@@ -11,6 +11,7 @@ from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.advice.inseparable import ELSE, way
 from weld_twin_core.diagnosis.result import Diagnosis, Site
 
+from .leading import in_order
 from .mending import look_at, warning
 from .words import found_name, listed, open_sets, open_sites, site_name, site_of, unnamed
 
@@ -97,7 +98,7 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
 
 def _looking(diagnosis: Diagnosis) -> list[str]:
     """Return where to look, and what to measure, while no cause has a name."""
-    told = [_at(diagnosis, k) for k in range(len(diagnosis.causes))[:_LARGEST]]
+    told = [_at(diagnosis, k) for k in in_order(diagnosis)[:_LARGEST]]
     told = [text for text in told if text]
     if diagnosis.next_experiment is not None:
         told.append(f'Measure what {_proposed(diagnosis)} proposes, and diagnose all together.')

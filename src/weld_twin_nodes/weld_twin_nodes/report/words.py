@@ -6,11 +6,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
 
+from .leading import in_order
 from .quantities import STAYS, both_angles, millimetres, odds, turns_only
 
 CAUSES = {
@@ -106,6 +107,10 @@ CURVES = ('joint_curve', 'frame_curve')
 """What stands where nothing has a name."""
 _EFFECT = re.compile(rf'\b({"|".join(name for name in CAUSES if "_" in name)})\b')
 """Names as files have them, which a sentence may bring along."""
+HALF = 0.5
+"""Probability from which one name is enough."""
+_OPEN = 3
+"""Alternatives named together."""
 _NAMED = 3
 """Names in a sentence; more are counted."""
 
@@ -156,9 +161,26 @@ def listed(names: Sequence[str], word: str = 'and') -> str:
     return f'{", ".join(names[:-1])} {word} {names[-1]}'
 
 
+def likely(
+    alternatives: Sequence[tuple[str, float]], word: Callable[[str], str] = place_name
+) -> str:
+    """Return the most probable; two or three where the first alone is not likely enough."""
+    return listed(list(dict.fromkeys(word(at) for at, _ in leading(alternatives))), 'or')
+
+
+def leading(alternatives: Sequence[tuple[str, float]]) -> list[tuple[str, float]]:
+    """Return the most probable, as many as are together likelier than not."""
+    told: list[tuple[str, float]] = []
+    for item in alternatives[:_OPEN]:
+        if sum(p for _, p in told) > HALF:
+            break
+        told.append(item)
+    return told
+
+
 def cause_words(cause: Cause) -> str:
     """Return place and dependence as a part of a sentence."""
-    where = place_name(cause.place[0][0]) if cause.place else 'a place not found'
+    where = likely(cause.place) or 'a place not found'
     on = [name for name, p in cause.dependence if p > 0.5][:2]
     if not on or on == ['constant']:
         return f'{where}, and is constant there' if on else where
@@ -179,7 +201,7 @@ def again_words(cause: Cause, *, many: bool = False) -> str | None:
 
 def someplace(cause: Cause) -> str:
     """Return a cause without a name as a heading: where it sits and what it depends on."""
-    where = place_name(cause.place[0][0]) if cause.place else 'a place not found'
+    where = likely(cause.place) or 'a place not found'
     on = [name for name, p in cause.dependence if p > 0.5][:2]
     if not on:
         return f'something at {where}'
@@ -290,7 +312,7 @@ def carries_curves(diagnosis: Diagnosis) -> bool:
 
 def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
     """Return where an unknown cause sits and what its curve brings."""
-    cause = diagnosis.causes[0]
+    cause = diagnosis.causes[in_order(diagnosis)[0]]
     shrink = diagnosis.shrink
     first = (
         f'The gap of {millimetres(diagnosis.gap.rms_m)} comes mostly from '

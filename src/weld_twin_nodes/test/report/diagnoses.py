@@ -162,7 +162,7 @@ def _contributions(robot, found, recordings, lines):
 def _errors(effect):
     """Return standard errors of its parameters: three per cent of each."""
     values = effect.to_mapping().items()
-    return {k: _error(v) for k, v in values if k not in ('effect', 'joint', 'order')}
+    return {k: _error(v) for k, v in values if k not in ('effect', 'joint', 'order', 'over')}
 
 
 def _error(value):

@@ -66,6 +66,18 @@ def test_of_an_unknown_cause_the_headline_has_what_is_taken_off_unseen_data_and_
     assert 'With its curve' in part(page, 'class="cards"', 'id="seam"')
 
 
+def test_of_several_curves_at_a_place_the_one_furthest_off_is_drawn():
+    robot = load('kuka_kr6_r900')
+    seam = [diagnoses.moving(robot, 'circle')]
+    curve = {'effect': 'joint_curve', 'joint': 'joint_a3', 'knots': [-1.0, 1.0]}
+    small, large = ({**curve, 'over': over, 'values': [-size, size]}
+                    for over, size in (('speed', 5e-5), ('direction', 4e-4)))  # fmt: skip
+    case = diagnoses.diagnosis('unknown', robot, [large], [small, large], seam, effects=())
+    both = replace(case.causes[0], members=(0, 1))
+    page = report_page(replace(case, causes=(both,)))
+    assert 'joint_a3: zero over direction' in page and 'zero over speed' not in page
+
+
 def test_a_place_that_is_not_likelier_than_not_is_never_told_alone():
     case = unknown(1e-4)
     places = (('joint_a5', 0.29), ('joint_a6', 0.29), ('joint_a4', 0.28))

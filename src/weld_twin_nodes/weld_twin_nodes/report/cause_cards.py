@@ -355,16 +355,20 @@ def _picture(diagnosis: Diagnosis, k: int) -> Html | None:
 
 
 def _curve(diagnosis: Diagnosis, cause: Cause) -> Html | None:
-    told = spreads(diagnosis)
+    """Return the curve that is furthest off, of those that stand for a cause."""
     found = diagnosis.model.found
-    figures = [
-        curve_figure(effect, told[m], diagnosis.model.robot.index(effect.joint))
+    curves = {
+        m: effect
         for m in cause.members
         if m < len(found)
         and isinstance(effect := found[m], JointCurve)
         and effect.over != 'constant'
-    ]
-    return joined(figures[:1]) if figures else None
+    }
+    if not curves:
+        return None
+    m, curve = max(curves.items(), key=lambda item: float(np.abs(item[1].values).max()))
+    robot = diagnosis.model.robot
+    return curve_figure(curve, spreads(diagnosis)[m], robot.index(curve.joint))
 
 
 def _smaller(rest: list[Cause]) -> Html | None:

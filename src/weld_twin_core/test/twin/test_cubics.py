@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats.qmc import Halton
 
 from weld_twin_core.arm import rotation
-from weld_twin_core.cubics import hermite, spline_slopes
+from weld_twin_core.cubics import hermite, slopes_of_many, spline_slopes
 from weld_twin_core.sequences import halton
 
 
@@ -36,6 +36,12 @@ def test_pieces_with_given_slopes(knots):
 def test_splines_bend_without_a_jump(knots, natural, ends):
     x, y, at = knots
     same(x, y, spline_slopes(x, y, natural=natural), at, CubicSpline(x, y, bc_type=ends))
+
+
+def test_a_spline_through_many_knots_is_the_same(knots):
+    x, y, at = knots
+    same(x, y, slopes_of_many(x, y), at, CubicSpline(x, y))
+    same(x[:4], y[:4], slopes_of_many(x[:4], y[:4]), x[:4], CubicSpline(x[:4], y[:4]))
 
 
 def test_a_natural_spline_through_two_knots_is_a_line():

@@ -13,6 +13,7 @@ import numpy as np
 from ..arm.chain import forward
 from ..arm.robot import Robot
 from ..arrays import Array
+from ..cubics import hermite, slopes_of_many
 from ..recording import JointMotion, Measurements, Recording
 from .cycles import measured_of, pose_cycles, stops
 from .iso9283 import nearest_pass
@@ -216,9 +217,6 @@ def _finer(t: Array, position: Array) -> tuple[Array, Array]:
     share = np.arange(FINER) / FINER
     steps = np.diff(t)
     dense = (t[:-1, None] + steps[:, None] * share).ravel()
-    # Loaded here: a fifth of all imports of a diagnosis, and few motions come back to their start.
-    from scipy.interpolate import CubicSpline
-
-    points: Array = CubicSpline(t, position)(dense)
+    points = hermite(t, position, slopes_of_many(t, position), dense)[0]
     points[np.repeat(steps > GAP * np.median(steps), FINER)] = np.nan
     return dense, points

@@ -7,7 +7,8 @@ A hose is held at a column or by a spring balancer and pulls the flange with for
 p the flange in the base frame: the pull is `force` where the base stands, and a spring draws to
 force / stiffness. Without a stiffness it is a pull of one size and direction, as balancers with a
 tapered drum give it (engineerfix.com, how an overhead tool balancer works). These four numbers are
-linear, and any smooth pull is close to them over the reach of an arm.
+linear, and follow a pull that changes little over the reach; near the place where the hose is
+held its direction turns faster than they can.
 
 The pull is a load: joints yield to it by their compliance, as they do to a payload. So it shows
 only where the joints' springs are known, and it is told from a payload by what pulls sideways, and

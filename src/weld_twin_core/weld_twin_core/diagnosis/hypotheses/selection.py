@@ -92,7 +92,7 @@ def forward(
     """
     steps: list[Step] = []
     now = start
-    taken = [(e.name, e.site) for e in start.model.found]
+    taken = _sites(start)
     while len(steps) < most:
         systems = work.beside(now.model, now.residual)
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
@@ -151,7 +151,10 @@ def _best_of(
     work: Workspace, now: Fit, close: list[Choice], effective: Callable[[Fit], float]
 ) -> tuple[Step | None, list[Effect]]:
     """Return the best of some choices after a nonlinear fit of each, and those refused."""
-    tried = [(c, fitted_with(work, now.model, c.effect())) for c in close[:SHORTLIST]]
+    tried = [
+        (c, _without_stand_in(work, c, fitted_with(work, now.model, c.effect())))
+        for c in close[:SHORTLIST]
+    ]
     # One count for all, that of the fit which leaves least: a worse model explains less and would
     # otherwise be allowed more rows.
     count = effective(min((f for _, f in tried), key=lambda f: f.rss))
@@ -168,6 +171,31 @@ def _best_of(
         if not absurd and (best is None or nats > best.nats):
             best = Step(choice.unit, nats, result)
     return best, impossible
+
+
+def _without_stand_in(work: Workspace, choice: Choice, result: Fit) -> Fit:
+    """
+    Return the fit without what stood in for others while a choice was missing.
+
+    An effect taken earlier may have passed for several, and runs beyond what a machine can have
+    once the choice explains its part. Then it goes, and what fits best beside the choice comes.
+    """
+    absurd = {effect.key for effect in implausible(result.model)}
+    sites = {(effect.name, effect.site) for effect in result.model.found if effect.key in absurd}
+    if not absurd or choice.unit.site in sites:
+        return result
+    kept = tuple(effect for effect in result.model.found if effect.key not in absurd)
+    alone = fit(work.problem, result.model.with_found(kept), work.scale, None, 5)
+    systems = work.beside(alone.model, alone.residual)
+    ranked = ranking(systems, work.library.units, float(alone.residual.size))
+    others = [c for c in ranked if c.unit.site not in sites and not _repeats(c, _sites(alone))]
+    fits = [fitted_with(work, alone.model, other.effect()) for other in others[:SHORTLIST]]
+    return min((alone, *fits), key=lambda f: f.rss)
+
+
+def _sites(found: Fit) -> list[tuple[str, str | None]]:
+    """Return what is in the model of a fit."""
+    return [(effect.name, effect.site) for effect in found.model.found]
 
 
 def implausible(model: Model) -> list[Effect]:

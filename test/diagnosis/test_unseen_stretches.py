@@ -162,3 +162,19 @@ def test_stretches_never_span_two_recordings():
     assert labels.size == 6 * 30 + 3 * 70
     assert set(labels[:ends]).isdisjoint(labels[ends:])
     assert (np.diff(labels) >= 0).all() and np.unique(labels).size == 8
+
+
+def test_what_one_stretch_alone_shows_stays_put_elsewhere():
+    """Sixty columns live on the first stretch alone; once it is taken off, rounding is left."""
+    rng = np.random.default_rng(3)
+    labels = np.repeat(np.arange(8), 100)
+    steady = rng.normal(size=labels.size)
+    spikes = rng.normal(size=(60, labels.size)) * np.where(labels == 0, 1e6, 1e-6)
+    columns, target = np.concatenate([steady[None], spikes]), 2.0 * steady
+    spans = [labels == k for k in range(8)]
+    normals = np.array([columns[:, s] @ columns[:, s].T for s in spans])
+    rights = np.array([columns[:, s] @ target[s, None] for s in spans])
+    none = np.zeros(len(columns))
+    unseen = Unseen(None, None, labels, columns, (), target[None], none, none, normals, rights)
+    left = unseen.base([]).residual
+    np.testing.assert_allclose(left[labels > 0], 0.0, atol=1e-6)

@@ -4,10 +4,12 @@
 
 import numpy as np
 import pytest
-from diagnosis_cells import SIGMA, recorded, sites, solved
+from diagnosis_cells import SIGMA, recorded, shaken, sites, solved
 
+from weld_twin_core import Measurements, Recording, Twin, default_seam, plan
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.effects import JointOffset, ServoLag
 
 SINGLE = {
     'backlash': dict(joint='elbow_joint', width=8e-4),
@@ -142,3 +144,21 @@ def test_the_same_data_give_the_same_answer():
     recording = recorded(robot, [{'effect': 'joint_compliance', **truth}], static=120)
     again = diagnose([recording], robot)
     assert again.as_dict() == solved(flaw('joint_compliance', **truth), static=120).as_dict()
+
+
+def test_what_stands_in_for_two_causes_gives_way_once_one_of_them_is_found():
+    """On this seam friction of joint_a5 fits best alone, and no machine has it beside the lag."""
+    robot = load('kuka_kr16_2')
+    seam = plan(robot, default_seam(robot, 'weave'), 'aggressive', rate_hz=125.0, fit=True)
+    commanded = Recording('seam', seam.motion)
+    flaws = [ServoLag('joint_a2', time_constant=6e-3), JointOffset('joint_a5', offset=1.1e-3)]
+    real = Twin(robot, flaws).poses(commanded)
+    rng = np.random.default_rng(21)
+    position = real.position + rng.normal(scale=3e-5, size=real.position.shape)
+    turned = shaken(real.rotation, 3e-5, rng)
+    measured = Measurements(seam.motion.t, position, turned)
+    answer = diagnose(commanded.with_measured(measured), robot)
+    assert {(e.effect.name, e.effect.site) for e in answer.effects} == {
+        ('servo_lag', 'joint_a2'), ('joint_offset', 'joint_a5')
+    }  # fmt: skip
+    assert answer.shrink.rms_after_m == pytest.approx(np.sqrt(3.0) * 3e-5, rel=0.1)

@@ -211,9 +211,10 @@ class Unseen:
 
         What a column shows on that stretch alone is nothing but rounding elsewhere; it stays put.
         """
-        at = np.ix_(index, index)
-        whole = index.size == self.columns.shape[0]
-        total, gone = (self._total, self.normals[b]) if whole else (self._total[at], self.normals[b][at])
+        total, gone = self._total, self.normals[b]
+        if index.size < self.columns.shape[0]:
+            at = np.ix_(index, index)
+            total, gone = total[at], gone[at]
         left = np.asarray(total - gone)
         left[np.diag_indices_from(left)] += ROUNDED * np.diag(total)
         return left

@@ -136,6 +136,7 @@ def test_what_is_certain_and_largest_is_to_be_done_first():
         actions=(*case.actions, 'Set the clock right.'),
         causes=tuple(causes),
         contributions=None,
+        model=replace(case.model, found=(*case.model.found, sure.effect)),
     )
     first, second, third = worth_doing(both)
     assert first == 'Set the clock right.'

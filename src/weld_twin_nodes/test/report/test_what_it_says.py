@@ -14,6 +14,7 @@ import pytest
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.result import Candidate, Check, Site, Where
 from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.metrics.conformity import Rule
 from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.belief import belief_of
 from weld_twin_nodes.report.controllers import correction
@@ -117,6 +118,73 @@ def test_a_curve_that_makes_the_worst_spot_worse_is_never_advised(size):
     if size < 0.0:
         card = part(report_page(case), 'class="cards"', 'id="seam"')
         assert 'the curve makes the worst spot worse' in card and 'can be corrected' not in card
+
+
+def test_the_controller_is_not_to_be_given_a_curve_that_takes_hardly_anything_off():
+    card = part(report_page(unknown(1e-6)), 'class="cards"', 'id="seam"')
+    assert 'Its curve takes hardly anything off: do not correct programs by it' in card
+    assert 'Nothing is to be entered: the curve takes hardly anything off.' in card
+    assert 'correct-program' not in card
+
+
+@pytest.mark.parametrize(('level', 'told'), [('ok', False), ('note', True)])
+def test_clocks_are_looked_at_for_a_lag_unless_they_were_found_right(level, told):
+    case = unknown(1e-4)
+    cause = replace(case.causes[0], dependence=(('speed', 0.8),))
+    checks = (Check('clocks', level, 'As they are.'),)
+    first = worth_doing(replace(case, causes=(cause,), checks=checks))[0]
+    assert 'gains and feed-forward of the drive' in first and ('clocks' in first) is told
+
+
+def open_and_sure(size):
+    """Return a zero or base that cannot be told apart, beside certain play of so much."""
+    robot = load('kuka_kr6_r900')
+    play = {'effect': 'backlash', 'joint': 'joint_a3', 'width': size}
+    zero = {'effect': 'joint_offset', 'joint': 'joint_a1', 'offset': 5e-4}
+    case = diagnoses.diagnosis('ambiguous', robot, [play, zero], [play, zero],
+                               [diagnoses.moving(robot, 'circle')])  # fmt: skip
+    alike = (Site('base_pose', None), Site('joint_offset', 'joint_a1'))
+    of_play, of_zero = case.causes
+    of_zero = replace(of_zero, share=0.7, name=((alike[1], 0.5), (alike[0], 0.4)))
+    return replace(
+        case,
+        causes=(of_zero, replace(of_play, share=0.2)),
+        contributions=replace(
+            case.contributions, parts=tuple(p[::-1] for p in case.contributions.parts)
+        ),
+        # The twin counts play first, the verdict names the zero first.
+        effects=case.effects[::-1],
+        actions=('Master joint_a1.', 'Service the gear.'),
+        indistinguishable=(alike, (Site('backlash', 'joint_a3'),)),
+        next_experiment={'sentence': 'Run the path.', 'cost': 0.7},
+    )
+
+
+def test_what_is_small_and_certain_waits_until_the_larger_is_told_apart():
+    case = open_and_sure(5e-4)
+    first, *_, last = worth_doing(case)
+    assert first.startswith('Find out whether it is zero offset of joint_a1 or base pose error: ')
+    assert last == 'Service the gear.'
+    assert (
+        'in part from zero offset of joint_a1 or base pose error (these data do not tell'
+        in (verdict(case)[0])
+    )
+    card = part(report_page(case), 'id="cause-1"', 'How sure')
+    assert 'Zero offset of joint_a1 or base pose error' in card
+
+
+def test_what_is_small_and_certain_comes_first_if_it_alone_meets_the_tolerance():
+    case = open_and_sure(5e-4)
+    left = left_without(case, 1)
+    told = [worth_doing(case, Rule(factor * left.largest_after, 1e-6, 1))[0]
+            for factor in (1.5, 0.9)]  # fmt: skip
+    assert told[0].startswith('Service the gear. ') and 'That alone leaves' in told[0]
+    assert told[1].startswith('Find out whether')
+
+
+def test_how_long_a_proposed_measurement_takes_stands_beside_it():
+    case = replace(unknown(1e-4), next_experiment={'sentence': 'Run the path.', 'cost': 0.7})
+    assert 'Measure what next_experiment.yaml proposes (about 1 min), and' in worth_doing(case)[-1]
 
 
 def test_a_named_cause_whose_mending_alone_makes_it_worse_is_to_be_mended_with_the_others():

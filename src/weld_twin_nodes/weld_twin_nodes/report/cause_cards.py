@@ -21,7 +21,7 @@ from .controllers import BRANDS, correction
 from .curve_plot import curve_figure
 from .directions import components, rms_words, sides_words
 from .html import Child, Html, joined, section, table, tag
-from .mending import left_without, look_at, taken_by_curve, warning
+from .mending import curve_fault, left_without, look_at, taken_by_curve, warning
 from .quantities import DEGREES, counted, ends_to, millimetres, parameter_rows, percent, turned
 from .remainder import places, remainder
 from .seam_view import seen_at
@@ -325,8 +325,9 @@ def _at_the_controller(
     head = 'At the controller' if brand is None else f'At the {BRANDS[brand]} controller'
     if not effects:
         return [(head, 'Nothing can be entered before the cause is known.')]
-    if unnamed(cause) and warning(diagnosis, k):
-        return [(head, 'Nothing is to be entered: the curve makes the worst spot worse.')]
+    fault = curve_fault(diagnosis, k)
+    if fault:
+        return [(head, f'Nothing is to be entered: the curve {fault}.')]
     return [(head, correction(effects[0], brand))]
 
 

@@ -13,7 +13,16 @@ from .family_table import families_table
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, change, millimetres, parameter_rows
 from .untried import reason_and_joints, untried
-from .words import carries_curves, cause, found_name, in_words, listed, parameter_word, site_name
+from .words import (
+    carries_curves,
+    cause,
+    found_name,
+    in_words,
+    listed,
+    open_sets,
+    parameter_word,
+    site_name,
+)
 
 _CANDIDATES = 6
 """Hypotheses shown for a cause."""
@@ -131,7 +140,7 @@ def slots(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
 def _sets(diagnosis: Diagnosis) -> Html | None:
     if not diagnosis.effects:
         return None
-    sets = [group for group in diagnosis.indistinguishable if len(group) > 1]
+    sets = open_sets(diagnosis)
     title = tag('h3', 'What these data cannot tell apart')
     if not sets and diagnosis.families:
         shared = [tag('li', in_words(reason, ())) for reason in diagnosis.reasons]

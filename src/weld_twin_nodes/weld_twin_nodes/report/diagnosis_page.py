@@ -83,7 +83,7 @@ def report_page(
     body = joined(
         [
             header(diagnosis),
-            opening(diagnosis, judged),
+            opening(diagnosis, judged, rule),
             *(_causes(diagnosis, sheet, rule) if sound else ()),
             checks_section(diagnosis),
             printed_section(diagnosis, inputs, judged),

@@ -13,7 +13,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 
 from .html import Child, Html, joined, section, table, tag
 from .quantities import counted
-from .to_do import made_for
+from .to_do import made_for, minutes
 from .untried import untried
 from .words import in_words, listed, open_sets, site_name
 
@@ -61,15 +61,15 @@ def _sites(diagnosis: Diagnosis) -> set[Site]:
 def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     """Return what to measure, why, and what it takes."""
     told = {'sentence', 'reason', *_APART}
-    cost, sigma = wanted.get('cost'), wanted.get('expected_separation_sigma')
+    sigma = wanted.get('expected_separation_sigma')
     rest = {key: value for key, value in wanted.items() if key not in told}
     if wanted.get('motion'):
         rest['as a program'] = (
             'weld-twin export-program next_experiment.yaml writes it in the language of the '
             'controller, with a sheet on how to load it'
         )
-    if cost:
-        rest['takes'] = f'about {cost:.0f} min'
+    if minutes(wanted):
+        rest['takes'] = minutes(wanted)
     if sigma:
         rest['tells them apart by'] = f'{sigma:.0f} standard deviations, as far as can be foreseen'
     lines = [

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 
 from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.metrics.conformity import Rule
 from weld_twin_core.recording import Recording
 
 from ..offline.where_it_holds import where_it_holds
@@ -47,7 +48,7 @@ def recorded_at(recordings: Sequence[Recording]) -> str:
     return f'recorded {when:%Y-%m-%d %H:%M} UTC'
 
 
-def opening(diagnosis: Diagnosis, judged: Html | None = None) -> Html:
+def opening(diagnosis: Diagnosis, judged: Html | None = None, rule: Rule | None = None) -> Html:
     """Return status, verdict, how it is judged, figures and actions."""
     first, second = verdict(diagnosis)
     sound = diagnosis.status != 'unsound'
@@ -60,7 +61,7 @@ def opening(diagnosis: Diagnosis, judged: Html | None = None) -> Html:
         _mended(diagnosis),
         _figures(diagnosis) if sound else None,
         _holds(diagnosis, judged) if sound else None,
-        _actions(diagnosis) if sound else None,
+        _actions(diagnosis, rule) if sound else None,
         id_='verdict',
     )
 
@@ -136,8 +137,8 @@ def _turned(diagnosis: Diagnosis) -> str:
     return f'RMS gap; {small_turn(left[1])} left over'
 
 
-def _actions(diagnosis: Diagnosis) -> Html | None:
-    told = worth_doing(diagnosis)
+def _actions(diagnosis: Diagnosis, rule: Rule | None) -> Html | None:
+    told = worth_doing(diagnosis, rule)
     if not told:
         return None
     items = [tag('li', action) for action in told]

@@ -23,7 +23,7 @@ _LOOK = {
     'constant': 'zeros and frames',
     'angle': 'gear and encoder',
     'direction': 'gear, belt and bearing, for play and friction',
-    'speed': 'gains and feed-forward of the drive, and the clocks',
+    'speed': 'gains and feed-forward of the drive',
     'acceleration': 'what is loose or soft',
     'load': 'what yields: gear, bearing, mount',
     'temperature': 'what grows warm',
@@ -31,6 +31,8 @@ _LOOK = {
     'place': 'the instrument and its line of sight',
 }
 """Where a fitter looks first when a cause has no name, by what it depends on."""
+_CLOCKS = 'clocks'
+"""Name of the check of the clocks: what is late by a clock grows with the speed, as a lag does."""
 
 
 class Left(NamedTuple):
@@ -108,9 +110,12 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
     first = f'Look at {where}: no known effect gives what is found there.'
     if cause.dependence:
         on = cause.dependence[0][0]
+        at = _LOOK.get(on, 'all that moves')
+        if on == 'speed' and not _one_clock(diagnosis):
+            at += ', and the clocks'
         how = 'is constant' if on == 'constant' else f'depends on {DEPENDENCES.get(on, on)}'
         first = (
-            f'Look at {where}, at {_LOOK.get(on, "all that moves")} first: what is found there '
+            f'Look at {where}, at {at} first: what is found there '
             f'{how}, and no known effect gives it.'
         )
     left = left_without(diagnosis, k)
@@ -118,13 +123,32 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
         return [first]
     if left.grows or left.rises:
         return [first, warning(diagnosis, k)]
-    if left.rms_after > STAYS * left.rms:
-        return [first, 'Its curve takes hardly anything off: do not correct programs by it.']
+    fault = curve_fault(diagnosis, k)
+    if fault:
+        return [first, f'Its curve {fault}: do not correct programs by it.']
     return [
         first,
         'Until that is found, programs can be corrected by its curve (weld-twin correct-program): '
         f'the largest deviation goes from {_both(left)}.',
     ]
+
+
+def curve_fault(diagnosis: Diagnosis, k: int) -> str:
+    """Return why programs are not to be corrected by the curve of a cause; nothing where they can."""
+    left = left_without(diagnosis, k)
+    if left is None or not unnamed(diagnosis.causes[k]):
+        return ''
+    if left.grows:
+        return 'makes the worst spot worse'
+    if left.rises:
+        return 'makes the whole worse'
+    return 'takes hardly anything off' if left.rms_after > STAYS * left.rms else ''
+
+
+def _one_clock(diagnosis: Diagnosis) -> bool:
+    """Tell whether the clocks were looked at and nothing was found."""
+    levels = [check.level for check in diagnosis.checks if check.name == _CLOCKS]
+    return bool(levels) and set(levels) == {'ok'}
 
 
 def _both(left: Left) -> str:

@@ -13,7 +13,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 
 from .footing import measured_next
 from .html import Child, Html, tag
-from .words import STATUS, listed, site_name
+from .words import STATUS, listed, open_sets, site_name
 
 _SHORT = 12
 """Digits of a hash that tell files apart on paper; the page has all."""
@@ -57,8 +57,7 @@ def _data(diagnosis: Diagnosis) -> str:
 
 
 def _alike(diagnosis: Diagnosis) -> str | None:
-    groups = [group for group in diagnosis.indistinguishable if len(group) > 1]
-    told = [listed([site_name(site) for site in group], 'or') for group in groups]
+    told = [listed([site_name(site) for site in group], 'or') for group in open_sets(diagnosis)]
     return '; '.join(told) or None
 
 

@@ -14,7 +14,7 @@ from weld_twin_core.diagnosis.result import Cause, Diagnosis, Site
 from weld_twin_core.recording import Recording
 
 from .charts import thinned
-from .words import CURVES, listed, site_name, someplace
+from .words import CURVES, listed, open_sets, site_name, someplace
 from .words import cause as called
 
 MOST = 8
@@ -62,11 +62,7 @@ def alternatives(diagnosis: Diagnosis, cause: Cause) -> tuple[Site, ...]:
     """Return what these data cannot tell apart, the most probable first; nothing where one is."""
     found = [effect for k, effect in enumerate(diagnosis.model.found) if k in cause.members]
     own = {Site(effect.name, effect.site) for effect in found} | {s for s, _ in cause.name[:1]}
-    for group in diagnosis.indistinguishable:
-        if len(group) > 1 and own & set(group):
-            order = dict(cause.name)
-            return tuple(sorted(group, key=lambda site: -order.get(site, 0.0)))
-    return ()
+    return next((group for group in open_sets(diagnosis) if own & set(group)), ())
 
 
 def switches(diagnosis: Diagnosis) -> tuple[Switch, ...]:

@@ -14,6 +14,7 @@ from rich.table import Table
 from weld_twin_core.diagnosis.result import Diagnosis
 
 from ..offline.where_it_holds import where_it_holds
+from .acceptance import Demand, rule_of
 from .cause_levels import LEVEL_HEADS, level_row
 from .cause_list import rivalry, slots
 from .changed_section import CHANGED_HEADS, changed_rows, nothing_changed
@@ -21,7 +22,7 @@ from .contact_clouds import contacts_told
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
 from .quantities import change, millimetres, parameter_rows
 from .to_do import worth_doing
-from .words import STATUS, found_name, listed, mended, site_name, verdict
+from .words import STATUS, found_name, listed, mended, open_sets, site_name, verdict
 
 _COLOURS = {
     'identified': 'green',
@@ -36,7 +37,7 @@ _BETWEEN = '  '
 """Between the columns of a table."""
 
 
-def print_summary(diagnosis: Diagnosis, console: Console) -> None:
+def print_summary(diagnosis: Diagnosis, console: Console, demand: Demand | None = None) -> None:
     """Print the verdict in two sentences, then tables as far as there is something in them."""
     first, second = verdict(diagnosis)
     colour = _COLOURS[diagnosis.status]
@@ -58,7 +59,8 @@ def print_summary(diagnosis: Diagnosis, console: Console) -> None:
     _print_changed(diagnosis, console)
     _print_data(diagnosis, console)
     _print_holds(diagnosis, console)
-    for action in worth_doing(diagnosis):
+    rule = rule_of(diagnosis, demand) if demand is not None else None
+    for action in worth_doing(diagnosis, rule):
         console.print(f'[bold]do:[/] {escape(action)}')
 
 
@@ -161,7 +163,6 @@ def _print_table(
 
 
 def _print_sets(diagnosis: Diagnosis, console: Console) -> None:
-    for group in diagnosis.indistinguishable:
-        if len(group) > 1:
-            names = listed([site_name(site) for site in group], 'or')
-            console.print(f'[yellow]cannot tell apart:[/] {escape(names)}')
+    for group in open_sets(diagnosis):
+        names = listed([site_name(site) for site in group], 'or')
+        console.print(f'[yellow]cannot tell apart:[/] {escape(names)}')

@@ -10,10 +10,21 @@ from typing import Any
 from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.advice.inseparable import ELSE, way
 from weld_twin_core.diagnosis.result import Diagnosis, Site
+from weld_twin_core.metrics.conformity import PASS, Rule
 
 from .leading import in_order
-from .mending import look_at, warning
-from .words import found_name, listed, open_sets, open_sites, site_name, site_of, unnamed
+from .mending import left_without, look_at, warning
+from .quantities import millimetres
+from .words import (
+    found_name,
+    listed,
+    open_sets,
+    open_sites,
+    share_by_site,
+    site_name,
+    site_of,
+    unnamed,
+)
 
 _LARGEST = 3
 """Actions told; the others are counted."""
@@ -23,8 +34,12 @@ TOGETHER = (
 )
 
 
-def worth_doing(diagnosis: Diagnosis) -> list[str]:
-    """Return what to do first: mend what is certain and large, tell apart what is open; or look."""
+def worth_doing(diagnosis: Diagnosis, rule: Rule | None = None) -> list[str]:
+    """
+    Return what to do first: mend what is certain and large, tell apart what is open; or look.
+
+    What is certain and smaller comes first only if the tolerance of ``rule`` is met by it alone.
+    """
     if diagnosis.status == 'unknown' and not diagnosis.actions:
         return _looking(diagnosis)
     if diagnosis.families and len(diagnosis.actions) > _LARGEST:
@@ -35,22 +50,46 @@ def worth_doing(diagnosis: Diagnosis) -> list[str]:
         return list(diagnosis.actions)
     if diagnosis.status != 'ambiguous':
         return _mending(diagnosis)
-    settled = _settled(diagnosis)
-    mending = _mending(diagnosis)
-    first = [mending[k] for k in settled]
-    others = [action for k, action in enumerate(mending) if k not in settled]
-    return [*first, *_telling(diagnosis), *others]
-
-
-def _settled(diagnosis: Diagnosis) -> list[int]:
-    """Return which effects are certain and larger than all that is open, the largest first."""
-    share = {k: cause.share for cause in diagnosis.causes for k in cause.members}
-    unsure = open_sites(diagnosis)
+    share = share_by_site(diagnosis)
     sites = [site_of(found) for found in diagnosis.effects]
-    open_ones = [share.get(k, 0.0) for k, site in enumerate(sites) if site in unsure]
-    most = max(open_ones, default=0.0)
-    sure = [k for k, site in enumerate(sites) if site not in unsure and share.get(k, 0.0) > most]
-    return sorted(sure, key=lambda k: -share[k])
+    order = sorted(range(len(sites)), key=lambda k: -share.get(sites[k], 0.0))
+    mending = _mending(diagnosis)
+    first = _settled(diagnosis, rule)
+    others = [mending[k] for k in order if sites[k] not in first]
+    now = [f'{mending[k]} {first[sites[k]]}'.rstrip() for k in order if sites[k] in first]
+    return [*now, *_telling(diagnosis), *others]
+
+
+def _settled(diagnosis: Diagnosis, rule: Rule | None) -> dict[Site, str]:
+    """
+    Return which effects are certain and worth mending before it is known what the others are.
+
+    They are larger than all that is open, or enough by themselves: then with what they leave.
+    """
+    share, unsure = share_by_site(diagnosis), open_sites(diagnosis)
+    most = max((share.get(site, 0.0) for site in unsure), default=0.0)
+    held = _causes_of(diagnosis)
+    out = {}
+    for site in map(site_of, diagnosis.effects):
+        if site in unsure:
+            continue
+        left = left_without(diagnosis, held[site]) if site in held else None
+        if share.get(site, 0.0) > most:
+            out[site] = ''
+        elif left is not None and rule is not None and rule.judged(left.largest_after) == PASS:
+            out[site] = f'That alone leaves {millimetres(left.largest_after)} at most.'
+    return out
+
+
+def _causes_of(diagnosis: Diagnosis) -> dict[Site, int]:
+    """Return which cause each effect in the twin belongs to."""
+    found = diagnosis.model.found
+    return {
+        Site(found[m].name, found[m].site): k
+        for k, cause in enumerate(diagnosis.causes)
+        for m in cause.members
+        if m < len(found)
+    }
 
 
 def _telling(diagnosis: Diagnosis) -> list[str]:
@@ -62,7 +101,7 @@ def _telling(diagnosis: Diagnosis) -> list[str]:
         if by != ELSE:
             out.append(f'{told}: {by}.')
         elif diagnosis.contacts is not None or made_for(diagnosis.next_experiment, group):
-            out.append(f'{told}: measure what {_proposed(diagnosis)} proposes.')
+            out.append(f'{told}: measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}.')
         else:
             out.append(
                 f'{told}: record other postures and motions than these, and diagnose all together.'
@@ -84,9 +123,7 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
     Where mending one alone makes the worst spot worse, that is said beside it.
     """
     unsure = open_sites(diagnosis)
-    found = [Site(effect.name, effect.site) for effect in diagnosis.model.found]
-    held = {found[m]: k for k, c in enumerate(diagnosis.causes) for m in c.members
-            if m < len(found)}  # fmt: skip
+    held = _causes_of(diagnosis)
     out = []
     for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
         if site_of(named) in unsure:
@@ -101,7 +138,10 @@ def _looking(diagnosis: Diagnosis) -> list[str]:
     told = [_at(diagnosis, k) for k in in_order(diagnosis)[:_LARGEST]]
     told = [text for text in told if text]
     if diagnosis.next_experiment is not None:
-        told.append(f'Measure what {_proposed(diagnosis)} proposes, and diagnose all together.')
+        told.append(
+            f'Measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}, and diagnose all '
+            'together.'
+        )
     return told
 
 
@@ -113,6 +153,17 @@ def _at(diagnosis: Diagnosis, k: int) -> str:
     found = diagnosis.model.found
     held = [found[m] for m in cause.members if m < len(found)]
     return ' '.join(actions(held, diagnosis.model.robot))
+
+
+def minutes(wanted: Mapping[str, Any] | None) -> str:
+    """Return how long a proposed measurement takes; nothing where that is not known."""
+    cost = (wanted or {}).get('cost')
+    return f'about {max(cost, 1.0):.0f} min' if cost else ''
+
+
+def _takes(diagnosis: Diagnosis) -> str:
+    told = minutes(diagnosis.next_experiment)
+    return f' ({told})' if told else ''
 
 
 def _proposed(diagnosis: Diagnosis) -> str:

@@ -254,11 +254,19 @@ def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     size = _size(diagnosis)
     choices = '; and from '.join(_either(group) for group in open_sets(diagnosis)[:2])
     unsure = open_sites(diagnosis)
-    settled = listed([found_name(f) for f in diagnosis.effects if site_of(f) not in unsure])
-    start = f'The {size} comes '
-    if settled:
-        start += f'in part from {settled}, in part '
-    return f'{start}from {choices}: these data do not tell which.', _gain(diagnosis, 'Either way')
+    sure = [found for found in diagnosis.effects if site_of(found) not in unsure]
+    settled = listed([found_name(found) for found in sure])
+    after = _gain(diagnosis, 'Either way')
+    if not sure:
+        return f'The {size} comes from {choices}: these data do not tell which.', after
+    # The largest first, as the cards have it; what has no card of its own stays in front.
+    share = share_by_site(diagnosis)
+    largest = max(share.get(site_of(found), 1.0) for found in sure)
+    if largest < max((share.get(site, 0.0) for site in unsure), default=0.0):
+        first = f'from {choices} (these data do not tell which), in part from {settled}.'
+    else:
+        first = f'from {settled}, in part from {choices}: these data do not tell which.'
+    return f'The {size} comes in part {first}', after
 
 
 def _either(group: Sequence[Site]) -> str:
@@ -269,8 +277,20 @@ def _either(group: Sequence[Site]) -> str:
 
 
 def open_sets(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
-    """Return the sets of which these data do not tell which it is."""
-    return [group for group in diagnosis.indistinguishable if len(group) > 1]
+    """
+    Return the sets of which these data do not tell which it is.
+
+    The set of the largest cause first, and in each the most probable first: so headline, cards and
+    what to do name them alike.
+    """
+    share = share_by_site(diagnosis)
+    odds_of = {site: p for held in diagnosis.causes for site, p in held.name}
+    groups = [
+        tuple(sorted(group, key=lambda site: -odds_of.get(site, 0.0)))
+        for group in diagnosis.indistinguishable
+        if len(group) > 1
+    ]
+    return sorted(groups, key=lambda group: -max(share.get(site, 0.0) for site in group))
 
 
 def open_sites(diagnosis: Diagnosis) -> set[Site]:
@@ -281,6 +301,17 @@ def open_sites(diagnosis: Diagnosis) -> set[Site]:
 def site_of(found: Found) -> Site:
     """Return the site of an effect that was found."""
     return Site(found.effect.name, found.effect.site)
+
+
+def share_by_site(diagnosis: Diagnosis) -> dict[Site, float]:
+    """Return the share of the squared gap of the cause that each effect in the twin belongs to."""
+    found = diagnosis.model.found
+    return {
+        Site(found[m].name, found[m].site): held.share
+        for held in diagnosis.causes
+        for m in held.members
+        if m < len(found)
+    }
 
 
 def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:

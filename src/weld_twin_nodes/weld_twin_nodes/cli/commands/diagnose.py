@@ -200,7 +200,7 @@ def run(args: argparse.Namespace) -> int:
         if args.pdf:
             print_page(place / PAGE, place / PDF)
     console = Console(highlight=False)
-    print_summary(diagnosis, console)
+    print_summary(diagnosis, console, sheet.demand)
     console.print(f'report: {Path(args.out) / PAGE}', markup=False)
     return UNSOUND if diagnosis.status == 'unsound' else 0
 

@@ -4,6 +4,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from weld_twin_nodes.cli import main
@@ -26,3 +30,19 @@ def test_every_command_prints_its_help(capsys):
             main([name, '--help'])
         assert end.value.code == 0
         assert f'usage: weld-twin {name}' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(('given', 'threads'), [({}, '1'), ({'OPENBLAS_NUM_THREADS': '2'}, '2')])
+def test_linear_algebra_stays_on_one_core_unless_told_otherwise(given, threads):
+    program = (
+        'import os, sys\n'
+        'from weld_twin_nodes.cli.main import main\n'
+        "sys.argv = ['weld-twin', 'schema', 'robot']\n"
+        'main()\n'
+        "print(os.environ['OPENBLAS_NUM_THREADS'])\n"
+    )
+    bare = {name: value for name, value in os.environ.items() if not name.endswith('NUM_THREADS')}
+    run = subprocess.run(
+        [sys.executable, '-c', program], env={**bare, **given}, capture_output=True, text=True
+    )
+    assert run.stdout.splitlines()[-1] == threads, run.stderr

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 
+from ..offline.environment import THREADS
 from .options import add_command
 
 USAGE_ERROR = 2
@@ -35,8 +36,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         wrong, 130 when interrupted.
 
     """
-    if argv is None:  # as a program: what it started ends with it
+    if argv is None:  # as a program: what it started ends with it, and nothing is loaded yet
         signal.signal(signal.SIGTERM, _end)
+        for name in THREADS:
+            os.environ.setdefault(name, '1')
     words = sys.argv[1:] if argv is None else list(argv)
     try:
         args = _parser(words).parse_args(words)

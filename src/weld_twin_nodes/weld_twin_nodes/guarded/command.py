@@ -22,7 +22,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 from weakref import WeakSet
 
-THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
+from ..offline.environment import THREADS
+
 START = 60.0
 """Seconds in which a warm process must be ready; it takes one or two."""
 LONGEST = 1 << 20

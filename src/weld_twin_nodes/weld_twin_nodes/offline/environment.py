@@ -1,12 +1,16 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Variables of the environment, for as long as a block lasts."""
+"""Variables of the environment: set for a block, and those that keep linear algebra on one core."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
+"""What tells the libraries under numpy how many threads to use. Matrices here have a few hundred
+rows: two threads spend more time waiting for each other than one takes for all the work."""
 
 
 @contextmanager

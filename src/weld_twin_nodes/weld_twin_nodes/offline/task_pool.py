@@ -27,13 +27,12 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
 
 from .content_hash import digest
-from .environment import environment
+from .environment import THREADS, environment
 
 Plain = Any
 """What JSON can hold."""
 Tell = Callable[[int, int, str], None]
 """Told how many tasks are done, how many there are, and what the last was."""
-_THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +165,7 @@ class Cores:
             self._pool = ProcessPoolExecutor(
                 self._workers, mp_context=context, initializer=_leave_interrupts
             )
-        with environment(**dict.fromkeys(_THREADS, '1')):
+        with environment(**dict.fromkeys(THREADS, '1')):
             futures: dict[Future[str], int] = {
                 self._pool.submit(call, task.function, task.arguments): k
                 for k, task in enumerate(tasks)

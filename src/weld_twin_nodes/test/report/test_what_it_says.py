@@ -16,6 +16,7 @@ from weld_twin_core.diagnosis.result import Candidate, Check, Site, Where
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_nodes.report import report_page
+from weld_twin_nodes.report.acceptance import Demand
 from weld_twin_nodes.report.belief import belief_of
 from weld_twin_nodes.report.controllers import correction
 from weld_twin_nodes.report.diagnosis_page import Sheet
@@ -134,6 +135,32 @@ def test_clocks_are_looked_at_for_a_lag_unless_they_were_found_right(level, told
     checks = (Check('clocks', level, 'As they are.'),)
     first = worth_doing(replace(case, causes=(cause,), checks=checks))[0]
     assert 'gains and feed-forward of the drive' in first and ('clocks' in first) is told
+
+
+def test_a_curve_is_told_by_where_it_is_furthest_off():
+    case = unknown(4e-4)
+    low, high = (f'{np.degrees(k):.3g}' for k in case.model.found[0].knots)
+    card = part(report_page(case), 'class="cards"', 'id="seam"')
+    row = re.search(r'Value off by up to (0\.023)° at (\S+)° ', card)
+    assert row and row[2] in (low, high)
+    assert f'zero over angle, up to 0.023° at {row[2]}°' in card
+
+
+def test_an_unknown_cause_is_unknown_only_among_what_was_to_be_tried():
+    case = unknown(1e-4)
+    rivals = tuple(Candidate(Site(name, 'joint_a2'), p, 1e-4, 0.5)
+                   for name, p in (('servo_lag', 0.6), ('backlash', 0.4)))  # fmt: skip
+    absent = dict.fromkeys(('friction', 'backlash'), 'excluded by the user')
+    case = replace(case, absent=absent, candidates=rivals)
+    page = report_page(case)
+    assert (
+        'among causes that were not excluded: friction and backlash were left out as asked; run '
+        'again with them'
+    ) in part(page, 'Confidence', '</dl>')
+    assert worth_doing(case)[0].startswith('Diagnose again with friction and backlash: ')
+    near = part(page, 'What fits best', 'Not considered')
+    assert 'servo lag of joint_a2' in near and 'backlash' not in near
+    assert 'not excluded' not in report_page(replace(case, absent={}))
 
 
 def open_and_sure(size):
@@ -255,11 +282,15 @@ def test_where_rivals_could_not_be_tried_nothing_is_said_to_be_settled():
 def test_samples_left_out_are_told_as_that_beside_an_instrument_without_outliers():
     good = [np.ones(len(t), bool) for t in PLAY.traces.t]
     good[0][:18] = False
-    fine = Check('outliers', 'ok', 'No measurement lies far off the rest.')
+    fine = Check('outliers', 'ok', 'No single reading stands out from its neighbours.')
     case = replace(PLAY, checks=(fine,), traces=replace(PLAY.traces, trusted=tuple(good)))
     page = plain(report_page(case))
     assert 'seam_run (18 samples left out: see the data)' in page
     assert 'left out 18 of' in page and 'outliers not drawn' not in page
+    sizes = sum(g.size for g in good)
+    assert f'of the {sizes - 18} samples that count' in page and 'of all samples' not in page
+    judged = part(report_page(case, sheet=Sheet(Demand(1e-3))), 'id="verdict"', '<h1')
+    assert '18 samples are left out of it: see the data' in judged
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from .belief import sure_entry
 from .cause_levels import LEVEL_HEADS, level_row, spreads
 from .charts import Axis, Line, chart
 from .controllers import BRANDS, correction
-from .curve_plot import curve_figure
+from .curve_plot import curve_figure, furthest
 from .directions import components, rms_words, sides_words
 from .html import Child, Html, joined, section, table, tag
 from .mending import curve_fault, left_without, look_at, taken_by_curve, warning
@@ -198,9 +198,10 @@ def _effects(diagnosis: Diagnosis, cause: Cause) -> list[Effect]:
 
 def _values(diagnosis: Diagnosis, cause: Cause) -> Html | None:
     errors = {(f.effect.name, f.effect.site): f.std for f in diagnosis.effects}
-    rows: list[Child] = []
+    curve = _furthest_off(diagnosis, cause)
+    rows: list[Child] = [] if curve is None else [tag('span', f'off by {furthest(curve[1])}')]
     for effect in _effects(diagnosis, cause):
-        if isinstance(effect, JointCurve) or 'curve' in effect.name:
+        if 'curve' in effect.name:
             continue
         for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
             rows.append(tag('span', f'{parameter_word(name)} {value}'))
@@ -356,7 +357,17 @@ def _picture(diagnosis: Diagnosis, k: int) -> Html | None:
 
 
 def _curve(diagnosis: Diagnosis, cause: Cause) -> Html | None:
-    """Return the curve that is furthest off, of those that stand for a cause."""
+    """Return the picture of the curve that is furthest off, of those that stand for a cause."""
+    chosen = _furthest_off(diagnosis, cause)
+    if chosen is None:
+        return None
+    m, curve = chosen
+    robot = diagnosis.model.robot
+    return curve_figure(curve, spreads(diagnosis)[m], robot.index(curve.joint))
+
+
+def _furthest_off(diagnosis: Diagnosis, cause: Cause) -> tuple[int, JointCurve] | None:
+    """Return which curve is furthest off, of those that stand for a cause."""
     found = diagnosis.model.found
     curves = {
         m: effect
@@ -367,9 +378,7 @@ def _curve(diagnosis: Diagnosis, cause: Cause) -> Html | None:
     }
     if not curves:
         return None
-    m, curve = max(curves.items(), key=lambda item: float(np.abs(item[1].values).max()))
-    robot = diagnosis.model.robot
-    return curve_figure(curve, spreads(diagnosis)[m], robot.index(curve.joint))
+    return max(curves.items(), key=lambda item: float(np.abs(item[1].values).max()))
 
 
 def _smaller(rest: list[Cause]) -> Html | None:

@@ -12,7 +12,7 @@ from weld_twin_core.effects import REGISTRY
 from .family_table import families_table
 from .html import Child, Html, bars, joined, section, table, tag
 from .quantities import MISSING, change, millimetres, parameter_rows
-from .untried import reason_and_joints, untried
+from .untried import reason_and_joints, untried, weighed
 from .words import (
     carries_curves,
     cause,
@@ -87,14 +87,15 @@ def _found(diagnosis: Diagnosis) -> Html | None:
 
 def _candidates(diagnosis: Diagnosis) -> Html | None:
     """Return the hypotheses for every cause, the most probable first."""
-    if not diagnosis.candidates:
+    candidates = weighed(diagnosis)
+    if not candidates:
         return None
-    groups = slots(diagnosis.candidates)
+    groups = slots(candidates)
     parts: list[Html] = []
     for slot in groups[:_SLOTS]:
         best = slot[0].probability
         parts.append(bars([_candidate(diagnosis, c, best) for c in slot[:_CANDIDATES]], 'wide'))
-    more = len(diagnosis.candidates) - sum(len(s[:_CANDIDATES]) for s in groups[:_SLOTS])
+    more = len(candidates) - sum(len(s[:_CANDIDATES]) for s in groups[:_SLOTS])
     note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
     if not diagnosis.effects:
         title = 'What fits best, though no cause is named'

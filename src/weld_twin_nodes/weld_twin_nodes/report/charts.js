@@ -81,10 +81,14 @@ window.charts = (() => {
     const chart = new uPlot(options(spec, place.clientWidth || 300, lines, bands), data, place);
     const one = { figure, spec, place, chart };
     drawn.push(one);
-    // Until an instant is looked at, a curve has the values of its middle.
-    if (spec.band) chart.setCursor({ left: chart.bbox.width / devicePixelRatio / 2, top: 1 });
+    // Until an instant is looked at, a curve has the values of where it is furthest off.
+    if (spec.band) chart.setCursor({ left: chart.valToPos(spec.x[furthest(data[1])], 'x'), top: 1 });
     new ResizeObserver(() => fit(one)).observe(place);
     return one;
+  }
+
+  function furthest(values) {
+    return values.reduce((best, v, i) => (Math.abs(v) > Math.abs(values[best]) ? i : best), 0);
   }
 
   function fit(one) {

@@ -43,9 +43,7 @@ def curve_figure(curve: JointCurve, covariance: Array | None, joint: int) -> Htm
         Number of its joint: over its angle, the cursor follows the instant looked at.
 
     """
-    x = np.linspace(curve.knots[0], curve.knots[-1], _SAMPLES)
-    weights = basis(curve.knots, x)
-    y = np.asarray(curve.values) @ weights
+    x, weights, y = _sampled(curve)
     band = np.zeros_like(y)
     if covariance is not None:
         band = _NINETY * np.sqrt(
@@ -56,10 +54,38 @@ def curve_figure(curve: JointCurve, covariance: Array | None, joint: int) -> Htm
     what = 'zero' if curve.channel == 'q' else curve.channel
     middle, half = y * size, band * size
     return chart(
-        f'{curve.joint}: {what} over {curve.over}',
+        f'{curve.joint}: {what} over {curve.over}, {furthest(curve)}',
         x * across,
         [Line('off by', middle), Line('not off', 0.0 * middle, 'soft', dashed=True)],
         (label, Axis('off by', unit)),
         band=(middle - half, middle + half),
         joint=joint if curve.over == 'angle' else None,
     )
+
+
+def furthest(curve: JointCurve) -> str:
+    """Return how far a curve is off where it is furthest off, and where that is."""
+    size, unit = _VALUES.get(curve.channel, (_DEGREES, '°'))
+    x, _, y = _sampled(curve)
+    at = int(np.argmax(np.abs(y)))
+    return (
+        f'up to {size * abs(float(y[at])):.3f}{_spaced(unit)} {_where(curve.over, float(x[at]))}'
+    )
+
+
+def _where(over: str, at: float) -> str:
+    if over == 'direction':
+        return f'going {"forward" if at > 0.0 else "backward"}'
+    across, axis = _AXES[over]
+    return f'at {across * at:.3g}{_spaced(axis.unit)}'
+
+
+def _spaced(unit: str) -> str:
+    return unit if unit == '°' else f'\N{NO-BREAK SPACE}{unit}'
+
+
+def _sampled(curve: JointCurve) -> tuple[Array, Array, Array]:
+    """Return what a curve runs over, (N,), the weights of its values, (K, N), and what it is there."""
+    x = np.linspace(curve.knots[0], curve.knots[-1], _SAMPLES)
+    weights = np.asarray(basis(curve.knots, x))
+    return x, weights, np.asarray(np.asarray(curve.values) @ weights)

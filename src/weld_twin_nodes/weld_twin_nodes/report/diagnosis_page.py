@@ -33,7 +33,8 @@ from .headline import header, opening
 from .html import Html, document, joined, own_file, tag
 from .joint_names import renamed
 from .printed import printed_section
-from .seam_view import seam_section
+from .quantities import counted
+from .seam_view import left_out, seam_section
 from .shrinking import shrink_section
 from .switches import page_data
 from .words import STATUS
@@ -127,6 +128,10 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
     size = largest(diagnosis)[0]
     verdict = rule.judged(size)
     where = f'as it is, {on_what(diagnosis)}'
+    out, _ = left_out(diagnosis)
+    if out:
+        verb = 'is' if out == 1 else 'are'
+        where += f'; {counted(out, "sample")} {verb} left out of it: see the data'
     return tag(
         'p',
         f'{judged_words(rule, size)}, {where}',

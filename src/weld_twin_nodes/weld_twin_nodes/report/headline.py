@@ -16,7 +16,7 @@ from .belief import together
 from .html import Html, tag
 from .quantities import counted, left_of, millimetres, odds, small_turn, turns_only
 from .to_do import worth_doing
-from .words import STATUS, mended, verdict
+from .words import STATUS, listed, mended, not_to_be_tried, verdict
 
 _SURE_OF = {
     'identified': 'that every cause named is right, and none is missing',
@@ -107,7 +107,7 @@ def _figures(diagnosis: Diagnosis) -> Html:
             (
                 'Confidence',
                 odds(diagnosis.confidence),
-                f'{_SURE_OF[diagnosis.status]}{together(diagnosis)}',
+                f'{_SURE_OF[diagnosis.status]}{together(diagnosis)}{_among(diagnosis)}',
             )
         )
     if gap.orientation_rms_rad is not None:
@@ -117,6 +117,18 @@ def _figures(diagnosis: Diagnosis) -> Html:
         for name, value, note in rows
     ]
     return tag('dl', *cells, class_='figures')
+
+
+def _among(diagnosis: Diagnosis) -> str:
+    """Return among which causes an unknown one is not, where some were not to be tried."""
+    names = not_to_be_tried(diagnosis)
+    if diagnosis.status != 'unknown' or not names:
+        return ''
+    verb = 'was' if len(names) == 1 else 'were'
+    return (
+        f', among causes that were not excluded: {listed(names)} {verb} left out as asked; run '
+        f'again with {"it" if len(names) == 1 else "them"}'
+    )
 
 
 def _left(diagnosis: Diagnosis) -> str:

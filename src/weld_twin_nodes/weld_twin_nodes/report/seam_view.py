@@ -37,7 +37,7 @@ def seam_section(diagnosis: Diagnosis) -> Html:
     return section(
         'What if' if switches(diagnosis) else ('The stations' if stations else 'The seam'),
         _switches(diagnosis),
-        _figures() if switches(diagnosis) else None,
+        _figures(diagnosis) if switches(diagnosis) else None,
         tag('div', *_panels(diagnosis, changes), class_='panels' if changes else 'panels one'),
         _controls(stations),
         tag('p', class_='instant', id_='instant'),
@@ -71,11 +71,11 @@ def _switches(diagnosis: Diagnosis) -> Html | None:
     )
 
 
-def _figures() -> Html:
+def _figures(diagnosis: Diagnosis) -> Html:
     """Return the figures that follow the switches."""
     cells = (
         ('Deviation then', 'now-rms', 'RMS, each stretch predicted from the others'),
-        ('Largest', 'now-max', 'of all samples'),
+        ('Largest', 'now-max', f'of {_counting(diagnosis)}'),
         ('Left of the gap', 'now-share', 'of its RMS'),
     )
     return tag(
@@ -88,6 +88,17 @@ def _figures() -> Html:
         ),
         class_='figures',
     )
+
+
+def left_out(diagnosis: Diagnosis) -> tuple[int, int]:
+    """Return how many samples no figure counts, and how many there are."""
+    good = [trusted(diagnosis, k) for k in range(len(diagnosis.traces.t))]
+    return sum(int((~g).sum()) for g in good), sum(g.size for g in good)
+
+
+def _counting(diagnosis: Diagnosis) -> str:
+    out, every = left_out(diagnosis)
+    return f'the {every - out} samples that count' if out else 'all samples'
 
 
 def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:

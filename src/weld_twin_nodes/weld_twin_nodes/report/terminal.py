@@ -22,6 +22,7 @@ from .contact_clouds import contacts_told
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
 from .quantities import change, millimetres, parameter_rows
 from .to_do import worth_doing
+from .untried import weighed
 from .words import STATUS, found_name, listed, mended, open_sets, site_name, verdict
 
 _COLOURS = {
@@ -53,7 +54,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, demand: Demand | None 
         _print_effects(diagnosis, console)
     if diagnosis.status == 'unknown' and diagnosis.causes:
         _print_levels(diagnosis, console)
-    elif len(diagnosis.candidates) > 1:
+    elif len(weighed(diagnosis)) > 1:
         _print_candidates(diagnosis, console)
     _print_sets(diagnosis, console)
     _print_changed(diagnosis, console)
@@ -126,7 +127,7 @@ def _print_levels(diagnosis: Diagnosis, console: Console) -> None:
 
 def _print_candidates(diagnosis: Diagnosis, console: Console) -> None:
     rows = []
-    for slot in slots(diagnosis.candidates):
+    for slot in slots(weighed(diagnosis)):
         rows += [
             [
                 site_name(item.site),

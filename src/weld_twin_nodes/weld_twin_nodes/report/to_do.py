@@ -18,6 +18,7 @@ from .quantities import millimetres
 from .words import (
     found_name,
     listed,
+    not_to_be_tried,
     open_sets,
     open_sites,
     share_by_site,
@@ -40,6 +41,12 @@ def worth_doing(diagnosis: Diagnosis, rule: Rule | None = None) -> list[str]:
 
     What is certain and smaller comes first only if the tolerance of ``rule`` is met by it alone.
     """
+    again = _again(diagnosis) if diagnosis.status == 'unknown' else []
+    return [*again, *_with_these(diagnosis, rule)]
+
+
+def _with_these(diagnosis: Diagnosis, rule: Rule | None) -> list[str]:
+    """Return what to do with what was found."""
     if diagnosis.status == 'unknown' and not diagnosis.actions:
         return _looking(diagnosis)
     if diagnosis.families and len(diagnosis.actions) > _LARGEST:
@@ -143,6 +150,18 @@ def _looking(diagnosis: Diagnosis) -> list[str]:
             'together.'
         )
     return told
+
+
+def _again(diagnosis: Diagnosis) -> list[str]:
+    """Return to diagnose with what was left out; nothing where all was tried."""
+    names = not_to_be_tried(diagnosis)
+    if not names:
+        return []
+    one = len(names) == 1
+    return [
+        f'Diagnose again with {listed(names)}: {"it was" if one else "they were"} left out as asked '
+        f'(--exclude-effect), and {"it" if one else "one of them"} may be the cause.'
+    ]
 
 
 def _at(diagnosis: Diagnosis, k: int) -> str:

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.hypotheses.still_joints import REASON
-from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.diagnosis.result import Candidate, Diagnosis
 
-from .words import cause, listed
+from .words import cause, listed, not_to_be_tried
 
 _KINDS = 4
 """Kinds of effects told; more are counted."""
@@ -30,7 +30,7 @@ def untried(diagnosis: Diagnosis) -> str:
         reason, joints = reason_and_joints(why, diagnosis)
         for joint in joints if reason == REASON else ():
             still.setdefault(joint, []).append(cause(effect, None))
-    asked = [cause(e, None) for e, why in sorted(diagnosis.absent.items()) if why == EXCLUDED]
+    asked = listed(not_to_be_tried(diagnosis))
     told = []
     if still:
         joints = [name for name in diagnosis.model.robot.joint_names if name in still]
@@ -43,5 +43,12 @@ def untried(diagnosis: Diagnosis) -> str:
             f'there: only a recording in which {"it moves" if one else "they move"} can.'
         )
     if asked:
-        told.append(f'{listed(asked)[:1].upper()}{listed(asked)[1:]} was not tried, as asked.')
+        verb = 'was' if len(not_to_be_tried(diagnosis)) == 1 else 'were'
+        told.append(f'{asked[:1].upper()}{asked[1:]} {verb} not tried, as asked.')
     return ' '.join(told)
+
+
+def weighed(diagnosis: Diagnosis) -> tuple[Candidate, ...]:
+    """Return the candidates without those of effects that were asked to be left out."""
+    absent = diagnosis.absent
+    return tuple(c for c in diagnosis.candidates if absent.get(c.site.effect) != EXCLUDED)

@@ -364,8 +364,13 @@ def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
 
 def _without(diagnosis: Diagnosis) -> str:
     """Return which effects were asked not to be tried: one of them may well explain the gap."""
-    names = [CAUSES.get(n, n) for n, why in diagnosis.absent.items() if why == EXCLUDED]
+    names = not_to_be_tried(diagnosis)
     return f' (tried without {listed(names)}, as asked)' if names else ''
+
+
+def not_to_be_tried(diagnosis: Diagnosis) -> list[str]:
+    """Return the effects, in words, that were asked to be left out."""
+    return [CAUSES.get(n, n) for n, why in diagnosis.absent.items() if why == EXCLUDED]
 
 
 def _none(diagnosis: Diagnosis) -> tuple[str, str]:

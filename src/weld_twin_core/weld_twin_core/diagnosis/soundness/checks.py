@@ -27,7 +27,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'repeats': (repeats, 'Nothing was recorded twice.'),
     'source of the joints': (source, 'Joint positions are not plainly those of a command.'),
     'motion': (motion, 'Every joint moves, both ways, and the frames can be told apart.'),
-    'outliers': (outliers, 'No measurement lies far off the rest.'),
+    'outliers': (outliers, 'No single reading stands out from its neighbours.'),
     'set-up': (setup, 'The set-up did not move while it was measured.'),
 }
 """Every check by name: the function, and what it says when it finds nothing."""

@@ -69,7 +69,7 @@ def furthest(curve: JointCurve) -> str:
     x, _, y = _sampled(curve)
     at = int(np.argmax(np.abs(y)))
     return (
-        f'up to {size * abs(float(y[at])):.3f}{_spaced(unit)} {_where(curve.over, float(x[at]))}'
+        f'up to {size * abs(float(y[at])):.3g}{_spaced(unit)} {_where(curve.over, float(x[at]))}'
     )
 
 

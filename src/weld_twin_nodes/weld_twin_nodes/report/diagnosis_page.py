@@ -131,7 +131,7 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
     out, _ = left_out(diagnosis)
     if out:
         verb = 'is' if out == 1 else 'are'
-        where += f'; {counted(out, "sample")} {verb} left out of it: see the data'
+        where += f'; {counted(out, "sample")} {verb} left out of it'
     return tag(
         'p',
         f'{judged_words(rule, size)}, {where}',

@@ -15,6 +15,7 @@ import numpy as np
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.markdown import table
+from weld_twin_nodes.offline.environment import THREADS
 
 from .growing import KINDS
 
@@ -56,7 +57,7 @@ def measured(
 
 def _point(name: str, size: float) -> dict[str, float]:
     words = [sys.executable, '-m', f'{__package__}.growing', name, str(size)]
-    one = {**os.environ, 'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1'}
+    one = {**os.environ, **dict.fromkeys(THREADS, '1')}
     done = subprocess.run(words, env=one, capture_output=True, text=True, check=False)
     if done.returncode:
         reason = done.stderr.strip().splitlines() or ['no reason given']

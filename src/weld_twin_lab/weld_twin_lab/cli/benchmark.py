@@ -12,10 +12,10 @@ from __future__ import annotations
 import argparse
 import os
 
+from weld_twin_nodes.offline.environment import THREADS
+
 ONE_THREAD = {
-    'OMP_NUM_THREADS': '1',
-    'OPENBLAS_NUM_THREADS': '1',
-    'MKL_NUM_THREADS': '1',
+    **dict.fromkeys(THREADS, '1'),
     'XLA_FLAGS': '--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1',
     'JAX_PLATFORMS': 'cpu',
 }

@@ -9,7 +9,7 @@ from weld_twin_core.diagnosis.result import Cause, Diagnosis
 from .html import Html, tag
 from .quantities import odds
 from .switches import alternatives, cause_name
-from .words import CURVES, DEPENDENCES, cause, leading, likely, place_name, site_name
+from .words import CURVES, DEPENDENCES, cause, depending, leading, likely, place_name, site_name
 
 _LISTED = 3
 """Places, dependences or names told of a level."""
@@ -54,8 +54,7 @@ def _on(cause: Cause) -> list[str]:
     if not cause.dependence:
         return ['What it depends on was not found.']
     on, p = cause.dependence[0]
-    how = 'is constant' if on == 'constant' else f'depends on {DEPENDENCES.get(on, on)}'
-    return [f'{odds(p)} that it {how}; the library has no name for it.']
+    return [f'{odds(p)} that it {depending(on)}; the library has no name for it.']
 
 
 def sure_entry(diagnosis: Diagnosis, cause: Cause) -> Html | None:

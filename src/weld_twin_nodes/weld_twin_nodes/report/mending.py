@@ -12,7 +12,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .quantities import STAYS, UNCHANGED, millimetres
 from .switches import as_it_is, squares, switches, trusted
-from .words import DEPENDENCES, likely, unnamed
+from .words import depending, likely, unnamed
 
 _GROWS = 1.02
 """Ratio of the largest deviation after to before from which it is told as grown: less than that is
@@ -113,10 +113,9 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
         at = _LOOK.get(on, 'all that moves')
         if on == 'speed' and not _one_clock(diagnosis):
             at += ', and the clocks'
-        how = 'is constant' if on == 'constant' else f'depends on {DEPENDENCES.get(on, on)}'
         first = (
             f'Look at {where}, at {at} first: what is found there '
-            f'{how}, and no known effect gives it.'
+            f'{depending(on)}, and no known effect gives it.'
         )
     left = left_without(diagnosis, k)
     if left is None:

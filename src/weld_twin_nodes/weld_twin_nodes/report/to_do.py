@@ -16,6 +16,7 @@ from .leading import in_order
 from .mending import left_without, look_at, warning
 from .quantities import millimetres
 from .words import (
+    cause_by_site,
     found_name,
     listed,
     not_to_be_tried,
@@ -75,7 +76,7 @@ def _settled(diagnosis: Diagnosis, rule: Rule | None) -> dict[Site, str]:
     """
     share, unsure = share_by_site(diagnosis), open_sites(diagnosis)
     most = max((share.get(site, 0.0) for site in unsure), default=0.0)
-    held = _causes_of(diagnosis)
+    held = cause_by_site(diagnosis)
     out = {}
     for site in map(site_of, diagnosis.effects):
         if site in unsure:
@@ -86,17 +87,6 @@ def _settled(diagnosis: Diagnosis, rule: Rule | None) -> dict[Site, str]:
         elif left is not None and rule is not None and rule.judged(left.largest_after) == PASS:
             out[site] = f'That alone leaves {millimetres(left.largest_after)} at most.'
     return out
-
-
-def _causes_of(diagnosis: Diagnosis) -> dict[Site, int]:
-    """Return which cause each effect in the twin belongs to."""
-    found = diagnosis.model.found
-    return {
-        Site(found[m].name, found[m].site): k
-        for k, cause in enumerate(diagnosis.causes)
-        for m in cause.members
-        if m < len(found)
-    }
 
 
 def _telling(diagnosis: Diagnosis) -> list[str]:
@@ -130,7 +120,7 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
     Where mending one alone makes the worst spot worse, that is said beside it.
     """
     unsure = open_sites(diagnosis)
-    held = _causes_of(diagnosis)
+    held = cause_by_site(diagnosis)
     out = []
     for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
         if site_of(named) in unsure:

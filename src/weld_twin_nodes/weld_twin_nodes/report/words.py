@@ -303,15 +303,25 @@ def site_of(found: Found) -> Site:
     return Site(found.effect.name, found.effect.site)
 
 
-def share_by_site(diagnosis: Diagnosis) -> dict[Site, float]:
-    """Return the share of the squared gap of the cause that each effect in the twin belongs to."""
+def cause_by_site(diagnosis: Diagnosis) -> dict[Site, int]:
+    """Return which cause each effect in the twin belongs to."""
     found = diagnosis.model.found
     return {
-        Site(found[m].name, found[m].site): held.share
-        for held in diagnosis.causes
+        Site(found[m].name, found[m].site): k
+        for k, held in enumerate(diagnosis.causes)
         for m in held.members
         if m < len(found)
     }
+
+
+def share_by_site(diagnosis: Diagnosis) -> dict[Site, float]:
+    """Return the share of the squared gap of the cause that each effect in the twin belongs to."""
+    return {site: diagnosis.causes[k].share for site, k in cause_by_site(diagnosis).items()}
+
+
+def depending(on: str) -> str:
+    """Return what something without a name does, by what it depends on."""
+    return 'is constant' if on == 'constant' else f'depends on {DEPENDENCES.get(on, on)}'
 
 
 def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:

@@ -25,6 +25,7 @@ from .selection import (
     consolidated,
     forward,
     implausible,
+    possible_part,
     without_misfit,
     without_negligible,
 )
@@ -168,8 +169,7 @@ def search(
         refused += absurd
         kept = [k for k, e in enumerate(final.model.found) if not beyond(final.model.robot, e)]
         slots = tuple(slots[k] for k in kept) if slots else ()
-        less = final.model.with_found(tuple(final.model.found[k] for k in kept))
-        final, scale = _fitted(full, less)
+        final, scale = _fitted(full, possible_part(final.model))
     return Search(
         problem=full,
         scale=scale,
@@ -248,9 +248,7 @@ def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
     """
     while absurd := implausible(now.model):
         refused += absurd
-        keys = {effect.key for effect in absurd}
-        kept = tuple(effect for effect in now.model.found if effect.key not in keys)
-        now = fit(work.problem, now.model.with_found(kept), work.scale, None, 4)
+        now = fit(work.problem, possible_part(now.model), work.scale, None, 4)
     return now
 
 

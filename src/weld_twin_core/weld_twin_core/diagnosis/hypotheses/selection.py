@@ -180,12 +180,10 @@ def _without_stand_in(work: Workspace, choice: Choice, result: Fit) -> Fit:
     An effect taken earlier may have passed for several, and runs beyond what a machine can have
     once the choice explains its part. Then it goes, and what fits best beside the choice comes.
     """
-    absurd = {effect.key for effect in implausible(result.model)}
-    sites = {(effect.name, effect.site) for effect in result.model.found if effect.key in absurd}
-    if not absurd or choice.unit.site in sites:
+    sites = {(effect.name, effect.site) for effect in implausible(result.model)}
+    if not sites or choice.unit.site in sites:
         return result
-    kept = tuple(effect for effect in result.model.found if effect.key not in absurd)
-    alone = fit(work.problem, result.model.with_found(kept), work.scale, None, 5)
+    alone = fit(work.problem, possible_part(result.model), work.scale, None, 5)
     systems = work.beside(alone.model, alone.residual)
     ranked = ranking(systems, work.library.units, float(alone.residual.size))
     others = [c for c in ranked if c.unit.site not in sites and not _repeats(c, _sites(alone))]
@@ -201,6 +199,11 @@ def _sites(found: Fit) -> list[tuple[str, str | None]]:
 def implausible(model: Model) -> list[Effect]:
     """Return the effects of a model that are beyond what a machine can have."""
     return [effect for effect in model.found if beyond(model.robot, effect)]
+
+
+def possible_part(model: Model) -> Model:
+    """Return the model without the effects that are beyond what a machine can have."""
+    return model.with_found(tuple(e for e in model.found if not beyond(model.robot, e)))
 
 
 def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:

@@ -15,6 +15,7 @@ from ...arrays import Array
 from ...recording import Recording
 from ..algebra.problem import Model, Problem
 from ..frames.alignment import refined
+from ..result import Unsound
 from .base_change import BaseChange, base_change, thinned
 from .lag import Lag, lag
 from .lengths import length
@@ -53,6 +54,10 @@ class Mistake(NamedTuple):
     mend: Mend | None
     of_all: bool = True
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    def told(self, *, applied: bool) -> Unsound:
+        """Return what is told of it in a diagnosis, undone or not."""
+        return Unsound(self.kind, self.at, self.sentence, self.remedy, applied, self.alike)
 
 
 class Finding(NamedTuple):

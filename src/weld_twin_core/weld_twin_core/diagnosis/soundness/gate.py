@@ -94,15 +94,11 @@ class Examined:
         if not kept:
             return self
         mistakes = [_undated(slip, problem) for slip in kept]
-        told = tuple(Check('data and set-up', 'unsound', m.sentence) for m in mistakes)
-        unsound = tuple(
-            Unsound(m.kind, m.at, m.sentence, m.remedy, False, m.alike) for m in mistakes
-        )
         return replace(
             self,
             posed=None,
-            checks=(*told, *self.checks),
-            unsound=(*self.unsound, *unsound),
+            checks=(*_first(mistakes, applied=False), *self.checks),
+            unsound=(*self.unsound, *(m.told(applied=False) for m in mistakes)),
         )
 
     def mended(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
@@ -157,20 +153,21 @@ def examine(
             if mistake.mend is not None:
                 trial = mistake.mend(trial)
     done = apply and look.posed is not None and all(m.mend is not None for m in mistakes)
-    what = 'mended' if done else 'data and set-up'
-    # What the checks say of data mended on trial holds for nothing that was given.
-    told_first = [Check(what, 'unsound', m.sentence) for m in mistakes]
     return Examined(
         trial if done else given,
         look.marked(mistakes) if done or not mistakes else None,
-        (*told_first, *(look.checks if done or not mistakes else ())),
-        (
-            *(Unsound(m.kind, m.at, m.sentence, m.remedy, done, m.alike) for m in mistakes),
-            *look.told,
-        ),
+        # What the checks say of data mended on trial holds for nothing that was given.
+        (*_first(mistakes, applied=done), *(look.checks if done or not mistakes else ())),
+        (*(m.told(applied=done) for m in mistakes), *look.told),
         tuple(mistakes) if done else (),
         look.dated,
     )
+
+
+def _first(mistakes: Sequence[Mistake], *, applied: bool) -> list[Check]:
+    """Return what stands before all checks: the mistakes, undone or not."""
+    what = 'mended' if applied else 'data and set-up'
+    return [Check(what, 'unsound', mistake.sentence) for mistake in mistakes]
 
 
 class _Look(NamedTuple):

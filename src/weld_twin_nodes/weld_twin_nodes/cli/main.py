@@ -13,7 +13,7 @@ from importlib import import_module
 from importlib.util import find_spec
 
 from ..offline.environment import THREADS
-from .options import add_command
+from .options import add_command, short_help
 
 USAGE_ERROR = 2
 """Exit code where the user can do something about it."""
@@ -98,11 +98,20 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         parser.error(
             f"'{chosen}' is a proof; it needs the package weld_twin_lab, which is not installed"
         )
-    for name in [chosen] if chosen in commands else commands:
-        module = import_module(commands[name])
-        sub = add_command(subparsers, name, module)
-        sub.set_defaults(run=module.run)
+    if chosen in commands:
+        module = import_module(commands[chosen])
+        add_command(subparsers, chosen, module).set_defaults(run=module.run)
+        return parser
+    for name, module_name in commands.items():
+        subparsers.add_parser(name, help=short_help(_docstring(module_name)))
     return parser
+
+
+def _docstring(module_name: str) -> str:
+    """Return the docstring of a module from its code, which is not run: a list of commands."""
+    spec = find_spec(module_name)
+    code = spec.loader.get_code(module_name) if spec and spec.loader else None  # type: ignore[attr-defined]
+    return str(code.co_consts[0]) if code else ''
 
 
 def _version() -> str:

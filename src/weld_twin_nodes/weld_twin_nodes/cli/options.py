@@ -139,6 +139,11 @@ def add_bag_output(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--storage', choices=('mcap', 'sqlite3'), default='mcap')
 
 
+def short_help(docstring: str) -> str:
+    """Return the first line of a docstring, as a list of subcommands shows it."""
+    return docstring.strip().partition('\n')[0].replace('%', '%%')
+
+
 def add_command(subparsers: Any, name: str, module: ModuleType) -> argparse.ArgumentParser:
     """
     Add a subcommand whose help is the module's docstring, with the module's own options.
@@ -155,7 +160,7 @@ def add_command(subparsers: Any, name: str, module: ModuleType) -> argparse.Argu
     text = (module.__doc__ or '').strip()
     parser: argparse.ArgumentParser = subparsers.add_parser(
         name,
-        help=text.partition('\n')[0].replace('%', '%%'),
+        help=short_help(text),
         description=text,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -31,8 +31,9 @@ from .predicting.allowed import allowed
 from .result import Diagnosis
 from .soundness import Examined, Given, examine, refuse_reused
 from .stability.repeated import repeated
-from .stability.steadied import steadied
-from .trust.signs import signs_of_answer
+from .stability.steadied import came_back, steadied
+from .trust.signs import Signs, signs_of_answer
+from .trust.signs_of_found import signs_of_found
 from .unseen.held_out_shrink import held_out_shrink
 from .unseen.leftover_structure import structure
 from .unseen.parted_elsewhere import parted_elsewhere
@@ -163,7 +164,10 @@ def _explained(
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict, beliefs)
     verdict = held_against(verdict, unseen, rival, beliefs)
-    signs = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks)
+    back = came_back(found, verdict, stability)
+    each = signs_of_found(found, unseen, evidence, verdict, back, holdout)
+    checks = examined.checks
+    signs = Signs(signs_of_answer(found, unseen, evidence, verdict, rival, checks, each), each)
     places = placed(found, verdict, rival, beliefs)
     progress('held against curves without a formula')
     found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)

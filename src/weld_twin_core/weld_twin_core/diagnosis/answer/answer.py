@@ -21,7 +21,7 @@ from ..soundness import Examined
 from ..stability.steadied import Stability, bounded, of_families
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
-from ..trust.trusted import trusted
+from ..trust.trusted import NAMING, trusted
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict
@@ -41,7 +41,7 @@ def answer(
     shrink: Shrink,
     examined: Examined,
     posterior: Posterior,
-    signs: Mapping[str, float],
+    signs: Signs,
     rival: Curved | None = None,
     placing: FreeForm | None = None,
     limits: Limits | None = None,
@@ -62,8 +62,8 @@ def answer(
         Whether the data are sound, and what was mended.
     posterior : Posterior
         The models that the recordings allow.
-    signs : mapping from str to float
-        Of the answer: what says how far it can be trusted.
+    signs : Signs
+        Of the answer, and of every effect found: what says how far it can be trusted.
     rival : Curved or None
         What explains the gap without a formula.
     placing : FreeForm or None
@@ -120,7 +120,7 @@ def _trusted(
     unseen: Unseen,
     evidence: Evidence,
     verdict: Verdict,
-    signs: Mapping[str, float],
+    signs: Signs,
     rival: Curved | None,
     placing: FreeForm | None,
     stability: Stability | None,
@@ -129,10 +129,11 @@ def _trusted(
     told, shares = causes(
         found, unseen, verdict, rival, evidence.floor, found.work.beliefs, placing
     )
+    sizes = (len(told), evidence.gap, evidence.floor)
     known = Signs(
-        {**signs, 'top_share': told[0].share if told else 0.0},
+        {**signs.answer, 'top_share': told[0].share if told else 0.0},
         tuple(
-            signs_of_cause(cause, k, len(told), evidence.gap, evidence.floor, rival)
+            signs_of_cause(cause, k, *sizes, rival, _of_effect(cause, verdict, signs))
             for k, cause in enumerate(told)
         ),
     )
@@ -141,6 +142,12 @@ def _trusted(
     if evidence.families is not None:
         told = of_families(told, evidence.families, found.work.beliefs)
     return verdict, tuple(covering(cause) for cause in told), shares, known
+
+
+def _of_effect(cause: Cause, verdict: Verdict, signs: Signs) -> Mapping[str, float]:
+    """Return the signs of the effect that stands for a cause; none of curves and of many."""
+    named = verdict.status in NAMING and signs.causes and len(cause.members) == 1
+    return signs.causes[cause.members[0]] if named else {}
 
 
 def _compared(found: Search, examined: Examined) -> dict[str, Any]:

@@ -42,6 +42,27 @@ class Stability:
     came_back: Mapping[Site, CameBack]
 
 
+def came_back(
+    found: Search, verdict: Verdict, stability: Stability | None
+) -> tuple[CameBack | None, ...]:
+    """
+    Return how often every effect found came back, itself or what it is named together with.
+
+    Parameters
+    ----------
+    found : Search
+    verdict : Verdict
+    stability : Stability or None
+        None tells nothing of any.
+
+    """
+    sites = [Site(effect.name, effect.site) for effect in found.final.model.found]
+    if stability is None:
+        return (None,) * len(sites)
+    alike = [next((group for group in verdict.sets if s in group), (s,)) for s in sites]
+    return tuple(stability.again.came_back(s, a) for s, a in zip(sites, alike, strict=True))
+
+
 def steadied(
     found: Search, again: Repeated | None, beliefs: Beliefs
 ) -> tuple[Search, Stability | None]:

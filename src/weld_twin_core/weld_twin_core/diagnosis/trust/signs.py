@@ -26,12 +26,12 @@ from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
 from ..verdict.weighing import Weighed
+from .numbers import FAR, Numbers, log, log1, plain, rms
+from .signs_of_found import left_at_joints, residual_signs, worst_of
 
 MOVES, WIDE = 0.02, 0.5
 """Travel [rad, m] from which on a joint shows something at all, and from which on it shows its
 angle well."""
-FAR = 1e3
-"""Signs are cut here: nothing beyond says more."""
 CURVES = (
     'curves',
     'curve_gain',
@@ -42,8 +42,6 @@ CURVES = (
     'form_gain',
     'form_sure',
 )
-
-Numbers = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -70,6 +68,7 @@ def signs_of_answer(
     verdict: Verdict,
     rival: Curved | None,
     checks: Sequence[Check],
+    each: Sequence[Mapping[str, float]] = (),
 ) -> Numbers:
     """
     Return the signs of an answer.
@@ -86,10 +85,12 @@ def signs_of_answer(
         The free-form explanation.
     checks : sequence of Check
         Of data and set-up.
+    each : sequence of mappings
+        Signs of every effect found.
 
     """
     case = Weighed(evidence, found.work.beliefs)
-    return _plain(
+    return plain(
         {
             **_of_gap(case),
             **_of_names(found, unseen, evidence, verdict),
@@ -97,7 +98,10 @@ def signs_of_answer(
             **_of_curves(unseen, rival, evidence.floor),
             **_of_data(found.problem),
             **families_in('named_', 'alone_', verdict.sets),
-            'rows': _log(found.effective(found.small)),
+            **residual_signs(unseen),
+            **({} if found.dense else left_at_joints(unseen, found.final.model)),
+            **worst_of(each),
+            'rows': log(found.effective(found.small)),
             'notes': sum(check.level == 'note' for check in checks),
             'warnings': sum(check.level == 'warning' for check in checks),
         }
@@ -105,7 +109,13 @@ def signs_of_answer(
 
 
 def signs_of_cause(
-    cause: Cause, rank: int, count: int, gap: float, floor: float, rival: Curved | None
+    cause: Cause,
+    rank: int,
+    count: int,
+    gap: float,
+    floor: float,
+    rival: Curved | None,
+    own: Mapping[str, float] | None = None,
 ) -> Numbers:
     """
     Return the signs of one cause, before anything learned is applied.
@@ -118,19 +128,21 @@ def signs_of_cause(
     gap, floor : float
         RMS of the gap and of the noise [m].
     rival : Curved or None
+    own : mapping from str to float, optional
+        Signs of the effect that stands for it.
 
     """
     seen = rival.form.parts if rival is not None else ()
     at = {part.group.at for part in seen}
     on = {part.group.on for part in seen}
     size = np.sqrt(max(cause.share, 0.0)) * gap / max(floor, 1e-12)
-    return _plain(
+    return plain(
         {
             'cause_rank': rank,
             'cause_count': count,
             'cause_share': cause.share,
             'cause_spread': cause.share_ci90[1] - cause.share_ci90[0],
-            'cause_size': _log(size),
+            'cause_size': log(size),
             **_levels('place', [p for _, p in cause.place]),
             **_levels('dependence', [p for _, p in cause.dependence]),
             **_levels('name', [p for _, p in cause.name]),
@@ -138,6 +150,7 @@ def signs_of_cause(
             'curve_on_dependence': float(bool(cause.dependence) and cause.dependence[0][0] in on),
             'one_joint': float(bool(cause.name) and cause.name[0][0].joint is not None),
             **families_in('cause_is_', 'cause_only_', [[site for site, _ in cause.name]]),
+            **(own or {}),
         }
     )
 
@@ -169,9 +182,9 @@ def _levels(level: str, listed: Sequence[float]) -> Numbers:
 def _of_gap(case: Weighed) -> Numbers:
     told, left = case.evidence, case.evidence.structure
     return {
-        'gap': _log(told.gap / max(told.floor, 1e-12)),
-        'after': _log(told.after / max(told.floor, 1e-12)),
-        'elsewhere': _log(told.after / max(told.fitted, 1e-12)),
+        'gap': log(told.gap / max(told.floor, 1e-12)),
+        'after': log(told.after / max(told.floor, 1e-12)),
+        'elsewhere': log(told.after / max(told.fitted, 1e-12)),
         'left': case.left,
         'complete': case.complete,
         'rise': case.rise,
@@ -184,7 +197,7 @@ def _of_gap(case: Weighed) -> Numbers:
         'independent': float(told.independent),
         'refused': len(told.refused) + len(told.lacking),
         'glimpsed': len(told.glimpsed),
-        'cancel': _log(sum(told.parts)) if told.parts else 0.0,
+        'cancel': log(sum(told.parts)) if told.parts else 0.0,
     }
 
 
@@ -201,8 +214,8 @@ def _of_names(found: Search, unseen: Unseen, evidence: Evidence, verdict: Verdic
         'breadth': max((len(group) for group in verdict.sets), default=0),
         'ambiguous': sum(len(group) > 1 for group in verdict.sets),
         'families': len(evidence.families or ()),
-        'weakest': _log(min(sizes, default=0.0)),
-        'strongest': _log(max(sizes, default=0.0)),
+        'weakest': log(min(sizes, default=0.0)),
+        'strongest': log(max(sizes, default=0.0)),
         'alike': _alike(unseen.targets[1:]) if len(model) <= len(evidence.slots) else 0.0,
         'coordinates': sum(coordinates),
         'most_coordinates': max(coordinates, default=0),
@@ -222,13 +235,13 @@ def _of_rivals(evidence: Evidence, verdict: Verdict) -> Numbers:
         masses.append(sum(r.probability for r in inside))
         nats.append(slot[0].nats)
         margins += [slot[0].nats - r.nats for r in outside]
-        apart += [_rms(slot[0].fit.residual - r.fit.residual) for r in outside]
+        apart += [rms(slot[0].fit.residual - r.fit.residual) for r in outside]
     return {
         'leader': min(leaders, default=0.0),
         'mass': float(np.prod(masses)) if masses else 0.0,
-        'nats': _log1(min(nats, default=0.0)),
-        'margin': _log1(min(margins, default=FAR)),
-        'apart': _log(min(apart, default=FAR)),
+        'nats': log1(min(nats, default=0.0)),
+        'margin': log1(min(margins, default=FAR)),
+        'apart': log(min(apart, default=FAR)),
         'near': sum(a < 0.1 for a in apart),
         'rivals': len(margins),
     }
@@ -250,7 +263,7 @@ def _of_curves(unseen: Unseen, rival: Curved | None, floor: float) -> Numbers:
         'curves': len(rival.form.parts),
         'curve_gain': gain,
         'curve_sure': sure,
-        'curve_left': _log(rival.rms_m / max(floor, 1e-12)),
+        'curve_left': log(rival.rms_m / max(floor, 1e-12)),
         'curve_kept': len(rival.kept),
         'curve_place': min(weights, default=0.0),
         'form_gain': rival.form.gain,
@@ -267,13 +280,13 @@ def _of_data(problem: Problem) -> Numbers:
         'orientation': float(max(problem.rows) > 3),
         'aligned': len(problem.align),
         'recordings': len(problem.recordings),
-        'samples': _log(sum(problem.samples)),
+        'samples': log(sum(problem.samples)),
         'wrench': float(first.wrench is not None),
         'temperature': float(first.temperature is not None),
         'moving': float((travel > MOVES).mean()),
         'wide': float((travel > WIDE).mean()),
-        'travel': _log(float(np.median(travel))),
-        'turns': _log1(float(np.median(_turns(problem)))),
+        'travel': log(float(np.median(travel))),
+        'turns': log1(float(np.median(_turns(problem)))),
     }
 
 
@@ -294,23 +307,3 @@ def _alike(parts: Array) -> float:
     unit = parts / size
     product = np.abs(unit @ unit.T)
     return float(product[~np.eye(len(parts), dtype=bool)].max())
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt((values**2).mean()))
-
-
-def _log(value: float) -> float:
-    """Return the decimal logarithm of what cannot be negative."""
-    return float(np.log10(max(value, 1.0 / FAR)))
-
-
-def _log1(value: float) -> float:
-    """Return a logarithm that is linear near zero, with the sign of the value."""
-    return float(np.sign(value) * np.log10(1.0 + abs(value)))
-
-
-def _plain(numbers: Mapping[str, float]) -> Numbers:
-    """Return finite numbers, cut where nothing beyond says more."""
-    items: Iterable[tuple[str, float]] = numbers.items()
-    return {k: float(np.clip(np.nan_to_num(v, nan=0.0), -FAR, FAR)) for k, v in items}

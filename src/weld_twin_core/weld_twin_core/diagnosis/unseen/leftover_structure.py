@@ -73,7 +73,7 @@ def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
     labels = unseen.trusted_labels()
     found: list[tuple[float, float, str, Array]] = []
     for name, columns in _generic(unseen.problem, model, unseen.scale):
-        gain, sure, squares = _best(base, columns, before, labels)
+        gain, sure, squares = best_of(base, columns, before, labels)
         found.append((gain, sure, name, squares))
     found.sort(key=lambda item: -item[0])
     gain, sure, _, squares = found[0]
@@ -82,8 +82,22 @@ def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
     return Structure(float(np.sqrt(squares.mean())), gain, sure, names)
 
 
-def _best(base: Base, columns: Array, before: Array, labels: Array) -> tuple[float, float, Array]:
-    """Return gain, its certainty and the squared errors at the best of a few ridges."""
+def best_of(
+    base: Base, columns: Array, before: Array, labels: Array
+) -> tuple[float, float, Array]:
+    """
+    Return gain, its certainty and the squared errors at the best of a few ridges.
+
+    Parameters
+    ----------
+    base : Base
+        The model that the columns are added to.
+    columns : array, shape (E, rows)
+        Of unit mean square.
+    before, labels : array, shape (samples,)
+        Squared errors without them, and the stretch of every trusted sample.
+
+    """
     best: tuple[float, float, Array] | None = None
     for residual in base.extended(columns, RIDGES):
         after = base.unseen.squares(residual)
@@ -131,7 +145,7 @@ def _column_group(
         problem.seen(k, maker.column(('q', i)))[None] * values[:, None, :]
         for k, (maker, values) in enumerate(zip(features, _alike_in_number(each), strict=True))
     ]
-    return _unit(problem.whitened(parts, scale))
+    return in_units(problem.whitened(parts, scale))
 
 
 def _alike_in_number(each: list[Array]) -> list[Array]:
@@ -164,10 +178,11 @@ def _pose_group(
         for j in range(3):
             block[j, :, :3] = (axes[:, :, j].T)[None] * values[:, None, :]
         parts.append(problem.seen(k, block.reshape(-1, 6, values.shape[1])))
-    return _unit(problem.whitened(parts, scale))
+    return in_units(problem.whitened(parts, scale))
 
 
-def _unit(columns: Array) -> Array:
+def in_units(columns: Array) -> Array:
+    """Return columns, (E, rows), scaled to unit mean square, without those that show nothing."""
     size = np.sqrt((columns**2).mean(axis=1, keepdims=True))
     live = size[:, 0] > 1e-12
     return np.asarray(columns[live] / size[live])
@@ -177,7 +192,7 @@ SIDE = 2
 """Row of `_motion` that holds the direction."""
 
 
-def _bumps(x: Array, low: float, high: float, count: int = KNOTS) -> Array:
+def bumps(x: Array, low: float, high: float, count: int = KNOTS) -> Array:
     """Return smooth bumps over a range, shape (count, M)."""
     width = (high - low) / (count - 1)
     centres = np.linspace(low, high, count)[:, None]
@@ -185,7 +200,7 @@ def _bumps(x: Array, low: float, high: float, count: int = KNOTS) -> Array:
 
 
 def _angle(maker: Features, i: int, low: float, high: float) -> Array:
-    return _bumps(maker.run.view.q[:, i], low, high)
+    return bumps(maker.run.view.q[:, i], low, high)
 
 
 def _motion(maker: Features, i: int, low: float, high: float) -> Array:
@@ -202,7 +217,7 @@ def _motion(maker: Features, i: int, low: float, high: float) -> Array:
 
 def _time(maker: Features) -> Array:
     t = maker.run.view.elapsed
-    return _bumps(t, float(t[0]), float(max(t[-1], t[0] + 1e-9)))
+    return bumps(t, float(t[0]), float(max(t[-1], t[0] + 1e-9)))
 
 
 def _steps(maker: Features) -> Array:

@@ -42,6 +42,8 @@ MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""
 Rows = Any
 """Rows of one stretch: a slice, or their numbers."""
+MOST_STEPS = 1e6
+"""A squared step counts so many times its variance at the most: far beyond any chance."""
 TETHER = 0.3
 """A coordinate moves about this share of its size when the stretches that show it are left out."""
 
@@ -229,6 +231,25 @@ class Unseen:
         whole[index] = step
         return np.asarray(whole @ self.columns[:, rows])
 
+    def wandered(self) -> Array:
+        """
+        Return how far every effect's coordinates move as stretches are left out, shape (K,).
+
+        Mean of the squared steps over what noise alone makes them; a formula that does not hold
+        wants other parameters on every stretch.
+        """
+        every, mix = np.arange(self.columns.shape[0]), np.eye(self.targets.shape[0])[0]
+        whole = _spread(self._total)
+        ratios = np.zeros((self.normals.shape[0], every.size))
+        for b in range(self.normals.shape[0]):
+            left = self._system(b, every)
+            system, size = unit_diagonal(left.copy(), DAMPING)
+            step = cho_solve(cho_factor(system), self._right(b, mix) / size) / size
+            more = np.maximum(_spread(left) - whole, ROUNDED * whole)
+            ratios[b] = step**2 / np.maximum(more, 1e-300)
+        told = np.minimum(ratios, MOST_STEPS).mean(axis=0)
+        return np.array([told[part].max(initial=0.0) for part in self.parts])
+
     def squares(self, residual: Array) -> Array:
         """Return the squared position error of every trusted sample, shape (samples,) [m^2]."""
         out = [
@@ -326,6 +347,12 @@ def rows_of(labels: Array) -> list[Rows]:
         bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
         return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
     return [np.flatnonzero(labels == k) for k in range(int(labels.max()) + 1)]
+
+
+def _spread(normal: Array) -> Array:
+    """Return the variance of every coordinate, (P,), in units of noise."""
+    system, size = unit_diagonal(normal.copy(), DAMPING)
+    return np.asarray(np.diag(cho_solve(cho_factor(system), np.eye(size.size))) / size**2)
 
 
 def _tether(model: Model) -> Array:

@@ -88,10 +88,10 @@ def with_motion(robot, found):
     return asked(robot, Recording('next', joints, recorded(robot, joints, rng).measured))
 
 
-def left_by_the_wrong_one(robot, problem, model):
-    """Return how much worse an offset fits than the spring that is there, in deviations."""
+def left_by_the_wrong_one(robot, problem, model, there=SPRING, wrong=OFFSET):
+    """Return how much worse the wrong effect fits than the one that is there, in deviations."""
     rng = np.random.default_rng(5)
-    truth = effects_from_list([SPRING], robot)
+    truth = effects_from_list([there], robot)
     made = tuple(
         recorded(model.robot, r.joints, rng, truth)
         if r.joints.static
@@ -102,7 +102,7 @@ def left_by_the_wrong_one(robot, problem, model):
     scale = known_scale(real)
     costs = [
         fit(real, model.with_found(effects_from_list([entry], robot)), scale).rss
-        for entry in (OFFSET, SPRING)
+        for entry in (wrong, there)
     ]
     return float(np.sqrt(max(costs[0] - costs[1], 0.0)))
 
@@ -118,6 +118,19 @@ def test_slow_creeping_against_nothing_asks_for_time(ur5):
     creep = {'effect': 'drift', 'xyz_rate': [2e-8, 0.0, 0.0]}
     found = proposed(ur5, *at_hand(ur5), creep, BASE)
     assert found['kind'] == 'warm_up'
+
+
+def test_what_comes_with_time_is_foreseen_for_the_stations_as_they_are_run(ur5):
+    wear = {'effect': 'wear', 'rate': 4e-7}
+    drift = {'effect': 'drift', 'xyz_rate': [0.0, 0.0, 1e-8]}
+    problem, model = at_hand(ur5, align=())
+    made = [effects_from_list([entry], ur5) for entry in (wear, drift)]
+    limits = Limits(minutes=5.0, set_up=False)
+    found = next_experiment(problem, model, made, known_scale(problem), limits)
+    # Stations of another place in the row would be foreseen with the time of that place.
+    assert found['motion']['static'] and found['stations'] > 5
+    parted = left_by_the_wrong_one(ur5, *with_motion(ur5, found), wear, drift)
+    assert 0.5 < parted / found['expected_separation_sigma'] < 2.0
 
 
 @pytest.mark.parametrize(('kind', 'wanted'), [(stations, 'bidirectional'), (moving, 'path')])

@@ -6,12 +6,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from weld_twin_core.diagnosis.advice import Limits
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
-from weld_twin_nodes.offline.investigation import decided, question, third_wanted, weighed
+from weld_twin_nodes.offline.closing import repeat_wanted, third_wanted, weighed
+from weld_twin_nodes.offline.investigation import decided, question
 
 from ..blind.recorded_motion import Motion
 from .sealed_cell import STAY, SealedCell, as_motion
@@ -51,6 +53,7 @@ def answered(
     first: Recording,
     later: Sequence[Recording],
     limits: Limits,
+    before: Mapping[str, Any] | None = None,
 ) -> tuple[Mapping[str, Any], str]:
     """
     Return the answer from the first recording and later ones, and why it closes the question.
@@ -62,6 +65,8 @@ def answered(
     later : sequence of Recording
     limits : Limits
         What the next experiment may take.
+    before : mapping, optional
+        What was believed before the last of them was made.
 
     """
     together = cell.diagnosed([first, *later], limits=limits)
@@ -73,7 +78,11 @@ def answered(
         # Too few stations to be diagnosed by themselves.
         return weighed(together)
     free = cell.diagnosed(list(later), limits=limits) if third_wanted(together, alone) else None
-    return weighed(together, alone, free)
+    newest = None
+    if repeat_wanted(together, alone, free, before):
+        with suppress(TwinError):
+            newest = cell.diagnosed([later[-1]], limits=limits)
+    return weighed(together, alone, free, before, newest)
 
 
 def _left(minutes: float, visit: float = VISIT) -> Limits:
@@ -164,7 +173,7 @@ def investigated(
         left, visit = left - asked['robot_minutes'], visit - asked['minutes']
         begun = time.perf_counter()
         try:
-            found, why = answered(cell, start, later, _left(left, visit))
+            found, why = answered(cell, start, later, _left(left, visit), found)
         except TwinError as error:
             return rounds, f'refused: {error}', answer
         answer = said(cell, found, why)

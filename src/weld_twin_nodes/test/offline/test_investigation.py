@@ -5,6 +5,7 @@
 import pytest
 
 from weld_twin_core.errors import DataError
+from weld_twin_nodes.offline.closing import repeat_wanted, third_wanted, weighed
 from weld_twin_nodes.offline.investigation import (
     begin,
     changed,
@@ -13,8 +14,6 @@ from weld_twin_nodes.offline.investigation import (
     read_state,
     recordings,
     take_in,
-    third_wanted,
-    weighed,
     write_state,
 )
 from weld_twin_nodes.report.investigation_page import investigation_page
@@ -230,3 +229,34 @@ def test_what_is_held_out_may_be_too_poor_to_be_foretold(free, closed):
     together, alone = named(SPRING, 0.8), named(None, 0.9, 'unknown')
     assert third_wanted(together, alone)
     assert bool(weighed(together, alone, free)[1]) is closed
+
+
+@pytest.mark.parametrize(
+    ('together', 'before', 'newest', 'closed'),
+    [
+        # What poor recordings hide from all of them, two without a measurement in common show.
+        (named(None, 0.98, 'unknown'), named(SPRING, 0.8), named(SPRING, 0.8), True),
+        (named(None, 0.98, 'unknown'), named(SPRING, 0.8), named(SPRING, 0.75), False),
+        (named(None, 0.98, 'unknown'), named(SPRING, 0.75), named(SPRING, 0.95), False),
+        (named(None, 0.98, 'unknown'), named(SPRING, 0.8), named(ELSE, 0.95), False),
+        (named(ELSE, 0.6), named(SPRING, 0.8), named(SPRING, 0.8), False),
+    ],
+)
+def test_the_same_answer_from_recordings_without_a_common_measurement_closes(
+    together, before, newest, closed
+):
+    alone = named(SPRING, 0.8)
+    found, why = weighed(together, alone, None, before, newest)
+    assert bool(why) is closed and (not closed or found is alone)
+    # Where it could not close, the newest need not be diagnosed by itself.
+    assert closed <= bool(repeat_wanted(together, alone, None, before))
+    assert repeat_wanted(together, named(None, 0.9, 'unknown'), None, before) is None
+
+
+def test_one_cause_more_than_was_as_likely_before_is_not_sure_by_agreeing_with_itself():
+    more = found('identified', groups=((SPRING,), (ELSE,)), confidence=0.75)
+    assert weighed(more, more)[1] and not weighed(more, more, None, named(SPRING, 0.8))[1]
+    # Fewer candidates for the same cause overturn nothing, nor does what was hardly believed.
+    fewer = named(SPRING, 0.75)
+    assert weighed(fewer, fewer, None, found('ambiguous', confidence=0.8))[1]
+    assert weighed(more, more, None, named(SPRING, 0.6))[1]

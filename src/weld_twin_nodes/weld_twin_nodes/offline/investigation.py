@@ -16,19 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
-from weld_twin_core.diagnosis.advice.next_step import SURE
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_text
 
+from .closing import ALIKE, NAMING, closes
+
 STATE, PAGE = 'investigation.json', 'investigation.html'
 SCHEMA = 'weld_twin/investigation/1'
-NAMING = ('identified', 'ambiguous')
-"""Verdicts that name causes."""
-AGREED = 0.7
-"""Confidence that two diagnoses of different recordings each need where only both together are sure:
-two that are wrong seldom name the same."""
-ALIKE = 'the causes are known as far as any motion can tell'
 SAID = 0.8
 """Probability from which an experiment says that it will decide; below it says that it may."""
 FOUND = 0.7
@@ -164,127 +159,6 @@ def take_in(
     return {**out, 'state': status, 'why': reason}
 
 
-def weighed(
-    together: Mapping[str, Any],
-    alone: Mapping[str, Any] | None = None,
-    free: Mapping[str, Any] | None = None,
-) -> tuple[Mapping[str, Any], str]:
-    """
-    Return which diagnosis to believe, and whether and why it closes the question.
-
-    What poor recordings show is easily misread, and then stands in the way of what better ones
-    show. So the experiments are also diagnosed alone, with the first recordings held out. What was
-    held out may be too poor to be foretold, as where a joint comes from when it hardly moves. So
-    where all recordings name a cause and only the held-out ones are against it, the experiments
-    are heard a third time, without them.
-
-    Parameters
-    ----------
-    together : mapping
-        The diagnosis of all recordings.
-    alone : mapping, optional
-        That of the experiments, with the recordings before them held out.
-    free : mapping, optional
-        That of the experiments with nothing held out; see `third_wanted`.
-
-    Returns
-    -------
-    found : mapping
-        The one that is believed.
-    why : str
-        In words why it closes the question; empty where it does not.
-
-    """
-    if alone is None:
-        return together, _closes(together)
-    closed = [_closes(found) for found in (together, alone)]
-    same = _named(together) == _named(alone)
-    sure = [found['verdict']['confidence'] or 0.0 for found in (together, alone)]
-    naming = [found['verdict']['status'] in NAMING for found in (together, alone)]
-    if same and all(naming) and (any(closed) or min(sure) >= AGREED):
-        found, why = (together, closed[0]) if sure[0] >= sure[1] else (alone, closed[1])
-        alike = 'all recordings, and the experiments alone, show the same causes'
-        return found, '' if _open_ends(found) else (why or alike)
-    for k, (found, other) in enumerate(((together, alone), (alone, together))):
-        against = naming[1 - k] and (other['verdict']['confidence'] or 0.0) >= AGREED
-        if closed[k] and not against:
-            return found, closed[k]
-    if free is not None and _named(free) == _named(together):
-        return (free, _closes(free)) if _closes(free) else (together, '')
-    # What does not fit together, as after a knock between two recordings, may be sound by itself.
-    torn = _unsound(together) and not _unsound(alone)
-    better = alone if torn or (naming[1] and not naming[0]) else together
-    return better, ''
-
-
-def _unsound(found: Mapping[str, Any]) -> bool:
-    return bool(found['verdict']['status'] == 'unsound')
-
-
-def _open_ends(found: Mapping[str, Any]) -> bool:
-    """
-    Return whether causes are named beside each other that some motion would part.
-
-    What can be parted among those named is asked first. So an experiment that asks something else
-    found no motion for it; nor did one that would part nothing.
-    """
-    wanted = found.get('next_experiment')
-    if found['verdict']['status'] != 'ambiguous' or wanted is None:
-        return bool(found['verdict']['status'] == 'ambiguous')
-    sigma = wanted['expected_separation_sigma']
-    if sigma is not None and sigma < NOTHING:
-        return False
-    sides = [{(e['effect'], e.get('joint')) for e in side} for side in wanted.get('between') or ()]
-    groups = [{(e['effect'], e.get('joint')) for e in group} for group in _sets(found)]
-    open_ = len(sides) == 2 and any(sides[0] & group and sides[1] & group for group in groups)
-    return open_ and not _inseparable(found)
-
-
-def third_wanted(together: Mapping[str, Any], alone: Mapping[str, Any] | None) -> bool:
-    """
-    Return whether the experiments should be heard without anything held out.
-
-    Parameters
-    ----------
-    together, alone : mapping
-        As `weighed` takes them.
-
-    """
-    if alone is None or _closes(together):
-        return False
-    likely = (together['verdict']['confidence'] or 0.0) >= AGREED
-    against = alone['verdict']['status'] not in NAMING
-    return together['verdict']['status'] in NAMING and likely and against
-
-
-def _closes(found: Mapping[str, Any]) -> str:
-    """Return why a diagnosis closes the question by itself; empty where it does not."""
-    verdict = found['verdict']
-    if (verdict['confidence'] or 0.0) < SURE:
-        return ''
-    if verdict['status'] == 'identified':
-        return 'the causes are identified'
-    if verdict['status'] == 'none':
-        return 'nothing is left to explain above the noise'
-    return ALIKE if verdict['status'] == 'ambiguous' and _inseparable(found) else ''
-
-
-def _inseparable(found: Mapping[str, Any]) -> bool:
-    """Return whether no motion parts what is left."""
-    wanted = found.get('next_experiment')
-    return wanted is not None and wanted['motion'] is None
-
-
-def _named(found: Mapping[str, Any]) -> list[list[tuple[str, str]]]:
-    """Return the sites of every cause, in an order of their own."""
-    groups = _sets(found)
-    return sorted(sorted((e['effect'], e.get('joint') or '') for e in group) for group in groups)
-
-
-def _sets(found: Mapping[str, Any]) -> Sequence[Sequence[Mapping[str, Any]]]:
-    return found['verdict'].get('indistinguishable') or ()
-
-
 def believed(found: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a diagnosis says, in short."""
     verdict = found['verdict']
@@ -329,7 +203,7 @@ def question(
     """
     if found['verdict']['status'] == 'unsound':
         return 'unsound', 'data or set-up are wrong; the page of the last round says what'
-    why = _closes(found) if why is None else why
+    why = closes(found) if why is None else why
     if why:
         return ('nothing would part them' if why == ALIKE else 'sure'), why
     wanted = found.get('next_experiment')

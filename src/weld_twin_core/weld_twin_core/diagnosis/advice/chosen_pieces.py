@@ -31,6 +31,8 @@ LEAST = 75.0
 NAMED = 3.0
 """Weight of what parts explanations that a verdict names beside each other, against what parts one of
 them from others: that question is put to whoever reads the verdict. A judgement."""
+AS_IT_WORKS = ('time', 'temperature')
+"""Dependences on how long the arm has been at work: a station shows more of them the later it comes."""
 GAIN = 0.05
 """A further piece has to add this share to the decision."""
 
@@ -137,12 +139,14 @@ def planned(
         return None
     told = normals(problem, model, alternatives, scale, option, now)
     before = told.before()
+    # Stations are foreseen one after the other; any other choice of them would come sooner.
+    in_turn = option.static and any(e.on in AS_IT_WORKS for each in alternatives for e in each)
     chosen: list[int] = []
     gains: dict[Pair, float] = {}
     score = 0.0
     while True:
         spent = sum(option.pieces[k].seconds for k in chosen)
-        more = _open(option, chosen, room - spent)
+        more = _open(option, chosen, room - spent)[: 1 if in_turn else None]
         if not more or (spent >= LEAST and _enough(gains)):
             break
         pick, found, gained = _next(told, before, chosen, more, option, named)

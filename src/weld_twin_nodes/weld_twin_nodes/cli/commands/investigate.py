@@ -198,7 +198,8 @@ def _heard(
     """Diagnose all recordings, and the experiments by themselves; return what to believe."""
     from weld_twin_core.errors import DataError
 
-    from ...offline.investigation import changed, recordings, third_wanted, weighed
+    from ...offline.closing import repeat_wanted, third_wanted, weighed
+    from ...offline.investigation import changed, recordings
     from ...offline.set_up_changes import FRAMES
 
     first, later = recordings(state)
@@ -207,14 +208,19 @@ def _heard(
     if not first or any(what in FRAMES for what in told.values()):
         # Seen with another tool, or from elsewhere, they cannot be held against the first.
         return weighed(found)
-    alone = free = None
+    alone = free = newest = None
     with suppress(DataError):  # too few to be diagnosed by themselves
         beside = place.with_name(f'{place.name}-experiments')
         alone = _diagnosed([*later, *bags], first, state, beside, told)
     if third_wanted(found, alone):
         beside = place.with_name(f'{place.name}-experiments-only')
         free = _diagnosed([*later, *bags], [], state, beside, told)
-    return weighed(found, alone, free)
+    before = {'verdict': state['rounds'][-1]['believed']}
+    if repeat_wanted(found, alone, free, before):
+        with suppress(DataError):
+            beside = place.with_name(f'{place.name}-newest-only')
+            newest = _diagnosed(bags, [], state, beside, told)
+    return weighed(found, alone, free, before, newest)
 
 
 def _diagnosed(

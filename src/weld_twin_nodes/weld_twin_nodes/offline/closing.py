@@ -22,9 +22,9 @@ AGREED = 0.7
 two that are wrong seldom name the same."""
 REPEATED = 0.8
 """Confidence that what was believed before an experiment, and what the experiment shows by itself, each
-need to close a question where neither is sure: the most that an answer is told as that is not. In 23 cells
-that this was developed on, all 16 answers of a round with it were right; of four between it and `AGREED`
-two were. Two recordings without a measurement in common seldom err towards the same name."""
+need to close a question where neither is sure: the most that an answer is told as that is not. In 23
+cells that this was developed on, all 16 answers of a round with it were right; of four between it and
+`AGREED` two were. Two recordings without a measurement in common seldom err alike."""
 REPEAT = 'the newest experiment shows by itself what was believed before it was made'
 ALIKE = 'the causes are known as far as any motion can tell'
 

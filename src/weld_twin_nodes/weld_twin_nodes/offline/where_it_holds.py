@@ -13,8 +13,10 @@ def where_it_holds(posterior: Posterior) -> list[str]:
         f'{v * 1e3:.2g} mm' for v in (posterior.recorded_m, posterior.anywhere_m)
     )
     out = [
-        f'This model holds within {recorded} (one standard deviation) where it was measured, within '
-        f'{anywhere} elsewhere in its reach.'
+        f'Corrected, the robot is right within {recorded} where it was measured, but only within '
+        f'{anywhere} elsewhere in its reach (one standard deviation each).'
+        if anywhere != recorded
+        else f'Corrected, the robot is right within {recorded} (one standard deviation).'
     ]
     out += left_open(posterior)
     return [*out, 'Measured at ' + '; '.join(posterior.domain.sentences()) + '.']

@@ -16,10 +16,12 @@ from weld_twin_core.metrics.performance import Performance, performance_of
 
 from .directions import worst
 from .html import Html, joined, section, table, tag
+from .mending import left_with, thought_mended
 from .performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows
 from .quantities import millimetres
 from .seam_view import at_rest, instant
-from .switches import as_it_is, parted, trusted
+from .switches import switches, trusted
+from .words import listed, unnamed
 
 WORDS = {
     PASS: 'passes',
@@ -65,13 +67,8 @@ def rule_of(diagnosis: Diagnosis, demand: Demand) -> Rule:
 
 def largest(diagnosis: Diagnosis) -> tuple[float, float]:
     """Return the largest deviation as it is, and with all causes mended, [m]."""
-    left, _ = parted(diagnosis)
-    out = [0.0, 0.0]
-    for k, after in enumerate(left):
-        for i, part in enumerate((as_it_is(diagnosis, k), after)):
-            sizes = np.linalg.norm(part[trusted(diagnosis, k)], axis=1)
-            out[i] = max(out[i], float(sizes.max(initial=0.0)))
-    return out[0], out[1]
+    left = left_with(diagnosis, range(len(switches(diagnosis))))
+    return left.largest, left.largest_after
 
 
 def on_what(diagnosis: Diagnosis) -> str:
@@ -101,20 +98,31 @@ def rule_data(rule: Rule) -> dict[str, Any]:
     }
 
 
+def most_data(diagnosis: Diagnosis) -> dict[str, float]:
+    """Return the largest deviation [mm] by which switches are thrown, a 1 or a 0 for each."""
+    if diagnosis.contacts is not None:
+        return {}
+    every = range(len(switches(diagnosis)))
+    return {
+        ''.join(str(int(k in mended)) for k in every): round(
+            1e3 * left_with(diagnosis, mended).largest_after, 9
+        )
+        for mended in thought_mended(diagnosis)
+    }
+
+
 def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
     """Return the judgement, with a field for a tolerance; None where contacts took its place."""
     if diagnosis.contacts is not None or not diagnosis.traces.t:
         return None
     rule = rule_of(diagnosis, demand)
-    before, after = largest(diagnosis)
-    rows = [_row(f'as it is{_where(diagnosis)}', before, rule, 'as-it-is')]
-    if diagnosis.model.found:
-        rows.append(_row('with what is ticked below as mended', after, rule, 'mended'))
-    heads = ('the robot', 'largest deviation', 'verdict')
+    before = largest(diagnosis)[0]
+    heads = ('the robot', 'RMS', 'largest deviation', 'verdict')
     return section(
         'Does it pass',
         _field(rule),
-        table(heads, rows, 'acceptance'),
+        table(heads, _rows(diagnosis, rule), 'acceptance'),
+        _more(diagnosis),
         tag(
             'p',
             _REMEDY,
@@ -147,12 +155,63 @@ def _field(rule: Rule) -> Html:
     return tag('p', label, ' ', unread, class_='asked')
 
 
-def _row(name: str, value: float, rule: Rule, key: str) -> tuple[Html | str, ...]:
-    verdict = rule.judged(value)
-    return (
-        name,
-        tag('span', millimetres(value), data_largest=key),
-        tag('span', WORDS[verdict], class_=f'mark {verdict}', data_verdict=key),
+def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
+    """Return a row for the robot as it is, and for each of the causes that may be mended."""
+    if not switches(diagnosis):
+        left = left_with(diagnosis, ())
+        first = _row(f'as it is{_where(diagnosis)}', left.rms, left.largest, rule)
+        if not diagnosis.model.found:
+            return [first]
+        return [
+            first,
+            _row('with what was found mended', left.rms_after, left.largest_after, rule),
+        ]
+    out = []
+    for mended in thought_mended(diagnosis):
+        left = left_with(diagnosis, mended)
+        out.append(_row(_told(diagnosis, mended), left.rms_after, left.largest_after, rule))
+    return out
+
+
+def _told(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
+    """Return in words which causes are thought mended."""
+    labels = [switch.label for switch in switches(diagnosis)]
+    if not mended:
+        return f'as it is{_where(diagnosis)}'
+    if len(mended) == len(labels):
+        names = f'all {len(labels)}' if len(labels) > 1 else labels[0]
+        return f'with {names} mended'
+    told = [f'{k + 1}. {labels[k]}' for k in mended]
+    return f'with only {listed(told)} mended'
+
+
+def _more(diagnosis: Diagnosis) -> Html | None:
+    """Return where the other combinations are, and what mended means without a name."""
+    parts = []
+    if len(thought_mended(diagnosis)) < 2 ** len(switches(diagnosis)):
+        parts.append('Any other combination: tick it under "What if".')
+    if any(unnamed(cause) for cause in diagnosis.causes if cause.members):
+        parts.append(
+            'Mended, of what has no name: programs corrected by the curve that was measured in its '
+            'place.'
+        )
+    return tag('p', ' '.join(parts), class_='note') if parts else None
+
+
+def _row(name: str, rms: float, most: float, rule: Rule) -> tuple[Html | str, ...]:
+    return name, millimetres(rms), millimetres(most), mark(rule, most)
+
+
+def mark(rule: Rule, size: float, before: str = '') -> Html:
+    """
+    Return the verdict on a largest deviation [m]; it follows the field for the tolerance.
+
+    What stands ``before`` it is left out with it where no tolerance is given.
+    """
+    verdict = rule.judged(size)
+    told = f'{before}{WORDS[verdict]}' if verdict is not None or not before else ''
+    return tag(
+        'span', told, class_=f'mark {verdict}', data_size=f'{1e3 * size:.9f}', data_before=before
     )
 
 

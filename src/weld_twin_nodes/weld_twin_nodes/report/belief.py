@@ -53,8 +53,9 @@ def belief_lines(diagnosis: Diagnosis, cause: Cause) -> list[str]:
 def _on(cause: Cause) -> list[str]:
     if not cause.dependence:
         return ['What it depends on was not found.']
-    on, p = cause.dependence[0]
-    return [f'{odds(p)} that it {depending(on)}; the library has no name for it.']
+    told = leading(cause.dependence)
+    on = depending(*(name for name, _ in told))
+    return [f'{odds(sum(p for _, p in told))} that it {on}; what it is, is open.']
 
 
 def sure_entry(diagnosis: Diagnosis, cause: Cause) -> Html | None:

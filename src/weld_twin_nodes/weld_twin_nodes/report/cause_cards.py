@@ -8,21 +8,19 @@ import numpy as np
 
 from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.result import Cause, Diagnosis
-from weld_twin_core.effects.effect import Effect
-from weld_twin_core.effects.joint_curve import JointCurve
-from weld_twin_core.effects.servo_lag import ServoLag
 from weld_twin_core.metrics.conformity import Rule
 
-from .acceptance import WORDS
+from .acceptance import mark
 from .belief import sure_entry
 from .cause_levels import LEVEL_HEADS, level_row, spreads
+from .cause_values import effects_of, furthest_off, one_of, values
 from .charts import Axis, Line, chart
 from .controllers import BRANDS, correction
-from .curve_plot import curve_figure, furthest
+from .curve_plot import curve_figure
 from .directions import components, rms_words, sides_words
 from .html import Child, Html, joined, section, table, tag
-from .mending import curve_fault, left_without, look_at, taken_by_curve, warning
-from .quantities import DEGREES, counted, ends_to, millimetres, parameter_rows, percent, turned
+from .mending import curve_fault, left_without, look_at, taken_by_curve, warned, warning
+from .quantities import counted, ends_to, millimetres, percent
 from .remainder import places, remainder
 from .seam_view import seen_at
 from .switches import (
@@ -37,8 +35,7 @@ from .switches import (
     trusted,
 )
 from .to_do import TOGETHER
-from .words import again_words, parameter_word, unnamed
-from .words import cause as named
+from .words import again_words, unnamed
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
@@ -48,6 +45,11 @@ _LATE = {'servo_lag', 'time_delay'}
 """Causes that read otherwise where the joints were commanded, not measured."""
 _SOURCE = 'source of the joints'
 """Name of the check that tells so."""
+_BY_CURVE = (
+    'As the cause is not known, this is with programs corrected by the curve that was measured in its '
+    'place.'
+)
+_SHORT = ' That curve follows only part of what happens here, so it takes off less than the share.'
 _VALUES = 4
 """Parameters told on a card; effects.yaml has all."""
 
@@ -65,9 +67,9 @@ def causes_cards(diagnosis: Diagnosis, brand: str | None, rule: Rule) -> Html | 
         tag('div', *cards, class_='cards'),
         _smaller(rest),
         id_='cards',
-        lead='Shares are of the squared gap, on data not used for fitting; the interval holds the '
-        f'true share with 90\N{NO-BREAK SPACE}%. All shares, with what is left and the noise, add up '
-        f'to 100\N{NO-BREAK SPACE}%.{_against(diagnosis, shown)}{_curves(diagnosis, shown)}',
+        lead='How much of the gap each cause makes, counted in squares so that all shares, with what '
+        f'is left and the noise, add up to 100\N{NO-BREAK SPACE}%. In brackets: where the true share '
+        f'lies, 90\N{NO-BREAK SPACE}% sure.{_against(diagnosis, shown)}',
     )
 
 
@@ -98,28 +100,6 @@ def _against(diagnosis: Diagnosis, shown: list[int]) -> str:
     )
 
 
-def _curves(diagnosis: Diagnosis, shown: list[int]) -> str:
-    """Return why a place holds more than its curve takes off, where that is so."""
-    first = next((k for k in shown if taken_by_curve(diagnosis, k) is not None), None)
-    left = None if first is None else left_without(diagnosis, first)
-    if left is None:
-        return ''
-    value = percent(1.0 - (left.rms_after / left.rms) ** 2)
-    return (
-        ' What a place holds, its own motion tells; a curve stands for it only as well as curves '
-        f'can, so it takes off less. {value} of the square off is {percent(left.rms_after / left.rms)} '
-        'of the RMS left; figures and pictures further down are with the curve.'
-    )
-
-
-def _by_curve(diagnosis: Diagnosis, k: int) -> str | None:
-    """Return how much of its share the curve of a cause without a name takes off unseen data."""
-    taken = taken_by_curve(diagnosis, k)
-    if taken is None:
-        return None
-    return f'; its curve takes off {percent(taken, places(diagnosis))}'
-
-
 def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     """Return one row for each cause, for what is left and for the noise: a whole of 100 %."""
     causes = diagnosis.causes
@@ -127,10 +107,8 @@ def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     decimals = places(diagnosis)
     for rank, k in enumerate(shown, 1):
         value, ends = ends_to(decimals, causes[k].share, *causes[k].share_ci90)
-        told = f'{value} ({ends}){_by_curve(diagnosis, k) or ""}'
-        rows.append(
-            (f'{rank}. {cause_name(diagnosis, causes[k])}', causes[k].share, told, 'cause')
-        )
+        label = f'{rank}. {cause_name(diagnosis, causes[k])}'
+        rows.append((label, causes[k].share, f'{value} ({ends})', 'cause'))
     smaller = sum(c.share for k, c in enumerate(causes) if k not in shown)
     if smaller > 0.0:
         rows.append(('smaller causes', smaller, percent(smaller, decimals), 'cause'))
@@ -156,10 +134,10 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
     entries = [
         ('How sure', sure_entry(diagnosis, cause)),
         ('Comes back', again_words(cause, many=bool(diagnosis.families))),
-        ('Value', _values(diagnosis, cause)),
+        ('Off by', _off_by(diagnosis, cause)),
         ('Stands on', _commanded(diagnosis, cause)),
         ('Effect on the seam', _effect(diagnosis, k)),
-        ('With its curve' if unnamed(cause) else 'If mended', _mended(diagnosis, k, rule)),
+        ('If only this is mended', _mended(diagnosis, k, rule)),
         ('What to do', _action(diagnosis, k)),
         *_at_the_controller(diagnosis, k, brand),
     ]
@@ -170,8 +148,7 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
         tag(
             'p',
             tag('b', percent(cause.share, places(diagnosis))),
-            ' of the squared gap',
-            _by_curve(diagnosis, k),
+            ' of the gap',
             class_='share',
         ),
         _box(diagnosis, k),
@@ -191,51 +168,25 @@ def _box(diagnosis: Diagnosis, k: int) -> Html | None:
     return None
 
 
-def _effects(diagnosis: Diagnosis, cause: Cause) -> list[Effect]:
-    found = diagnosis.model.found
-    return [found[m] for m in cause.members if m < len(found)]
-
-
-def _values(diagnosis: Diagnosis, cause: Cause) -> Html | None:
-    errors = {(f.effect.name, f.effect.site): f.std for f in diagnosis.effects}
-    curve = _furthest_off(diagnosis, cause)
-    rows: list[Child] = [] if curve is None else [tag('span', f'off by {furthest(curve[1])}')]
-    for effect in _effects(diagnosis, cause):
-        if 'curve' in effect.name:
-            continue
-        for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
-            rows.append(tag('span', f'{parameter_word(name)} {value}'))
-        if isinstance(effect, ServoLag):
-            rows.append(tag('span', _trail(diagnosis, effect)))
+def _off_by(diagnosis: Diagnosis, cause: Cause) -> Html | None:
+    rows = values(diagnosis, cause)
     if not rows:
         return None
-    more = [tag('span', f'and {len(rows) - _VALUES} more')] if len(rows) > _VALUES else []
-    return tag('span', *rows[:_VALUES], *more, class_='lines')
+    if alternatives(diagnosis, cause):
+        rows = [f'should it be {one_of(diagnosis, cause)}:', *rows]
+    more = [f'and {len(rows) - _VALUES} more'] if len(rows) > _VALUES else []
+    return tag('span', *(tag('span', row) for row in [*rows[:_VALUES], *more]), class_='lines')
 
 
 def _commanded(diagnosis: Diagnosis, cause: Cause) -> str | None:
     """Return what was noted of the joints, where a cause is a matter of command and arm."""
-    late = {effect.name for effect in _effects(diagnosis, cause)} | {
+    late = {effect.name for effect in effects_of(diagnosis, cause)} | {
         s.effect for s, _ in cause.name
     }
     if not late & _LATE:
         return None
     noted = [c.sentence for c in diagnosis.checks if c.name == _SOURCE and c.level != 'ok']
     return ' '.join(noted) or None
-
-
-def _trail(diagnosis: Diagnosis, lag: ServoLag) -> str:
-    """Return how far a joint trails its command where the recordings move it fastest."""
-    robot = diagnosis.model.robot
-    i = robot.index(lag.joint)
-    speeds = [np.abs(r.joints.velocity[:, i]).max() for r in diagnosis.recordings]
-    fastest = float(max(speeds, default=0.0))
-    trail = fastest * float(lag.time_constant)
-    if robot.prismatic[i]:
-        return (
-            f'{lag.joint} trails by {millimetres(trail)} at its fastest ({1e3 * fastest:.0f} mm/s)'
-        )
-    return f'{lag.joint} trails by {turned(trail)} at its fastest ({DEGREES * fastest:.0f} °/s)'
 
 
 def _part(diagnosis: Diagnosis, k: int) -> tuple[int, np.ndarray, np.ndarray] | None:
@@ -280,24 +231,21 @@ def _mended(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:
     left = left_without(diagnosis, k)
     if left is None:
         return None
-    verdict = rule.judged(left.largest_after)
-    word = '' if verdict is None else f': {WORDS[verdict]}'
-    alone = f'{1e3 * left.largest_after:.6f}'
-    return joined(
-        [
-            f'RMS {"falls" if left.rms_after < left.rms else "rises"} from '
-            f'{millimetres(left.rms)} to {millimetres(left.rms_after)}, the largest '
-            f'{"grows" if left.grows else "goes"} from {millimetres(left.largest)} to '
-            f'{millimetres(left.largest_after)}',
-            tag('span', word, class_=f'mark {verdict}', data_alone=alone),
-            '.',
-        ]
+    told = (
+        f'RMS {"falls" if left.rms_after < left.rms else "rises"} from '
+        f'{millimetres(left.rms)} to {millimetres(left.rms_after)}, the largest '
+        f'{"grows" if left.grows else "goes"} from {millimetres(left.largest)} to '
+        f'{millimetres(left.largest_after)}'
     )
+    parts: list[Child] = [told, mark(rule, left.largest_after, ', '), '.']
+    if unnamed(diagnosis.causes[k]):
+        parts.append(f' {_BY_CURVE}{_SHORT * (taken_by_curve(diagnosis, k) is not None)}')
+    return joined(parts)
 
 
 def _action(diagnosis: Diagnosis, k: int) -> Html | str | None:
     cause = diagnosis.causes[k]
-    effects = _effects(diagnosis, cause)[:_VALUES]
+    effects = effects_of(diagnosis, cause)[:_VALUES]
     if diagnosis.families and len(effects) > 1:
         return TOGETHER
     if not effects:
@@ -308,28 +256,30 @@ def _action(diagnosis: Diagnosis, k: int) -> Html | str | None:
         told = dict.fromkeys(actions(effects, diagnosis.model.robot))
         sentences = [*told, *filter(None, [warning(diagnosis, k)])]
     if alternatives(diagnosis, cause):
-        one = named(effects[0].name, effects[0].site)
         sentences = [
-            f'Which of them it is must be measured first. Should it be {one}:',
+            'Which of them it is must be measured first. Should it be '
+            f'{one_of(diagnosis, cause)}:',
             *sentences,
         ]
-    if len(sentences) == 1:
-        return sentences[0]
-    return tag('span', *(tag('span', text) for text in sentences), class_='lines')
+    return tag('span', *(tag('span', *warned(text)) for text in sentences), class_='lines')
 
 
 def _at_the_controller(
     diagnosis: Diagnosis, k: int, brand: str | None
 ) -> list[tuple[str, str | None]]:
     cause = diagnosis.causes[k]
-    effects = _effects(diagnosis, cause)
+    effects = effects_of(diagnosis, cause)
     head = 'At the controller' if brand is None else f'At the {BRANDS[brand]} controller'
     if not effects:
         return [(head, 'Nothing can be entered before the cause is known.')]
     fault = curve_fault(diagnosis, k)
     if fault:
         return [(head, f'Nothing is to be entered: the curve {fault}.')]
-    return [(head, correction(effects[0], brand))]
+    told = correction(effects[0], brand)
+    if told is not None and alternatives(diagnosis, cause):
+        which = one_of(diagnosis, cause)
+        told = f'Nothing before it is known which it is. Should it be {which}: {told}'
+    return [(head, told)]
 
 
 def _picture(diagnosis: Diagnosis, k: int) -> Html | None:
@@ -358,27 +308,13 @@ def _picture(diagnosis: Diagnosis, k: int) -> Html | None:
 
 def _curve(diagnosis: Diagnosis, cause: Cause) -> Html | None:
     """Return the picture of the curve that is furthest off, of those that stand for a cause."""
-    chosen = _furthest_off(diagnosis, cause)
-    if chosen is None:
+    chosen = furthest_off(diagnosis, cause)
+    # A constant is one value, and no picture.
+    if chosen is None or chosen[1].over == 'constant':
         return None
     m, curve = chosen
     robot = diagnosis.model.robot
     return curve_figure(curve, spreads(diagnosis)[m], robot.index(curve.joint))
-
-
-def _furthest_off(diagnosis: Diagnosis, cause: Cause) -> tuple[int, JointCurve] | None:
-    """Return which curve is furthest off, of those that stand for a cause."""
-    found = diagnosis.model.found
-    curves = {
-        m: effect
-        for m in cause.members
-        if m < len(found)
-        and isinstance(effect := found[m], JointCurve)
-        and effect.over != 'constant'
-    }
-    if not curves:
-        return None
-    return max(curves.items(), key=lambda item: float(np.abs(item[1].values).max()))
 
 
 def _smaller(rest: list[Cause]) -> Html | None:

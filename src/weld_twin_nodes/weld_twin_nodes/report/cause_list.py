@@ -29,8 +29,8 @@ _CANDIDATES = 6
 _SLOTS = 6
 """Places of which rivals are listed."""
 _INSTEAD = (
-    'No effect is named. These come nearest; the twin carries the curves on the cards above in their '
-    'place.'
+    'No effect is named. These come nearest; figures and pictures are with the curves on the cards '
+    'above.'
 )
 _STAND_IN = (
     'No effect is named. These imitate the unknown cause together; figures and pictures that say '
@@ -41,6 +41,7 @@ _RIVALS = (
     'They are weighed against each other only, as if one of them had to be it; how sure it is '
     'stands on the card.'
 )
+_BARS = 'All bars have one scale: what would be left of the gap; a full bar is all of it.'
 _ALIKE = 1.5
 """Ratio of probabilities below which two candidates are told as alike."""
 _HARDLY = 1000.0
@@ -74,7 +75,7 @@ def causes_section(diagnosis: Diagnosis) -> Html:
 
 def _found(diagnosis: Diagnosis) -> Html | None:
     if not diagnosis.effects:
-        return None if diagnosis.model.found else tag('p', 'No effect was put into the twin.')
+        return None if diagnosis.model.found else tag('p', 'No effect was found.')
     if diagnosis.families:
         return families_table(diagnosis)
     heads = ['Effect', 'Parameter', 'Value ± standard error']
@@ -94,7 +95,8 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
     parts: list[Html] = []
     for slot in groups[:_SLOTS]:
         best = slot[0].probability
-        parts.append(bars([_candidate(diagnosis, c, best) for c in slot[:_CANDIDATES]], 'wide'))
+        rows = [_candidate(diagnosis, c, best) for c in slot[:_CANDIDATES]]
+        parts.append(bars(rows, 'wide'))
     more = len(candidates) - sum(len(s[:_CANDIDATES]) for s in groups[:_SLOTS])
     note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
     if not diagnosis.effects:
@@ -103,16 +105,15 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
     else:
         title = 'Candidates against each other'
         lead = f'{_GROUP if len(groups) > 1 else ""}{_RIVALS}'
-    told = tag('p', lead, class_='note')
+    told = tag('p', f'{lead} {_BARS}', class_='note')
     return joined([tag('h3', title), told, *parts, note])
 
 
 def _candidate(diagnosis: Diagnosis, c: Candidate, best: float) -> tuple[str, float, str]:
     """Return label, length and text of a bar; what only stands in is not compared."""
     left = f'leaves {millimetres(c.rms_after_m)} ({change(c.shrink)})'
-    if not diagnosis.effects:
-        return site_name(c.site), c.shrink, left
-    return site_name(c.site), c.probability / max(best, 1e-12), f'{rivalry(c, best)} · {left}'
+    told = f'{rivalry(c, best)} · {left}' if diagnosis.effects else left
+    return site_name(c.site), 1.0 - c.shrink, told
 
 
 def rivalry(candidate: Candidate, best: float) -> str:

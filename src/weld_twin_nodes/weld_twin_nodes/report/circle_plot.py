@@ -98,9 +98,8 @@ def circles_section(diagnosis: Diagnosis) -> Html | None:
         'The circle',
         tag('div', *figures, class_='panels'),
         id_='circles',
-        lead='Radial deviation of the tool point, magnified, against the commanded circle '
-        '(ISO 230-4). The ticks at the rim are where joints turn back; those of a cause are named, '
-        'long names by their number from the base.',
+        lead='How far outside or inside the commanded circle the tool point is, magnified (as in '
+        'ISO 230-4).',
     )
 
 
@@ -119,7 +118,21 @@ def _figure(diagnosis: Diagnosis, k: int, circle: Circle) -> Html:
         'figure',
         tag('canvas', data_circle=k, role='img', aria_label=label),
         tag('figcaption', told),
+        _key(bool(diagnosis.model.found)),
     )
+
+
+def _key(changes: bool) -> Html:
+    """Return what the lines and ticks of a polar plot are."""
+    rows = [
+        ('before', 'as it is'),
+        *([('after', 'with what is ticked mended')] if changes else []),
+        ('soft', 'middle ring: the commanded circle; outside it the tool is too far out'),
+        ('ink', 'tick at the rim: a joint turns back there; the joint of a cause is named, a long '
+         'name by its number from the base'),
+    ]  # fmt: skip
+    items = [tag('li', tag('i', class_=f'swatch {colour}'), ' ', told) for colour, told in rows]
+    return tag('ul', *items, class_='key')
 
 
 def _radial(circle: Circle, path: Array, deviation: Array) -> Array:

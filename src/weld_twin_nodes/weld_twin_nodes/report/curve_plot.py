@@ -8,6 +8,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects.curve import basis
+from weld_twin_core.effects.frame_curve import FrameCurve
 from weld_twin_core.effects.joint_curve import JointCurve
 
 from .charts import Axis, Line, chart
@@ -66,10 +67,23 @@ def curve_figure(curve: JointCurve, covariance: Array | None, joint: int) -> Htm
 def furthest(curve: JointCurve) -> str:
     """Return how far a curve is off where it is furthest off, and where that is."""
     size, unit = _VALUES.get(curve.channel, (_DEGREES, '°'))
+    if curve.over == 'constant':
+        return f'{size * float(np.ravel(curve.values)[0]):.3g}{_spaced(unit)} everywhere'
     x, _, y = _sampled(curve)
     at = int(np.argmax(np.abs(y)))
     return (
         f'up to {size * abs(float(y[at])):.3g}{_spaced(unit)} {_where(curve.over, float(x[at]))}'
+    )
+
+
+def furthest_frame(curve: FrameCurve) -> str:
+    """Return how far a frame moves by its curve where it moves furthest."""
+    moved, turned = (
+        float(np.linalg.norm(np.reshape(part, (3, -1)), axis=0).max())
+        for part in (np.asarray(curve.xyz), np.asarray(curve.rotvec))
+    )
+    return (
+        f'up to {1e3 * moved:.3g}\N{NO-BREAK SPACE}mm and turns by up to {_DEGREES * turned:.3g}°'
     )
 
 

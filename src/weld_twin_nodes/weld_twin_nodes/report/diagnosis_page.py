@@ -16,6 +16,7 @@ from .acceptance import (
     acceptance_section,
     judged_words,
     largest,
+    most_data,
     on_what,
     rule_data,
     rule_of,
@@ -81,12 +82,14 @@ def report_page(
     rule = rule_of(diagnosis, sheet.demand)
     sound = diagnosis.status != 'unsound'
     judged = _judged(diagnosis, rule) if sound else None
+    brand = sheet.brand or brand_of(diagnosis.model.robot.name)
     body = joined(
         [
             header(diagnosis),
-            opening(diagnosis, judged, rule),
-            *(_causes(diagnosis, sheet, rule) if sound else ()),
+            opening(diagnosis, judged, rule if sound else None, brand),
+            *(_causes(diagnosis, sheet, rule, brand) if sound else ()),
             checks_section(diagnosis),
+            _engineers(diagnosis) if sound else None,
             printed_section(diagnosis, inputs, judged),
         ]
     )
@@ -95,15 +98,21 @@ def report_page(
     main = tag('main', Html(renamed(body, sheet.joints)), foot)
     if not sound:
         return document(title, main)
-    data = {**page_data(diagnosis), 'rule': rule_data(rule), 'circles': circle_data(diagnosis)}
+    data = {
+        **page_data(diagnosis),
+        'most': most_data(diagnosis),
+        'rule': rule_data(rule),
+        'circles': circle_data(diagnosis),
+    }
     told = Html(renamed(embedded(data, 'data'), sheet.joints))
     scripts = [tag('script', own_file(name)) for name in SCRIPTS]
     return document(title, main, told, charts=True, scripts=scripts)
 
 
-def _causes(diagnosis: Diagnosis, sheet: Sheet, rule: Rule) -> tuple[Html | None, ...]:
+def _causes(
+    diagnosis: Diagnosis, sheet: Sheet, rule: Rule, brand: str | None
+) -> tuple[Html | None, ...]:
     """Return what causes the gap, whether it passes, where it lies, and what to measure next."""
-    brand = sheet.brand or brand_of(diagnosis.model.robot.name)
     return (
         acceptance_section(diagnosis, sheet.demand),
         causes_cards(diagnosis, brand, rule),
@@ -111,13 +120,18 @@ def _causes(diagnosis: Diagnosis, sheet: Sheet, rule: Rule) -> tuple[Html | None
         circles_section(diagnosis),
         where_section(diagnosis),
         next_section(diagnosis),
-        tag(
-            'div',
-            causes_section(diagnosis),
-            changed_section(diagnosis),
-            shrink_section(diagnosis),
-            class_='detail',
-        ),
+    )
+
+
+def _engineers(diagnosis: Diagnosis) -> Html:
+    """Return rivals, changes and the way the gap shrinks: whom the answer is enough need none of it."""
+    return tag(
+        'details',
+        tag('summary', 'For engineers: what else it could be, and how far each effect shrinks it'),
+        causes_section(diagnosis),
+        changed_section(diagnosis),
+        shrink_section(diagnosis),
+        class_='detail',
     )
 
 
@@ -137,5 +151,6 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
         f'{judged_words(rule, size)}, {where}',
         class_=f'status judged {verdict}',
         hidden='' if rule.tolerance_m is None else None,
-        data_top=where,
+        data_top=f'{1e3 * size:.9f}',
+        data_where=where,
     )

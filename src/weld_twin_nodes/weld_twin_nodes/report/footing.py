@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from weld_twin_core import __version__
@@ -12,14 +12,23 @@ from weld_twin_core.diagnosis.result import Diagnosis, Site
 from weld_twin_msgs_py.files.input_files import InputFile
 
 from .html import Child, Html, joined, section, table, tag
-from .quantities import counted
+from .quantities import counted, odds
 from .to_do import made_for, minutes
 from .untried import untried
-from .words import in_words, listed, open_sets, site_name
+from .words import (
+    CURVES,
+    cause,
+    depending,
+    in_words,
+    listed,
+    open_sets,
+    place_name,
+    site_name,
+)
 
 _APART = (
     *('kind', 'motion', 'between', 'cost', 'robot_minutes', 'expected_separation_sigma'),
-    *('changes', 'promise'),
+    *('changes', 'promise', 'skipped'),
 )
 """What programs need of a measurement, or the page says in words."""
 _ENOUGH = (
@@ -61,7 +70,6 @@ def _sites(diagnosis: Diagnosis) -> set[Site]:
 def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     """Return what to measure, why, and what it takes."""
     told = {'sentence', 'reason', *_APART}
-    sigma = wanted.get('expected_separation_sigma')
     rest = {key: value for key, value in wanted.items() if key not in told}
     if wanted.get('motion'):
         rest['as a program'] = (
@@ -70,15 +78,37 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
         )
     if minutes(wanted):
         rest['takes'] = minutes(wanted)
-    if sigma:
-        rest['tells them apart by'] = f'{sigma:.0f} standard deviations, as far as can be foreseen'
-    lines = [
-        tag('p', in_words(wanted[key], sites), class_=class_)
-        for key, class_ in (('sentence', None), ('reason', 'note'))
-        if wanted.get(key)
-    ]
+    if wanted.get('promise'):
+        rest['likely to decide'] = odds(wanted['promise'])
+    lines = [tag('p', in_words(wanted['sentence'], sites))] if wanted.get('sentence') else []
+    why = parts_what(wanted) or (in_words(wanted['reason'], sites) if wanted.get('reason') else '')
+    lines += [tag('p', why, class_='note')] if why else []
     entries = _entries(rest)
     return joined([*lines, tag('dl', *entries, class_='pairs') if entries else None])
+
+
+def parts_what(wanted: Mapping[str, Any]) -> str:
+    """
+    Return what a measurement is to tell apart, in a sentence; nothing where it parts nothing.
+
+    What an explanation without a name depends on is told only where the two differ in that alone:
+    the curves that stand for it may run over something else than what it was found to depend on.
+    """
+    one, other = wanted.get('between') or ((), ())
+    if not one or not other:
+        return ''
+    same = {item.get('at') for item in one} == {item.get('at') for item in other}
+    sides = [listed(list(dict.fromkeys(_side(item, same) for item in side)))
+             for side in (one, other)]  # fmt: skip
+    return '' if sides[0] == sides[1] else f'It shows whether it is {sides[0]} or {sides[1]}.'
+
+
+def _side(item: Mapping[str, Any], same: bool) -> str:
+    """Return one part of an explanation in words, with what it depends on at the same place."""
+    if item['effect'] not in CURVES:
+        return cause(item['effect'], item.get('joint'))
+    at = f'something at {place_name(str(item.get("at")))}'
+    return f'{at} that {depending(str(item.get("on")))}' if same else at
 
 
 def _left_open(diagnosis: Diagnosis, wanted: dict[str, Any]) -> list[Html]:

@@ -1,24 +1,38 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What mending one cause leaves, and where that would make the seam worse."""
+"""What mending one cause or several leaves, and where that would make the seam worse."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
+from .html import Child, tag
 from .quantities import STAYS, UNCHANGED, millimetres
-from .switches import as_it_is, squares, switches, trusted
-from .words import depending, likely, unnamed
+from .switches import as_it_is, parted, squares, switches, trusted
+from .words import (
+    depending,
+    leading,
+    likely,
+    listed,
+    not_to_be_tried,
+    unnamed,
+    untried_in_short,
+)
 
 _GROWS = 1.02
 """Ratio of the largest deviation after to before from which it is told as grown: less than that is
 a matter of which sample has the largest noise."""
 _APART = 0.02
 """Share of the squared gap by which a curve may fall short of its place before both are told."""
+_EVERY = 3
+"""Switches of which every combination is told; of more, each alone and all together."""
 _LOOK = {
     'constant': 'zeros and frames',
     'angle': 'gear and encoder',
@@ -31,6 +45,11 @@ _LOOK = {
     'place': 'the instrument and its line of sight',
 }
 """Where a fitter looks first when a cause has no name, by what it depends on."""
+_NOT = re.compile(
+    r'((?:Do not correct programs|Not this alone)\b[^.]*(?:\.\d[^.]*)*\.'
+    r'|: do not correct programs by it\.)'
+)
+"""What a reader is told not to do."""
 _CLOCKS = 'clocks'
 """Name of the check of the clocks: what is late by a clock grows with the speed, as a lag does."""
 
@@ -56,22 +75,38 @@ class Left(NamedTuple):
 
 def left_without(diagnosis: Diagnosis, k: int) -> Left | None:
     """Return what is left with cause ``k`` alone mended; None where it cannot be thought away."""
-    told = diagnosis.contributions
     for at, switch in enumerate(switches(diagnosis)):
-        if switch.members == (k,) and told is not None:
-            products = np.array(squares(diagnosis))
-            on = np.ones(products.shape[0])
-            before = np.sqrt(on @ products @ on)
-            on[1 + at] = 0.0
-            after = np.sqrt(max(float(on @ products @ on), 0.0))
-            most = [0.0, 0.0]
-            for run, parts in enumerate(told.parts):
-                whole, good = as_it_is(diagnosis, run), trusted(diagnosis, run)
-                for i, left in enumerate((whole, whole - parts[k])):
-                    size = float(np.linalg.norm(left[good], axis=1).max(initial=0.0))
-                    most[i] = max(most[i], size)
-            return Left(1e-3 * float(before), 1e-3 * float(after), *most)
+        if switch.members == (k,):
+            return left_with(diagnosis, (at,))
     return None
+
+
+def left_with(diagnosis: Diagnosis, mended: Collection[int]) -> Left:
+    """
+    Return what is left with some of the `switches` thrown, counted from 0.
+
+    The page has these figures from nowhere else, so that one is the same wherever it stands.
+    """
+    products = np.array(squares(diagnosis))
+    on = np.ones(products.shape[0])
+    before = np.sqrt(on @ products @ on)
+    on[[1 + at for at in mended]] = 0.0
+    after = np.sqrt(max(float(on @ products @ on), 0.0))
+    most = [0.0, 0.0]
+    for run, (left, parts) in enumerate(zip(*parted(diagnosis), strict=True)):
+        good = trusted(diagnosis, run)
+        there = [k for k in range(len(parts)) if k not in mended]
+        for i, whole in enumerate((as_it_is(diagnosis, run), left + parts[there].sum(axis=0))):
+            size = float(np.linalg.norm(whole[good], axis=1).max(initial=0.0))
+            most[i] = max(most[i], size)
+    return Left(1e-3 * float(before), 1e-3 * float(after), *most)
+
+
+def thought_mended(diagnosis: Diagnosis) -> list[tuple[int, ...]]:
+    """Return which switches are thrown together where the page says what is left: none first."""
+    count = len(switches(diagnosis))
+    sizes = range(count + 1) if count <= _EVERY else (0, 1, count)
+    return [mended for size in sizes for mended in combinations(range(count), size)]
 
 
 def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
@@ -85,7 +120,8 @@ def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
     if left is None:
         return None
     taken = max(1.0 - (left.rms_after / max(left.rms, 1e-300)) ** 2, 0.0)
-    return taken if taken < cause.share - _APART else None
+    # Beside the interval of its share, what the curve falls short by is no news.
+    return taken if taken < cause.share_ci90[0] - _APART else None
 
 
 def warning(diagnosis: Diagnosis, k: int) -> str:
@@ -103,19 +139,25 @@ def warning(diagnosis: Diagnosis, k: int) -> str:
     return f'Not this alone: {told}; mend it together with the others.'
 
 
+def warned(told: str) -> list[Child]:
+    """Return a text as markup, in which what not to do stands out."""
+    parts = _NOT.split(told)
+    return [tag('strong', text) if k % 2 else text for k, text in enumerate(parts) if text]
+
+
 def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
     """Return where to look for a cause without a name, and whether its curve helps so long."""
     cause = diagnosis.causes[k]
     where = likely(cause.place) or 'the whole cell'
-    first = f'Look at {where}: no known effect gives what is found there.'
+    first = f'Look at {where}: {_no_effect(diagnosis)} gives what is found there.'
     if cause.dependence:
-        on = cause.dependence[0][0]
-        at = _LOOK.get(on, 'all that moves')
-        if on == 'speed' and not _one_clock(diagnosis):
-            at += ', and the clocks'
+        # Where two fit alike, both are told: the first alone would send a fitter to the wrong part.
+        on = [name for name, _ in leading(cause.dependence)]
+        at = [_LOOK.get(name, 'all that moves') for name in on]
+        at += ['the clocks'] * ('speed' in on and not _one_clock(diagnosis))
         first = (
-            f'Look at {where}, at {at} first: what is found there '
-            f'{depending(on)}, and no known effect gives it.'
+            f'Look at {where}, at {listed(list(dict.fromkeys(at)))} first: what is found there '
+            f'{depending(*on)}, and {_no_effect(diagnosis)} gives it.'
         )
     left = left_without(diagnosis, k)
     if left is None:
@@ -130,6 +172,13 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
         'Until that is found, programs can be corrected by its curve (weld-twin correct-program): '
         f'the largest deviation goes from {_both(left)}.',
     ]
+
+
+def _no_effect(diagnosis: Diagnosis) -> str:
+    """Return that no effect gives it, and of how many that can be said."""
+    if not not_to_be_tried(diagnosis):
+        return 'no known effect'
+    return f'no effect that was tried ({untried_in_short(diagnosis)}, as asked)'
 
 
 def curve_fault(diagnosis: Diagnosis, k: int) -> str:

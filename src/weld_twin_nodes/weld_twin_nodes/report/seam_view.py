@@ -9,18 +9,21 @@ import numpy as np
 from weld_twin_core.diagnosis.result import Diagnosis
 
 from .charts import Axis, Line, chart
-from .html import Html, joined, section, tag
-from .quantities import MISSING, counted, millimetres
+from .html import Child, Html, joined, section, tag
+from .mending import left_with
+from .quantities import counted, millimetres, percent
 from .switches import along, as_it_is, drawn, parted, static, switches, trusted
 
 _LINE = (
-    'The thin line is where the twin has the tool, the coloured one where it was measured, its '
-    'deviation enlarged.'
+    'The thin line is where the model of the robot has the tool, the coloured one where it was '
+    'measured, its deviation enlarged.'
 )
 _STATIONS = (
-    'Each line goes from where the twin has the tool to a dot where it was measured, its '
-    'deviation enlarged.'
+    'Each line goes from where the model of the robot has the tool to a dot where it was measured, '
+    'its deviation enlarged.'
 )
+_TENTH = 0.1
+"""Part of the gap below which what is left is told with a decimal."""
 _RECORDINGS = 6
 """Recordings drawn over time."""
 
@@ -73,18 +76,19 @@ def _switches(diagnosis: Diagnosis) -> Html | None:
 
 def _figures(diagnosis: Diagnosis) -> Html:
     """Return the figures that follow the switches."""
-    cells = (
-        ('Deviation then', 'now-rms', 'RMS, each stretch predicted from the others'),
-        ('Largest', 'now-max', f'of {_counting(diagnosis)}'),
-        ('Left of the gap', 'now-share', 'of its RMS'),
-    )
+    left = left_with(diagnosis, range(len(switches(diagnosis))))
+    share = left.rms_after / max(left.rms, 1e-300)
+    cells: tuple[tuple[str, str, str, Child], ...] = (
+        ('Left then', 'now-rms', millimetres(left.rms_after), 'RMS, on data not used for fitting'),
+        ('At the worst spot', 'now-max', millimetres(left.largest_after), joined([
+            f'of {_counting(diagnosis)}', tag('span', id_='now-verdict', data_before=': ')])),
+        ('Of the gap', 'now-share', percent(share, int(share < _TENTH)), 'of its RMS is left'),
+    )  # fmt: skip
     return tag(
         'dl',
         *(
-            tag(
-                'div', tag('dt', name), tag('dd', MISSING, id_=key), tag('dd', note, class_='note')
-            )
-            for name, key, note in cells
+            tag('div', tag('dt', name), tag('dd', value, id_=key), tag('dd', note, class_='note'))
+            for name, key, value, note in cells
         ),
         class_='figures',
     )
@@ -161,7 +165,7 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     if switches(diagnosis) or diagnosis.model.found:
         lines.append(Line('with that mended', _size(left[index]), 'after', points=dots))
     floor = np.full(index.size, 1e3 * diagnosis.gap.noise_floor_m)
-    lines.append(Line('noise floor', floor, 'soft', dashed=True))
+    lines.append(Line('measuring noise', floor, 'soft', dashed=True))
     axes = (Axis('station') if dots else Axis('time', 's'), Axis('deviation', 'mm'))
     recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
     title = recording.name if recording is not None else f'recording {k + 1}'

@@ -38,7 +38,11 @@ window.sheet = (() => {
     return Math.sqrt(Math.max(sum, 0));
   }
 
-  const most = (side) => Math.max(0, ...data.runs.flatMap((run) => run.size[side]));
+  // What the page was written with where it has it: it has all samples, not only those drawn.
+  function most() {
+    const told = data.most[mended.map(Number).join('')];
+    return told ?? Math.max(0, ...data.runs.flatMap((run) => run.size.now));
+  }
 
   function judged(largest) {
     const { tolerance, below, above, words } = data.rule;
@@ -72,26 +76,22 @@ window.sheet = (() => {
   }
 
   function accept() {
-    const largest = { 'as-it-is': most('before'), mended: most('now') };
-    for (const item of all('[data-largest]')) item.textContent = mm(largest[item.dataset.largest]);
-    for (const item of all('[data-verdict]')) {
-      const [kind, word] = judged(largest[item.dataset.verdict]);
+    const now = document.getElementById('now-verdict');
+    if (now) now.dataset.size = most();
+    for (const item of all('[data-size]')) {
+      const [kind, word] = judged(Number(item.dataset.size));
+      const before = item.dataset.before;
       item.className = `mark ${kind}`;
-      item.textContent = word;
+      item.textContent = before && data.rule.tolerance == null ? '' : `${before}${word}`;
     }
     const remedy = document.getElementById('remedy');
-    if (remedy) remedy.hidden = !['as-it-is', 'mended'].some((side) => judged(largest[side])[0] === 'open');
-    for (const item of all('[data-alone]')) {
-      const [kind, word] = judged(Number(item.dataset.alone));
-      item.className = `mark ${kind}`;
-      item.textContent = data.rule.tolerance == null ? '' : `: ${word}`;
-    }
+    if (remedy) remedy.hidden = !all('#acceptance [data-size]').some((item) => item.classList.contains('open'));
     for (const item of all('[data-top]')) {
-      const [kind, word] = judged(largest['as-it-is']), { tolerance } = data.rule;
+      const size = Number(item.dataset.top), [kind, word] = judged(size), { tolerance } = data.rule;
       item.className = `status judged ${kind}`;
       item.hidden = tolerance == null;
       if (tolerance == null) continue;
-      const told = `${word}: ${mm(largest['as-it-is'])} of ${mm(tolerance)} allowed${limits(kind)}, ${item.dataset.top}`;
+      const told = `${word}: ${mm(size)} of ${mm(tolerance)} allowed${limits(kind)}, ${item.dataset.where}`;
       item.textContent = told[0].toUpperCase() + told.slice(1);
     }
   }
@@ -106,7 +106,7 @@ window.sheet = (() => {
     const now = rms(there), before = rms(() => true);
     const share = 100 * now / Math.max(before, 1e-12);
     put('now-rms', mm(now));
-    put('now-max', mm(most('now')));
+    put('now-max', mm(most()));
     put('now-share', `${share.toFixed(share < 10 ? 1 : 0)} %`);
     for (const figure of all('#seam figure.chart')) {
       const run = data.runs[Number(figure.dataset.key.replace('run', ''))];

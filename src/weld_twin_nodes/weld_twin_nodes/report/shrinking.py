@@ -23,7 +23,7 @@ def shrink_section(diagnosis: Diagnosis) -> Html:
         tag('p', _judged(diagnosis)),
         leftover(diagnosis),
         id_='shrink',
-        lead='RMS gap as each effect is put into the twin in turn, each stretch of the recordings '
+        lead='RMS gap as each effect is put into the model in turn, each stretch of the recordings '
         'predicted from the others. At each step the effects that are in are fitted anew, so one can '
         'take up a part of another: a card, which leaves the others as they are, may say otherwise.',
     )
@@ -43,7 +43,7 @@ def _waterfall(diagnosis: Diagnosis) -> Html:
         rows.append(_step(('+ ' if k else '') + name, rms / largest, before / largest, rms))
         before = rms
     floor = diagnosis.gap.noise_floor_m
-    rows.append(_step('noise floor', floor / largest, floor / largest, floor, 'floor'))
+    rows.append(_step('measuring noise', floor / largest, floor / largest, floor, 'floor'))
     return tag('ul', *rows, class_='bars waterfall wide')
 
 
@@ -60,7 +60,7 @@ def _given(diagnosis: Diagnosis) -> float:
 def _judged(diagnosis: Diagnosis) -> str:
     shrink = diagnosis.shrink
     if not diagnosis.model.found:
-        return f'No effect is in the twin, so nothing shrinks; judged on {shrink.held_out}.'
+        return f'No effect was found, so nothing shrinks; judged on {shrink.held_out}.'
     if shrink.orientation_rad is not None and turns_only(diagnosis):
         before, after = map(both_angles, shrink.orientation_rad)
         return f'The position gap stays; the orientation gap of {before} shrinks to {after}.'

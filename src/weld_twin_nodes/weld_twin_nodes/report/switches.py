@@ -195,7 +195,7 @@ def _joints(diagnosis: Diagnosis, recording: Recording, t: Array) -> list[list[f
 
 
 def _micrometres(points: Array) -> list[float]:
-    return [round(float(value), 1) for value in np.nan_to_num(1e6 * points).ravel()]
+    return [round(float(value), 2) for value in np.nan_to_num(1e6 * points).ravel()]
 
 
 def _large(diagnosis: Diagnosis) -> float:

@@ -319,9 +319,11 @@ def share_by_site(diagnosis: Diagnosis) -> dict[Site, float]:
     return {site: diagnosis.causes[k].share for site, k in cause_by_site(diagnosis).items()}
 
 
-def depending(on: str) -> str:
-    """Return what something without a name does, by what it depends on."""
-    return 'is constant' if on == 'constant' else f'depends on {DEPENDENCES.get(on, on)}'
+def depending(*on: str) -> str:
+    """Return what something without a name does, by what it may depend on."""
+    words = [DEPENDENCES.get(name, name) for name in on if name != 'constant']
+    told = ['is constant'] if 'constant' in on else []
+    return ' or '.join([*told, *([f'depends on {listed(words, "or")}'] if words else [])])
 
 
 def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
@@ -353,29 +355,42 @@ def carries_curves(diagnosis: Diagnosis) -> bool:
 
 def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
     """Return where an unknown cause sits and what its curve brings."""
-    cause = diagnosis.causes[in_order(diagnosis)[0]]
+    first, *others = (diagnosis.causes[k] for k in in_order(diagnosis))
     shrink = diagnosis.shrink
-    first = (
-        f'The gap of {millimetres(diagnosis.gap.rms_m)} comes mostly from '
-        f'{cause_words(cause)}; no effect in the library{_without(diagnosis)} explains it.'
-    )
+    told = f'comes mostly from {cause_words(first)};'
+    if first.share < HALF and others:
+        # What another place holds is more: "mostly" would say the opposite of the bars below.
+        told = f'comes in part from {cause_words(first)}, in part from {cause_words(others[0])};'
+    why = 'no known effect explains it'
+    if not_to_be_tried(diagnosis):
+        why = f'what causes it is open: {untried_in_short(diagnosis)}, as asked'
     before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)
     change = (
-        f'With a curve in its place, {before} shrinks to {after}'
+        f'Corrected by a curve that was measured in its place, {before} shrinks to {after}'
         if shrink.ratio < STAYS
-        else f'No curve in its place takes it off: {before} becomes {after}'
+        else f'No curve measured in its place takes it off: {before} becomes {after}'
     )
-    second = (
-        f'{change} on data not used for fitting; the noise floor is '
-        f'{millimetres(diagnosis.gap.noise_floor_m)}.'
+    return (
+        f'The gap of {millimetres(diagnosis.gap.rms_m)} {told} {why}.',
+        f'{change} on data not used for fitting; {_noise(diagnosis)}.',
     )
-    return first, second
+
+
+def _noise(diagnosis: Diagnosis) -> str:
+    return f'measuring noise alone is {millimetres(diagnosis.gap.noise_floor_m)}'
 
 
 def _without(diagnosis: Diagnosis) -> str:
     """Return which effects were asked not to be tried: one of them may well explain the gap."""
     names = not_to_be_tried(diagnosis)
     return f' (tried without {listed(names)}, as asked)' if names else ''
+
+
+def untried_in_short(diagnosis: Diagnosis) -> str:
+    """Return that some effects were not tried; of many only the first, as the first step has all."""
+    names = not_to_be_tried(diagnosis)
+    told = names if len(names) <= _NAMED else [*names[: _NAMED - 1], f'{len(names) - 2} more']
+    return f'{listed(told)} {"was" if len(names) == 1 else "were"} not tried'
 
 
 def not_to_be_tried(diagnosis: Diagnosis) -> list[str]:
@@ -385,11 +400,11 @@ def not_to_be_tried(diagnosis: Diagnosis) -> list[str]:
 
 def _none(diagnosis: Diagnosis) -> tuple[str, str]:
     first = (
-        f'There is no gap above the noise: measured and twin differ by '
+        f'There is no gap above the noise: measured and model differ by '
         f'{millimetres(diagnosis.gap.rms_m)}, of which {millimetres(diagnosis.gap.noise_floor_m)} '
         'is noise.'
     )
-    return first, 'As far as these data reach, the twin is the robot.'
+    return first, 'As far as these data reach, the model is the robot.'
 
 
 def _unsound(diagnosis: Diagnosis) -> tuple[str, str]:
@@ -415,16 +430,14 @@ def _size(diagnosis: Diagnosis) -> str:
 def _gain(diagnosis: Diagnosis, start: str = '') -> str:
     shrink = diagnosis.shrink
     what = 'it' if len(diagnosis.effects) == 1 else 'them'
-    opening = f'{start}, with {what} in the twin' if start else f'With {what} in the twin'
+    opening = f'{start}, with {what} mended' if start else f'With {what} mended'
     if shrink.orientation_rad is not None and turns_only(diagnosis):
         before, after = map(both_angles, shrink.orientation_rad)
         return (
             f'{opening}, {before} shrinks to {after} on data not used for fitting; the position '
-            f'gap, {millimetres(shrink.rms_after_m)} at a noise floor of '
-            f'{millimetres(diagnosis.gap.noise_floor_m)}, stays as it is.'
+            f'gap, {millimetres(shrink.rms_after_m)}, stays as it is; {_noise(diagnosis)}.'
         )
     return (
         f'{opening}, {millimetres(shrink.rms_before_m)} shrinks to '
-        f'{millimetres(shrink.rms_after_m)} on data not used for fitting; the noise floor is '
-        f'{millimetres(diagnosis.gap.noise_floor_m)}.'
+        f'{millimetres(shrink.rms_after_m)} on data not used for fitting; {_noise(diagnosis)}.'
     )

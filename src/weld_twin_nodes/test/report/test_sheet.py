@@ -23,7 +23,7 @@ from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.directions import components, sides_words
 from weld_twin_nodes.report.joint_names import joint_labels, renamed
 from weld_twin_nodes.report.quantities import turned, with_ends
-from weld_twin_nodes.report.switches import cause_name, page_data
+from weld_twin_nodes.report.switches import cause_name, page_data, switches
 
 THREE = diagnoses.circle()
 PARTS = ('base_yaw_actuator', 'shoulder_lift', 'forearm_elbow_rotation', 'w1', 'w2', 'w3')
@@ -70,6 +70,12 @@ def unit(vectors):
 
 def millimetres(text):
     return float(re.search(r'[\d.]+', text)[0])
+
+
+def as_it_is(page):
+    """Return the verdict on the robot as it is, and its largest deviation [mm]."""
+    row = page.locator('table.acceptance tbody tr').first
+    return row.locator('.mark'), millimetres(row.locator('td').nth(1).inner_text())
 
 
 @pytest.fixture
@@ -133,8 +139,7 @@ def test_the_wheel_scrolls_the_page_until_the_view_is_clicked(page):
 
 def test_a_tolerance_is_asked_for_and_judged_by_the_uncertainty(browser):
     page = browser.open(report_page(THREE))
-    verdict = page.locator('[data-verdict=as-it-is]')
-    size = millimetres(page.locator('[data-largest=as-it-is]').inner_text())
+    verdict, size = as_it_is(page)
     assert verdict.inner_text() == 'no tolerance given'
     for tolerance, word in ((2 * size, 'passes'), (size, 'cannot be said'), (size / 2, 'fails')):
         page.locator('#tolerance').fill(f'{tolerance:.4f}')
@@ -153,7 +158,7 @@ def test_a_tolerance_is_read_with_a_comma_and_nothing_else_is_guessed(browser):
         field.fill('')
         field.press_sequentially(text)
         assert wrong.is_visible() and not top.is_visible()
-        assert page.locator('[data-verdict=as-it-is]').inner_text() == 'no tolerance given'
+        assert as_it_is(page)[0].inner_text() == 'no tolerance given'
         assert field.get_attribute('aria-invalid') == 'true'
 
 
@@ -172,8 +177,7 @@ def test_an_open_verdict_tells_its_limits_and_what_to_do(browser):
 
 def test_the_mark_at_the_top_follows_the_tolerance_field(browser):
     page = browser.open(report_page(THREE))
-    top, table = page.locator('#verdict .judged'), page.locator('[data-verdict=as-it-is]')
-    size = millimetres(page.locator('[data-largest=as-it-is]').inner_text())
+    top, (table, size) = page.locator('#verdict .judged'), as_it_is(page)
     assert not top.is_visible()
     for tolerance in (2 * size, size, size / 2):
         page.locator('#tolerance').fill(f'{tolerance:.4f}')
@@ -271,13 +275,30 @@ def test_a_card_says_that_nothing_is_to_be_entered_and_how_far_a_joint_trails():
 
 
 def test_what_is_left_with_one_mended_is_judged_on_its_card(page):
-    size = float(page.locator('#cause-3 [data-alone]').get_attribute('data-alone'))
-    page.get_by_role('button', name='all mended').click()
-    for k in (0, 1):
-        page.locator(f'.switches input[data-switch="{k}"]').uncheck()
-    assert millimetres(page.locator('#now-max').inner_text()) == pytest.approx(size, abs=1e-3)
+    size = float(page.locator('#cause-3 [data-size]').get_attribute('data-size'))
     page.locator('#tolerance').fill(f'{2 * size:.4f}')
-    assert page.locator('#cause-3 [data-alone]').inner_text() == ': passes'
+    assert page.locator('#cause-3 [data-size]').inner_text() == ', passes'
+
+
+@pytest.mark.parametrize('mended', [(2,), (0, 1), (0, 1, 2)])
+def test_one_figure_is_the_same_in_card_table_switches_and_headline(page, mended):
+    page.get_by_role('button', name='as it is').click()
+    for k in mended:
+        page.locator(f'.switches input[data-switch="{k}"]').check()
+    told = ['#now-rms', '#now-max'], 'table.acceptance tbody tr'
+    shown = [page.locator(place).inner_text() for place in told[0]]
+    names = [switch.label for switch in switches(THREE)]
+    row = 'mended: all 3' if len(mended) == 3 else ' and '.join(
+        f'{k + 1}. {names[k]}' for k in mended)  # fmt: skip
+    cells = page.locator(told[1]).filter(
+        has_text=re.compile(f'{re.escape(row)}$|{re.escape(row)}\\s')
+    )
+    assert cells.first.locator('td').all_inner_texts()[:2] == shown
+    if len(mended) == 1:
+        card = (
+            page.locator(f'#cause-{mended[0] + 1}').inner_text().replace('\N{NO-BREAK SPACE}', ' ')
+        )
+        assert all(f'to {text}' in card for text in shown)
 
 
 def test_what_was_not_considered_is_named_in_words():

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 
@@ -19,6 +20,7 @@ from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.acceptance import Demand
 from weld_twin_nodes.report.belief import belief_of
 from weld_twin_nodes.report.controllers import correction
+from weld_twin_nodes.report.diagnosis_files import diagnosis_text
 from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.mending import left_without
 from weld_twin_nodes.report.quantities import counted
@@ -54,18 +56,30 @@ def unknown(size):
     return replace(case, causes=(cause,))
 
 
-def test_of_an_unknown_cause_the_headline_has_what_is_taken_off_unseen_data_and_nothing_else():
+def test_of_an_unknown_cause_one_share_and_one_figure_of_what_is_left_are_told():
     case = unknown(1e-4)
     first, second = map(plain, verdict(case))
     assert '97 %' not in first and 'depending on the direction of motion' in first
     assert '%' not in second and 'on data not used for fitting' in second
     page = report_page(case)
-    taken = 100 * (1 - case.shrink.ratio**2)
-    told = part(page, 'bars wide shares', 'class="cards"')
-    assert re.search(r'97 % \(70 to 100 %\); its curve takes off [<\d]', told)
-    figure = float(re.search(r'its curve takes off (?:< )?(\d+) %', told)[1])
-    assert figure == pytest.approx(max(taken, 0.0), abs=1.0)
-    assert 'With its curve' in part(page, 'class="cards"', 'id="seam"')
+    bar = part(page, 'bars wide shares', 'class="cards"')
+    assert '97 % (70 to 100 %)' in bar and 'curve' not in bar
+    card = part(page, 'class="cards"', 'id="seam"')
+    left = left_without(case, 0)
+    told = re.search(r'If only this is mended RMS \w+ from [\d.]+ mm to ([\d.]+) mm', card)
+    assert float(told[1]) == pytest.approx(1e3 * left.rms_after, abs=6e-4)
+    assert 'programs corrected by the curve' in card and 'so it takes off less' in card
+
+
+def test_what_holds_less_than_half_is_never_told_as_most():
+    case = unknown(1e-4)
+    small, other = (
+        replace(case.causes[0], share=0.3),
+        replace(case.causes[0], share=0.6, members=()),
+    )
+    other = replace(other, place=(('joint_a5', 0.8),), dependence=(('constant', 0.9),))
+    first, _ = verdict(replace(case, causes=(small, other), contributions=None))
+    assert 'mostly' not in first and 'in part from joint_a5, and is constant there' in first
 
 
 def test_of_several_curves_at_a_place_the_one_furthest_off_is_drawn():
@@ -141,7 +155,7 @@ def test_a_curve_is_told_by_where_it_is_furthest_off():
     case = unknown(4e-4)
     low, high = (f'{np.degrees(k):.3g}' for k in case.model.found[0].knots)
     card = part(report_page(case), 'class="cards"', 'id="seam"')
-    row = re.search(r'Value off by up to (0\.0229)° at (\S+)° ', card)
+    row = re.search(r'By how much off by up to (0\.0229)° at (\S+)° ', card)
     assert row and row[2] in (low, high)
     assert f'zero over angle, up to 0.0229° at {row[2]}°' in card
 
@@ -153,14 +167,17 @@ def test_an_unknown_cause_is_unknown_only_among_what_was_to_be_tried():
     absent = dict.fromkeys(('friction', 'backlash'), 'excluded by the user')
     case = replace(case, absent=absent, candidates=rivals)
     page = report_page(case)
-    assert (
-        'among causes that were not excluded: friction and backlash were left out as asked; run '
-        'again with them'
-    ) in part(page, 'Confidence', '</dl>')
-    assert worth_doing(case)[0].startswith('Diagnose again with friction and backlash: ')
+    told = 'friction and backlash were not tried, as asked'
+    assert f'the cause is none of those tried; {told}' in part(page, 'How sure', '</dl>')
+    again, look, *_ = worth_doing(case)
+    assert again.startswith('Diagnose again with friction and backlash: ')
+    assert f'no effect that was tried ({told}) gives it' in look and told in verdict(case)[0]
     near = part(page, 'What fits best', 'Not considered')
     assert 'servo lag of joint_a2' in near and 'backlash' not in near
-    assert 'not excluded' not in report_page(replace(case, absent={}))
+    whole = replace(case, absent={})
+    assert 'not tried, as asked' not in report_page(whole) and 'no known effect' in verdict(whole)[0]
+    kept = [c['effect'] for c in json.loads(diagnosis_text(case, ()))['candidates']]
+    assert kept == ['servo_lag']
 
 
 def open_and_sure(size):
@@ -196,7 +213,8 @@ def test_what_is_small_and_certain_waits_until_the_larger_is_told_apart():
         'in part from zero offset of joint_a1 or base pose error (these data do not tell'
         in (verdict(case)[0])
     )
-    card = part(report_page(case), 'id="cause-1"', 'How sure')
+    page = report_page(case)
+    card = part(page[page.index('class="cards"') :], 'id="cause-1"', 'How sure')
     assert 'Zero offset of joint_a1 or base pose error' in card
 
 
@@ -233,7 +251,8 @@ def test_a_cause_has_one_figure_of_belief_and_no_part_is_less_sure_than_the_whol
     case = replace(PLAY, causes=(cause,), confidence=0.96)
     assert belief_of(case, cause) == 0.96
     card = report_page(case)
-    card = card[card.index('How sure') : card.index('<dt>Value')]
+    card = card[card.index('class="cards"') :]
+    card = card[card.index('How sure') : card.index('<dt>By how much')]
     seen = plain(re.sub('<details.*?</details>', '', card, flags=re.DOTALL))
     assert re.findall(r'\d+ %', seen) == ['96 %'] and 'that it is backlash of elbow_joint' in seen
 
@@ -243,17 +262,18 @@ def test_the_whole_says_why_it_is_less_sure_than_its_parts():
         replace(c, name=((c.name[0][0], p),))
         for c, p in zip(CIRCLE.causes, (0.98, 0.9, 0.8), strict=True)
     )
-    top = part(report_page(replace(CIRCLE, causes=causes, confidence=0.7)), 'Confidence', '</dl>')
+    top = part(report_page(replace(CIRCLE, causes=causes, confidence=0.7)), 'How sure', '</dl>')
     assert 'All at once is less likely than each alone: 98 %, 90 %, 80 %' in top
     even = replace(CIRCLE, causes=causes, confidence=0.98)
-    assert 'less likely than each' not in part(report_page(even), 'Confidence', '</dl>')
+    assert 'less likely than each' not in part(report_page(even), 'How sure', '</dl>')
 
 
 def test_of_causes_that_fit_alike_the_figure_is_that_of_the_set():
     case = diagnoses.ambiguous()
     names = tuple((site, 0.32) for site in case.indistinguishable[0])
     case = replace(case, confidence=0.48, causes=(replace(case.causes[0], name=names),))
-    card = part(report_page(case), 'How sure', '<dt>Value')
+    page = report_page(case)
+    card = part(page[page.index('class="cards"') :], 'How sure', '<dt>By how much')
     assert '64 % that it is one of these; which of them is open.' in card
     places = part(report_page(case), 'By place', 'By what it depends on')
     assert 'joint_a1 or the base' in places

@@ -178,11 +178,9 @@ def _told(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
     labels = [switch.label for switch in switches(diagnosis)]
     if not mended:
         return f'as it is{_where(diagnosis)}'
-    if len(mended) == len(labels):
-        names = f'all {len(labels)}' if len(labels) > 1 else labels[0]
-        return f'with {names} mended'
-    told = [f'{k + 1}. {labels[k]}' for k in mended]
-    return f'with only {listed(told)} mended'
+    if len(mended) == len(labels) > 1:
+        return f'mended: all {len(labels)}'
+    return f'mended: only {listed([f"{k + 1}. {labels[k]}" for k in mended])}'
 
 
 def _more(diagnosis: Diagnosis) -> Html | None:

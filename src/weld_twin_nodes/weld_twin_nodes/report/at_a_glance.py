@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import re
+
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
 
@@ -31,18 +33,22 @@ from .words import listed, not_to_be_tried, untried_in_short
 
 _CAUSES = 4
 """Causes in the table; the cards have more."""
+_RADIANS = re.compile(r' \([^)]*mrad\)')
 _VALUES = 2
 """Values of a cause in the table; its card has more."""
 _SURE_OF = {
     'identified': 'that every cause named is right, and none is missing',
     'ambiguous': 'that what is named holds the causes, and none is missing',
-    'unknown': 'that the cause is none of those known',
+    'unknown': 'that the cause is none of those tried',
 }
 _APART = '\N{NO-BREAK SPACE}\N{NO-BREAK SPACE}'
 """Between a size and the verdict on it."""
 _WIDER = 2.0
 """Ratio of the error elsewhere in the reach to that where it was measured from which it is a warning."""
-_HEADS = ('Cause', 'Share of the gap', 'Off by', 'How sure', 'If only this is mended', 'Enter it')
+_HEADS = (
+    *('Cause', 'Share of the gap', 'By how much', 'How sure'),
+    *('If only this is mended', 'Where to enter it'),
+)
 WORDS = (
     ('gap', 'how far the tool is from where the model of the robot has it: measured minus model'),
     ('RMS', 'an average of sizes: the root of the mean of the squares'),
@@ -157,7 +163,7 @@ def _among(diagnosis: Diagnosis) -> str:
     """Return among which causes an unknown one is not, where some were not to be tried."""
     if diagnosis.status != 'unknown' or not not_to_be_tried(diagnosis):
         return ''
-    return f', of those that were tried: {untried_in_short(diagnosis)}, as asked'
+    return f'; {untried_in_short(diagnosis)}, as asked'
 
 
 def _data(diagnosis: Diagnosis) -> Figure | None:
@@ -204,7 +210,8 @@ def _row(diagnosis: Diagnosis, k: int, brand: str | None, rule: Rule) -> Html:
     name = cause_name(diagnosis, cause)
     value, ends = ends_to(places(diagnosis), cause.share, *cause.share_ci90)
     sure = belief_lines(diagnosis, cause)
-    off = values(diagnosis, cause)[:_VALUES]
+    # Radians stand on the card.
+    off = [_RADIANS.sub('', told) for told in values(diagnosis, cause)[:_VALUES]]
     if alternatives(diagnosis, cause) and off:
         off = [f'should it be {one_of(diagnosis, cause)}:', *off]
     cells: list[Child] = [

@@ -134,7 +134,7 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
     entries = [
         ('How sure', sure_entry(diagnosis, cause)),
         ('Comes back', again_words(cause, many=bool(diagnosis.families))),
-        ('Off by', _off_by(diagnosis, cause)),
+        ('By how much', _off_by(diagnosis, cause)),
         ('Stands on', _commanded(diagnosis, cause)),
         ('Effect on the seam', _effect(diagnosis, k)),
         ('If only this is mended', _mended(diagnosis, k, rule)),

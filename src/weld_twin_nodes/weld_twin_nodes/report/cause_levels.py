@@ -32,7 +32,7 @@ def _alternatives(told: list[tuple[str, float]]) -> str:
 def _names(cause: Cause) -> str:
     named = [(site, p) for site, p in cause.name if site.effect not in CURVES]
     if unnamed(cause):
-        return 'none that the library knows; its curve is below' if cause.name else 'none'
+        return 'none that was tried'
     return _alternatives([(site_name(site), p) for site, p in named])
 
 

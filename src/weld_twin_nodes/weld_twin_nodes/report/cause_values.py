@@ -35,10 +35,10 @@ def values(diagnosis: Diagnosis, cause: Cause) -> list[str]:
             rows.append(f'moves by {furthest_frame(effect)}')
         if effect.name in CURVES:
             continue
-        for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
-            rows.append(f'{parameter_word(name)} {value}')
         if isinstance(effect, ServoLag):
             rows.append(_trail(diagnosis, effect))
+        for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
+            rows.append(f'{parameter_word(name)} {value}')
     return rows
 
 

@@ -64,7 +64,10 @@ _PLACES = {
     ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',
 }
 """Menus as they are usually called. docs/sheet.md tells which names were found where."""
-UNCHECKED = 'The way through the menus was not checked against a manual.'
+UNCHECKED = (
+    'The way through the menus was not checked against a manual; names differ by version of the '
+    'controller.'
+)
 """Said wherever a menu is named."""
 
 

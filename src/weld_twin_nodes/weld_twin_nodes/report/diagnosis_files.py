@@ -23,6 +23,7 @@ from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
 from ..offline.exports import write_all
 from ..offline.where_it_holds import where_it_holds
 from .diagnosis_page import Sheet, report_page
+from .untried import weighed
 
 RESULT = 'diagnosis.json'
 PAGE = 'report.html'
@@ -79,9 +80,27 @@ def write_results(
 def diagnosis_text(diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> str:
     """Return the text of diagnosis.json; what is not a finite number is null."""
     content = diagnosis.as_dict()
+    if content['candidates'] is not None:
+        content['candidates'] = _candidates(diagnosis, content['candidates'])
     content['inputs'] = [item.as_dict() for item in inputs]
     content['version'] = __version__
     return json.dumps(_plain(content), indent=1, allow_nan=False) + '\n'
+
+
+def _candidates(diagnosis: Diagnosis, told: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """
+    Return the candidates without effects that were asked to be left out.
+
+    Where one of those is the same error as what is named, on any motion, it stands in
+    ``indistinguishable``; then it stays here too, marked as excluded.
+    """
+    tried = set(weighed(diagnosis))
+    named = {site for group in diagnosis.indistinguishable for site in group}
+    return [
+        item if own in tried else {**item, 'excluded': True}
+        for own, item in zip(diagnosis.candidates, told, strict=True)
+        if own in tried or own.site in named
+    ]
 
 
 def _plain(value: Any) -> Any:

@@ -80,6 +80,9 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
         rest['takes'] = minutes(wanted)
     if wanted.get('promise'):
         rest['likely to decide'] = odds(wanted['promise'])
+    elif wanted.get('expected_separation_sigma'):
+        sigma = f'{wanted["expected_separation_sigma"]:.0f}'
+        rest['tells them apart by'] = f'{sigma} standard deviations, as far as can be foreseen'
     lines = [tag('p', in_words(wanted['sentence'], sites))] if wanted.get('sentence') else []
     why = parts_what(wanted) or (in_words(wanted['reason'], sites) if wanted.get('reason') else '')
     lines += [tag('p', why, class_='note')] if why else []

@@ -45,9 +45,10 @@ _LOOK = {
     'place': 'the instrument and its line of sight',
 }
 """Where a fitter looks first when a cause has no name, by what it depends on."""
+_DEGREES = re.compile(r'(?<=\d) deg\b')
 _NOT = re.compile(
     r'((?:Do not correct programs|Not this alone)\b[^.]*(?:\.\d[^.]*)*\.'
-    r'|: do not correct programs by it\.)'
+    r'|Its curve [^.]*: do not correct programs by it\.)'
 )
 """What a reader is told not to do."""
 _CLOCKS = 'clocks'
@@ -140,8 +141,8 @@ def warning(diagnosis: Diagnosis, k: int) -> str:
 
 
 def warned(told: str) -> list[Child]:
-    """Return a text as markup, in which what not to do stands out."""
-    parts = _NOT.split(told)
+    """Return an action as markup: what not to do stands out, and degrees have their sign."""
+    parts = _NOT.split(_DEGREES.sub('°', told))
     return [tag('strong', text) if k % 2 else text for k, text in enumerate(parts) if text]
 
 

@@ -1,0 +1,114 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The first screen answers what a fitter asks first, and what misled a reader once does so no more."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import diagnoses
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis.result import Candidate, Site
+from weld_twin_nodes.report import report_page
+from weld_twin_nodes.report.acceptance import Demand
+from weld_twin_nodes.report.diagnosis_page import Sheet
+from weld_twin_nodes.report.footing import next_section, parts_what
+from weld_twin_nodes.report.mending import left_with, warned
+from weld_twin_nodes.report.to_do import worth_doing
+
+CIRCLE = diagnoses.circle()
+
+
+def plain(text):
+    return re.sub(r'\s+', ' ', re.sub('<[^>]+>', ' ', text))
+
+
+def nameless(over, **changes):
+    """Return a gap that a curve of one joint over something stands for."""
+    robot = load('kuka_kr6_r900')
+    curve = {'effect': 'joint_curve', 'joint': 'joint_a3', 'over': over,
+             'values': [4e-4] if over == 'constant' else [-4e-4, 4e-4],
+             'knots': [0.0] if over == 'constant' else [-1.0, 1.0]}  # fmt: skip
+    seam = [diagnoses.moving(robot, 'circle')]
+    case = diagnoses.diagnosis('unknown', robot, [curve], [curve], seam, effects=())
+    return replace(case, causes=(replace(case.causes[0], **changes),))
+
+
+def test_the_first_screen_answers_the_ten_tasks():
+    page = report_page(CIRCLE, sheet=Sheet(Demand(5e-4)))
+    top = page[page.index('id="verdict"') : page.index('id="acceptance"')]
+    left = left_with(CIRCLE, (0,))
+    for told in (
+        'How far off', 'At the worst spot', 'after the start', 'May we weld with it', 'fails',
+        'Left with all mended', 'How sure', '97 %', 'Were the data good', '1 warning (outliers)',
+        '1. Backlash of joint_a3', 'play 0.0458', '97 % that it is backlash of joint_a3',
+        f'{1e3 * left.rms_after:.3f} mm RMS, {1e3 * left.largest_after:.3f} mm at most',
+        'Nothing to enter', 'All mended',
+    ):  # fmt: skip
+        assert told in plain(top)
+
+
+def test_every_combination_of_three_causes_stands_in_the_table():
+    page = report_page(CIRCLE, sheet=Sheet(Demand(5e-4)))
+    rows = plain(page[page.index('<table class="acceptance"') : page.index('ISO 14253')])
+    assert rows.count('mended:') == 7 and 'only 1. backlash of joint_a3 and 3. servo' in rows
+
+
+def test_of_dependences_that_fit_alike_both_are_looked_at():
+    case = nameless('direction', dependence=(('load', 0.35), ('angle', 0.35), ('time', 0.2)))
+    (first, *_) = worth_doing(case)
+    assert 'at what yields: gear, bearing, mount and gear and encoder first' in first
+    assert 'depends on the load or the angle' in first
+    assert '70 % that it depends on the load or the angle' in plain(report_page(case))
+
+
+def test_a_constant_without_a_name_has_a_value():
+    page = plain(report_page(nameless('constant', dependence=(('constant', 0.9),))))
+    assert 'By how much off by 0.0229° everywhere' in page
+
+
+@pytest.mark.parametrize(
+    ('one', 'other', 'told'),
+    [
+        (('joint_curve', 'j2', 'speed'), ('joint_curve', 'j3', 'speed'),
+         'It shows whether it is something at j2 or something at j3.'),
+        (('joint_curve', 'j2', 'speed'), ('joint_curve', 'j2', 'load'),
+         'It shows whether it is something at j2 that depends on the speed or something at j2 that '
+         'depends on the load.'),
+        (('backlash', 'j2', 'direction'), ('joint_curve', 'j3', 'speed'),
+         'It shows whether it is backlash of j2 or something at j3.'),
+    ],
+)  # fmt: skip
+def test_a_measurement_is_told_by_what_it_parts(one, other, told):
+    sides = [[{'effect': e, 'joint': at, 'at': at, 'on': on}] for e, at, on in (one, other)]
+    wanted = {'between': sides, 'reason': 'by 22 standard deviations', 'promise': 0.48}
+    assert parts_what(wanted) == told
+    page = plain(next_section(replace(CIRCLE, next_experiment=wanted)))
+    assert told in page and 'Likely to decide 48 %' in page and 'standard deviations' not in page
+
+
+def test_the_circle_has_a_key():
+    page = report_page(CIRCLE)
+    key = plain(page[page.index('class="key"') : page.index('id="where"')])
+    for told in ('as it is', 'with what is ticked mended', 'the commanded circle', 'turns back'):
+        assert told in key
+
+
+def test_bars_of_rivals_have_one_scale():
+    rivals = [
+        Candidate(Site(name, 'joint_a1'), p, 1e-4, shrink)
+        for name, p, shrink in (('servo_lag', 0.9, 0.8), ('friction', 0.1, 0.5),
+                                ('joint_offset', 1.0, 0.2))
+    ]  # fmt: skip
+    page = report_page(replace(CIRCLE, candidates=tuple(rivals)))
+    bars = page[page.index('Candidates against each other') : page.index('cannot tell apart')]
+    assert re.findall(r'width:([\d.]+)%', bars) == ['20.00', '50.00', '80.00']
+
+
+def test_what_not_to_do_stands_out():
+    told = ''.join(map(str, warned('Turn 0.5 deg. Do not correct programs by its curve: 0.1 mm.')))
+    assert told == ('Turn 0.5°. <strong>Do not correct programs by its curve: 0.1 mm.</strong>')
+    assert warned('Turn.') == ['Turn.']

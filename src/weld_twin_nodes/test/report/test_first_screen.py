@@ -12,11 +12,13 @@ import pytest
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.result import Candidate, Site
+from weld_twin_core.effects import effect_from_mapping
 from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.acceptance import Demand
 from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.footing import next_section, parts_what
 from weld_twin_nodes.report.mending import left_with, warned
+from weld_twin_nodes.report.quantities import in_short, short_rows
 from weld_twin_nodes.report.to_do import worth_doing
 
 CIRCLE = diagnoses.circle()
@@ -88,6 +90,26 @@ def test_a_measurement_is_told_by_what_it_parts(one, other, told):
     assert parts_what(wanted) == told
     page = plain(next_section(replace(CIRCLE, next_experiment=wanted)))
     assert told in page and 'Likely to decide 48 %' in page and 'standard deviations' not in page
+
+
+@pytest.mark.parametrize(
+    ('value', 'std', 'told'),
+    [
+        (0.028651, 0.00025, '0.0287 ± 0.0003°'),
+        (0.063025, 0.000081, '0.0630 ± 0.0001°'),
+        (0.5, 0.2, '0.500 ± 0.200°'),
+        (-12.345, None, '\N{MINUS SIGN}12.3°'),
+    ],
+)
+def test_a_value_has_the_digits_of_the_action_beside_it(value, std, told):
+    assert in_short(value, std, 1.0, '°') == told
+
+
+def test_of_a_frame_only_the_axes_that_count_are_told():
+    base = effect_from_mapping({'effect': 'base_pose', 'xyz': [0, 0, 0], 'rotvec': [0, 0, 6e-4]})
+    assert short_rows(base, {'xyz': [5e-6] * 3, 'rotvec': [2e-6] * 3}) == [
+        ('rotvec', 'z 0.0344 ± 0.0001°')
+    ]
 
 
 def test_the_circle_has_a_key():

@@ -175,7 +175,9 @@ def test_an_unknown_cause_is_unknown_only_among_what_was_to_be_tried():
     near = part(page, 'What fits best', 'Not considered')
     assert 'servo lag of joint_a2' in near and 'backlash' not in near
     whole = replace(case, absent={})
-    assert 'not tried, as asked' not in report_page(whole) and 'no known effect' in verdict(whole)[0]
+    assert (
+        'not tried, as asked' not in report_page(whole) and 'no known effect' in verdict(whole)[0]
+    )
     kept = [c['effect'] for c in json.loads(diagnosis_text(case, ()))['candidates']]
     assert kept == ['servo_lag']
 

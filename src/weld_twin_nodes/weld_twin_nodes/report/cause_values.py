@@ -13,7 +13,7 @@ from weld_twin_core.effects.joint_curve import JointCurve
 from weld_twin_core.effects.servo_lag import ServoLag
 
 from .curve_plot import furthest, furthest_frame
-from .quantities import DEGREES, millimetres, parameter_rows, turned
+from .quantities import DEGREES, millimetres, short_rows, turned
 from .words import CURVES, parameter_word
 from .words import cause as named
 
@@ -37,7 +37,7 @@ def values(diagnosis: Diagnosis, cause: Cause) -> list[str]:
             continue
         if isinstance(effect, ServoLag):
             rows.append(_trail(diagnosis, effect))
-        for name, value in parameter_rows(effect, errors.get((effect.name, effect.site), {})):
+        for name, value in short_rows(effect, errors.get((effect.name, effect.site), {})):
             rows.append(f'{parameter_word(name)} {value}')
     return rows
 

@@ -49,6 +49,8 @@ _SMALL = 0.1
 """Share below which whole per cents have only one digit."""
 _UNREAD = 5e-4
 """Angle [degrees] that is left over and that nobody reads: it would be 0.000."""
+_THREE = 3
+"""Digits of a value beside an action: more than a controller or a fitter can use."""
 _SEEN = 2.0
 """Standard errors within which all parts of a vector count as nothing: about 95 %."""
 _GAP = '\N{NO-BREAK SPACE}'
@@ -163,10 +165,58 @@ def uncertain(value: float, std: float | None, factor: float = 1.0, unit: str = 
     return f'{_signed(f"{value:.{places}f}")} ± {std:.{places}f}{tail}'
 
 
+def in_short(value: float, std: float | None, factor: float = 1.0, unit: str = '') -> str:
+    """
+    Return '0.0287 ± 0.0003°': three digits of the value, as actions have it.
+
+    The error is told to the same place, and never as nothing.
+    """
+    value = factor * value
+    tail = unit if unit.startswith('°') else f' {unit}' if unit else ''
+    places = min(max(_THREE - 1 - floor(log10(abs(value) or 1.0)), 0), 9)
+    told = _signed(f'{value:.{places}f}')
+    if std is None or not isfinite(std) or std <= 0.0:
+        return f'{told}{tail}'
+    error = max(round(factor * std, places), 10.0**-places)
+    return f'{told} ± {error:.{places}f}{tail}'
+
+
 def _signed(number: str) -> str:
     if not number.strip('-0.'):
         number = number.lstrip('-')
     return number.replace('-', '\N{MINUS SIGN}')
+
+
+def short_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return the parameters of an effect as `in_short`; of a vector the axes that count."""
+    if isinstance(effect, TransmissionRipple):
+        return _orders(effect, std)
+    out = []
+    for p in effect.parameters:
+        value, error = getattr(effect, p.name), std.get(p.name)
+        factor, unit = display_unit(p.name, p.unit)
+        if np.ndim(value):
+            told = _that_count(
+                value, error, *((DEGREES, '°') if unit == 'mrad' else (factor, unit))
+            )
+        elif unit == 'mrad':
+            beside = in_short(float(value), None, factor, unit)
+            told = f'{in_short(float(value), error, DEGREES, "°")} ({beside})'
+        else:
+            told = in_short(float(value), None if np.ndim(error) else error, factor, unit)
+        out += [(p.name, told)] if told else []
+    return out
+
+
+def _that_count(value: Any, std: Any, factor: float, unit: str) -> str:
+    """Return the parts of a vector that differ from nothing, each with its axis."""
+    errors = std if np.ndim(std) and len(std) == len(value) else [None] * len(value)
+    axes = ('x ', 'y ', 'z ') if len(value) == len('xyz') else [''] * len(value)
+    return ', '.join(
+        axis + in_short(float(v), e, factor, unit)
+        for axis, v, e in zip(axes, value, errors, strict=True)
+        if (abs(v) > _SEEN * e if e is not None else v != 0.0)
+    )
 
 
 def parameter_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]:

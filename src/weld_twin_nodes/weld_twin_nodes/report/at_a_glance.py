@@ -16,7 +16,7 @@ from .cause_values import effects_of, one_of, values
 from .controllers import UNCHECKED, correction
 from .directions import components, sides_words, worst
 from .html import Child, Html, joined, tag
-from .mending import curve_fault, left_with, left_without
+from .mending import curve_fault, left_with, left_without, thought_mended
 from .quantities import (
     counted,
     ends_to,
@@ -34,6 +34,7 @@ from .words import listed, not_to_be_tried, untried_in_short
 _CAUSES = 4
 """Causes in the table; the cards have more."""
 _RADIANS = re.compile(r' \([^)]*mrad\)')
+_SENTENCE = re.compile(r'(?<=\.) (?=[A-Z])')
 _VALUES = 2
 """Values of a cause in the table; its card has more."""
 _SURE_OF = {
@@ -140,7 +141,8 @@ def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
         all_of_it = 'with this mended' if len(switches(diagnosis)) == 1 else 'with all mended'
         told.append(f'; {all_of_it} {millimetres(after)} at most')
         told.append(mark(rule, after, _APART))
-    told.append(joined(['. ', tag('a', 'Each combination', href='#acceptance')]))
+    link = 'Each combination' if len(switches(diagnosis)) > 1 else 'How it is judged'
+    told.append(joined(['. ', tag('a', link, href='#acceptance')]))
     return 'May we weld with it', mark(rule, before), joined(told)
 
 
@@ -255,7 +257,7 @@ def _enter(diagnosis: Diagnosis, k: int, brand: str | None) -> str:
     told = correction(found[0], brand)
     if told is None:
         return 'see the card'
-    return told.removesuffix(UNCHECKED).rstrip()
+    return _SENTENCE.split(told.removesuffix(UNCHECKED).rstrip())[0]
 
 
 def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
@@ -273,9 +275,11 @@ def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
 def _more(diagnosis: Diagnosis) -> Html:
     more = len(diagnosis.causes) - _CAUSES
     told: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
-    two = 'two of three mended, or any other combination: '
-    if len(switches(diagnosis)) > 2:
-        told += [f'{two[:1].upper()}{two[1:]}', tag('a', 'Does it pass', href='#acceptance'), '. ']
+    count = len(switches(diagnosis))
+    if count > 2:
+        every = len(thought_mended(diagnosis)) == 2**count
+        name, at = ('Does it pass', 'acceptance') if every else ('What if', 'seam')
+        told += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
     return joined([*told, 'A click on a cause leads to its card.'])
 
 

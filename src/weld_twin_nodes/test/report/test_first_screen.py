@@ -62,7 +62,7 @@ def test_every_combination_of_three_causes_stands_in_the_table():
 def test_of_dependences_that_fit_alike_both_are_looked_at():
     case = nameless('direction', dependence=(('load', 0.35), ('angle', 0.35), ('time', 0.2)))
     (first, *_) = worth_doing(case)
-    assert 'at what yields: gear, bearing, mount and gear and encoder first' in first
+    assert 'at what yields (gear, bearing, mount) and at gear and encoder first' in first
     assert 'depends on the load or the angle' in first
     assert '70 % that it depends on the load or the angle' in plain(report_page(case))
 

@@ -20,7 +20,6 @@ from .words import (
     depending,
     leading,
     likely,
-    listed,
     not_to_be_tried,
     unnamed,
     untried_in_short,
@@ -39,7 +38,7 @@ _LOOK = {
     'direction': 'gear, belt and bearing, for play and friction',
     'speed': 'gains and feed-forward of the drive',
     'acceleration': 'what is loose or soft',
-    'load': 'what yields: gear, bearing, mount',
+    'load': 'what yields (gear, bearing, mount)',
     'temperature': 'what grows warm',
     'time': 'what creeps, slips or wears',
     'place': 'the instrument and its line of sight',
@@ -157,7 +156,7 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
         at = [_LOOK.get(name, 'all that moves') for name in on]
         at += ['the clocks'] * ('speed' in on and not _one_clock(diagnosis))
         first = (
-            f'Look at {where}, at {listed(list(dict.fromkeys(at)))} first: what is found there '
+            f'Look at {where}, at {" and at ".join(dict.fromkeys(at))} first: what is found there '
             f'{depending(*on)}, and {_no_effect(diagnosis)} gives it.'
         )
     left = left_without(diagnosis, k)

@@ -193,7 +193,8 @@ def short_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]:
         return _orders(effect, std)
     out = []
     for p in effect.parameters:
-        value, error = getattr(effect, p.name), std.get(p.name)
+        value: Any = getattr(effect, p.name)
+        error: Any = std.get(p.name)
         factor, unit = display_unit(p.name, p.unit)
         if np.ndim(value):
             told = _that_count(

@@ -167,7 +167,7 @@ def bearing_tilt(cell):
 
 def wear(cell):
     worn = np.eye(4)
-    worn[2, 3] = -1e-3 * cell.elapsed
+    worn[2, 3] = -1e-3 * np.log(1.0 + 0.3 * cell.elapsed) / 0.3
     cell.tool = cell.robot.T_flange_tool @ worn
 
 
@@ -292,7 +292,7 @@ DEFINITIONS = {
     'drift': ({'xyz_rate': SMALL}, drift),
     'loaded_play': ({'joint': 'j1', 'width': 2e-3, 'torque': 5.0}, loaded_play),
     'bearing_tilt': ({'joint': 'j0', 'lean': [2e-3, 1e-3, 0.0, 3e-3]}, bearing_tilt),
-    'wear': ({'rate': 1e-3}, wear),
+    'wear': ({'rate': 1e-3, 'slowing': 0.3}, wear),
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
     'pedestal_tilt': ({'compliance': [1e-5, 3e-5]}, pedestal_tilt),
     'hose_pull': ({'force': [10.0, -20.0, 30.0], 'stiffness': 40.0}, hose_pull),

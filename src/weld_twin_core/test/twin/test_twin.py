@@ -151,7 +151,7 @@ DRAWN = {
     'friction': {'joint': 'j1', 'windup': 1e-2, 'asymmetry': 0.2, 'travel': 0.1},
     'loaded_play': {'joint': 'j1', 'width': 1e-2, 'torque': 5.0},
     'bearing_tilt': {'joint': 'j1', 'lean': [1e-3, 2e-3, 3e-3, -1e-3]},
-    'wear': {'rate': 1e-4},
+    'wear': {'rate': 1e-4, 'slowing': 0.2},
     'joint_compliance': {'joint': 'j1', 'compliance': 1e-5},
     'cartesian_compliance': {'compliance': [1e-6, 2e-6, 3e-6]},
     'payload': {'mass': 2.0, 'com': [0.01, 0.02, 0.03]},

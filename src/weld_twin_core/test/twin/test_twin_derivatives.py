@@ -44,7 +44,7 @@ ENTRIES = {
     'joint_compliance': {'joint': 'j1', 'compliance': 1e-5},
     'loaded_play': {'joint': 'j1', 'width': 1e-4, 'torque': 20.0},
     'bearing_tilt': {'joint': 'j1', 'lean': [1e-3, 2e-3, 3e-3, -1e-3]},
-    'wear': {'rate': 1e-4},
+    'wear': {'rate': 1e-4, 'slowing': 0.2},
     'cartesian_compliance': {'compliance': [1e-6, 2e-6, 3e-6]},
     'payload': {'mass': 2.0, 'com': [0.01, 0.02, 0.03]},
     'servo_lag': {'joint': 'j3', 'time_constant': 0.01},

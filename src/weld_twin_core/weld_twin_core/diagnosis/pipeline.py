@@ -34,6 +34,7 @@ from .stability.repeated import repeated
 from .stability.steadied import came_back, steadied
 from .trust.signs import Signs, signs_of_answer
 from .trust.signs_of_found import signs_of_found
+from .unseen.carrying import carrying
 from .unseen.held_out_shrink import held_out_shrink
 from .unseen.leftover_structure import structure
 from .unseen.parted_elsewhere import parted_elsewhere
@@ -152,11 +153,12 @@ def _explained(
     examined = examined.torn(found.problem, found.final.model)
     if examined.posed is None:
         return refusal(examined)
+    holdout = examined.mended(holdout)
+    found = carrying(found, holdout, exclude, beliefs)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     leftover = structure(unseen, found.final.model, beliefs)
     progress('looked for what is left')
     floor = noise_floor(found.problem, found.problem.residuals(found.final.model))
-    holdout = examined.mended(holdout)
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
     found, least = parted_elsewhere(found, holdout, beliefs)
     found, stability = steadied(found, repeated(found), beliefs)

@@ -154,6 +154,13 @@ TABLE: dict[tuple[str, str], Plausible] = {
         1e-4,
         'derived: a tip that loses a millimetre in ten minutes; 6 mm in a minute is cut',
     ),
+    ('wear', 'slowing'): Plausible(
+        0.02,
+        0.0,
+        0.2,
+        'derived: a sharp tip is blunt, and wears half as fast, after a minute or so; within some '
+        'seconds it is chipped, not worn',
+    ),
     ('joint_compliance', 'compliance'): Plausible(
         3e-5,
         -1e-5,

@@ -1,13 +1,28 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Wear: the tool gets shorter along its own axis while it works."""
+"""
+Wear: the tool gets shorter along its own axis while it works, by rate * log(1 + slowing t) / slowing.
 
+A tip that is sharp wears fast, and slower the blunter it is: the rate falls off as 1 / (1 + slowing
+t). With no slowing it draws back evenly.
+"""
+
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..arm.channels import Shift
+from ..arrays import Array
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+
+SLOWED = (0.0, 0.5)
+"""Slowing that a search starts from, over the length of the recording: none, and a rate that falls
+by a third."""
+SMALL = 1e-4
+"""Below it log(1 + x) / x is its series; there the two differ by 1e-13."""
 
 
 @register
@@ -16,6 +31,7 @@ class Wear(Effect):
     """The tool centre point draws back along the tool's z axis, from each recording's start on."""
 
     rate: Value = 0.0
+    slowing: Value = 0.0
 
     name = 'wear'
     depends_on = 'time'
@@ -23,18 +39,61 @@ class Wear(Effect):
     of = 'robot'
     stage = Stage.LINK
     common = False
-    parameters = (Parameter('rate', 'm/s', typical=1e-6),)
+    parameters = (
+        Parameter('rate', 'm/s', typical=1e-6),
+        Parameter('slowing', '1/s', typical=0.01, lower=0.0, linear=False),
+    )
     needs = frozenset({'time'})
 
     def displace(self, view: View) -> Shift:
-        """Return minus rate times elapsed time along the tool's z, in the flange's axes."""
-        return {key: self.number('rate') * value for key, value in _shorter(view).items()}
+        """Return minus what is worn off along the tool's z, in the flange's axes."""
+        share, _ = _slowed(self.number('slowing') * view.elapsed)
+        return _shorter(view, self.number('rate') * view.elapsed * share)
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return minus the elapsed time along the tool's z."""
-        return [_shorter(view)]
+        """Return what is worn off for a rate of one, and by how much less it is with slowing."""
+        t = view.elapsed
+        share, falls = _slowed(self.number('slowing') * t)
+        return [_shorter(view, t * share), _shorter(view, self.number('rate') * t**2 * falls)]
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return what is worn off for a rate of one."""
+        return [_shorter(view, view.elapsed * _slowed(self.number('slowing') * view.elapsed)[0])]
+
+    def from_atoms(self, coefficients: Array) -> 'Wear':
+        """Return the wear whose rate is the coefficient."""
+        return Wear(float(coefficients[0]), self.slowing)
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """
+        Yield a tip that wears evenly, and one that has slowed down by the end.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            None: it is of the whole robot.
+        pull : array, shape (N,), optional
+            Not looked at.
+
+        """
+        span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
+        for slowed in SLOWED:
+            yield cls(0.0, slowed / span)
 
 
-def _shorter(view: View) -> Shift:
+def _slowed(x: Array) -> tuple[Array, Array]:
+    """Return log(1 + x) / x and its derivative, for x of any shape, not negative."""
+    safe = np.maximum(x, SMALL)
+    share = np.log1p(safe) / safe
+    falls = (1.0 / (1.0 + safe) - share) / safe
+    few = x < SMALL
+    return np.where(few, 1.0 - 0.5 * x, share), np.where(few, -0.5 + 2.0 / 3.0 * x, falls)
+
+
+def _shorter(view: View, worn: Array) -> Shift:
+    """Return the tool shorter by some lengths, shape (..., N) [m]."""
     along = view.robot.T_flange_tool[:3, 2]
-    return {('tool', k): -float(along[k]) * view.elapsed for k in range(3)}
+    return {('tool', k): -float(along[k]) * worn for k in range(3)}

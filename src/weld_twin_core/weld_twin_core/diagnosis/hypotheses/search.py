@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from ...arrays import Array
@@ -69,6 +69,8 @@ class Search:
         Whether many small errors were fitted together.
     refused : tuple of Effect
         What would explain the rest best, but no machine has.
+    ruled_out : frozenset of Site
+        What is alike on the recordings fitted, and fails on held-out ones.
 
     """
 
@@ -84,6 +86,7 @@ class Search:
     crowded: bool = False
     dense: bool = False
     refused: tuple[Effect, ...] = ()
+    ruled_out: frozenset[Site] = frozenset()
 
     @property
     def library(self) -> Library:
@@ -183,6 +186,22 @@ def search(
         crowded=chosen.crowded,
         refused=tuple(refused),
     )
+
+
+def refitted(found: Search, small: Fit) -> Search:
+    """
+    Return what was found with another choice of effects, fitted on all measurements.
+
+    Parameters
+    ----------
+    found : Search
+    small : Fit
+        The choice, fitted on the workspace's measurements.
+
+    """
+    final, scale = _fitted(found.problem, small.model)
+    precision = effect_precision(final.model)
+    return replace(found, small=small, final=final, scale=scale, precision=precision)
 
 
 def _fitted(full: Problem, model: Model) -> tuple[Fit, Scale]:

@@ -21,7 +21,7 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
-from ...effects.effect import Effect
+from ...effects.effect import Effect, Stage
 from ...effects.registry import REGISTRY
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
@@ -32,6 +32,7 @@ from ..result import Site
 from .rivals import Rival, nats_in_place, weighed
 from .search import Search
 from .selection import fitted_with, implausible
+from .still_joints import hardly_moves
 
 POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
@@ -41,6 +42,9 @@ SAME = 1e-6
 """Share of an error that may lie outside what another one spans; far above rounding."""
 MOST_SEEDS = 3
 """Instances of an excluded kind that are fitted at most; between them lie sizes ten times apart."""
+FEW = 2
+"""Instances of a kind that are tried on a joint at rest: what leaks in from either side; of waves
+one does, as all stand still."""
 SEED = 7
 """Of the postures: any generic set gives the same answer."""
 
@@ -147,14 +151,13 @@ def _with_constants(
         if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
     ]
     work, listed = found.work, {rival.site for rival in slot}
-    maker = work.problem.features(found.small.model)[0]
+    features = work.problem.features(found.small.model)
     seeds = [
         seed
-        for joint in dict.fromkeys(joints)
-        if joint is not None
+        for joint in _with_next(found.baseline.model.robot, joints)
         for kind in REGISTRY.values()
-        if kind.of == 'joint' and kind.applicable(maker.view, joint) is None
-        for seed in kind.constants(maker.view, joint)
+        if kind.cause and kind.of == 'joint' and kind.applicable(features[0].view, joint) is None
+        for seed in (*kind.constants(features[0].view, joint), *_at_rest(features, kind, joint))
         if Site(kind.name, joint) not in listed
     ]
     if not seeds:
@@ -167,7 +170,30 @@ def _with_constants(
         for seed, own in tried
         if not implausible(own.model)
     ]
-    return weighed([*slot, *more], beliefs.temperature)
+    return weighed([*slot, *_best_of_each(more)], beliefs.temperature)
+
+
+def _at_rest(features: list[Features], kind: type[Effect], joint: str) -> list[Effect]:
+    """Return instances that are no more than a constant, as the joint they need hardly moves."""
+    if not kind.by_motion or kind.stage in (Stage.SERVO, Stage.PLAY):
+        return []
+    seeds = list(kind.seeds(features[0].view, joint))[:FEW]
+    return [seed for seed in seeds if hardly_moves(features, seed)]
+
+
+def _with_next(robot: Robot, joints: Sequence[str | None]) -> list[str]:
+    """Return joints, each with the one after it: its bearing sits in the link before."""
+    named = [robot.index(joint) for joint in joints if joint is not None]
+    both = [k for i in named for k in (i, i + 1) if k < robot.n]
+    return [robot.joint_names[k] for k in dict.fromkeys(both)]
+
+
+def _best_of_each(more: Sequence[Rival]) -> list[Rival]:
+    """Return the best rival of every site."""
+    out: dict[Site, Rival] = {}
+    for rival in sorted(more, key=lambda one: one.nats):
+        out[rival.site] = rival
+    return list(out.values())
 
 
 def _of(site: Site) -> Effect:

@@ -68,7 +68,7 @@ def candidates_of(found: Search, frames: Array, bare: Array) -> list[Candidate]:
     taken, count = {own.site for own in out}, sum(len(own.columns) for own in out)
     for more in (*_rivals(found, features), *_others(found, frames, bare)):
         fits = count + len(more.columns) <= MOST and np.isfinite(more.columns).all()
-        if fits and more.site not in taken:
+        if fits and more.site not in taken | found.ruled_out:
             out.append(more)
             taken.add(more.site)
             count += len(more.columns)

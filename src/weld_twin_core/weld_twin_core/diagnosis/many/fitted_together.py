@@ -24,6 +24,7 @@ from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
+from .beside_few import members_beside
 from .small_errors import many_small
 
 BEAR = (10, 30, 100)
@@ -78,8 +79,7 @@ def fitted_together(
     few = unseen_rms(found)
     better = found.crowded or left < beliefs.better * few
     if not better:
-        many = _crowd(found) > beliefs.crowd or _many(best, beliefs)
-        better = left < CHOSEN * few and many
+        better = left < CHOSEN * few and _many(found, best, beliefs)
     if better and not found.crowded and _one_and_crumbs(best, beliefs):
         better = False
     if better and found.problem.untracked and PLACES - 1 <= found.problem.places < PLENTY_PLACES:
@@ -163,9 +163,12 @@ def _one_and_crumbs(found: Search, beliefs: Beliefs) -> bool:
     return whole and _members(found, beliefs) < beliefs.several
 
 
-def _many(found: Search, beliefs: Beliefs) -> bool:
-    """Return whether many effects move the tool by much of what all of them leave."""
-    return _members(found, beliefs) >= beliefs.many
+def _many(found: Search, best: Search, beliefs: Beliefs) -> bool:
+    """Return whether there are many: too many one by one, or as many in sum and beside the few."""
+    if _crowd(found) > beliefs.crowd:
+        return True
+    many = _members(best, beliefs) >= beliefs.many
+    return many and members_beside(found, best, beliefs) >= beliefs.many
 
 
 def _members(found: Search, beliefs: Beliefs) -> int:

@@ -218,11 +218,11 @@ def _learned(
     x = coordinates(model)
     target = _target(normal, right, float(residual @ residual), x)
     precision, freedom = learned_precision(
-        *_projected(*target, frames),
+        *projected(*target, frames),
         residual.size,
         labels,
         scales,
-        _believed(model),
+        believed(model),
         learn=learn,
     )
     ridge = np.concatenate([np.zeros(frames), precision])
@@ -235,8 +235,15 @@ def _learned(
     return trial, precision, freedom + frames
 
 
-def _believed(model: Model) -> Array:
-    """Return the prior precision of every coordinate; curves are as high as ripple usually is."""
+def believed(model: Model) -> Array:
+    """
+    Return the prior precision of every coordinate; curves are as high as ripple usually is.
+
+    Parameters
+    ----------
+    model : Model
+
+    """
     parts = [effect_precision(model.with_found((effect,))) for effect in model.found]
     for effect, part in zip(model.found, parts, strict=True):
         if not (effect.cause or effect.of_setup):
@@ -252,8 +259,19 @@ def _target(normal: Array, right: Array, rss: float, x: Array) -> tuple[Array, A
     return normal, right + shift, rss + float(2.0 * now @ right + now @ shift)
 
 
-def _projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Array, Array, float]:
-    """Return the normal equations with the leading frame columns projected out."""
+def projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Array, Array, float]:
+    """
+    Return the normal equations with the leading columns projected out.
+
+    Parameters
+    ----------
+    normal : array, shape (P, P)
+    right : array, shape (P,)
+    rss : float
+    frames : int
+        How many lead.
+
+    """
     if not frames:
         return normal, right, rss
     cross = normal[:frames, frames:]

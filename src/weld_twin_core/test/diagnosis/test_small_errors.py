@@ -11,9 +11,10 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.hypotheses.search import search
+from weld_twin_core.diagnosis.many.beside_few import members_beside
 from weld_twin_core.diagnosis.many.fitted_together import fitted_together
 from weld_twin_core.diagnosis.many.small_errors import many_small
-from weld_twin_core.effects import REGISTRY, LinkTwist, TransmissionRipple
+from weld_twin_core.effects import REGISTRY, LinkTwist, MeasurementScale, TransmissionRipple
 
 GEOMETRY = ('joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parallelism')
 MIDDLE = np.array([0.0, -1.2, 1.3, -1.2, -1.5, 0.0])
@@ -158,3 +159,16 @@ def test_a_creep_that_stands_in_for_postures_visited_in_order_is_left_out(robot)
     creeping, worse = told(-1.0)
     assert 'drift' in creeping - names
     assert error < 0.8 * worse
+
+
+def test_one_wrong_scale_is_not_ten_wrong_links(robot):
+    """Fitted in its place, links and zeros share it; beside it there is none of them."""
+    scaled = stations(robot, 0.9, [MeasurementScale(1e-3)], count=60)
+    problem, start = aligned([scaled], robot, '', ())
+    few = search(problem, start, (), Beliefs(), lambda text: None)
+    without = tuple(name for name in REGISTRY if REGISTRY[name].waves or REGISTRY[name].bends)
+    fit, scale, precision = many_small(problem, start, without, Beliefs(), lambda text: None)
+    many = replace(few, final=fit, scale=scale, precision=precision, slots=(), dense=True)
+    assert [effect.name for effect in few.final.model.found] == ['measurement_scale']
+    assert members_beside(few, many, Beliefs()) == 0
+    assert members_beside(replace(few, final=few.baseline), many, Beliefs()) > 3

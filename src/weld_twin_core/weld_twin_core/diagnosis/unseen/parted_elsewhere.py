@@ -3,8 +3,8 @@
 """
 Which of the rivals that move the tool alike here part on held-out recordings.
 
-Nothing is fitted to those and the model stays as it is: a rival that leaves more there than the
-one in the model is not its like. So the shrink is still judged on data that chose nothing.
+Nothing is fitted to those: a rival that leaves more there than the one in the model is not its
+like. The one in the model carries over as well as any, as far as `carrying` could tell.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from weld_twin_core.diagnosis.result import Candidate, Site
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.acceptance import Demand
+from weld_twin_nodes.report.controllers import correction
 from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.footing import next_section, parts_what
 from weld_twin_nodes.report.mending import left_with, warned
@@ -110,6 +111,13 @@ def test_of_a_frame_only_the_axes_that_count_are_told():
     assert short_rows(base, {'xyz': [5e-6] * 3, 'rotvec': [2e-6] * 3}) == [
         ('rotvec', 'z 0.0344 ± 0.0001°')
     ]
+
+
+def test_without_a_maker_it_is_told_what_takes_the_correction():
+    zero = effect_from_mapping({'effect': 'joint_offset', 'joint': 'j', 'offset': 1e-3})
+    gear = effect_from_mapping({'effect': 'gear_ratio', 'joint': 'j', 'scale': 1e-3})
+    assert correction(zero, None).startswith('As the zero of this axis')
+    assert 'correct the points of the program' in correction(gear, None)
 
 
 def test_the_circle_has_a_key():

@@ -294,7 +294,11 @@ def test_rivals_are_weighed_against_each_other_without_a_second_figure_of_belief
 
 def test_where_rivals_could_not_be_tried_nothing_is_said_to_be_settled():
     assert 'Nothing: in these recordings no other effect' in report_page(PLAY)
-    still = {'friction': 'the joint hardly moves (wrist_1_joint)', 'drift': 'excluded by the user'}
+    still = {
+        'friction': 'the joint hardly moves (wrist_1_joint)',
+        'joint_coupling': 'the joint hardly moves (elbow_joint)',
+        'drift': 'excluded by the user',
+    }
     page = plain(report_page(replace(PLAY, absent=still)))
     assert 'no other effect looks like' not in page and 'No further measurement' not in page
     assert page.count('wrist_1_joint hardly moves, so friction could not be tried there') == 2

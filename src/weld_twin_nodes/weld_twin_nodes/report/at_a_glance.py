@@ -255,8 +255,6 @@ def _enter(diagnosis: Diagnosis, k: int, brand: str | None) -> str:
     if alternatives(diagnosis, cause):
         return 'nothing before it is known which it is'
     told = correction(found[0], brand)
-    if told is None:
-        return 'see the card'
     return _SENTENCE.split(told.removesuffix(UNCHECKED).rstrip())[0]
 
 

@@ -276,7 +276,7 @@ def _at_the_controller(
     if fault:
         return [(head, f'Nothing is to be entered: the curve {fault}.')]
     told = correction(effects[0], brand)
-    if told is not None and alternatives(diagnosis, cause):
+    if alternatives(diagnosis, cause):
         which = one_of(diagnosis, cause)
         told = f'Nothing before it is known which it is. Should it be {which}: {told}'
     return [(head, told)]

@@ -64,6 +64,15 @@ _PLACES = {
     ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',
 }
 """Menus as they are usually called. docs/sheet.md tells which names were found where."""
+_ANYWHERE = {
+    'zero': 'As the zero of this axis, by mastering it anew',
+    'base': 'As the frame of the base or of the work object',
+    'tool': 'As the tool centre point',
+    'load': 'As the payload',
+    'model': 'In the kinematic model, where the controller has one that can be edited; else correct '
+    'the points of the program (weld-twin correct-program)',
+}
+"""What takes a correction at any controller, by the kind of the error."""
 UNCHECKED = (
     'The way through the menus was not checked against a manual; names differ by version of the '
     'controller.'
@@ -77,18 +86,14 @@ def brand_of(robot: str) -> str | None:
     return next((brand for brand in BRANDS if name.startswith(brand)), None)
 
 
-def correction(effect: Effect, brand: str | None) -> str | None:
-    """
-    Return where this maker's controller takes the correction, or why there is nothing to enter.
-
-    None where there is something to enter and the maker is not known.
-    """
+def correction(effect: Effect, brand: str | None) -> str:
+    """Return where this maker's controller takes the correction, or why there is nothing to enter."""
     kind = _KINDS.get(effect.name)
     if kind is None and effect.name not in _BY_PROGRAM:
         return f'Nothing to enter: {_MATTERS.get(effect.name, _OWN)}.'
-    if brand is None:
-        return None
-    place = _PLACES.get((brand, str(kind)))
+    if brand is None and kind is not None:
+        return f'{_ANYWHERE[kind]}; --controller with the name of its maker tells the menu.'
+    place = _PLACES.get((str(brand), str(kind)))
     if place is None:
         return _PROGRAM
     place = place.format(**_off(effect))

@@ -7,6 +7,7 @@ from __future__ import annotations
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.hypotheses.still_joints import REASON
 from weld_twin_core.diagnosis.result import Candidate, Diagnosis
+from weld_twin_core.effects import REGISTRY
 
 from .words import cause, listed, not_to_be_tried
 
@@ -28,7 +29,9 @@ def untried(diagnosis: Diagnosis) -> str:
     still: dict[str, list[str]] = {}
     for effect, why in sorted(diagnosis.absent.items()):
         reason, joints = reason_and_joints(why, diagnosis)
-        for joint in joints if reason == REASON else ():
+        # Of a coupling it is the joint beside that hardly moves; other effects name that one.
+        beside = 'source' in getattr(REGISTRY.get(effect), 'options', ())
+        for joint in joints if reason == REASON and not beside else ():
             still.setdefault(joint, []).append(cause(effect, None))
     asked = listed(not_to_be_tried(diagnosis))
     told = []

@@ -5,13 +5,14 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.hypotheses.atoms import (
+from weld_twin_core.diagnosis.algebra.atoms import (
     Amounts,
     MovedJoint,
     Whole,
     gathered,
     moved_joint,
 )
+from weld_twin_core.diagnosis.algebra.designed import Design
 
 ROWS = np.repeat([6, 3], [5, 4])
 """Five poses of one recording and four points of another."""
@@ -60,3 +61,30 @@ def test_only_what_moves_one_joint_and_nothing_else_is_kept_as_amounts():
     assert moved_joint([one, [{('q', 1): np.ones(3)}]]) is None
     assert moved_joint([[{('tau', 2): np.ones(3)}]]) is None
     assert moved_joint([[]]) is None
+
+
+@pytest.fixture
+def mixed(columns):
+    """Return columns of a design: three written out, four of one joint, four of another."""
+    rng = np.random.default_rng(8)
+    other = MovedJoint(rng.normal(size=ROWS.sum()), columns.joint.first)
+    wide = Whole(rng.normal(size=(3, ROWS.sum())))
+    return Design((wide, columns, Amounts(other, rng.normal(size=(4, ROWS.size)))))
+
+
+@pytest.mark.parametrize('samples', [range(9), range(2, 6), [0, 3, 4, 8]])
+@pytest.mark.parametrize('index', [range(11), [1, 3, 4, 10], [5, 6], []])
+def test_a_design_in_pieces_has_the_products_of_its_columns_written_out(mixed, index, samples):
+    rng, index = np.random.default_rng(4), np.array(index, int)
+    rows = np.flatnonzero(np.isin(np.repeat(np.arange(ROWS.size), ROWS), samples))
+    plain = mixed.written_out()[index][:, rows]
+    if samples == range(2, 6):
+        rows = slice(rows[0], rows[-1] + 1)
+    found = mixed.chosen(index).within(rows)
+    other, weights = rng.normal(size=(2, plain.shape[1])), rng.normal(size=(5, index.size))
+    np.testing.assert_allclose(found.written_out(), plain, rtol=1e-15)
+    np.testing.assert_allclose(found.normal(), plain @ plain.T, atol=1e-13)
+    np.testing.assert_allclose(found.products(other), plain @ other.T, atol=1e-13)
+    np.testing.assert_allclose(found.times(other[0]), plain @ other[0], atol=1e-13)
+    np.testing.assert_allclose(found.mixed(weights), weights @ plain, atol=1e-13)
+    np.testing.assert_allclose(found.peaks(), np.abs(plain).max(axis=1), rtol=1e-14)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
+from weld_twin_core.diagnosis.algebra.designed import Design
 from weld_twin_core.diagnosis.algebra.fit import TRUSTED, fit, trusted
 from weld_twin_core.diagnosis.algebra.problem import Scale
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
@@ -29,10 +30,7 @@ def made_up(columns, blocks, seed=0, rows=640, parts=3, prior=0.0):
     slices = tuple(slice(lo, hi) for lo, hi in pairwise(bounds))
     precision = np.concatenate([np.zeros(2), rng.uniform(0.0, prior, columns - 2)])
     pull = precision * rng.normal(size=columns)
-    spans = [np.flatnonzero(labels == b) for b in range(blocks)]
-    normals = np.array([a[:, s] @ a[:, s].T for s in spans])
-    rights = np.array([a[:, s] @ targets[:, s].T for s in spans])
-    return Unseen(None, None, labels, a, slices, targets, precision, pull, normals, rights)
+    return Unseen(None, None, labels, Design.of(a), slices, targets, precision, pull)
 
 
 def refitted(unseen, kept, extra=None, ridge=0.0):
@@ -45,7 +43,7 @@ def refitted(unseen, kept, extra=None, ridge=0.0):
             *(np.arange(unseen.parts[k].start, unseen.parts[k].stop) for k in kept),
         ]
     ).astype(int)
-    columns, root = unseen.columns[index], np.sqrt(unseen.precision[index])
+    columns, root = unseen.columns.written_out()[index], np.sqrt(unseen.precision[index])
     wanted = -np.divide(unseen.pull[index], root, out=np.zeros(index.size), where=root > 0.0)
     if extra is not None:
         columns = np.concatenate([columns, extra])
@@ -84,13 +82,11 @@ def test_a_model_without_frames_and_effects_predicts_its_target():
         None,
         None,
         unseen.labels,
-        unseen.columns[:0],
+        Design.of(np.zeros((0, unseen.labels.size))),
         (),
         unseen.targets[:1],
         np.zeros(0),
         np.zeros(0),
-        np.zeros((5, 0, 0)),
-        np.zeros((5, 0, 1)),
     )
     np.testing.assert_array_equal(bare.predict([]), unseen.targets[0])
     extra = np.random.default_rng(3).normal(size=(2, unseen.labels.size))
@@ -171,10 +167,7 @@ def test_what_one_stretch_alone_shows_stays_put_elsewhere():
     steady = rng.normal(size=labels.size)
     spikes = rng.normal(size=(60, labels.size)) * np.where(labels == 0, 1e6, 1e-6)
     columns, target = np.concatenate([steady[None], spikes]), 2.0 * steady
-    spans = [labels == k for k in range(8)]
-    normals = np.array([columns[:, s] @ columns[:, s].T for s in spans])
-    rights = np.array([columns[:, s] @ target[s, None] for s in spans])
     none = np.zeros(len(columns))
-    unseen = Unseen(None, None, labels, columns, (), target[None], none, none, normals, rights)
+    unseen = Unseen(None, None, labels, Design.of(columns), (), target[None], none, none)
     left = unseen.base([]).residual
     np.testing.assert_allclose(left[labels > 0], 0.0, atol=1e-6)

@@ -188,20 +188,27 @@ def pose_cycles(found: list[Stop], robot: Robot) -> list[PoseCycles]:
     labels = _labels(q)
     commands = forward(robot, q)
     before = [-1, *labels[:-1]]
+    ends = np.cumsum(np.bincount(labels))[:-1]
     return [
         _cycles([found[k] for k in rows], commands[rows], tuple(int(before[k]) for k in rows))
-        for rows in (np.flatnonzero(labels == label) for label in range(max(labels) + 1))
+        for rows in np.split(np.argsort(labels, kind='stable'), ends)
     ]
 
 
 def _labels(q: Array) -> np.ndarray:
     """Return the number of the pose of each stop, counted as they first come."""
     labels = np.full(len(q), -1)
+    # Of thousands of stations, few are near in the first joint: only these are compared in all.
+    order = np.argsort(q[:, 0])
+    first = q[order, 0]
+    low = np.searchsorted(first, q[:, 0] - SAME_POSE, 'left')
+    high = np.searchsorted(first, q[:, 0] + SAME_POSE, 'right')
     count = 0
     for k in range(len(q)):
         if labels[k] < 0:
-            alike = np.abs(q - q[k]).max(axis=1) < SAME_POSE
-            labels[alike & (labels < 0)] = count
+            near = order[low[k] : high[k]]
+            alike = near[np.abs(q[near] - q[k]).max(axis=1) < SAME_POSE]
+            labels[alike[labels[alike] < 0]] = count
             count += 1
     return labels
 

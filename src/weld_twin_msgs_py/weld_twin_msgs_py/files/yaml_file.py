@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
 SIZE_LIMIT = 1_000_000
@@ -135,6 +136,10 @@ def parse_yaml(text: str, what: str) -> Any:
         raise ModelError(f'{what}: {reason}') from None
 
 
+WIDTH = 99
+"""Columns of a line at the most, as in the rest of the project."""
+
+
 class _Dumper(yaml.SafeDumper):
     """Rows of numbers on one line, everything else as a block."""
 
@@ -159,6 +164,43 @@ def yaml_text(data: Any) -> str:
         Dumper=_Dumper,
         sort_keys=False,
         allow_unicode=True,
-        width=99,
+        width=WIDTH,
         default_flow_style=False,
     )
+
+
+def numbers_text(key: str, values: Array) -> str:
+    """
+    Return finite numbers, or rows of them, as `yaml_text` writes them under a key.
+
+    A motion has tens of thousands; a general emitter looks at each of them, for a second or two.
+
+    Parameters
+    ----------
+    key : str
+    values : array, shape (N,) or (N, n), not empty
+
+    """
+    if values.ndim == 1:
+        return f'{key}: {_wrapped([_number(v) for v in values.tolist()], len(key) + 2)}\n'
+    rows = (_wrapped([_number(v) for v in row], 2) for row in values.tolist())
+    return f'{key}:\n' + ''.join(f'- {row}\n' for row in rows)
+
+
+def _number(value: float) -> str:
+    """Return a number as YAML 1.1 reads it: without a point it would be a text."""
+    text = repr(float(value))
+    return text if '.' in text else text.replace('e', '.0e', 1)
+
+
+def _wrapped(items: Sequence[str], start: int) -> str:
+    """Return a row of numbers that begins at a column, broken once a line is wide enough."""
+    lines, line = [], ' ' * start + '['
+    for item in items[:-1]:
+        line += f'{item},'
+        if len(line) > WIDTH:
+            lines.append(line)
+            line = '  '
+        else:
+            line += ' '
+    return '\n'.join([*lines, line + items[-1] + ']'])[start:]

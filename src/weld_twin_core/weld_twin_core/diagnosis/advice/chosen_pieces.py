@@ -197,12 +197,12 @@ def _next(
     named: int,
 ) -> tuple[int, dict[Pair, float], float]:
     """Return the piece that adds most for its time, what pairs gain with it, and the score."""
-    after = told.added(chosen, more)
     table: dict[Pair, Array] = {}
-    pairs = sorted({(min(pair), max(pair)) for pair in after})
-    undecided = [pair for pair in pairs if _mean(before, pair) < MARGIN * DECIDES]
+    pairs = sorted({(min(pair), max(pair)) for pair in before})
     # What the data at hand decide already is no question, unless nothing else is left.
-    for one, other in undecided or pairs:
+    asked = [pair for pair in pairs if _mean(before, pair) < MARGIN * DECIDES] or pairs
+    after = told.added([way for pair in asked for way in (pair, pair[::-1])], chosen, more)
+    for one, other in asked:
         # The mean over which of the two is true: where one contains the other, as play that may be
         # zero, only the truth of the larger one shows.
         ways = [

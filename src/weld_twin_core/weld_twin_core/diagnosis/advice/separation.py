@@ -75,12 +75,16 @@ class Normals:
         """Return by how many standard deviations the data at hand part every pair."""
         return {pair: float(_left(matrix[None])[0]) for pair, matrix in self.now.items()}
 
-    def added(self, chosen: Sequence[int], more: Sequence[int]) -> dict[Pair, Array]:
+    def added(
+        self, pairs: Sequence[Pair], chosen: Sequence[int], more: Sequence[int]
+    ) -> dict[Pair, Array]:
         """
         Return by how many standard deviations pairs part with further pieces, shape (len(more),).
 
         Parameters
         ----------
+        pairs : sequence of (int, int)
+            Those that are asked about.
         chosen : sequence of int
             Pieces that are in already.
         more : sequence of int
@@ -88,8 +92,8 @@ class Normals:
 
         """
         out = {}
-        for pair, now in self.now.items():
-            base = now + self.pieces[pair][list(chosen)].sum(axis=0)
+        for pair in pairs:
+            base = self.now[pair] + self.pieces[pair][list(chosen)].sum(axis=0)
             out[pair] = _left(base + self.pieces[pair][list(more)])
         return out
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ...arrays import Array
+from .designed import Design, designed
 from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
 from .robust_spread import measured_axes, robust_spread
@@ -89,14 +90,8 @@ def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[st
         The noise that residuals are measured in, and the weight of every sample.
 
     """
-    features = problem.features(model)
-    parts, names = problem.frame_columns(features)
-    columns = [problem.whitened(parts, scale)]
-    for k, effect in enumerate(model.found):
-        block = problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
-        columns.append(block)
-        names = names + [f'{k}.{j}' for j in range(block.shape[0])]
-    return np.concatenate(columns), names
+    columns, names = designed(problem, model, scale)
+    return columns.written_out(), names
 
 
 def stepped(problem: Problem, model: Model, step: Array) -> Model:
@@ -256,16 +251,18 @@ class _Point:
         return cls(problem, scale, prior, model, residual, ridge, x, cost)
 
     @cached_property
-    def columns(self) -> tuple[Array, list[str]]:
-        """Return the whitened columns, shape (P, rows), and their names."""
-        return design(self.problem, self.model, self.scale)
+    def columns(self) -> tuple[Design, list[str]]:
+        """Return the whitened columns and their names."""
+        return designed(self.problem, self.model, self.scale)
 
     @cached_property
     def normal_equations(self) -> tuple[Array, Array]:
         """Return normal matrix and right-hand side of a step, the priors included."""
         columns, _ = self.columns
-        right = columns @ self.residual - self.ridge * self.x
-        return columns @ columns.T + np.diag(self.ridge), right
+        right = columns.times(self.residual) - self.ridge * self.x
+        normal = columns.normal()
+        normal[np.diag_indices_from(normal)] += self.ridge
+        return normal, right
 
     def stepped(self, step: Array) -> _Point:
         """Return the model after a step of frames and coordinates."""

@@ -15,6 +15,7 @@ References
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,18 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.fit import coordinates, design
+from ..algebra.definite import inverted, well_conditioned
+from ..algebra.designed import Design, designed
+from ..algebra.fit import coordinates
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
+from ..algebra.unit_diagonal import unit_diagonal
 from ..hypotheses.starts import profile
 
 BLOCKS = 24
 """Stretches whose scores are held apart: enough to tell a variance to a third."""
+SINGULAR = 1e-12
+"""Share of the largest eigenvalue below which a direction is one that columns repeat."""
 UNSEEN = 1e-2
 """A coordinate a thousand times its typical size must move some row by this much noise."""
 
@@ -68,26 +74,35 @@ def _variance(
     problem: Problem, model: Model, scale: Scale, precision: Array, share: float
 ) -> Array:
     """Return the variance of every fit coordinate, shape (K,); NaN where there is none."""
-    columns, _ = design(problem, model, scale)
+    columns, _ = designed(problem, model, scale)
     count = coordinates(model).size
     prior = precision if precision.size else np.zeros(count)
-    live = np.concatenate([np.ones(columns.shape[0] - count, bool), _free(model)])
+    live = np.concatenate([np.ones(columns.count - count, bool), _free(model)])
     live &= _visible(columns, model)
-    columns = columns[live]
+    columns = columns.chosen(np.flatnonzero(live))
     ridge = np.concatenate([frame_prior(problem, model)[0], prior])[live]
-    size = np.sqrt((columns**2).sum(axis=1) + ridge)
-    columns /= size[:, None]
-    normal = columns @ columns.T + np.diag(ridge / size**2)
-    inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
+    normal = columns.normal()
+    normal[np.diag_indices_from(normal)] += ridge
+    inverse, size = _inverse(normal)
     residual = problem.whitened(problem.residuals(model), scale)
     cuts = np.flatnonzero(np.diff(problem.block_labels(BLOCKS))) + 1
-    stretches = np.split(np.arange(residual.size), cuts)
-    scores = inverse @ np.stack([columns[:, s] @ residual[s] for s in stretches], axis=1)
+    bounds = [0, *cuts.tolist(), residual.size]
+    stretches = [slice(a, b) for a, b in pairwise(bounds)]
+    each = [columns.within(s).times(residual[s]) / size for s in stretches]
+    scores = inverse @ np.stack(each, axis=1)
     blocks = max(len(stretches), 2)
     together = (scores**2).sum(axis=1) * blocks / (blocks - 1)
     out = np.full(live.size, np.nan)
     out[live] = np.maximum(np.diag(inverse) / share, together) / size**2
     return out[live.size - count :]
+
+
+def _inverse(normal: Array) -> tuple[Array, Array]:
+    """Return the inverse of a normal matrix with ones on its diagonal, and its columns' norms."""
+    scaled, size = unit_diagonal(normal)
+    if well_conditioned(scaled, SINGULAR):
+        return inverted(scaled), size
+    return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)), size
 
 
 def _free(model: Model) -> NDArray[np.bool_]:
@@ -101,11 +116,11 @@ def _free(model: Model) -> NDArray[np.bool_]:
     return np.array(out, dtype=bool)
 
 
-def _visible(columns: Array, model: Model) -> NDArray[np.bool_]:
+def _visible(columns: Design, model: Model) -> NDArray[np.bool_]:
     """Return which columns the data show, shape (P,)."""
     scales = np.concatenate([effect.coordinate_scales() for effect in model.found])
-    reach = np.concatenate([np.ones(columns.shape[0] - scales.size), 1e3 * scales])
-    return np.asarray(np.abs(columns).max(axis=1) * reach > UNSEEN)
+    reach = np.concatenate([np.ones(columns.count - scales.size), 1e3 * scales])
+    return np.asarray(columns.peaks() * reach > UNSEEN)
 
 
 def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: float) -> Array:

@@ -13,9 +13,9 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ...twin.features import Features, joints_of
+from ..algebra.atoms import Amounts, Columns, MovedJoint, Whole, amounts, gathered, moved_joint
 from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
-from .atoms import Amounts, Columns, MovedJoint, Whole, amounts, gathered, moved_joint
 from .seed_systems import SeedSystems
 from .still_joints import REASON, hardly_moves
 

@@ -51,10 +51,10 @@ def _fields(unseen: Unseen) -> Array:
     fields, count = unseen.targets[1:], unseen.frames
     if not count:
         return fields
-    normal = unseen.normals.sum(axis=0)[:count, :count] + np.diag(unseen.precision[:count])
-    right = unseen.rights.sum(axis=0)[:count, 1:]
-    step = np.linalg.lstsq(normal, right, rcond=None)[0]
-    return np.asarray(fields - step.T @ unseen.columns[:count])
+    columns = unseen.columns.chosen(np.arange(count)).written_out()
+    normal = columns @ columns.T + np.diag(unseen.precision[:count])
+    step = np.linalg.lstsq(normal, columns @ fields.T, rcond=None)[0]
+    return np.asarray(fields - step.T @ columns)
 
 
 def _metres(unseen: Unseen, rows: Array) -> list[Array]:

@@ -19,13 +19,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.linalg.lapack import dtrtri
 
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...errors import DataError
-from ..algebra.fit import Fit, coordinates, design, fit, robust_scale, solve_scaled, stepped
+from ..algebra.definite import solved
+from ..algebra.designed import designed
+from ..algebra.fit import Fit, coordinates, fit, robust_scale, solve_scaled, stepped
 from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
@@ -91,13 +91,10 @@ def learned_precision(
     usual = _usual(scales, believed)
     variance, most = _first_variances(labels, usual)
     learned_of = np.flatnonzero(learn | ~np.isfinite(most))
-    noise = 1.0
+    noise, room = 1.0, np.empty_like(normal)
     for _ in range(ROUNDS):
         precision = _precision(tied, variance, labels, usual)
-        system = normal / noise + np.diag(precision)
-        factor = _factor(system)
-        mean = cho_solve(factor, right / noise)
-        spread = (np.tril(dtrtri(factor[0], lower=1)[0]) ** 2).sum(axis=0)
+        mean, spread = _solved(normal, right, noise, precision, room)
         determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
         left = rss - 2.0 * right @ mean + mean @ normal @ mean
         noise = max(left / max(rows - determined.sum(), 1.0), 1e-6)
@@ -133,18 +130,22 @@ def _first_variances(labels: Array, usual: Array) -> tuple[Array, Array]:
     return variance, most
 
 
-def _factor(system: Array) -> tuple[Array, bool]:
-    """Return the Cholesky factor, with as much on the diagonal as columns that repeat need."""
-    each = np.diag_indices_from(system)
-    size = np.abs(system[each])
+def _solved(
+    normal: Array, right: Array, noise: float, precision: Array, room: Array
+) -> tuple[Array, Array]:
+    """
+    Return mean and variance of the coordinates under a prior about zero, shapes (K,).
+
+    ``room``, shape (K, K), is worked in. As much is put on the diagonal as columns that repeat need.
+    """
+    size = np.abs(normal.diagonal() / noise + precision)
     for more in JITTER:
-        damped = system.copy()
-        damped[each] += more * (size + more * size.max(initial=1.0))
-        try:
-            factor: tuple[Array, bool] = cho_factor(damped, lower=True)
-        except LinAlgError:
-            continue
-        return factor
+        np.divide(normal, noise, out=room)
+        extra = more * (size + more * size.max(initial=1.0))
+        room[np.diag_indices_from(room)] += precision + extra
+        found = solved(room, right / noise)
+        if found is not None:
+            return found
     raise DataError('the measurements say so little that no errors can be fitted together')
 
 
@@ -208,10 +209,10 @@ def _learned(
 ) -> tuple[Model, Array, float]:
     """Return the model after one linear step, the prior precision learned, and its freedom."""
     residual = problem.whitened(problem.residuals(model), scale)
-    columns, _ = design(problem, model, scale)
+    columns, _ = designed(problem, model, scale)
     frame_ridge, off = frame_prior(problem, model)
     frames = frame_ridge.size
-    normal, right = columns @ columns.T, columns @ residual
+    normal, right = columns.normal(), columns.times(residual)
     normal[:frames, :frames] += np.diag(frame_ridge)
     right[:frames] -= frame_ridge * off
     labels, scales = groups(model.found, beliefs)

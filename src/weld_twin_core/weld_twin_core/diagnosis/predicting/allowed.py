@@ -27,7 +27,8 @@ from ...recording import Recording
 from ...twin.domain import Domain
 from ...twin.posterior import Directions, Posterior, postures_within_limits, usual_sigma
 from ...twin.twin import Twin
-from ..algebra.fit import LEAST_TURN, coordinates, design
+from ..algebra.designed import designed
+from ..algebra.fit import LEAST_TURN, coordinates
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Model, Problem, Scale
@@ -189,8 +190,8 @@ def _rows(problem: Problem, model: Model, scale: Scale, what: Directions) -> Row
 
 
 def _unseen(problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows) -> Unseen:
-    own, _ = design(problem, model, scale)
-    pull, x = np.zeros(own.shape[0]), np.zeros(own.shape[0])
+    own, _ = designed(problem, model, scale)
+    pull, x = np.zeros(own.count), np.zeros(own.count)
     if precision.size:
         pull[-precision.size :], x[-precision.size :] = precision, coordinates(model)
     return Unseen(

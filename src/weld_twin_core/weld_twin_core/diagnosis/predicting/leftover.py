@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
+from ..algebra.designed import Design
 from ..algebra.fit import solve_scaled
 from ..algebra.gram import Index
 from ..algebra.noise_floor import NoiseFloor
@@ -44,7 +45,7 @@ class Unseen:
 
     Attributes
     ----------
-    own : array, shape (K, rows)
+    own : Design
         Whitened columns of frames and found effects: what the fit turned.
     precision, pull : array, shape (K,)
         Of the fit's prior, and how hard it pulls from where the fit is.
@@ -58,7 +59,7 @@ class Unseen:
 
     """
 
-    own: Array
+    own: Design
     precision: Array
     pull: Array
     columns: Array
@@ -174,18 +175,20 @@ def _predicted(
 ) -> tuple[list[Array], list[Array]]:
     """Return the error of every sample predicted from other blocks, and its second moment."""
     errors, shifts = np.array(unseen.residual), np.zeros(unseen.residual.size)
-    normal = unseen.own @ unseen.own.T + np.diag(unseen.precision)
-    right = unseen.own @ unseen.residual - unseen.pull
+    normal = unseen.own.normal()
+    normal[np.diag_indices_from(normal)] += unseen.precision
+    right = unseen.own.times(unseen.residual) - unseen.pull
     place = np.repeat(np.arange(len(samples)), [index.size for index in samples])
     moments: list[Array] = [np.zeros((0, 0))] * len(samples)
     for b in np.unique(unseen.labels):
         out = unseen.labels == b
-        mine, columns = unseen.own[:, out], unseen.columns[:, out]
-        step = solve_scaled(normal - mine @ mine.T, right - mine @ unseen.residual[out], 1e-9)
+        mine, columns = unseen.own.within(np.flatnonzero(out)), unseen.columns[:, out]
+        pulled = right - mine.times(unseen.residual[out])
+        moved = mine.mixed(solve_scaled(normal - mine.normal(), pulled, 1e-9))
         mean, covariance = given(out)
-        errors[out] -= step @ mine
+        errors[out] -= moved
         # The mean is counted from the fit to all rows, the error from the fit to the others.
-        shifts[out] = mean @ columns - step @ mine
+        shifts[out] = mean @ columns - moved
         spread, at = covariance @ columns, 0
         for k in np.unique(place[out]):
             size = samples[k].size

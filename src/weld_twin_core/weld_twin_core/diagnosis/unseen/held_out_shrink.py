@@ -135,7 +135,7 @@ def _waterfall(
     steps: list[tuple[str, float]] = []
     kept: list[int] = []
     rest = dict(members)
-    if unseen.columns.shape[0] > LARGE:
+    if unseen.columns.count > LARGE:
         # Trying every family at every step costs too much here; how far each gets alone orders.
         for name in sorted(members, key=lambda n: alone[n]):
             kept += members[name]

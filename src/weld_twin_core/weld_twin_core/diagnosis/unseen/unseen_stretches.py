@@ -14,18 +14,20 @@ once; a model is a choice of columns and targets.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
-from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dpotri
 
 from ...arrays import Array
-from ..algebra.fit import Fit, design, trusted
+from ..algebra.atoms import Rows
+from ..algebra.definite import inverted
+from ..algebra.designed import Design, designed
+from ..algebra.fit import Fit, trusted
 from ..algebra.gram import Index
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
@@ -40,10 +42,10 @@ ROUNDED = 1e-13
 times what one difference of doubles loses."""
 MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""
-Rows = Any
-"""Rows of one stretch: a slice, or their numbers."""
 MOST_STEPS = 1e6
 """A squared step counts so many times its variance at the most: far beyond any chance."""
+Solver = Callable[[Array], Array]
+"""Solves normal equations for one right-hand side or several."""
 TETHER = 0.3
 """A coordinate moves about this share of its size when the stretches that show it are left out."""
 
@@ -58,33 +60,30 @@ class Unseen:
     problem, scale : Problem, Scale
     labels : array, shape (rows,)
         Stretch of every row.
-    columns : array, shape (P, rows)
-        Frames, then the coordinates of every found effect.
+    columns : Design
+        P columns: frames, then the coordinates of every found effect.
     parts : tuple of slice
         Columns of every effect.
     targets : array, shape (1 + K, rows)
         The final residual, then what each effect takes off it, exactly.
     precision, pull : array, shape (P,)
         Prior precision of every column, and how hard it pulls from where the fit is now.
-    normals : array, shape (blocks, P, P);  rights : array, shape (blocks, P, 1 + K)
 
     """
 
     problem: Problem
     scale: Scale
     labels: Array
-    columns: Array
+    columns: Design
     parts: tuple[slice, ...]
     targets: Array
     precision: Array
     pull: Array
-    normals: Array
-    rights: Array
 
     @classmethod
     def of(cls, problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
         """
-        Prepare the parts of a fitted model.
+        Prepare the parts of a fitted model, once.
 
         Parameters
         ----------
@@ -98,62 +97,40 @@ class Unseen:
             Prior precision of the fit coordinates, one over variance.
 
         """
-        model = fit.model
-        columns, _ = design(problem, model, scale)
-        frames = columns.shape[0] - fit.coordinates.size
-        parts, at = [], frames
-        for effect in model.found:
-            size = effect.coordinates().size
-            parts.append(slice(at, at + size))
-            at += size
-        targets = [fit.residual] + [
-            problem.whitened(problem.residuals(model.without(k)), scale) - fit.residual
-            for k in range(len(model.found))
-        ]
-        prior = np.zeros(columns.shape[0])
-        prior[:frames], off = frame_prior(problem, model)
-        if precision.size:
-            prior[frames:] = precision
-        x = np.concatenate([off, fit.coordinates])
-        # A learned prior holds a coordinate already; a tether would tell it of unseen stretches.
-        tether = np.where(prior > 0.0, 0.0, np.concatenate([np.zeros(frames), _tether(model)]))
-        labels = problem.block_labels(BLOCKS)
-        stacked = np.array(targets)
-        normals, rights = _sums(columns, stacked, labels)
-        return cls(
-            problem=problem,
-            scale=scale,
-            labels=labels,
-            columns=columns,
-            parts=tuple(parts),
-            targets=stacked,
-            precision=prior + tether,
-            pull=prior * x,
-            normals=normals,
-            rights=rights,
-        )
+        if fit in _MADE:
+            given, made = _MADE[fit]
+            same = made.problem is problem and made.scale is scale
+            if same and np.array_equal(given, precision):
+                return made
+        _MADE[fit] = precision, _prepared(problem, scale, fit, precision)
+        return _MADE[fit][1]
 
     def by(self, labels: Array) -> Unseen:
         """Return the same with other parts left out in turn, told by a label of every row."""
-        normals, rights = _sums(self.columns, self.targets, labels)
-        return replace(self, labels=labels, normals=normals, rights=rights)
+        key = labels.tobytes()
+        if key not in self._others:
+            self._others[key] = replace(self, labels=labels)
+        return self._others[key]
+
+    @cached_property
+    def _others(self) -> dict[bytes, Unseen]:
+        return {}
 
     @property
     def frames(self) -> int:
         """Return the number of nuisance columns."""
-        return int(self.parts[0].start if self.parts else self.columns.shape[0])
+        return int(self.parts[0].start if self.parts else self.columns.count)
 
     def predict(self, kept: Sequence[int]) -> Array:
         """Return the residual on every stretch of the model fitted on the others, (rows,)."""
-        if self.columns.shape[0] <= MANY:
+        if self.columns.count <= MANY:
             return self.base(kept).residual
         # With hundreds of columns an inverse per stretch serves every choice of effects.
         index = self._index(kept)
-        gone = np.setdiff1d(np.arange(self.columns.shape[0]), index)
+        gone = np.setdiff1d(np.arange(self.columns.count), index)
         if gone.size > index.size:
             return self.base(kept).residual
-        mix = np.ones(self.targets.shape[0])
-        mix[[1 + k for k in kept]] = 0.0
+        mix = self._mix(kept)
         residual = mix @ self.targets
         for b, rows in enumerate(self._spans):
             inverse = self._inverses[b]
@@ -161,37 +138,52 @@ class Unseen:
             if gone.size:
                 force = np.linalg.solve(inverse[np.ix_(gone, gone)], step[gone])
                 step = step - inverse[:, gone] @ force
-            residual[rows] -= step @ self.columns[:, rows]
+            residual[rows] -= self._stretches[b].mixed(step)
         return residual
 
     @cached_property
     def _inverses(self) -> list[Array]:
-        """Return the inverse normal matrix of all columns for every stretch left out."""
-        out, everything = [], np.arange(self.columns.shape[0])
-        for b in range(self.normals.shape[0]):
-            system = self._system(b, everything)
-            size = np.sqrt(np.maximum(np.diag(system), 0.0))
-            unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
-            system *= np.outer(unit, unit)
-            system[np.diag_indices_from(system)] += DAMPING
-            half, _ = dpotri(cho_factor(system, lower=True)[0], lower=1)
-            out.append((np.tril(half) + np.tril(half, -1).T) * np.outer(unit, unit))
-        return out
+        """Return the inverse of all normal equations without every stretch."""
+        return [self._inverse(b) for b in range(len(self._spans))]
+
+    def _inverse(self, b: int) -> Array:
+        """Return the inverse of all normal equations without one stretch, shape (P, P)."""
+        system = self._system(b, np.arange(self.columns.count))
+        size = np.sqrt(np.maximum(np.diag(system), 0.0))
+        unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+        system *= unit[:, None]
+        system *= unit
+        system[np.diag_indices_from(system)] += DAMPING
+        inverse = inverted(system)
+        inverse *= unit[:, None]
+        inverse *= unit
+        return inverse
 
     def base(self, kept: Sequence[int]) -> Base:
         """Return a model of some effects, fitted with each stretch left out in turn."""
-        index = self._index(kept)
+        index, mix = self._index(kept), self._mix(kept)
+        target = mix @ self.targets
+        solvers, residual = list[Solver](), target.copy()
+        for b, rows in enumerate(self._spans if index.size else ()):
+            solver = self._solver(b, index)
+            whole = np.zeros(self.columns.count)
+            whole[index] = solver(self._right(b, mix)[index])
+            residual[rows] -= self._stretches[b].mixed(whole)
+            solvers.append(solver)
+        return Base(self, index, target, solvers, residual)
+
+    def _solver(self, b: int, index: Index) -> Solver:
+        """Return what solves the normal equations of some columns without one stretch."""
+        if index.size == self.columns.count > MANY:
+            return partial(np.matmul, self._inverses[b])
+        system, size = unit_diagonal(self._system(b, index), DAMPING)
+        return partial(_solved, cho_factor(system, overwrite_a=True), size)
+
+    def _mix(self, kept: Sequence[int]) -> Array:
+        """Return which targets a model of some effects is to explain, shape (1 + K,)."""
         mix = np.ones(self.targets.shape[0])
         mix[[1 + k for k in kept]] = 0.0
-        target = mix @ self.targets
-        factors, residual = [], target.copy()
-        for b, rows in enumerate(self._spans if index.size else ()):
-            system, size = unit_diagonal(self._system(b, index), DAMPING)
-            factor = cho_factor(system, overwrite_a=True)
-            step = cho_solve(factor, self._right(b, mix)[index] / size) / size
-            residual[rows] -= self._moved(step, index, rows)
-            factors.append((factor, size))
-        return Base(self, index, target, factors, residual)
+        return mix
 
     def _index(self, kept: Sequence[int]) -> Index:
         """Return the columns of the frames and of some effects."""
@@ -204,8 +196,39 @@ class Unseen:
         return rows_of(self.labels)
 
     @cached_property
+    def _stretches(self) -> list[Design]:
+        """Return the columns of every stretch."""
+        return [self.columns.within(rows) for rows in self._spans]
+
+    @cached_property
+    def _normals(self) -> list[Array]:
+        """Return the normal matrix of every stretch, where there are few columns."""
+        return [part.normal() for part in self._stretches]
+
+    def _normal(self, b: int, index: Index) -> Array:
+        """Return the normal matrix of some columns on one stretch."""
+        if self.columns.count > MANY:
+            return self._stretches[b].chosen(index).normal()
+        normal = self._normals[b]
+        return normal if index.size == self.columns.count else normal[np.ix_(index, index)]
+
+    @cached_property
+    def _rights(self) -> list[Array]:
+        """Return the products of the columns with all targets on every stretch, (P, 1 + K)."""
+        parts = zip(self._stretches, self._spans, strict=True)
+        return [part.products(self.targets[:, rows]) for part, rows in parts]
+
+    @cached_property
     def _total(self) -> Array:
-        return np.asarray(self.normals.sum(axis=0) + np.diag(self.precision))
+        """Return the normal matrix of all columns on all stretches, with the priors."""
+        few = self.columns.count <= MANY
+        total = np.sum(self._normals, axis=0) if few else self.columns.normal()
+        total[np.diag_indices_from(total)] += self.precision
+        return np.asarray(total)
+
+    @cached_property
+    def _right_total(self) -> Array:
+        return np.asarray(sum(self._rights))
 
     def _system(self, b: int, index: Index) -> Array:
         """
@@ -213,23 +236,16 @@ class Unseen:
 
         What a column shows on that stretch alone is nothing but rounding elsewhere; it stays put.
         """
-        total, gone = self._total, self.normals[b]
-        if index.size < self.columns.shape[0]:
-            at = np.ix_(index, index)
-            total, gone = total[at], gone[at]
-        left = np.asarray(total - gone)
+        total = self._total
+        if index.size < self.columns.count:
+            total = total[np.ix_(index, index)]
+        left = total - self._normal(b, index)
         left[np.diag_indices_from(left)] += ROUNDED * np.diag(total)
-        return left
+        return np.asarray(left)
 
     def _right(self, b: int, mix: Array) -> Array:
         """Return the right-hand side of every column on all stretches but one."""
-        return np.asarray((self.rights.sum(axis=0) - self.rights[b]) @ mix - self.pull)
-
-    def _moved(self, step: Array, index: Index, rows: Rows) -> Array:
-        """Return what a step of some columns takes off a stretch of rows, without a copy."""
-        whole = np.zeros(self.columns.shape[0])
-        whole[index] = step
-        return np.asarray(whole @ self.columns[:, rows])
+        return np.asarray((self._right_total - self._rights[b]) @ mix - self.pull)
 
     def wandered(self) -> Array:
         """
@@ -238,10 +254,10 @@ class Unseen:
         Mean of the squared steps over what noise alone makes them; a formula that does not hold
         wants other parameters on every stretch.
         """
-        every, mix = np.arange(self.columns.shape[0]), np.eye(self.targets.shape[0])[0]
+        every, mix = np.arange(self.columns.count), np.eye(self.targets.shape[0])[0]
         whole = _spread(self._total)
-        ratios = np.zeros((self.normals.shape[0], every.size))
-        for b in range(self.normals.shape[0]):
+        ratios = np.zeros((len(self._spans), every.size))
+        for b in range(len(self._spans)):
             left = self._system(b, every)
             system, size = unit_diagonal(left.copy(), DAMPING)
             step = cho_solve(cho_factor(system), self._right(b, mix) / size) / size
@@ -289,7 +305,7 @@ class Base:
     unseen: Unseen
     index: Index
     target: Array
-    factors: list[tuple[tuple[Array, bool], Array]]
+    solvers: list[Solver]
     residual: Array
 
     def extended(self, extra: Array, ridges: Sequence[float]) -> list[Array]:
@@ -303,42 +319,71 @@ class Base:
             Prior precision of the further columns.
 
         """
-        own = self.unseen.columns
-        if self.index.size < own.shape[0]:
-            own = own[self.index]
         spans = self.unseen._spans
         both = np.concatenate([extra, self.target[None]])
-        crosses = [own[:, rows] @ both[:, rows].T for rows in spans]
+        crosses = [own.products(both[:, rows]) for own, rows in zip(self._own, spans, strict=True)]
         squares = [extra[:, rows] @ both[:, rows].T for rows in spans]
         cross_all, square_all = sum(crosses), sum(squares)
         outs = np.tile(self.target, (len(ridges), 1))
         for b, rows in enumerate(spans):
-            here, mine = extra[:, rows], own[:, rows]
+            here, mine = extra[:, rows], self._own[b]
             cross, right = np.split(cross_all - crosses[b], [extra.shape[0]], axis=1)
             square, pull = np.split(square_all - squares[b], [extra.shape[0]], axis=1)
             right, pull = right[:, 0] - self.unseen.pull[self.index], pull[:, 0]
             if self.index.size:
-                factor, size = self.factors[b]
-                solved = cho_solve(factor, np.column_stack([cross, right]) / size[:, None])
-                solved /= size[:, None]
+                solved = self.solvers[b](np.column_stack([cross, right]))
                 square = square - cross.T @ solved[:, :-1]
                 pull = pull - cross.T @ solved[:, -1]
             eye = np.eye(here.shape[0])
             more = np.stack([np.linalg.solve(square + (r + 1e-9) * eye, pull) for r in ridges])
             outs[:, rows] -= more @ here
             if self.index.size:
-                outs[:, rows] -= (solved[:, -1] - more @ solved[:, :-1].T) @ mine
+                outs[:, rows] -= mine.mixed(solved[:, -1] - more @ solved[:, :-1].T)
         return list(outs)
 
+    @cached_property
+    def _own(self) -> list[Design]:
+        """Return the columns of the model on every stretch."""
+        return [part.chosen(self.index) for part in self.unseen._stretches]
 
-def _sums(columns: Array, targets: Array, labels: Array) -> tuple[Array, Array]:
-    """Return the normal equations of every part, and their right-hand sides."""
-    spans = rows_of(labels)
-    normals = np.empty((len(spans), columns.shape[0], columns.shape[0]))
-    for normal, rows in zip(normals, spans, strict=True):
-        part = columns[:, rows]
-        np.matmul(part, part.T, out=normal)
-    return normals, np.array([columns[:, rows] @ targets[:, rows].T for rows in spans])
+
+_MADE: WeakKeyDictionary[Fit, tuple[Array, Unseen]] = WeakKeyDictionary()
+"""What was prepared of every fit that somebody still holds: several steps ask for the same."""
+
+
+def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
+    """Return the parts of a fitted model; see `Unseen.of`."""
+    model = fit.model
+    columns, _ = designed(problem, model, scale)
+    frames = columns.count - fit.coordinates.size
+    ends = np.cumsum([frames, *(effect.coordinates().size for effect in model.found)]).tolist()
+    targets = [fit.residual] + [
+        problem.whitened(problem.residuals(model.without(k)), scale) - fit.residual
+        for k in range(len(model.found))
+    ]
+    prior = np.zeros(columns.count)
+    prior[:frames], off = frame_prior(problem, model)
+    if precision.size:
+        prior[frames:] = precision
+    x = np.concatenate([off, fit.coordinates])
+    # A learned prior holds a coordinate already; a tether would tell it of unseen stretches.
+    tether = np.where(prior > 0.0, 0.0, np.concatenate([np.zeros(frames), _tether(model)]))
+    return Unseen(
+        problem=problem,
+        scale=scale,
+        labels=problem.block_labels(BLOCKS),
+        columns=columns,
+        parts=tuple(slice(a, b) for a, b in pairwise(ends)),
+        targets=np.array(targets),
+        precision=prior + tether,
+        pull=prior * x,
+    )
+
+
+def _solved(factor: tuple[Array, bool], size: Array, right: Array) -> Array:
+    """Return the solution of scaled normal equations, shape as the right-hand side (P, ...)."""
+    unit = size if right.ndim == 1 else size[:, None]
+    return np.asarray(cho_solve(factor, right / unit) / unit)
 
 
 def rows_of(labels: Array) -> list[Rows]:

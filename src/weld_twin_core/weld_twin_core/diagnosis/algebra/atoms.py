@@ -19,8 +19,11 @@ import numpy as np
 from ...arm.channels import Shift
 from ...arrays import Array
 from ...twin.features import Features
-from ..algebra.gram import Index
-from ..algebra.problem import Problem, Scale
+from .gram import Index
+from .problem import Problem, Scale
+
+Rows = slice | Index
+"""Some rows: a slice, or their numbers."""
 
 
 class Columns(Protocol):
@@ -41,6 +44,18 @@ class Columns(Protocol):
 
     def largest(self) -> float:
         """Return their largest entry, by size."""
+
+    def peaks(self) -> Array:
+        """Return the largest entry of each, by size, shape (K,)."""
+
+    def mixed(self, weights: Array) -> Array:
+        """Return sums of them with weights, shape (..., K), as shape (..., rows)."""
+
+    def chosen(self, index: Index) -> Columns:
+        """Return some of them."""
+
+    def within(self, rows: Rows) -> Columns:
+        """Return them on some rows, all those of a sample or none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +90,23 @@ class Whole:
 
     def largest(self) -> float:
         """Return their largest entry, by size."""
-        return float(np.abs(self.rows).max(initial=0.0))
+        return float(self.peaks().max(initial=0.0))
+
+    def peaks(self) -> Array:
+        """Return the largest entry of each, by size, shape (K,)."""
+        return np.asarray(np.abs(self.rows).max(axis=1, initial=0.0))
+
+    def mixed(self, weights: Array) -> Array:
+        """Return sums of them with weights, shape (..., K), as shape (..., rows)."""
+        return np.asarray(weights @ self.rows)
+
+    def chosen(self, index: Index) -> Whole:
+        """Return some of them."""
+        return Whole(self.rows[index])
+
+    def within(self, rows: Rows) -> Whole:
+        """Return them on some rows."""
+        return Whole(self.rows[:, rows])
 
 
 class MovedJoint:
@@ -123,6 +154,24 @@ class MovedJoint:
         """Return the products with other rows, shape (..., rows), sample by sample."""
         return np.asarray(np.add.reduceat(self.row * rows, self.first, axis=-1))
 
+    def moved_by(self, each: Array) -> Array:
+        """Return what amounts, shape (..., samples), do to the tool, shape (..., rows)."""
+        last = np.append(self.first[1:], self.row.size)
+        return np.asarray(np.repeat(each, last - self.first, axis=-1) * self.row)
+
+    def samples(self, rows: Rows) -> Rows:
+        """Return the samples of some rows, all those of a sample or none."""
+        if isinstance(rows, slice):
+            start, stop = np.searchsorted(self.first, (rows.start, rows.stop))
+            return slice(int(start), int(stop))
+        return np.flatnonzero(np.isin(self.first, rows))
+
+    def within(self, rows: Rows) -> MovedJoint:
+        """Return the same on some rows, all those of a sample or none."""
+        samples = self.samples(rows)
+        sizes = np.diff(np.append(self.first, self.row.size))[samples]
+        return MovedJoint(self.row[rows], np.cumsum(sizes) - sizes)
+
 
 @dataclass(frozen=True, eq=False)
 class Amounts:
@@ -147,8 +196,7 @@ class Amounts:
 
     def written_out(self) -> Array:
         """Return the columns, shape (K, rows)."""
-        last = np.append(self.joint.first[1:], self.joint.row.size)
-        return np.asarray(np.repeat(self.each, last - self.joint.first, axis=1) * self.joint.row)
+        return self.joint.moved_by(self.each)
 
     def products(self, rows: Array) -> Array:
         """Return their products with other rows, shape (R, rows), as shape (K, R)."""
@@ -160,7 +208,24 @@ class Amounts:
 
     def largest(self) -> float:
         """Return their largest entry, by size."""
-        return float((np.abs(self.each) * self.joint.most).max(initial=0.0))
+        return float(self.peaks().max(initial=0.0))
+
+    def peaks(self) -> Array:
+        """Return the largest entry of each, by size, shape (K,)."""
+        return np.asarray((np.abs(self.each) * self.joint.most).max(axis=1, initial=0.0))
+
+    def mixed(self, weights: Array) -> Array:
+        """Return sums of them with weights, shape (..., K), as shape (..., rows)."""
+        return self.joint.moved_by(weights @ self.each)
+
+    def chosen(self, index: Index) -> Amounts:
+        """Return some of them."""
+        return Amounts(self.joint, self.each[index])
+
+    def within(self, rows: Rows) -> Amounts:
+        """Return them on some rows, all those of a sample or none."""
+        samples = self.joint.samples(rows)
+        return Amounts(self.joint.within(rows), self.each[:, samples])
 
 
 def moved_joint(shifts: Sequence[Sequence[Shift]]) -> int | None:
@@ -221,6 +286,8 @@ def _alike(one: Columns, other: Columns) -> bool:
 
 def _joined(run: Sequence[Columns]) -> Columns:
     first = run[0]
+    if len(run) == 1:
+        return first
     if isinstance(first, Amounts):
         return Amounts(
             first.joint, np.concatenate([p.each for p in run if isinstance(p, Amounts)])

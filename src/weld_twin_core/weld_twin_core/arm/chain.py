@@ -84,8 +84,20 @@ def tool_frame(robot: Robot, shift: Shift = NO_SHIFT) -> tuple[Array, Array]:
     return rotation @ rotation_matrix(error[..., 3:]), origin + error[..., :3]
 
 
+def _nothing(value: Any) -> bool:
+    """Return whether a value is the number zero, as half the values of most arms are."""
+    return np.ndim(value) == 0 and value == 0.0
+
+
+def _slid(point: Array, axis: Array, length: Any) -> Array:
+    """Return points moved along an axis."""
+    return point if _nothing(length) else point + length * axis
+
+
 def _turn(first: Array, second: Array, angle: Array) -> tuple[Array, Array]:
     """Turn the pair of axes (first, second) by an angle in their plane."""
+    if _nothing(angle):
+        return first, second
     cosine, sine = np.cos(angle), np.sin(angle)
     return first * cosine + second * sine, second * cosine - first * sine
 
@@ -139,12 +151,11 @@ def _standard_row(
 ) -> tuple[Array, Array, Array, Array, RowAxes]:
     z_row, z_point = z, p
     x, y = _turn(x, y, v['theta'])
-    p = p + v['d'] * z + v['a'] * x
+    p = _slid(_slid(p, z, v['d']), x, v['a'])
     x_row, x_point = x, p
     y, z = _turn(y, z, v['alpha'])
     y_row, y_point = y, p
-    if np.ndim(v['beta']) or v['beta'] != 0.0:
-        z, x = _turn(z, x, v['beta'])
+    z, x = _turn(z, x, v['beta'])
     return x, y, z, p, RowAxes(z_row, z_point, x_row, x_point, y_row, y_point)
 
 
@@ -154,14 +165,13 @@ def _modified_row(
     alpha_axis, start = x, p
     y, z = _turn(y, z, v['alpha'])
     y_row = y
-    if np.ndim(v['beta']) or v['beta'] != 0.0:
-        z, x = _turn(z, x, v['beta'])
-    p = p + v['a'] * x
+    z, x = _turn(z, x, v['beta'])
+    p = _slid(p, x, v['a'])
     # alpha turns about the x before beta and a moves along the x after it; the two differ only
     # when beta is not zero, so RowAxes keeps alpha's axis and `column` rebuilds a's from y and z.
     z_row, z_point = z, p
     x, y = _turn(x, y, v['theta'])
-    p = p + v['d'] * z
+    p = _slid(p, z, v['d'])
     return x, y, z, p, RowAxes(z_row, z_point, alpha_axis, start, y_row, start)
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -51,7 +52,7 @@ class Parametric:
 
     def check_values(self) -> None:
         """
-        Refuse parameters without physical meaning.
+        Refuse parameters without physical meaning; they are looked at once.
 
         Raises
         ------
@@ -59,6 +60,8 @@ class Parametric:
             Wrong length, not a number, or outside the bounds.
 
         """
+        if '_sound' in self.__dict__:
+            return
         for parameter in self.parameters:
             value = self._numeric(parameter, getattr(self, parameter.name))
             if parameter.size > 1 and (value.ndim == 0 or value.shape[-1] != parameter.size):
@@ -73,6 +76,7 @@ class Parametric:
                     f'{self.name}: {parameter.name} = {value} {parameter.unit} is outside '
                     f'[{parameter.lower:g}, {parameter.upper:g}]'
                 )
+        self.__dict__['_sound'] = True
 
     def _is_number(self, parameter: Parameter) -> bool:
         value = np.asarray(getattr(self, parameter.name))
@@ -88,6 +92,11 @@ class Parametric:
                 count = np.shape(getattr(self, parameter.name))[-1]
                 out += [(parameter, k) for k in range(count)]
         return out
+
+    @cached_property
+    def draws(self) -> tuple[int, ...]:
+        """Return the draw axis of the parameters: (D,), or () for plain numbers."""
+        return self.vector().shape[:-1]
 
     def vector(self) -> Array:
         """Return all components as one vector, shape (P,), or (D, P) with draws."""

@@ -54,7 +54,7 @@ class EffectStages:
         object.__setattr__(self, 'effects', tuple(self.effects))
         for effect in self.effects:
             effect.check(self.robot)
-        counts = {effect.vector().shape[:-1] for effect in self.effects} - {(), (1,)}
+        counts = {effect.draws for effect in self.effects} - {(), (1,)}
         if len(counts) > 1:
             raise ModelError(
                 'the effects carry different numbers of draws: '
@@ -64,7 +64,7 @@ class EffectStages:
     @property
     def draws(self) -> tuple[int, ...]:
         """Return the draw axis of the effects' parameters: (D,), or () for plain numbers."""
-        return np.broadcast_shapes(*(effect.vector().shape[:-1] for effect in self.effects))
+        return np.broadcast_shapes(*(effect.draws for effect in self.effects))
 
     def late(self, elapsed: Array | float) -> Array:
         """

@@ -13,9 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
@@ -44,22 +45,32 @@ class Member:
 @dataclass(frozen=True, eq=False)
 class Folds:
     """
-    Normal equations of every fold of one way to divide the rows.
+    Normal equations of every fold of one way to divide the rows, as far as they are asked for.
+
+    Of a hundred groups a choice looks at some tens, and at few of them together.
 
     Attributes
     ----------
-    normals : array, shape (B, P, P);  rights : array, shape (B, P);  squares : array, shape (B,)
+    columns : array, shape (P, rows)
+        Features, whitened.
+    target : array, shape (rows,)
+        What they are to explain, whitened.
+    order : array of int, shape (rows,), or None
+        Rows fold by fold; None where they lie so.
+    spans : tuple of slice
+        The folds, in that order.
 
     """
 
-    normals: Array
-    rights: Array
-    squares: Array
+    columns: Array
+    target: Array
+    order: Index | None
+    spans: tuple[slice, ...]
 
     @classmethod
     def of(cls, columns: Array, target: Array, labels: Array) -> Folds:
         """
-        Multiply out every fold.
+        Divide the rows by folds.
 
         Parameters
         ----------
@@ -71,35 +82,67 @@ class Folds:
             The fold that each row belongs to.
 
         """
-        # Rows that lie together are looked at where they are; others are copied, fold by fold.
         together = bool((np.diff(labels) >= 0).all())
-        ends = np.searchsorted(labels, np.append(np.unique(labels), labels[-1] + 1))
-        rows: list[Any] = [slice(a, b) for a, b in pairwise(ends)] if together else []
-        rows = rows or [labels == n for n in np.unique(labels)]
-        normals = np.empty((len(rows), len(columns), len(columns)))
-        rights = np.empty((len(rows), len(columns)))
-        for part, normal, right in zip(rows, normals, rights, strict=True):
-            own = columns[:, part]
-            np.matmul(own, own.T, out=normal)
-            np.matmul(own, target[part], out=right)
-        return cls(normals, rights, np.array([target[part] @ target[part] for part in rows]))
+        order = None if together else np.argsort(labels, kind='stable')
+        ends = np.cumsum(np.unique(labels, return_counts=True)[1]).tolist()
+        return cls(columns, target, order, tuple(slice(a, b) for a, b in pairwise([0, *ends])))
 
     def errors(self, index: Index, precision: Array) -> Array:
         """Return the squared error on every fold of the columns fitted on the others, (B,)."""
         if not index.size:
             return self.squares
-        mine = self.normals[:, index[:, None], index]
-        pulls = self.rights[:, index]
-        normal, right = self.total
-        others = normal[np.ix_(index, index)] + np.diag(precision) - mine
-        x = np.linalg.solve(others, (right[index] - pulls)[..., None])[..., 0]
+        self._ask(index)
+        mine = self._normals[:, index[:, None], index]
+        pulls = self._rights[:, index]
+        others = mine.sum(axis=0) + np.diag(precision) - mine
+        x = np.linalg.solve(others, (pulls.sum(axis=0) - pulls)[..., None])[..., 0]
         explained = np.einsum('bp,bp->b', x, 2.0 * pulls - np.einsum('bpq,bq->bp', mine, x))
         return np.asarray(self.squares - explained)
 
+    def _ask(self, index: Index) -> None:
+        """Multiply out what is not there yet of some columns with each other."""
+        lacking = ~self._have[np.ix_(index, index)]
+        while lacking.any():
+            first = int(np.argmax(lacking.sum(axis=1)))
+            alike = (lacking == lacking[first]).all(axis=1)
+            rows, others = index[alike], index[lacking[first]]
+            one, other = self._sorted(rows), self._sorted(others)
+            for normal, part in zip(self._normals, self.spans, strict=True):
+                block = one[:, part] @ other[:, part].T
+                normal[np.ix_(rows, others)] = block
+                normal[np.ix_(others, rows)] = block.T
+            self._have[np.ix_(rows, others)] = self._have[np.ix_(others, rows)] = True
+            lacking = ~self._have[np.ix_(index, index)]
+
+    def _sorted(self, index: Index) -> Array:
+        """Return some columns, fold by fold."""
+        own = self.columns[index]
+        return own if self.order is None else own[:, self.order]
+
     @cached_property
-    def total(self) -> tuple[Array, Array]:
-        """Return the normal equations of all folds together, shapes (P, P) and (P,)."""
-        return self.normals.sum(axis=0), self.rights.sum(axis=0)
+    def _normals(self) -> Array:
+        """Return room for the normal matrices, shape (B, P, P); what is not written costs nothing."""
+        return np.empty((len(self.spans), len(self.columns), len(self.columns)))
+
+    @cached_property
+    def _have(self) -> NDArray[np.bool_]:
+        """Return which entries of the normal matrices are there, shape (P, P)."""
+        return np.zeros((len(self.columns), len(self.columns)), dtype=bool)
+
+    @cached_property
+    def _rights(self) -> Array:
+        """Return the products with what is to be explained in every fold, shape (B, P)."""
+        weight = np.zeros((self.target.size, len(self.spans)))
+        rows = np.arange(self.target.size) if self.order is None else self.order
+        for fold, part in enumerate(self.spans):
+            weight[rows[part], fold] = self.target[rows[part]]
+        return np.asarray((self.columns @ weight).T)
+
+    @cached_property
+    def squares(self) -> Array:
+        """Return the square of what is to be explained in every fold, shape (B,)."""
+        target = self.target if self.order is None else self.target[self.order]
+        return np.array([target[part] @ target[part] for part in self.spans])
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,19 +171,31 @@ class Choosing:
     def shortlist(self, members: Sequence[Member]) -> list[int]:
         """Return the groups that would fit best in sample beside the members, best first."""
         index, precision = self._columns_of(members)
-        normal, right = self.ways[0].total
-        own = cho_factor(normal[np.ix_(index, index)] + np.diag(precision))
-        rest = right - normal[:, index] @ cho_solve(own, right[index])
+        columns, right = self.ways[0].columns, self._right
+        beside = columns @ columns[index].T
+        own = cho_factor(beside[index] + np.diag(precision))
+        rest = right - beside @ cho_solve(own, right[index])
         taken = {m.group for m in members}
         falls = {}
         for k, place in enumerate(self.places):
             if k in taken:
                 continue
-            cross = normal[np.ix_(index, place)]
-            left = normal[np.ix_(place, place)] - cross.T @ cho_solve(own, cross)
+            cross = beside[place].T
+            left = self._alone[k] - cross.T @ cho_solve(own, cross)
             left[np.diag_indices_from(left)] += RIDGES[1]
             falls[k] = float(rest[place] @ cho_solve(cho_factor(left), rest[place]))
         return sorted(falls, key=lambda k: -falls[k])[:SHORTLIST]
+
+    @cached_property
+    def _right(self) -> Array:
+        """Return the products of all columns with what is to be explained, shape (P,)."""
+        return np.asarray(self.ways[0].columns @ self.ways[0].target)
+
+    @cached_property
+    def _alone(self) -> list[Array]:
+        """Return the products of every group's columns with each other."""
+        each = (self.ways[0].columns[place] for place in self.places)
+        return [own @ own.T for own in each]
 
     def _columns_of(self, members: Sequence[Member]) -> tuple[Index, Array]:
         index = np.concatenate([self.fixed, *(self.places[m.group] for m in members)])

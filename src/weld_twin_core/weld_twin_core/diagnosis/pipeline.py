@@ -57,6 +57,7 @@ def diagnose(
     apply: bool = False,
     may_change: str | Iterable[str] = (),
     limits: Limits | None = None,
+    experiment: bool = True,
     progress: Progress = lambda text: None,
 ) -> Diagnosis:
     """
@@ -89,6 +90,8 @@ def diagnose(
         later recordings have that the first has not.
     limits : Limits, optional
         What the next experiment may cost, and where it has to stay.
+    experiment : bool
+        Plan the next experiment where one is needed; without, that takes no time.
     progress : callable
         Told in a few words what has been done.
 
@@ -133,7 +136,8 @@ def diagnose(
     if examined.posed is None:
         return refusal(examined)
     exclude = (*exclude, *not_told(examined.posed[0]))
-    return _explained(examined, exclude, holdout, beliefs, limits, progress)
+    asked = (limits or Limits()) if experiment else None
+    return _explained(examined, exclude, holdout, beliefs, asked, progress)
 
 
 def _explained(

@@ -141,20 +141,21 @@ class View:
         """Return the position of one joint, shape (..., N)."""
         return self.q[..., index]
 
-    def displaced(self, more: Shift, *, keep_frames: bool = False) -> View:
+    def displaced(self, *more: Shift, keep_frames: bool = False) -> View:
         """
         Return the view with more displacement.
 
         Parameters
         ----------
-        more : mapping of channel to array
+        more : mappings of channel to array
         keep_frames : bool
             The displacement moves no frame, so frames already worked out stay as they are.
 
         """
         total = dict(self.shift)
-        for key, value in more.items():
-            total[key] = total[key] + value if key in total else value
+        for shift in more:
+            for key, value in shift.items():
+                total[key] = total[key] + value if key in total else value
         out = replace(self, shift=total)
         if keep_frames and 'frames' in self.__dict__:
             out.__dict__['frames'] = self.frames

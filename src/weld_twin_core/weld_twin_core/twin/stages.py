@@ -135,8 +135,9 @@ class EffectStages:
                     own += indexed(k, effect.gradient(view))
                     for key, value in effect.slope(view).items():
                         slopes[key] = slopes.get(key, 0.0) + value
-            for shift in [effect.displace(view) for _, effect in effects]:
-                view = view.displaced(shift, keep_frames=stage in (Stage.LOAD, Stage.POSE))
+            if effects:
+                shifts = [effect.displace(view) for _, effect in effects]
+                view = view.displaced(*shifts, keep_frames=stage in (Stage.LOAD, Stage.POSE))
         before = [(k, c, _sloped(shift, slopes)) for k, c, shift in tangents or ()]
         return view, tuple(sorted(before + own, key=lambda item: item[:2]))
 

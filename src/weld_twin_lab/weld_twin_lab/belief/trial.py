@@ -85,6 +85,7 @@ def _diagnosed(case: Case) -> Diagnosis:
         known=effects_from_list([dict(item) for item in cell.known], cell.robot),
         exclude=case.excluded,
         holdout=[holdout],
+        experiment=False,
     )
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -244,10 +245,15 @@ def deviation(cell: Cell, causes: Sequence[Cause], taken: Take) -> Array:
 
     Samples are compared by their stamps, as whoever measures must.
     """
-    instrument = exact(cell.tracker)
-    moved, ideal = record(cell, causes, taken, instrument), record(cell, (), taken, instrument)
+    moved, ideal = record(cell, causes, taken, exact(cell.tracker)), _ideal(cell, taken)
     off = moved.position - at_stamps(ideal, moved.t_measured)
     return off - rigid(ideal.position, off) if 'base' in cell.align else off
+
+
+@lru_cache(maxsize=2)
+def _ideal(cell: Cell, taken: Take) -> PlantRecording:
+    """Return what the cell records without a cause and without noise; sizing asks for it often."""
+    return record(cell, (), taken, exact(cell.tracker))
 
 
 def at_stamps(made: PlantRecording, t: Array) -> Array:

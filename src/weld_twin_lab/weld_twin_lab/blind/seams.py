@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import json
 
 import numpy as np
 
@@ -57,12 +57,18 @@ def seam_motion(robot: Robot, span: float, rate: float, rng: np.random.Generator
 
 def working_posture(robot: Robot) -> Array:
     """Return a posture that bends the arm and stays away from the limits, shape (n,)."""
-    return np.array(_posture(robot))
-
-
-@lru_cache(maxsize=32)
-def _posture(robot: Robot) -> Array:
     bare = robot.with_frames(tool=np.eye(4))
+    key = json.dumps(bare.to_mapping())
+    if key not in _POSTURES:
+        _POSTURES[key] = _posture(bare)
+    return np.array(_POSTURES[key])
+
+
+_POSTURES: dict[str, Array] = {}
+"""By what robots say of themselves: every case has an object of its own."""
+
+
+def _posture(bare: Robot) -> Array:
     q = plan(bare, bundled_seam(bare, 'line'), 'smooth', 10.0, fit=True).motion.q
     return np.asarray(q[len(q) // 2])
 

@@ -82,20 +82,23 @@ def _rubbing(t: np.ndarray, q: np.ndarray, uneven: float, richness: float) -> np
     rest = np.exp(-dt / CREEP * np.exp(-((speed / STILL) ** 2)))
     follow = -np.expm1(-dt / (LOOP * max(richness, 1e-3)))
     force = yielded = 0.0
-    out = np.empty_like(q)
-    for k in range(len(q)):
-        force = (force * bend[k] + target[k] * (1.0 - bend[k])) * rest[k]
-        yielded += follow[k] * (force - yielded)
-        out[k] = yielded
-    return out
+    out = []
+    # Plain numbers: an entry of an array costs several times as much as what is done with it.
+    for b, w, r, f in zip(*(each.tolist() for each in (bend, target, rest, follow)), strict=True):
+        force = (force * b + w * (1.0 - b)) * r
+        yielded += f * (force - yielded)
+        out.append(yielded)
+    return np.array(out)
 
 
 def _contacts(q: np.ndarray, travel: float) -> np.ndarray:
     """Return the mean of the contacts' forces over what they let go at, shape (N,)."""
     gives = 2.0 * travel * (np.arange(CONTACTS) + 0.5) / CONTACTS
-    bent = np.zeros(CONTACTS)
-    out = np.empty_like(q)
-    for k, step in enumerate(np.diff(q, prepend=q[0])):
-        bent = np.clip(bent + step, -gives, gives)
-        out[k] = (bent / gives).mean()
-    return out
+    bent, least = np.zeros(CONTACTS), -gives
+    out = np.empty((q.size, CONTACTS))
+    for row, step in zip(out, np.diff(q, prepend=q[0]).tolist(), strict=True):
+        np.add(bent, step, out=bent)
+        np.maximum(bent, least, out=bent)
+        np.minimum(bent, gives, out=bent)
+        row[:] = bent
+    return np.asarray((out / gives).mean(axis=1))

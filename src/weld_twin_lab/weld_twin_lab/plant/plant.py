@@ -12,6 +12,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -108,6 +109,24 @@ class _Cell:
         """What the arm stands on."""
         return Pedestal(self.compliant, self.causes)
 
+    def seen(self, t: np.ndarray, rng: np.random.Generator) -> Motion:
+        """
+        Return `true_poses`, worked out once for the same instants and the same chance.
+
+        A recording with noise, the same without, and the same again are asked for one by one.
+        """
+        chance = rng.bit_generator
+        key = t.tobytes(), repr(chance.state)
+        if key not in self._seen:
+            pose = true_poses(self, t, rng)
+            self._seen[key] = pose, chance.state
+        pose, chance.state = self._seen[key]
+        return pose
+
+    @cached_property
+    def _seen(self) -> dict[tuple[bytes, str], tuple[Motion, Any]]:
+        return {}
+
     def leaned(self, t: np.ndarray) -> Motion:
         """Return how the base has turned at true times (M,) [s], in its own frame."""
         if self.pedestal.stiff:
@@ -182,7 +201,7 @@ def _record(cell: _Cell, instrument: Tracker, rng: np.random.Generator) -> Plant
         stamps = sensors.stamped(t, instrument.jitter, rng)
         t_joint = sensors.instants(command.t, instrument.joint_rate, instrument.joint_drop, rng)
         joint_stamps = sensors.stamped(t_joint, instrument.joint_jitter, rng)
-    pose = true_poses(cell, t, rng)
+    pose = cell.seen(t, rng)
     floors = [float(item['sigma']) for item in cell.causes.of('measurement_noise')]
     sigma = float(np.linalg.norm([instrument.sigma, *floors]))
     position, quaternion = sensors.observe(instrument, pose, sigma, rng)

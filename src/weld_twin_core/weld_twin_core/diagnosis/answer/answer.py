@@ -68,8 +68,8 @@ def answer(
         What explains the gap without a formula.
     placing : FreeForm or None
         What tells place and dependence of an unknown gap.
-    limits : Limits, optional
-        What the next experiment may cost, and where it has to stay.
+    limits : Limits or None
+        What the next experiment may cost, and where it has to stay; None plans none.
     stability : Stability or None
         What halves of the data say of the names.
 
@@ -89,7 +89,7 @@ def answer(
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,
         unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, placing),
-        next_experiment=next_step(found, verdict, limits, rival),
+        next_experiment=None if limits is None else next_step(found, verdict, limits, rival),
         actions=actions([named.effect for named in effects], found.baseline.model.robot),
         model=found.final.model,
         families=verdict.families,

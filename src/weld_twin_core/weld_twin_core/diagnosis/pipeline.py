@@ -167,6 +167,7 @@ def _explained(
     found, least = parted_elsewhere(found, holdout, beliefs)
     found, stability = steadied(found, repeated(found), beliefs)
     evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least)
+    unseen.forget_other_parts()
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict, beliefs)
     verdict = held_against(verdict, unseen, rival, beliefs)

@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
@@ -127,6 +126,8 @@ def _seen_from_before(recording: Recording, robot: Robot) -> Recording:
         return recording
     nominal = Twin(robot).poses(recording, measured.t).position
     middle, goal = measured.position.mean(axis=0), nominal.mean(axis=0)
+    from scipy.spatial.transform import Rotation  # 30 ms that most commands do not need
+
     turn = Rotation.align_vectors(nominal - goal, measured.position - middle)[0].as_matrix()
     moved = (measured.position - middle) @ turn.T + goal
     rotation = None if measured.rotation is None else turn @ measured.rotation

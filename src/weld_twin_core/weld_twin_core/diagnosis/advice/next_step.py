@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import erfc, sqrt
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtr
 
 from ...effects import REGISTRY
 from ...effects.effect import Effect
@@ -134,7 +134,8 @@ def promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     sigma = wanted['expected_separation_sigma']
     if wanted['between'] is None or wanted['motion'] is None or sigma is None:
         return None
-    parted = float(ndtr(np.log(max(sigma, 1e-9) / DECIDES) / np.log(FORESEEN)))
+    beyond = np.log(max(sigma, 1e-9) / DECIDES) / np.log(FORESEEN)
+    parted = 0.5 * erfc(-beyond / sqrt(2.0))
     if verdict.status != 'unknown':
         return parted * (NAMED + GAINED * verdict.confidence)
     named = all(REGISTRY[item['effect']].cause for side in wanted['between'] for item in side)

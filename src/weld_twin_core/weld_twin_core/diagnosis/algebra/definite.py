@@ -8,11 +8,16 @@ A copy of a matrix of more than a thousand columns takes as long as a good part 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import LinAlgError
+from scipy.linalg.blas import dsymm, dsymv
 from scipy.linalg.lapack import dpocon, dpotrf, dpotri, dpotrs, dtrtri
 
 from ...arrays import Array
+from .gram import Index
 
 SAFE = 100.0
 """The condition is an estimate, good to some factor: so much is left between."""
@@ -41,6 +46,86 @@ def inverted(matrix: Array) -> Array:
         upper[here, here] = corner + np.triu(corner, 1).T
         upper[start + STRIP :, here] = upper[here, start + STRIP :].T
     return np.asarray(upper)
+
+
+@dataclass(frozen=True, eq=False)
+class Triangle:
+    """
+    A symmetric matrix, kept as one triangle.
+
+    Attributes
+    ----------
+    square : array, shape (P, P)
+        In Fortran order; its other triangle may hold anything.
+    lower : bool
+        Which triangle counts.
+    unit : array, shape (P,)
+        What rows and columns are multiplied by.
+
+    """
+
+    square: Array
+    lower: bool
+    unit: Array
+
+    def times(self, right: Array) -> Array:
+        """Return the product with a vector, shape (P,), or with several, shape (P, R)."""
+        if right.ndim == 1:
+            return np.asarray(
+                self.unit * dsymv(1.0, self.square, self.unit * right, lower=self.lower)
+            )
+        unit = self.unit[:, None]
+        return np.asarray(unit * dsymm(1.0, self.square, unit * right, lower=self.lower))
+
+    def among(self, index: Index) -> Array:
+        """Return the rows and columns of some numbers, ascending, shape (n, n)."""
+        part = self.square[np.ix_(index, index)]
+        half = np.tril(part, -1) if self.lower else np.triu(part, 1)
+        whole = half + half.T
+        whole[np.diag_indices_from(whole)] = np.diag(part)
+        return np.asarray(whole * np.outer(self.unit[index], self.unit[index]))
+
+
+def inverses(scaled: Iterable[tuple[Array, Array]]) -> list[Triangle]:
+    """
+    Return the inverses of symmetric matrices of one size, two in the room of one.
+
+    Parameters
+    ----------
+    scaled : iterable of (array (P, P), array (P,))
+        Each matrix, and what rows and columns of its inverse are multiplied by.
+
+    Raises
+    ------
+    LinAlgError
+        A matrix is not positive definite.
+
+    """
+    out: list[Triangle] = []
+    for matrix, unit in scaled:
+        lower, count = len(out) % 2 == 0, len(matrix)
+        if lower:
+            room = np.empty((count, count + 1), order='F')
+        square = room[:, :count] if lower else room[:, 1:]
+        _put(square, matrix, lower=lower)
+        factor, failed = dpotrf(square, lower=lower, clean=0, overwrite_a=1)
+        if failed:
+            raise LinAlgError('the matrix is not positive definite')
+        out.append(Triangle(dpotri(factor, lower=lower, overwrite_c=1)[0], lower, unit))
+    return out
+
+
+def _put(square: Array, matrix: Array, *, lower: bool) -> None:
+    """Write one triangle of a symmetric matrix into a square, and leave the other as it is."""
+    for start in range(0, len(matrix), STRIP):
+        here, beyond = slice(start, start + STRIP), slice(start + STRIP, None)
+        corner = matrix[here, here]
+        own = np.tri(len(corner), dtype=bool)
+        np.copyto(square[here, here], corner, where=own if lower else own.T)
+        if lower:
+            square[beyond, here] = matrix[beyond, here]
+        else:
+            square[here, beyond] = matrix[here, beyond]
 
 
 def well_conditioned(matrix: Array, least: float) -> bool:

@@ -25,7 +25,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
 from ..algebra.atoms import Rows
-from ..algebra.definite import inverted
+from ..algebra.definite import Triangle, inverses
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
 from ..algebra.gram import Index
@@ -112,6 +112,10 @@ class Unseen:
             self._others[key] = replace(self, labels=labels)
         return self._others[key]
 
+    def forget_other_parts(self) -> None:
+        """Let go of what was worked out for other parts: with many columns it is a hundred MB."""
+        self._others.clear()
+
     @cached_property
     def _others(self) -> dict[bytes, Unseen]:
         return {}
@@ -134,30 +138,28 @@ class Unseen:
         residual = mix @ self.targets
         for b, rows in enumerate(self._spans):
             inverse = self._inverses[b]
-            step = inverse @ self._right(b, mix)
+            step = inverse.times(self._right(b, mix))
             if gone.size:
-                force = np.linalg.solve(inverse[np.ix_(gone, gone)], step[gone])
-                step = step - inverse[:, gone] @ force
+                force = np.zeros(step.size)
+                force[gone] = np.linalg.solve(inverse.among(gone), step[gone])
+                step = step - inverse.times(force)
             residual[rows] -= self._stretches[b].mixed(step)
         return residual
 
     @cached_property
-    def _inverses(self) -> list[Array]:
+    def _inverses(self) -> list[Triangle]:
         """Return the inverse of all normal equations without every stretch."""
-        return [self._inverse(b) for b in range(len(self._spans))]
+        return inverses(self._scaled(b) for b in range(len(self._spans)))
 
-    def _inverse(self, b: int) -> Array:
-        """Return the inverse of all normal equations without one stretch, shape (P, P)."""
+    def _scaled(self, b: int) -> tuple[Array, Array]:
+        """Return all normal equations without one stretch, scaled, and by what, (P, P) and (P,)."""
         system = self._system(b, np.arange(self.columns.count))
         size = np.sqrt(np.maximum(np.diag(system), 0.0))
         unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
         system *= unit[:, None]
         system *= unit
         system[np.diag_indices_from(system)] += DAMPING
-        inverse = inverted(system)
-        inverse *= unit[:, None]
-        inverse *= unit
-        return inverse
+        return system, unit
 
     def base(self, kept: Sequence[int]) -> Base:
         """Return a model of some effects, fitted with each stretch left out in turn."""
@@ -175,7 +177,7 @@ class Unseen:
     def _solver(self, b: int, index: Index) -> Solver:
         """Return what solves the normal equations of some columns without one stretch."""
         if index.size == self.columns.count > MANY:
-            return partial(np.matmul, self._inverses[b])
+            return self._inverses[b].times
         system, size = unit_diagonal(self._system(b, index), DAMPING)
         return partial(_solved, cho_factor(system, overwrite_a=True), size)
 

@@ -217,7 +217,7 @@ class Twin(EffectStages):
             if self.of_stage(Stage.CLOCK):
                 t = t - self.behind(t - motion.t[0], static=motion.static)
             q, qd, *sides = recording.at(t)
-            picker = Picker(motion, t)
+            picker = Picker(motion, t) if moved is not None or tangents else None
         if moved is not None:
             q = q + (moved if picker is None else picker.take(moved))
             qd = qd + (rates(motion, moved) if picker is None else picker.rates(moved))

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError
 
 from ...arrays import Array
 from ...effects.setup_motion import of_the_robot
@@ -27,6 +27,7 @@ from ...recording import Recording
 from ...twin.domain import Domain
 from ...twin.posterior import Directions, Posterior, postures_within_limits, usual_sigma
 from ...twin.twin import Twin
+from ..algebra.definite import inverted, solved
 from ..algebra.designed import designed
 from ..algebra.fit import LEAST_TURN, coordinates
 from ..algebra.independent_rows import effective_share
@@ -293,18 +294,19 @@ def learned(rows: Rows, prior: Prior, expected: float = 1.0) -> tuple[Array, flo
 
 def _solved(normal: Array, right: Array, middle: Array, size: Array) -> tuple[Array, Array]:
     """Return mean and variance of coordinates with a prior about ``middle``, shapes (P,)."""
-    factor = _factor(normal * np.outer(size, size))
-    mean = middle + size * cho_solve(factor, size * (right - normal @ middle))
-    spread = np.diag(cho_solve(factor, np.eye(size.size))) * size**2
-    return mean, spread
+    system = _with_prior(normal * np.outer(size, size))
+    found = solved(system, size * (right - normal @ middle))
+    if found is None:
+        raise LinAlgError('the information of the data is not definite')
+    return middle + size * found[0], found[1] * size**2
 
 
-def _factor(information: Array) -> tuple[Array, bool]:
-    """Return the Cholesky factor of the data's information and a prior of unit width."""
+def _with_prior(information: Array) -> Array:
+    """Return the data's information with a prior of unit width added, in its place."""
     # Rounding of the largest entries must not outweigh the prior in open directions.
     jitter = 1.0 + 1e-14 * float(np.trace(information))
-    factor, lower = cho_factor(information + jitter * np.eye(information.shape[0]))
-    return factor, bool(lower)
+    information[np.diag_indices_from(information)] += jitter
+    return information
 
 
 class Conditioning:
@@ -345,7 +347,7 @@ class Conditioning:
         if but is not None:
             less = self._unit[:, but]
             system, right = system - less @ less.T, right - less @ self._wanted[but]
-        inverse = cho_solve(_factor(system), np.eye(width.size))
+        inverse = inverted(_with_prior(system.copy()))
         right = right - system @ (self._prior.middle / width)
         mean = self._prior.middle + width * (inverse @ right)
-        return mean, 0.5 * (inverse + inverse.T) * np.outer(width, width)
+        return mean, inverse * np.outer(width, width)

@@ -167,7 +167,6 @@ def _explained(
     found, least = parted_elsewhere(found, holdout, beliefs)
     found, stability = steadied(found, repeated(found), beliefs)
     evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least)
-    unseen.forget_other_parts()
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict, beliefs)
     verdict = held_against(verdict, unseen, rival, beliefs)
@@ -175,6 +174,7 @@ def _explained(
     each = signs_of_found(found, unseen, evidence, verdict, back, holdout)
     checks = examined.checks
     signs = Signs(signs_of_answer(found, unseen, evidence, verdict, rival, checks, each), each)
+    unseen.forget_other_parts()
     places = placed(found, verdict, rival, beliefs)
     progress('held against curves without a formula')
     found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)

@@ -101,11 +101,17 @@ class Normals:
 def _left(matrices: Array) -> Array:
     """Return what columns leave of the last one, its length, shape (K,)."""
     size = np.sqrt(np.maximum(np.diagonal(matrices, axis1=1, axis2=2), 1e-300))
-    scaled = matrices / size[:, :, None] / size[:, None, :]
-    columns, cross = scaled[:, :-1, :-1], scaled[:, :-1, -1:]
-    held = columns + LOOSE * np.eye(columns.shape[1])
-    taken = (cross * np.linalg.solve(held, cross)).sum(axis=(1, 2))
-    return np.asarray(size[:, -1] * np.sqrt(np.maximum(1.0 - taken, 0.0)))
+    scaled = matrices / size[:, :, None]
+    scaled /= size[:, None, :]
+    each = np.arange(matrices.shape[1] - 1)
+    scaled[:, each, each] += LOOSE
+    try:
+        # The last pivot of the factor is what is left, at half the work of solving.
+        return np.asarray(size[:, -1] * np.linalg.cholesky(scaled)[:, -1, -1])
+    except np.linalg.LinAlgError:  # one of them leaves nothing but rounding
+        cross = scaled[:, :-1, -1:]
+        taken = (cross * np.linalg.solve(scaled[:, :-1, :-1], cross)).sum(axis=(1, 2))
+        return np.asarray(size[:, -1] * np.sqrt(np.maximum(1.0 - taken, 0.0)))
 
 
 def normals(

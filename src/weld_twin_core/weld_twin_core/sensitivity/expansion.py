@@ -23,7 +23,7 @@ from ..arm.chain import jacobian
 from ..arrays import Array
 from ..effects import REGISTRY, Stage
 from ..twin.twin import Twin
-from .memory_draws import MEMORY, Remembered, remembered
+from .memory_draws import MEMORY, Remembered, Rest, remembered
 from .outcome import Outcomes, joined, outcomes
 from .seam_study import Study
 from .tolerance import Tolerance, with_draws
@@ -31,7 +31,7 @@ from .tolerance import Tolerance, with_draws
 CHUNK = 30_000
 """Runs times path points worked on at once; a few of such arrays fit the processor's cache."""
 Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
-_BLOCK = 1024
+_BLOCK = 2048
 """Runs whose play and lag are worked out together; larger arrays than these cost page faults."""
 _RANK = 1e-6
 """Shapes weaker than this part of the strongest are left out."""
@@ -89,25 +89,29 @@ class Expansion:
 
     def _left(self, draws: Array) -> _Left:
         """Return what the slopes leave, the path points where any joint has something put last."""
-        rests = [part.rest(self.study, draws) for part in self.memory]
-        where = np.zeros(self.study.samples, dtype=bool)
-        for rest in rests:
-            where |= rest.where
-        joints = [
-            (rest.table[:, None, where] * moved[:, where], rest.row)
-            for rest, moved in zip(rests, self.moved, strict=True)
-        ]
-        order = np.argsort(where, kind='stable')
-        return _Left(order, np.ascontiguousarray(self.shapes[:, :, order]), joints)
+        found = [part.rest(draws) for part in self.memory]
+        somewhere = np.zeros(self.study.samples, dtype=bool)
+        for _, where in found:
+            somewhere[where] = True
+        order = np.argsort(somewhere, kind='stable')
+        place = np.argsort(order) - (self.study.samples - int(somewhere.sum()))
+        carried = np.zeros((3, sum(w.size for _, w in found), int(somewhere.sum())))
+        start = 0
+        for (_, where), moved in zip(found, self.moved, strict=True):
+            rows = np.arange(start, start + where.size)
+            carried[:, rows, place[where]] = moved[:, where]
+            start += where.size
+        shapes = np.ascontiguousarray(self.shapes[:, :, order])
+        return _Left(order, shapes, [rest for rest, _ in found], carried)
 
     def _deviations(self, draws: Array, left: _Left, chunk: slice) -> Array:
         x = np.ascontiguousarray((draws / self.scale).T)
         first, second = self.products
         features = np.concatenate([x, x[first] * x[second]])
         out: Array = (features.T @ self.weights) @ left.shapes
-        for table, row in left.joints:
-            touched = out[:, :, out.shape[2] - table.shape[2] :]
-            touched += table[row[chunk]].swapaxes(0, 1)
+        if left.carried.size:
+            rests = np.concatenate([rest.of(chunk) for rest in left.rests], axis=1)
+            out[:, :, out.shape[2] - left.carried.shape[2] :] += rests @ left.carried
         return out
 
 
@@ -116,12 +120,14 @@ class _Left(NamedTuple):
     What the slopes leave of some draws.
 
     ``order`` of the path points (N,) puts those where anything is left last, K of them;
-    ``shapes`` are in it. ``joints`` are deviations (U, 3, K) there, and which a draw has (D,).
+    ``shapes`` are in it. ``rests`` are displacements of the joints, S columns in all, and
+    ``carried`` (3, S, K) how far each moves the tool there.
     """
 
     order: NDArray[np.intp]
     shapes: Array
-    joints: list[tuple[Array, NDArray[np.intp]]]
+    rests: list[Rest]
+    carried: Array
 
 
 def expandable(tolerances: Sequence[Tolerance]) -> bool:

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,23 +23,40 @@ from .tolerance import Tolerance, with_draws
 MEMORY = (Stage.SERVO, Stage.PLAY)
 _NOTHING = 1e-15
 """Below this displacement [rad or m] nothing is left to carry."""
+_STRAIGHT = 1e-10
+"""How far [rad or m] a displacement may be from the straight line between two knots: at the end of
+an arm of a metre that is a tenth of a nanometre, a millionth of what play does there."""
+_COARSE = 64
+"""Even steps that a table begins with; each is halved where the displacement bends."""
+_HALVINGS = 24
+"""Halvings after which steps are below what is left of the numbers' precision."""
+_KNOTS = 4096
+"""Knots beyond which a table costs more than the draws it is for: a long recording of a joint
+that turns often bends at very many widths."""
 
 
 class Rest(NamedTuple):
     """
-    What the slope leaves: displacements of every different draw, shape (U, N).
+    What the slope leaves of the displacements by some draws, at the path points where it does.
 
-    ``row`` says which of them a draw has, shape (D,).
+    ``table`` (B, K) holds it at some values, ``rise`` (B, K) how much the next value adds, or
+    None; a draw (D,) is the ``row`` and its ``part`` of the way to the next.
     """
 
     table: Array
+    rise: Array | None
     row: NDArray[np.intp]
+    part: Array | None
 
-    @property
-    def where(self) -> NDArray[np.bool_]:
-        """Return at which path points anything is left, shape (N,)."""
-        found: NDArray[np.bool_] = np.abs(self.table).max(axis=0) > _NOTHING
-        return found
+    def of(self, draws: slice) -> Array:
+        """Return the displacements of some of the draws, shape (D, K)."""
+        row = self.row[draws]
+        out = self.table[row]
+        if self.rise is not None and self.part is not None:
+            more = self.rise[row]
+            more *= self.part[draws, None]
+            out += more
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +66,7 @@ class Remembered:
 
     Attributes
     ----------
+    study : Study
     joint : int
     columns : tuple of int
         Which tolerances of the study are its own, M of them.
@@ -58,17 +77,99 @@ class Remembered:
 
     """
 
+    study: Study
     joint: int
     columns: tuple[int, ...]
     tolerances: tuple[Tolerance, ...]
     slope: Array
 
-    def rest(self, study: Study, draws: Array) -> Rest:
-        """Return what the slope leaves of the displacements by draws, shape (D, P)."""
-        own, row = _different(draws[:, self.columns])
-        left = displacement(study, self.joint, self.tolerances, own)
-        left -= own @ self.slope
-        return Rest(left, row)
+    def left(self, own: Array) -> Array:
+        """Return what the slope leaves of the displacements by draws (D, M), shape (D, N)."""
+        out = displacement(self.study, self.joint, self.tolerances, own)
+        out -= own @ self.slope
+        return out
+
+    @cached_property
+    def table(self) -> tuple[Array, Array] | None:
+        """
+        Return values of the one tolerance (B,) and what the slope leaves there (B, N).
+
+        Between them it is straight, as play is in its width. None where there are several
+        tolerances, or too many bends.
+        """
+        if len(self.columns) != 1:
+            return None
+        ends = self.tolerances[0].distribution.values([0.0, 1.0])
+        return _straight_between(lambda x: self.left(x[:, None]), *ends)
+
+    def rest(self, draws: Array) -> tuple[Rest, NDArray[np.intp]]:
+        """Return what the slope leaves of draws (D, P), and at which path points (K,)."""
+        own = draws[:, self.columns]
+        if self.table is not None:
+            knots, values = self.table
+            one = own[:, 0]
+            if knots[0] <= one.min() and one.max() <= knots[-1]:
+                row = np.clip(np.searchsorted(knots, one, 'right') - 1, 0, knots.size - 2)
+                part = (one - knots[row]) / (knots[row + 1] - knots[row])
+                where, table, rise = self._carried
+                return Rest(table, rise, row, part), where
+        different, row = _different(own)
+        left = self.left(different)
+        where = _somewhere(left)
+        return Rest(left[:, where], None, row, None), where
+
+    @cached_property
+    def _carried(self) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return the path points where the table has anything, and the table and its rise there."""
+        assert self.table is not None
+        values = self.table[1]
+        where = _somewhere(values)
+        table = np.ascontiguousarray(values[:, where])
+        return where, table[:-1], np.diff(table, axis=0)
+
+
+def _somewhere(values: Array) -> NDArray[np.intp]:
+    """Return the columns of (B, N) that hold anything."""
+    return np.flatnonzero(np.abs(values).max(axis=0) > _NOTHING)
+
+
+def _straight_between(
+    function: Callable[[Array], Array], low: float, high: float
+) -> tuple[Array, Array] | None:
+    """
+    Return knots (B,) and a function's values there (B, N), straight between them to `_STRAIGHT`.
+
+    Steps are halved where the middle is off the straight line; None where that takes too many.
+    """
+    knots = np.linspace(low, high, _COARSE + 1)
+    values = function(knots)
+    first = np.arange(_COARSE)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (knots[first] + knots[first + 1])
+        between = function(middle)
+        off = np.abs(between - 0.5 * (values[first] + values[first + 1])).max(axis=1)
+        bent = off > _STRAIGHT
+        if not bent.any():
+            break
+        if knots.size + bent.sum() > _KNOTS:
+            return None
+        at = first[bent] + 1
+        knots = np.insert(knots, at, middle[bent])
+        values = np.insert(values, at, between[bent], axis=0)
+        # Both halves of a step that was halved are looked at again; all others are straight.
+        place = at - 1 + np.arange(at.size)
+        first = np.stack([place, place + 1], axis=1).ravel()
+    return _needed(knots, values)
+
+
+def _needed(knots: Array, values: Array) -> tuple[Array, Array]:
+    """Return the knots where something bends, and the two ends."""
+    inner = knots[1:-1]
+    part = ((inner - knots[:-2]) / (knots[2:] - knots[:-2]))[:, None]
+    line = values[:-2] + part * (values[2:] - values[:-2])
+    bends = np.abs(values[1:-1] - line).max(axis=1) > 0.01 * _STRAIGHT
+    keep = np.concatenate([[True], bends, [True]])
+    return knots[keep], values[keep]
 
 
 def _different(draws: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -103,7 +204,7 @@ def remembered(
         own = tuple(tolerances[k] for k in members)
         size = scale[members]
         slope = displacement(study, joint, own, np.diag(size)) / size[:, None]
-        out.append(Remembered(joint, tuple(members), own, slope))
+        out.append(Remembered(study, joint, tuple(members), own, slope))
     return tuple(out)
 
 

@@ -8,20 +8,24 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.markdown import table
 
+from ..blind.diagnosing import engine_digest
 from . import waiting_data as data
+from .costs import Cost, cost_of
 
-Tell = Callable[[str], None]
+Entry = dict[str, Any]
+"""What one job costs, and when and with which versions that was measured."""
+Keep = Callable[[Entry], None]
 
 
 @dataclass(frozen=True)
@@ -113,15 +117,9 @@ JOBS = (
 )
 
 
-class Cost(NamedTuple):
-    """Seconds on the clock, seconds of processor time, and the largest process [bytes]."""
-
-    wall: float
-    cpu: float
-    peak: float
-
-
-def measured(base: Path | None, out: Path, runs: int, only: Sequence[str], tell: Tell) -> Any:
+def measured(
+    base: Path | None, out: Path, runs: int, only: Sequence[str], keep: Keep
+) -> list[Entry]:
     """
     Return what every job costs, here and in another checkout, in turn.
 
@@ -135,8 +133,8 @@ def measured(base: Path | None, out: Path, runs: int, only: Sequence[str], tell:
         Pairs of runs after one to warm up; jobs that take long are run once.
     only : sequence of str
         Parts of the names of jobs; empty for all.
-    tell : callable
-        Told what has been done.
+    keep : callable
+        Given each entry as soon as it has been measured.
 
     Raises
     ------
@@ -154,14 +152,48 @@ def measured(base: Path | None, out: Path, runs: int, only: Sequence[str], tell:
     if not wanted:
         raise DataError(f'no job is called {", ".join(only)}; leave --only out to see all')
     out.mkdir(parents=True, exist_ok=True)
+    versions = {'engine': engine_digest()[:16], 'commit': commit_of(Path(__file__).parent)}
+    if base is not None:
+        versions['base'] = commit_of(base)
     entries = []
     for job in wanted:
-        entries.append(_entry(job, pythons, out, runs))
-        tell(f'{job.name}: {entries[-1]}')
+        # Others on the machine: with them, seconds on the clock mean little.
+        about = {**versions, 'on': date.today().isoformat(), 'load': os.getloadavg()[0]}
+        entries.append({**_entry(job, pythons, out, runs), 'measured': about})
+        keep(entries[-1])
     return entries
 
 
-def _entry(job: Job, pythons: dict[str, str], out: Path, runs: int) -> dict[str, Any]:
+def commit_of(place: Path) -> str:
+    """Return the commit of a checkout, with '+' where files differ from it; '' for no checkout."""
+    try:
+        said = subprocess.run(
+            ['git', '-C', str(place), 'describe', '--always', '--abbrev=7', '--dirty=+']
+            + ['--exclude=*'],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    except OSError:  # no git here
+        return ''
+    return said.stdout.strip()
+
+
+def merged(kept: Sequence[Entry], new: Sequence[Entry]) -> list[Entry]:
+    """
+    Return entries measured earlier with the new ones in their places, in the order of `JOBS`.
+
+    Parameters
+    ----------
+    kept, new : sequence of dict
+        As `measured` gives them. What is no job any more is left out.
+
+    """
+    found = {entry['job']: entry for entry in (*kept, *new)}
+    return [found[job.name] for job in JOBS if job.name in found]
+
+
+def _entry(job: Job, pythons: dict[str, str], out: Path, runs: int) -> Entry:
     place = data.made(job.needs, out) if job.needs else Path()
     costs: dict[str, list[Cost]] = {name: [] for name in pythons}
     for turn in range(1 if job.once else runs + 1):
@@ -171,7 +203,7 @@ def _entry(job: Job, pythons: dict[str, str], out: Path, runs: int) -> dict[str,
                 raise DataError(f'the command of {job.name!r} fails; run it by hand to see why')
             if cost is not None and (turn or job.once):
                 costs[name].append(cost)
-    entry: dict[str, Any] = {'job': job.name, 'runs': len(costs['here'])}
+    entry: Entry = {'job': job.name, 'runs': len(costs['here'])}
     for name, own in costs.items():
         if own:
             wall, cpu, peak = np.median(np.array(own), axis=0)
@@ -191,34 +223,28 @@ def _run(words: Sequence[str], place: Path, written: Path) -> Cost | None:
     # An installed program is compiled once, whatever the shell of this run says of that.
     odd = ('PYTHONPATH', 'PYTHONDONTWRITEBYTECODE')
     quiet = {key: value for key, value in os.environ.items() if key not in odd}
-    start = time.perf_counter()
-    process = subprocess.Popen(
-        filled, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=quiet
-    )
-    _, status, used = os.wait4(process.pid, 0)
-    wall = time.perf_counter() - start
-    process.returncode = os.waitstatus_to_exitcode(status)
+    code, cost = cost_of(filled, environment=quiet)
     shutil.rmtree(written, ignore_errors=True)
-    if process.returncode != 0:
-        return None
-    return Cost(wall, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024.0)
+    return cost if code == 0 else None
 
 
-def page(entries: Sequence[dict[str, Any]]) -> str:
+def page(entries: Sequence[Entry]) -> str:
     """Return the table with what a reader must know of it, in Markdown."""
     return (
         '# What people wait for\n\n'
-        'Whole commands, started cold, by `weld-twin lab waits`. Ratios are medians of pairs of runs; '
-        'the cases, robots and effects of an earlier version are fewer, so its blind cases are '
-        'not the same.\n\n' + summary(entries)
+        'Whole commands, started cold, by `weld-twin lab waits`. Ratios are medians of pairs of '
+        'runs; the cases, robots and effects of an earlier version are fewer, so its blind cases '
+        'are not the same. Memory is that of the largest process. A row tells the day and the '
+        'commit it was measured on, and how many others were at work on the machine (its load).'
+        '\n\n' + summary(entries)
     )
 
 
-def summary(entries: Sequence[dict[str, Any]]) -> str:
+def summary(entries: Sequence[Entry]) -> str:
     """Return the table in Markdown."""
     rows: list[Sequence[object]] = [
         ('job', 'wall [s]', 'processor [s]', 'memory [MB]', 'before: wall, processor, memory')
-        + ('times as fast: wall, processor', 'share of the memory')
+        + ('times as fast: wall, processor', 'share of the memory', 'measured')
     ]
     for entry in entries:
         now, before, ratio = entry['here'], entry.get('base'), entry.get('ratio')
@@ -231,6 +257,7 @@ def summary(entries: Sequence[dict[str, Any]]) -> str:
                 '' if before is None else _told(before),
                 '' if ratio is None else f'{1 / ratio["wall"]:.2f}, {1 / ratio["cpu"]:.2f}',
                 '' if ratio is None else f'{ratio["peak"]:.2f}',
+                _when(entry),
             )
         )
     return table(*rows)
@@ -238,3 +265,11 @@ def summary(entries: Sequence[dict[str, Any]]) -> str:
 
 def _told(cost: dict[str, float]) -> str:
     return f'{cost["wall"]:.3g}, {cost["cpu"]:.3g}, {cost["peak"] / 1e6:.0f}'
+
+
+def _when(entry: Entry) -> str:
+    about = entry.get('measured')
+    if about is None:  # entries of earlier versions do not say
+        return ''
+    beside = f' beside {about["base"]}' if about.get('base') else ''
+    return f'{about["on"]}, {about["commit"]}{beside}, load {about["load"]:.1f}'

@@ -3,13 +3,20 @@
 """What people wait for: whole commands started cold, beside those of another checkout.
 
 Runs each command here and there in turn. Ratios of pairs count: the machine's own speed drifts.
-Writes waits.json and waits.md.
+Writes waits.json and waits.md. With --only, the other rows of a waits.json in --out stay as they
+are; every row says when and with which versions it was measured.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ...benchmark.waiting import Entry
+
+WAITS = 'waits.json'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,23 +35,50 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure all jobs and print the table."""
-    import json
     import sys
     from tempfile import TemporaryDirectory
 
-    from weld_twin_msgs_py.files.whole_files import write_text
-
-    from ...benchmark.waiting import measured, page, summary
-
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
+    from ...benchmark.waiting import measured, summary
 
     out = Path(args.out)
-    out.mkdir(parents=True, exist_ok=True)
+    kept = _kept(out / WAITS) if args.only else []
     base = None if args.base is None else Path(args.base)
+
+    def keep(entry: Entry) -> None:
+        nonlocal kept
+        print(f'{entry["job"]}: {entry}', file=sys.stderr, flush=True)
+        kept = _written(out, kept, entry)
+
     with TemporaryDirectory() as folder:
-        entries = measured(base, Path(folder), max(args.runs, 1), args.only, tell)
-    write_text(out / 'waits.json', json.dumps(entries, indent=1) + '\n')
-    write_text(out / 'waits.md', page(entries))
-    print(summary(entries))
+        measured(base, Path(folder), max(args.runs, 1), args.only, keep)
+    print(summary(kept))
     return 0
+
+
+def _kept(file: Path) -> list[Entry]:
+    """Return the rows that were measured before; none where there are none."""
+    import json
+
+    from weld_twin_core.errors import DataError
+
+    if not file.exists():
+        return []
+    try:
+        found: list[Entry] = json.loads(file.read_text(encoding='utf-8'))
+    except ValueError:
+        raise DataError(f"'{file}' is damaged; remove it to measure all jobs anew") from None
+    return found
+
+
+def _written(out: Path, kept: list[Entry], entry: Entry) -> list[Entry]:
+    """Write the rows with a new one among them; return them."""
+    import json
+
+    from weld_twin_msgs_py.files.whole_files import write_text
+
+    from ...benchmark.waiting import merged, page
+
+    rows = merged(kept, [entry])
+    write_text(out / WAITS, json.dumps(rows, indent=1) + '\n', overwrite=True)
+    write_text(out / 'waits.md', page(rows), overwrite=True)
+    return rows

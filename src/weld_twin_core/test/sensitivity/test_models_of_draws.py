@@ -27,6 +27,7 @@ from weld_twin_core.sensitivity import (
     tolerance_stack,
     tolerances_from_list,
 )
+from weld_twin_core.sensitivity.memory_draws import remembered
 from weld_twin_core.sensitivity.outcome import outcomes
 
 
@@ -118,6 +119,22 @@ def test_fast_model_agrees_with_the_exact_twin_run_by_run(study, families):
     for found, wanted in zip(fast(draws), exact(draws), strict=True):
         np.testing.assert_allclose(found, wanted, rtol=1e-3)
     assert fast.error < 1e-3
+
+
+@pytest.mark.parametrize('family', ['backlash', 'servo_lag', 'friction'])
+def test_what_a_joint_remembers_is_the_same_from_a_table_as_run_by_run(study, family):
+    tolerances = default_tolerances(study.robot, (family,))[:3]
+    joints = remembered(study, tolerances, np.array([t.distribution.std for t in tolerances]))
+    for joint in joints:
+        assert joint.table is None or joint.table[0].size < 500
+        draws = draws_at(tolerances, np.random.default_rng(2).random((200, len(tolerances))))
+        rest, where = joint.rest(draws)
+        found = np.zeros((200, study.samples))
+        found[:, where] = rest.of(slice(None))
+        np.testing.assert_allclose(found, joint.left(draws[:, joint.columns]), atol=3e-10)
+    # Draws beyond what the tolerances can be are run one by one.
+    beyond, where = joints[0].rest(100.0 + np.abs(draws))
+    assert beyond.rise is None
 
 
 def test_effects_the_expansion_cannot_carry_are_run_exactly(study):

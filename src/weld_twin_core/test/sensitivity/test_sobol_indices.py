@@ -4,6 +4,8 @@
 
 import numpy as np
 import pytest
+from SALib.analyze import morris as salib_screening
+from SALib.sample import morris as salib_ways
 from SALib.sample import sobol
 from SALib.util import compute_groups_matrix
 from scipy.stats import norm
@@ -98,6 +100,25 @@ def test_seed_zero_is_a_seed():
 def test_morris_keeps_to_seed_zero_as_well():
     runs = [morris_screening(ishigami, 'abc', 20, seed=0).as_dict() for _ in range(2)]
     assert runs[0] == runs[1]
+
+
+def test_ways_and_measures_of_morris_are_those_of_salib():
+    names = tuple('abcde')
+    design = MorrisDesign(names, 6, seed=4)
+    problem = {'num_vars': 5, 'names': list(names), 'bounds': [[0.02, 0.98]] * 5}
+    asked = {'num_levels': 8}
+    seeds = [np.random.default_rng([4, k]) for k in range(2)]
+    runs = salib_ways.sample(problem, 6, seed=seeds[0], **asked)
+    np.testing.assert_allclose(design.samples(), runs, rtol=1e-14)
+    results = np.sin(runs @ np.arange(1.0, 6.0)) + runs[:, 0] * runs[:, 4]
+    wanted = salib_screening.analyze(problem, runs, results, seed=seeds[1], **asked)
+    found = design.screening(results)
+    for key, value in (
+        ('mu_star', found.mu_star),
+        ('mu_star_conf', found.mu_star_half),
+        ('sigma', found.sigma),
+    ):
+        np.testing.assert_allclose(value, np.asarray(wanted[key], dtype=float), rtol=1e-12)
 
 
 def test_results_that_are_not_numbers_are_counted_and_refused():

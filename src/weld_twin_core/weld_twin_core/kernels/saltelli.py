@@ -21,7 +21,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from ..arrays import Array
 
@@ -42,6 +41,8 @@ def base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
         Of the scrambling.
 
     """
+    from scipy.stats import qmc  # half a second, for nothing but this
+
     pair = qmc.Sobol(2 * inputs, scramble=True, seed=seed).random(base)
     return pair[:, :inputs], pair[:, inputs:]
 

@@ -106,9 +106,8 @@ class Remembered:
         """Return what the slope leaves of draws (D, P), and at which path points (K,)."""
         own = draws[:, self.columns]
         if self.table is not None:
-            knots, values = self.table
-            one = own[:, 0]
-            if knots[0] <= one.min() and one.max() <= knots[-1]:
+            knots, one = self.table[0], own[:, 0]
+            if np.all((knots[0] <= one) & (one <= knots[-1])):
                 row = np.clip(np.searchsorted(knots, one, 'right') - 1, 0, knots.size - 2)
                 part = (one - knots[row]) / (knots[row + 1] - knots[row])
                 where, table, rise = self._carried

@@ -3,6 +3,8 @@
 """
 Morris screening: which of many errors matter at all, in a few runs for each.
 
+Design, measures and intervals are those of SALib, in whole-array form.
+
 References
 ----------
 .. [1] M. D. Morris, "Factorial sampling plans for preliminary computational experiments",
@@ -19,15 +21,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
 from ..arrays import Array
 from ..errors import DataError
 from .evaluate import Function
 from .outcome import refuse_unfinite
-from .salib import salib
 
 LEVELS = 8
 """Levels of the grid of each input; even, as the method wants, so that all are visited alike."""
+STEP = LEVELS / (2.0 * (LEVELS - 1.0))
+"""How far an input moves at a time, as a part of the grid: as the method wants [1]_."""
+CONFIDENCE = 0.95
+"""Of the intervals of mu star."""
+RESAMPLES = 100
+"""Of the bootstrap behind them."""
 MARGIN = 0.02
 """Probability left out at either end, where a normal distribution is infinitely far out."""
 
@@ -100,19 +108,11 @@ class MorrisDesign:
         if self.seed < 0:
             raise DataError(f'a seed must not be negative, got {self.seed}')
 
-    def _problem(self) -> dict[str, Any]:
-        bounds = [[MARGIN, 1.0 - MARGIN]] * len(self.names)
-        return {'num_vars': len(self.names), 'names': list(self.names), 'bounds': bounds}
-
     def samples(self) -> Array:
         """Return probabilities of every input, shape (trajectories (P + 1), P)."""
-        values: Array = salib('sample.morris').sample(
-            self._problem(),
-            self.trajectories,
-            num_levels=LEVELS,
-            seed=np.random.default_rng([self.seed, 0]),
-        )
-        return values
+        rng = _numbers(self.seed, 0)
+        each = [_trajectory(len(self.names), rng) for _ in range(self.trajectories)]
+        return np.concatenate(each) * (1.0 - 2.0 * MARGIN) + MARGIN
 
     def screening(self, results: Array) -> Screening:
         """
@@ -126,20 +126,41 @@ class MorrisDesign:
         """
         values = np.asarray(results, dtype=np.float64)
         refuse_unfinite(values, 'Morris screening')
-        found = salib('analyze.morris').analyze(
-            self._problem(),
-            self.samples(),
-            values,
-            num_levels=LEVELS,
-            seed=np.random.default_rng([self.seed, 1]),
-        )
-        mean, half, scatter = (
-            np.asarray(found[key], dtype=np.float64)
-            for key in ('mu_star', 'mu_star_conf', 'sigma')
-        )
+        inputs = len(self.names)
+        steps = np.diff(self.samples().reshape(self.trajectories, inputs + 1, inputs), axis=1)
+        change = np.diff(values.reshape(self.trajectories, inputs + 1), axis=1)
+        # One input moves at a time: its step says at which place of the trajectory, and whereto.
+        effects = np.einsum('tk,tkp->pt', change, np.sign(steps)) / STEP
+        rng = _numbers(self.seed, 1)
+        picks = rng.integers(self.trajectories, size=(inputs, RESAMPLES, self.trajectories))
+        size = np.abs(effects)
+        again = np.take_along_axis(size[:, None], picks, axis=-1).mean(axis=-1)
+        half = float(ndtri(0.5 + 0.5 * CONFIDENCE)) * again.std(axis=1, ddof=1)
         return Screening(
-            self.names, mean, half, scatter, self.trajectories, values.size, self.seed
+            self.names,
+            size.mean(axis=1),
+            half,
+            effects.std(axis=1, ddof=1),
+            self.trajectories,
+            values.size,
+            self.seed,
         )
+
+
+def _numbers(seed: int, which: int) -> np.random.Generator:
+    """Return the generator that SALib 1.6 makes of one with this seed."""
+    return np.random.default_rng([seed, which]).spawn(1)[0]
+
+
+def _trajectory(inputs: int, rng: np.random.Generator) -> Array:
+    """Return one way through the grid, shape (P + 1, P), on which every input moves once."""
+    order = np.eye(inputs)
+    rng.shuffle(order)
+    way = rng.choice([-1, 1], inputs)
+    start = rng.choice(np.linspace(0.0, 1.0 - STEP, LEVELS // 2), inputs)
+    moved = np.tril(np.ones((inputs + 1, inputs)), -1) @ order.T
+    out: Array = start + 0.5 * STEP * ((2.0 * moved - 1.0) * way + 1.0)
+    return out
 
 
 def morris_screening(

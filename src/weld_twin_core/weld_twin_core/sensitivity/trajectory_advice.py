@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
-from scipy.stats import qmc
 
 from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix, transform
 from ..arrays import Array
+from ..effects import Effect
 from ..errors import PathError
 from ..motion.inverse import PathSolution, solve_path
 from ..motion.paths import Path, Torch
@@ -48,19 +47,7 @@ def expected_deviation(study: Study, tolerances: Sequence[Tolerance]) -> Array:
     tolerances : sequence of Tolerance
 
     """
-    tolerances = tuple(tolerances)
-    mean = np.array([t.distribution.mean for t in tolerances])
-    std = np.array([t.distribution.std for t in tolerances])
-    twin = Twin(study.robot, with_draws(study.known, tolerances, mean))
-    poses, change = twin.linearise(study.recording, study.at)
-    place = {
-        (twin.effects[c.effect].name, twin.effects[c.effect].site, c.parameter.name, c.index): k
-        for k, c in enumerate(twin.components())
-    }
-    columns = [place[t.effect, t.joint, t.parameter, t.index] for t in tolerances]
-    bias = poses.position - study.nominal.position
-    scatter = (change[:, :3, columns] * std) ** 2
-    return np.asarray(np.sqrt((bias**2).sum(axis=-1) + scatter.sum(axis=(1, 2))))
+    return _Scatter.of(study.known, tolerances).deviation(study)
 
 
 def expected_rms(study: Study, tolerances: Sequence[Tolerance]) -> float:
@@ -73,8 +60,43 @@ def expected_rms(study: Study, tolerances: Sequence[Tolerance]) -> float:
     tolerances : sequence of Tolerance
 
     """
-    square = expected_deviation(study, tolerances) ** 2
-    return float(np.sqrt((square * arc_weights(study.s)).sum()))
+    return _rms(study, expected_deviation(study, tolerances))
+
+
+def _rms(study: Study, deviation: Array) -> float:
+    """Return the root mean square over the arc length of deviations (N,) [m]."""
+    return float(np.sqrt((deviation**2 * arc_weights(study.s)).sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Scatter:
+    """Errors at their means, and how far each of them scatters: the same for every motion."""
+
+    effects: tuple[Effect, ...]
+    std: Array
+    columns: list[int]
+
+    @classmethod
+    def of(cls, known: tuple[Effect, ...], tolerances: Sequence[Tolerance]) -> _Scatter:
+        mean = np.array([t.distribution.mean for t in tolerances])
+        std = np.array([t.distribution.std for t in tolerances])
+        effects = with_draws(known, tolerances, mean)
+        scalars = [
+            (effect.name, effect.site, parameter.name, index)
+            for effect in effects
+            for parameter, index in effect.components()
+            if parameter.differentiable
+        ]
+        place = {key: k for k, key in enumerate(scalars)}
+        columns = [place[t.effect, t.joint, t.parameter, t.index] for t in tolerances]
+        return cls(effects, std, columns)
+
+    def deviation(self, study: Study) -> Array:
+        """Return the root of the expected squared deviation at every path point, (N,) [m]."""
+        poses, change = Twin(study.robot, self.effects).linearise(study.recording, study.at)
+        bias = poses.position - study.nominal.position
+        scatter = (change[:, :3, self.columns] * self.std) ** 2
+        return np.asarray(np.sqrt((bias**2).sum(axis=-1) + scatter.sum(axis=(1, 2))))
 
 
 @dataclass(frozen=True)
@@ -267,21 +289,23 @@ class _Search:
         torch: Torch,
         room: Room,
     ) -> None:
-        self.robot, self.path, self.tolerances = robot, path, tolerances
+        self.robot, self.length, self.scatter = robot, path.length, _Scatter.of((), tolerances)
         self.torch, self.room = torch, room
         self.s = np.linspace(0.0, path.length, _POINTS)
+        self.seam = path.sample(self.s)
+        self.axes = seam_axes(self.seam.tangent, self.seam.normal)
         self.span = np.array([np.pi, room.shift, room.shift, room.yaw])
 
     def study(self, values: Array) -> tuple[Study, PathSolution]:
         """Return the study of a placement, and how the arm stands."""
         placement = Placement(*map(float, values))
         robot, torch = placement.robot(self.robot), placement.torch(self.torch)
-        seam = self.path.sample(self.s)
-        solution = solve_path(robot, torch.poses(seam))
+        # The seam is moved and not the arm: what is prepared for an arm serves all placements.
+        back = self.robot.T_world_base @ np.linalg.inv(robot.T_world_base)
+        solution = solve_path(self.robot, back @ torch.poses(self.seam))
         recording = Recording('placement', JointMotion(self.s / _SPEED, solution.q))
-        axes = seam_axes(seam.tangent, seam.normal)
         nominal = Twin(robot).poses(recording)
-        study = Study(robot, recording, None, self.s, axes, self.path.length, (), nominal)
+        study = Study(robot, recording, None, self.s, self.axes, self.length, (), nominal)
         return study, solution
 
     def cost(self, values: Array) -> float:
@@ -294,7 +318,7 @@ class _Search:
             return np.inf
         if solution.condition.max() > self.room.condition:
             return np.inf
-        return expected_rms(study, self.tolerances)
+        return _rms(study, self.scatter.deviation(study))
 
     def result(self, label: str, values: Array) -> PlacementResult:
         """Return the placement with its numbers."""
@@ -302,7 +326,7 @@ class _Search:
         return PlacementResult(
             label,
             Placement(*map(float, values)),
-            expected_rms(study, self.tolerances),
+            _rms(study, self.scatter.deviation(study)),
             float(solution.limit_margin.min()),
             float(solution.condition.max()),
         )
@@ -324,6 +348,10 @@ class _Search:
             What the values that are not free stay at.
 
         """
+        # Both bring most of scipy along, and whoever asks for no placement needs neither.
+        from scipy.optimize import minimize
+        from scipy.stats import qmc
+
         p = start.placement
         known = np.array([p.rotation, p.x, p.y, p.yaw])
 

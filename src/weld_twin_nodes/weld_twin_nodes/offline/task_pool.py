@@ -17,6 +17,7 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -82,8 +83,19 @@ class Runner:
     def __exit__(self, *_: object) -> None:
         self._pool.close()
 
-    def run(self, tasks: Sequence[Task]) -> list[Plain]:
-        """Return the results in the order of the tasks."""
+    def run(
+        self, tasks: Sequence[Task], meanwhile: Callable[[], object] | None = None
+    ) -> list[Plain]:
+        """
+        Return the results in the order of the tasks.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+        meanwhile : callable, optional
+            What this process does once others have the tasks.
+
+        """
         results: list[Plain] = [None] * len(tasks)
         waiting = []
         for k, task in enumerate(tasks):
@@ -95,7 +107,10 @@ class Runner:
         done = len(tasks) - len(waiting)
         if done:
             self._told(done, len(tasks), f'{done} results were there already')
-        for place, text in self._pool.run([tasks[k] for k in waiting]):
+        coming = self._pool.run([tasks[k] for k in waiting])
+        if meanwhile is not None:
+            meanwhile()
+        for place, text in coming:
             k = waiting[place]
             results[k] = json.loads(text)
             self._keep(tasks[k], text)
@@ -151,25 +166,33 @@ class Cores:
     ----------
     workers : int
         0 means one for every core.
+    ahead : str
+        A module that the processes begin to import at once, while this one goes on; left out,
+        they start with the first task.
 
     """
 
-    def __init__(self, workers: int = 0) -> None:
+    def __init__(self, workers: int = 0, ahead: str = '') -> None:
         self._workers = workers or available_cores()
         self._pool: ProcessPoolExecutor | None = None
+        if ahead:
+            self._submitted([(import_module, (ahead,))] * self._workers)
 
     def run(self, tasks: Sequence[Task]) -> Iterator[tuple[int, str]]:
-        """Run as many at once as there are workers."""
+        """Run as many at once as there are workers; they begin before a result is asked for."""
+        asked = [(call, (task.function, task.arguments)) for task in tasks]
+        return self._completed({future: k for k, future in enumerate(self._submitted(asked))})
+
+    def _submitted(self, asked: Sequence[tuple[Callable[..., Any], Any]]) -> list[Future[Any]]:
         if self._pool is None:
             context = multiprocessing.get_context('spawn')
             self._pool = ProcessPoolExecutor(
                 self._workers, mp_context=context, initializer=_leave_interrupts
             )
         with environment(**dict.fromkeys(THREADS, '1')):
-            futures: dict[Future[str], int] = {
-                self._pool.submit(call, task.function, task.arguments): k
-                for k, task in enumerate(tasks)
-            }
+            return [self._pool.submit(function, *arguments) for function, arguments in asked]
+
+    def _completed(self, futures: dict[Future[str], int]) -> Iterator[tuple[int, str]]:
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
@@ -197,22 +220,30 @@ class Cluster:
         self._client, self._completed = _connected(address)
 
     def run(self, tasks: Sequence[Task]) -> Iterator[tuple[int, str]]:
-        """Run on the cluster's workers."""
+        """Run on the cluster's workers; they begin before a result is asked for."""
         futures = {
             self._client.submit(call, task.function, task.arguments, pure=False): k
             for k, task in enumerate(tasks)
         }
-        for future in self._completed(list(futures)):
-            yield futures[future], future.result()
+        return ((futures[f], f.result()) for f in self._completed(list(futures)))
 
     def close(self) -> None:
         """Leave the cluster; what has not begun is not run."""
         self._client.close()
 
 
-def pool_of(scheduler: str = '', workers: int = 0) -> Pool:
+def pool_of(scheduler: str = '', workers: int = 0, ahead: str = '') -> Pool:
     """
     Return the cluster at an address, or the cores of this machine.
+
+    Parameters
+    ----------
+    scheduler : str
+        Address of the cluster; empty for this machine.
+    workers : int
+        Processes of this machine; 0 means one for every core.
+    ahead : str
+        A module that these begin to import at once.
 
     Raises
     ------
@@ -222,7 +253,7 @@ def pool_of(scheduler: str = '', workers: int = 0) -> Pool:
     """
     if workers < 0:
         raise DataError(f'the number of workers must not be negative, got {workers}')
-    return Cluster(scheduler) if scheduler else Cores(workers)
+    return Cluster(scheduler) if scheduler else Cores(workers, ahead)
 
 
 def _leave_interrupts() -> None:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.sensitivity.claims import CaseName, judge
 from weld_twin_msgs_py.files import markdown
 
 from ..offline.task_pool import Runner, Task
@@ -33,6 +32,8 @@ def run_claims(
     runner: Runner, robots: Sequence[Robot], seams: Sequence[str] = SEAMS, seed: int = 0
 ) -> dict[str, Any]:
     """Return the claims with their verdicts, and what was measured on every case."""
+    from weld_twin_core.sensitivity.claims import CaseName, judge
+
     names = [CaseName(robot.name, seam) for robot in robots for seam in seams]
     tasks = [
         Task(claim_case, (robot, seam, seed), f'claims: {robot.name}, {seam}')

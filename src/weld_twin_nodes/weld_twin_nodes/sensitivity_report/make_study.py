@@ -51,12 +51,16 @@ def make_study(
 
     """
     place = study_directory(out)
-    with Runner(pool, place / TASKS, tell) as runner:
-        study = None if setting is None else run_study(setting, runner)
-        claims = run_claims(runner, claims_on, seams, seed) if claims_on else None
     drawings: list[Drawing] = []
+
+    def draw_all() -> None:
+        assert setting is not None
+        drawings.extend(make_figures(place / 'figures', setting, drawable(setting)))
+
+    with Runner(pool, place / TASKS, tell) as runner:
+        study = None if setting is None else run_study(setting, runner, draw_all)
+        claims = run_claims(runner, claims_on, seams, seed) if claims_on else None
     if setting is not None and study is not None:
-        drawings = make_figures(place / 'figures', setting, drawable(setting))
         write_study(place, study, setting.tolerances)
     if claims is not None:
         write_claims(place, claims)

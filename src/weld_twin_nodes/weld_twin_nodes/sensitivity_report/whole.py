@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -27,13 +28,15 @@ OUTPUTS = ('d_norm', 'across_m', 'stickout_m')
 """What Sobol indices are given of."""
 
 
-def run_study(setting: Setting, runner: Runner) -> dict[str, Any]:
-    """Return everything the study finds."""
+def run_study(
+    setting: Setting, runner: Runner, meanwhile: Callable[[], object] | None = None
+) -> dict[str, Any]:
+    """Return everything the study finds; ``meanwhile`` is done while workers run its tasks."""
     out: dict[str, Any] = {'schema': SCHEMA, 'setting': setting.describe(), 'motions': {}}
     designs = {name: _Designs(setting, name) for name in setting.studies}
     asked = _pieces(setting)
     jobs = {k: v for name, d in designs.items() for k, v in d.jobs(setting.studies[name]).items()}
-    found, done = run_all(runner, jobs, list(asked.values()))
+    found, done = run_all(runner, jobs, list(asked.values()), meanwhile)
     pieces = dict(zip(asked, done, strict=True))
     for name, design in designs.items():
         out['motions'][name] = {

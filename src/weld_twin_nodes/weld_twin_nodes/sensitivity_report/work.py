@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from base64 import b64decode, b64encode
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -15,15 +16,15 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.motion.paths import Path, Torch, default_seam
 from weld_twin_core.sensitivity import Model, Outcomes, Study, Tolerance
-from weld_twin_core.sensitivity.claims import measure_case
+from weld_twin_core.sensitivity.outcome import joined
 
 from ..offline.content_hash import digest
 from ..offline.task_pool import Runner, Task
 
-BLOCK = 8192
-"""Runs of one task."""
-
-
+BLOCK = 32_768
+"""Runs of one task: with their results they take some ten megabytes and a part of a second."""
+_KEPT = 2
+"""Models that a worker keeps: one for each motion of a seam."""
 _models: dict[str, Model] = {}
 """What a worker made last, by content: it sees the same study many times."""
 
@@ -31,26 +32,38 @@ _models: dict[str, Model] = {}
 def _model(study: Study, tolerances: tuple[Tolerance, ...]) -> Model:
     key = digest(study, tolerances)
     if key not in _models:
-        _models.clear()
+        while len(_models) >= _KEPT:
+            del _models[next(iter(_models))]
         _models[key] = sensitivity.model(study, tolerances)
     return _models[key]
 
 
-def run_block(
+def run_packed(
     study: Study,
     tolerances: tuple[Tolerance, ...],
     unit: Array,
     drawn: tuple[Tolerance, ...] | None = None,
 ) -> dict[str, Any]:
     """
-    Return what the runs at probabilities (D, P) come to, and how exact the model is.
+    Return what the runs at probabilities (D, P) come to, `packed`, and how exact the model is.
 
     ``drawn`` are narrower tolerances of the same errors that the runs are drawn from: the model of
     the wider ones holds for them.
     """
     model = _model(study, tolerances)
     found = model(sensitivity.draws_at(drawn or tolerances, unit))
-    return {'model_error': model.error, **found._asdict()}
+    return {'model_error': model.error, 'outcomes': packed(found)}
+
+
+def packed(found: Outcomes) -> str:
+    """Return outcomes as text, without the digits that take most of the time of a fast model."""
+    return b64encode(np.ascontiguousarray(found, dtype='<f8').tobytes()).decode()
+
+
+def unpacked(text: str) -> Outcomes:
+    """Return the outcomes that were `packed`, exactly."""
+    rows = np.frombuffer(b64decode(text), dtype='<f8').reshape(len(Outcomes._fields), -1)
+    return Outcomes(*rows)
 
 
 def local(study: Study, tolerances: tuple[Tolerance, ...]) -> dict[str, Any]:
@@ -103,6 +116,9 @@ def placement(
 
 def claim_case(robot: Robot, seam: str, seed: int) -> dict[str, float]:
     """Return the measurements of a robot on a bundled seam that decide the claims."""
+    # A study without claims does without what they bring along.
+    from weld_twin_core.sensitivity.claims import measure_case
+
     return measure_case(robot, default_seam(robot, seam), seed)
 
 
@@ -112,7 +128,10 @@ narrower ones."""
 
 
 def run_all(
-    runner: Runner, jobs: dict[str, Job], pieces: Sequence[Task] = ()
+    runner: Runner,
+    jobs: dict[str, Job],
+    pieces: Sequence[Task] = (),
+    meanwhile: Callable[[], object] | None = None,
 ) -> tuple[dict[str, tuple[Outcomes, float]], list[Any]]:
     """
     Return what the runs of every job come to with the largest error of its model, and the pieces.
@@ -123,6 +142,8 @@ def run_all(
     jobs : mapping from label to Job
     pieces : sequence of Task
         Begun first, the longest in front: what is left for the end is short then.
+    meanwhile : callable, optional
+        What this process does once the workers have their tasks.
 
     """
     tasks, owners = list(pieces), []
@@ -130,10 +151,10 @@ def run_all(
         for start in range(0, len(unit), BLOCK):
             block = unit[start : start + BLOCK]
             text = f'{label}: runs {start} to {start + len(block)}'
-            tasks.append(Task(run_block, (study, tolerances, block, drawn), text))
+            tasks.append(Task(run_packed, (study, tolerances, block, drawn), text))
             owners.append(label)
     parts: dict[str, list[dict[str, Any]]] = {label: [] for label in jobs}
-    results = runner.run(tasks)
+    results = runner.run(tasks, meanwhile)
     for label, result in zip(owners, results[len(pieces) :], strict=True):
         parts[label].append(result)
     found = {label: (_joined(own), own[0]['model_error']) for label, own in parts.items()}
@@ -141,5 +162,4 @@ def run_all(
 
 
 def _joined(parts: list[dict[str, Any]]) -> Outcomes:
-    columns = ([np.asarray(part[name]) for part in parts] for name in Outcomes._fields)
-    return Outcomes(*(np.concatenate(column) for column in columns))
+    return joined([unpacked(part['outcomes']) for part in parts])

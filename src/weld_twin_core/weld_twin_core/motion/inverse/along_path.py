@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ...arm.bulk import kernel_of
-from ...arm.chain import forward, frames
+from ...arm.chain import Frames, forward, frames
 from ...arm.robot import Robot
 from ...arm.rotation import rotation_matrix, rotation_vector, transform
 from ...arrays import Array
@@ -87,7 +88,7 @@ class PathSolution:
 
     @cached_property
     def _posture(self) -> tuple[Array, Array, Array]:
-        return _posture(self.robot, self.q)
+        return _posture(self.robot, self.q, frames(self.robot, self.q))
 
 
 def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSolution:
@@ -130,11 +131,11 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
     kind = family(robot)
     of_all = _followed if kind is None else _closed
     tracks = of_all(robot, poses, seed)
-    failures = np.array([_first_failure(robot, q, poses) for q in tracks])
+    failures = _first_failures(robot, tracks, poses)
     good = np.flatnonzero(failures == len(poses))
     if not good.size:
         raise ReachError(_explain(robot, tracks, failures, poses))
-    best = min(good, key=lambda k: _rank(robot, tracks[k], seed))
+    best = good[np.argmin(_ranks(robot, tracks[good], seed))]
     q = polish(robot, tracks[best], poses)[0]
     return PathSolution(robot, poses, q, kind or 'search')
 
@@ -142,10 +143,12 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
 def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     """Return every closed-form branch, shape (8, N, n), unwrapped and on its best turn."""
     q = joined(_determined(robot, branches(robot, poses), poses))
-    for k, track in enumerate(q):
-        bad = ~np.isfinite(track).all(axis=-1)
-        if not bad.all():
-            q[k, ~bad] = _on_turn(robot, np.unwrap(track[~bad], axis=0), seed)
+    sound = np.isfinite(q).all(axis=-1)
+    whole = sound.all(axis=-1)
+    if whole.any():
+        q[whole] = _on_turn(robot, np.unwrap(q[whole], axis=1), seed)
+    for k in np.flatnonzero(~whole & sound.any(axis=-1)):
+        q[k, sound[k]] = _on_turn(robot, np.unwrap(q[k, sound[k]], axis=0), seed)
     return q
 
 
@@ -175,12 +178,14 @@ def _between(start: Array, end: Array, part: float) -> Array:
 
 
 def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:
-    if seed is not None:
-        shift = np.round((np.asarray(seed) - q[0]) / TURN)
-        near = q + TURN * np.where(robot.prismatic, 0.0, shift)
-        if ((near >= robot.lower) & (near <= robot.upper)).all():
-            return near
-    return q + TURN * turns_to_middle(robot, q.min(axis=0), q.max(axis=0))
+    """Return tracks (..., N, n) on the whole turns nearest the seed, or the middle of the limits."""
+    middle = q + TURN * turns_to_middle(robot, q.min(axis=-2), q.max(axis=-2))[..., None, :]
+    if seed is None:
+        return middle
+    shift = np.round((np.asarray(seed) - q[..., :1, :]) / TURN)
+    near = q + TURN * np.where(robot.prismatic, 0.0, shift)
+    inside = ((near >= robot.lower) & (near <= robot.upper)).all(axis=(-2, -1))
+    return np.where(inside[..., None, None], near, middle)
 
 
 def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
@@ -191,7 +196,8 @@ def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
             f'{robot.name} cannot reach sample 0 at {where(poses[0])}: the nearest the tool gets '
             f'is {gap(missing)}; move the seam or turn the torch'
         )
-    starts = np.array(sorted(starts, key=lambda q: _rank(robot, q[None], seed)))[:_TRACKED]
+    best = np.argsort(_ranks(robot, starts[:, None], seed), kind='stable')
+    starts = starts[best[:_TRACKED]]
     index = np.unique(np.linspace(0, len(poses) - 1, _KNOTS).round().astype(int))
     knots = _track(robot, starts, poses[index])
     if len(index) == len(poses):
@@ -221,37 +227,39 @@ def _track(robot: Robot, q: Array, poses: Array) -> Array:
     return np.stack(out, axis=1)
 
 
-def _first_failure(robot: Robot, q: Array, poses: Array) -> int:
-    """Return the first sample that is not reached, past a limit or after a jump; N if none."""
+def _first_failures(robot: Robot, q: Array, poses: Array) -> NDArray[np.intp]:
+    """Return of tracks (K, N, n) the first sample not reached, past a limit or after a jump, or N."""
     fails: Mask = np.any(np.isnan(q) | (q < robot.lower) | (q > robot.upper), axis=-1)
-    fails[1:] |= jumps(robot, q, poses)
-    return int(np.argmax(fails)) if fails.any() else len(q)
+    fails[:, 1:] |= jumps(robot, q, poses)
+    return np.where(fails.any(axis=1), fails.argmax(axis=1), len(poses))
 
 
-def _rank(robot: Robot, q: Array, seed: Array | None) -> float:
-    """Return a number that is smaller for a better track."""
+def _ranks(robot: Robot, q: Array, seed: Array | None) -> Array:
+    """Return numbers (K,) that are smaller for better tracks (K, N, n)."""
     if seed is not None:
-        return float(np.linalg.norm(q[0] - seed))
-    some = q[:: max(1, len(q) // 100)]
-    condition, _, margin = _posture(robot, some)
-    room = min(float(margin.min()) / _COMFORTABLE, 1.0)
-    return -room / float(condition.max()) * (1.0 if _above_base(robot, some) else 0.1)
+        return np.asarray(np.linalg.norm(q[:, 0] - seed, axis=-1))
+    some = q[:, :: max(1, q.shape[1] // 100)]
+    chain = frames(robot, some)
+    condition, _, margin = _posture(robot, some, chain)
+    room = np.minimum(margin.min(axis=-1) / _COMFORTABLE, 1.0)
+    return -room / condition.max(axis=-1) * np.where(_above_base(chain), 1.0, 0.1)
 
 
-def _above_base(robot: Robot, q: Array) -> bool:
-    """Tell whether every joint stays on the arm's side of the surface the base stands on."""
-    chain = frames(robot, q)
+def _above_base(chain: Frames) -> Mask:
+    """Tell, shape (K,), whether joints stay on the arm's side of the surface the base stands on."""
     up, foot = chain.base_rotation[:, 2], chain.base_point
+    samples = chain.position.shape[:-1]
     heights = [np.moveaxis(row.z_point, 0, -1) @ up - foot @ up for row in chain.rows]
-    return min(float(height.min()) for height in heights) > -1e-6
+    lowest = [np.broadcast_to(height, samples).min(axis=-1) for height in heights]
+    return np.asarray(np.min(lowest, axis=0) > -1e-6)
 
 
-def _posture(robot: Robot, q: Array) -> tuple[Array, Array, Array]:
-    """Return condition number, manipulability and distance to the nearest limit, (N,) each."""
-    jacobian = chain_jacobian(robot, frames(robot, q)).copy()
-    jacobian[:, :3] /= reach(robot)
+def _posture(robot: Robot, q: Array, chain: Frames) -> tuple[Array, Array, Array]:
+    """Return condition number, manipulability and distance to the nearest limit, (...) each."""
+    jacobian = chain_jacobian(robot, chain).copy()
+    jacobian[..., :3, :] /= reach(robot)
     values = np.linalg.svd(jacobian, compute_uv=False)
-    condition = values[:, 0] / np.maximum(values[:, -1], 1e-300)
+    condition = values[..., 0] / np.maximum(values[..., -1], 1e-300)
     margin = np.minimum(q - robot.lower, robot.upper - q).min(axis=-1)
     return condition, values.prod(axis=-1), margin
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -36,6 +37,7 @@ class Screws:
 Solver = Callable[[Screws, Array, Array], Array]
 
 
+@lru_cache(maxsize=8)
 def screws(robot: Robot) -> Screws:
     """Return the joint axes of a robot at joint position zero, in the world frame."""
     zero = np.zeros(robot.n)
@@ -47,6 +49,7 @@ def screws(robot: Robot) -> Screws:
     )
 
 
+@lru_cache(maxsize=8)
 def family(robot: Robot) -> str | None:
     """Return 'spherical wrist', 'three parallel', or None where no closed form applies."""
     if robot.n != 6 or robot.prismatic.any():
@@ -92,66 +95,77 @@ def _spherical(arm: Screws, rotation: Array, point: Array) -> Array:
     """Return q (8, N, 6): shoulder, elbow and wrist, each two ways."""
     h, p = arm.axis, arm.point
     centre = np.asarray(_meeting(arm, 4, 5))
-    out = []
-    for q1 in -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0])):
-        # Minus: it is the arm that turns back onto the point.
-        reach = turn(h[0], -q1, point - p[0]) - (p[1] - p[0])
-        length = np.linalg.norm(reach, axis=-1)
-        for q3 in angle_to_distance(p[2] - p[1], h[2], centre - p[2], length):
-            bent = p[2] - p[1] + turn(h[2], q3, np.broadcast_to(centre - p[2], reach.shape))
-            q2 = angle_onto(h[1], bent, reach)
-            arm_turn = turn_matrix(h[0], q1) @ turn_matrix(h[1], q2) @ turn_matrix(h[2], q3)
-            wrist = np.swapaxes(arm_turn, -1, -2) @ rotation
-            out += [
-                np.stack([q1, q2, q3, *angles], axis=-1)
-                for angles in _wrist(h[3], h[4], h[5], wrist)
-            ]
-    return np.stack(out)
+    q1 = -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0]))
+    # Minus: it is the arm that turns back onto the point.
+    reach = turn(h[0], -q1, point - p[0]) - (p[1] - p[0])
+    length = np.linalg.norm(reach, axis=-1)
+    q3 = _two_ways(angle_to_distance(p[2] - p[1], h[2], centre - p[2], length), 1)
+    bent = p[2] - p[1] + turn(h[2], q3, np.broadcast_to(centre - p[2], (*q3.shape, 3)))
+    q2 = angle_onto(h[1], bent, reach[:, None])
+    shoulder = turn_matrix(h[0], q1)[:, None]
+    arm_turn = shoulder @ turn_matrix(h[1], q2) @ turn_matrix(h[2], q3)
+    wrist = np.swapaxes(arm_turn, -1, -2) @ rotation
+    angles = _wrist(h[3], h[4], h[5], wrist)
+    return _listed(q1[:, None, None], q2[:, :, None], q3[:, :, None], *angles)
 
 
-def _wrist(h4: Array, h5: Array, h6: Array, rotation: Array) -> list[tuple[Array, Array, Array]]:
-    """Return both (q4, q5, q6) with R(h4, q4) R(h5, q5) R(h6, q6) = rotation."""
+def _two_ways(both: Array, axis: int) -> Array:
+    """Return two angles, the axis of which is first, with that axis behind those before them."""
+    return np.moveaxis(both, 0, axis)
+
+
+def _listed(*angles: Array) -> Array:
+    """Return joint positions (8, N, 6) of angles that broadcast to (2, 2, 2, N)."""
+    q = np.stack(np.broadcast_arrays(*angles), axis=-1)
+    return q.reshape(8, *q.shape[3:])
+
+
+def _wrist(h4: Array, h5: Array, h6: Array, rotation: Array) -> tuple[Array, Array, Array]:
+    """
+    Return both (q4, q5, q6) with R(h4, q4) R(h5, q5) R(h6, q6) = rotation.
+
+    Of rotations (2, 2, N, 3, 3), shape (2, 2, 2, N) each.
+    """
     last = rotation @ h6
-    out = []
-    for q5 in angle_to_height(h4, h5, np.broadcast_to(h6, last.shape), last @ h4):
-        q4 = angle_onto(h4, turn(h5, q5, np.broadcast_to(h6, last.shape)), last)
-        before = turn_matrix(h4, q4) @ turn_matrix(h5, q5)
-        out.append((q4, q5, _rest(h6, np.swapaxes(before, -1, -2) @ rotation)))
-    return out
+    q5 = _two_ways(angle_to_height(h4, h5, np.broadcast_to(h6, last.shape), last @ h4), 2)
+    q4 = angle_onto(h4, turn(h5, q5, np.broadcast_to(h6, (*q5.shape, 3))), last[:, :, None])
+    before = turn_matrix(h4, q4) @ turn_matrix(h5, q5)
+    return q4, q5, _rest(h6, np.swapaxes(before, -1, -2) @ rotation[:, :, None])
 
 
 def _three_parallel(arm: Screws, rotation: Array, point: Array) -> Array:
     """Return q (8, N, 6): shoulder, wrist and elbow, each two ways."""
     h, p = arm.axis, arm.point
     centre = np.asarray(_meeting(arm, 4, 5))
-    out = []
-    for q1 in -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0])):
-        turned = turn_matrix(h[0], -q1) @ rotation
-        last = turned @ h[5]
-        for q5 in angle_to_height(h[1], h[4], np.broadcast_to(h[5], last.shape), last @ h[1]):
-            # Turns about the parallel axes leave h2 alone, so h2 shows the wrist's turn.
-            seen = turn(h[4], -q5, np.broadcast_to(h[1], last.shape))
-            q6 = -angle_onto(h[5], seen, np.swapaxes(turned, -1, -2) @ h[1])
-            after = turn_matrix(h[4], q5) @ turn_matrix(h[5], q6)
-            total = _rest(h[1], turned @ np.swapaxes(after, -1, -2))
-            foot = turn(h[0], -q1, point - p[0]) - (p[1] - p[0])
-            foot = foot - turn(h[1], total, np.broadcast_to(centre - p[3], foot.shape))
-            out += [
-                np.stack([q1, *angles, q5, q6], axis=-1) for angles in _planar(arm, foot, total)
-            ]
-    return np.stack(out)
+    q1 = -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0]))
+    turned = turn_matrix(h[0], -q1) @ rotation
+    last = turned @ h[5]
+    straight = np.broadcast_to(h[5], last.shape)
+    q5 = _two_ways(angle_to_height(h[1], h[4], straight, last @ h[1]), 1)
+    turned = turned[:, None]
+    # Turns about the parallel axes leave h2 alone, so h2 shows the wrist's turn.
+    seen = turn(h[4], -q5, np.broadcast_to(h[1], (*q5.shape, 3)))
+    q6 = -angle_onto(h[5], seen, np.swapaxes(turned, -1, -2) @ h[1])
+    after = turn_matrix(h[4], q5) @ turn_matrix(h[5], q6)
+    total = _rest(h[1], turned @ np.swapaxes(after, -1, -2))
+    foot = turn(h[0], -q1, point - p[0])[:, None] - (p[1] - p[0])
+    foot = foot - turn(h[1], total, np.broadcast_to(centre - p[3], foot.shape))
+    q2, q3, q4 = _planar(arm, foot, total)
+    return _listed(q1[:, None, None], q2, q3, q4, q5[:, :, None], q6[:, :, None])
 
 
-def _planar(arm: Screws, foot: Array, total: Array) -> list[tuple[Array, Array, Array]]:
-    """Return both (q2, q3, q4) that put axis 4 at ``foot`` from axis 2 and turn by ``total``."""
+def _planar(arm: Screws, foot: Array, total: Array) -> tuple[Array, Array, Array]:
+    """
+    Return both (q2, q3, q4) that put axis 4 at ``foot`` from axis 2 and turn by ``total``.
+
+    Of feet (2, 2, N, 3), shape (2, 2, 2, N) each.
+    """
     h, upper, fore = arm.axis, arm.point[2] - arm.point[1], arm.point[3] - arm.point[2]
-    out = []
-    for q3 in angle_to_distance(upper, h[2], fore, np.linalg.norm(foot, axis=-1)):
-        bent = upper + turn(h[2], q3, np.broadcast_to(fore, foot.shape))
-        q2 = angle_onto(h[1], bent, foot)
-        signs = h[1] @ h[2], h[1] @ h[3]
-        out.append((q2, q3, signs[1] * (total - q2 - signs[0] * q3)))
-    return out
+    q3 = _two_ways(angle_to_distance(upper, h[2], fore, np.linalg.norm(foot, axis=-1)), 2)
+    bent = upper + turn(h[2], q3, np.broadcast_to(fore, (*q3.shape, 3)))
+    q2 = angle_onto(h[1], bent, foot[:, :, None])
+    signs = h[1] @ h[2], h[1] @ h[3]
+    return q2, q3, signs[1] * (total[:, :, None] - q2 - signs[0] * q3)
 
 
 def _rest(axis: Array, rotation: Array) -> Array:

@@ -32,10 +32,11 @@ def travel(robot: Robot, poses: Array) -> Array:
 
 
 def distances(first: Array, second: Array) -> tuple[Array, Array]:
-    """Return how far poses (N, 4, 4) are apart, shape (N,) each [m, rad]."""
-    gap = (first - second).reshape(-1, 16)
+    """Return how far poses (..., 4, 4) are apart, shape (...) each [m, rad]."""
+    gap = first - second
+    gap = gap.reshape(*gap.shape[:-2], 16)
     gap *= gap
-    moved, turned = np.sqrt(gap @ _SUMS).T
+    moved, turned = np.moveaxis(np.sqrt(gap @ _SUMS), -1, 0)
     # The chord between rotations, as long as 2 sqrt(2) sin(angle / 2).
     return moved, 2.0 * np.arcsin(np.minimum(turned / np.sqrt(8.0), 1.0))
 
@@ -60,7 +61,7 @@ def joined(tracks: Array) -> Array:
 
 def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
     """
-    Tell, shape (N - 1,), where the arm leaves the path between two samples.
+    Tell, shape (..., N - 1), where the arm leaves the path between two samples.
 
     Half way between two joint positions of one motion the tool is near both; half way between
     two branches it is somewhere else, or the joints move much farther than the tool.
@@ -68,20 +69,20 @@ def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
     Parameters
     ----------
     robot : Robot
-    q : array, shape (N, n) [rad or m]
+    q : array, shape (..., N, n) [rad or m]
     poses : array, shape (N, 4, 4)
         Where the tool should be.
 
     """
-    if len(q) < 2:
-        return np.zeros(0, dtype=bool)
-    halfway = forward(robot, np.nan_to_num(0.5 * (q[1:] + q[:-1])))
+    if len(poses) < 2:
+        return np.zeros((*q.shape[:-2], 0), dtype=bool)
+    halfway = forward(robot, np.nan_to_num(0.5 * (q[..., 1:, :] + q[..., :-1, :])))
     tool = np.diff(travel(robot, poses))
     size, away = reach(robot), -3.0 * tool
     for ends in (poses[:-1], poses[1:]):
         moved, turned = distances(halfway, ends)
-        away += np.hypot(moved / size, turned)
-    joints = np.abs(np.diff(q, axis=0)).max(axis=-1)
+        away = away + np.hypot(moved / size, turned)
+    joints = np.abs(np.diff(q, axis=-2)).max(axis=-1)
     return np.asarray((away > 1e-3) | ((joints > LEAP) & (joints > _STEEP * tool)))
 
 

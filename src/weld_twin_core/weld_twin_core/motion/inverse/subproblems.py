@@ -14,6 +14,7 @@ References
 
 import numpy as np
 
+from ...arm.rotation import skew
 from ...arrays import Array
 
 
@@ -35,7 +36,9 @@ def turn(axis: Array, angle: Array, vector: Array) -> Array:
 
 def turn_matrix(axis: Array, angle: Array) -> Array:
     """Return rotation matrices (..., 3, 3) by angles (...) about a fixed unit axis (3,)."""
-    return np.stack([turn(axis, angle, unit) for unit in np.eye(3)], axis=-1)
+    along, around = np.outer(axis, axis), skew(axis)
+    cosine, sine = np.cos(angle)[..., None, None], np.sin(angle)[..., None, None]
+    return along + cosine * (np.eye(3) - along) + sine * around
 
 
 def angle_onto(axis: Array, start: Array, end: Array) -> Array:
@@ -101,4 +104,8 @@ def _cross(first: Array, second: Array) -> Array:
     """Return cross products (..., 3); numpy's own spends most of its time on moving axes."""
     a, b, c = first[..., 0], first[..., 1], first[..., 2]
     x, y, z = second[..., 0], second[..., 1], second[..., 2]
-    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
+    out = np.empty(np.broadcast_shapes(first.shape, second.shape))
+    out[..., 0] = b * z - c * y
+    out[..., 1] = c * x - a * z
+    out[..., 2] = a * y - b * x
+    return out

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from weld_twin_core.sensitivity.tolerance import Tolerance
 
     from ...sensitivity_report import Setting
+
+_WORK = 'weld_twin_nodes.sensitivity_report.work'
+"""What the processes that work need: they import it while this one gets their tasks ready."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -149,26 +152,22 @@ def _add_effort(group: argparse._ArgumentGroup) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the study and say where the page is."""
     from ...offline.task_pool import pool_of
-    from ...sensitivity_report import make_figures, make_study
-    from ...sensitivity_report.study_files import study_directory
 
     setting = _setting(args)
     if args.figure:
+        from ...sensitivity_report import make_figures
+        from ...sensitivity_report.study_files import study_directory
+
         assert setting is not None
         place = study_directory(args.out) / 'figures'
         for drawing in make_figures(place, setting, args.figure):
             print(f'{place / drawing.name}.svg: {drawing.caption}')
         return 0
     robots = _claims_robots(args)
-    with _progress() as tell:
-        page = make_study(
-            args.out,
-            pool_of(args.scheduler, args.workers),
-            setting,
-            claims_on=robots,
-            tell=tell,
-            seed=args.seed,
-        )
+    with closing(pool_of(args.scheduler, args.workers, ahead=_WORK)) as pool, _progress() as tell:
+        from ...sensitivity_report import make_study
+
+        page = make_study(args.out, pool, setting, claims_on=robots, tell=tell, seed=args.seed)
     _print_summary(Path(args.out))
     print(f'page: {page}')
     return 0

@@ -384,8 +384,7 @@ class _Search:
                 'fatol': 1e-9,
             },
         )
-        values = full(found.x) if found.fun < min(costs) else full(first)
-        return self.result(label, values)
+        return self.result(label, full(found.x if found.fun < min(costs) else first))
 
 
 def _wrapped(angle: float) -> float:

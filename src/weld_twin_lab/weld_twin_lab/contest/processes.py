@@ -14,6 +14,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from ..benchmark.costs import cost_of
+
 SAID = 'said.txt'
 """What a method printed while it worked."""
 LIMIT = 300.0
@@ -71,10 +73,8 @@ class Cold:
         """Have the answer to a case written to a place."""
         filled = [word.format(case=case, out=place) for word in self._words]
         with (place / SAID).open('w', encoding='utf-8') as said:
-            process = subprocess.Popen(filled, stdout=said, stderr=subprocess.STDOUT)
-            code, seconds, memory = waited(process.pid)
-            process.returncode = code
-        return Ended(seconds, memory, _trouble(place, code))
+            code, cost = cost_of(filled, said=said, limit=LIMIT)
+        return Ended(cost.cpu, int(cost.peak), _trouble(place, code))
 
     def close(self) -> None:
         """Do nothing: no process is kept."""

@@ -143,12 +143,13 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
 def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     """Return every closed-form branch, shape (8, N, n), unwrapped and on its best turn."""
     q = joined(_determined(robot, branches(robot, poses), poses))
-    sound = np.isfinite(q).all(axis=-1)
-    whole = sound.all(axis=-1)
+    sound: Mask = np.isfinite(q).all(axis=-1)
+    whole: Mask = sound.all(axis=-1)
     if whole.any():
         q[whole] = _on_turn(robot, np.unwrap(q[whole], axis=1), seed)
-    for k in np.flatnonzero(~whole & sound.any(axis=-1)):
-        q[k, sound[k]] = _on_turn(robot, np.unwrap(q[k, sound[k]], axis=0), seed)
+    for track, there in zip(q, sound, strict=True):
+        if there.any() and not there.all():
+            track[there] = _on_turn(robot, np.unwrap(track[there], axis=0), seed)
     return q
 
 
@@ -184,7 +185,7 @@ def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:
         return middle
     shift = np.round((np.asarray(seed) - q[..., :1, :]) / TURN)
     near = q + TURN * np.where(robot.prismatic, 0.0, shift)
-    inside = ((near >= robot.lower) & (near <= robot.upper)).all(axis=(-2, -1))
+    inside: Mask = ((near >= robot.lower) & (near <= robot.upper)).all(axis=(-2, -1))
     return np.where(inside[..., None, None], near, middle)
 
 
@@ -242,7 +243,8 @@ def _ranks(robot: Robot, q: Array, seed: Array | None) -> Array:
     chain = frames(robot, some)
     condition, _, margin = _posture(robot, some, chain)
     room = np.minimum(margin.min(axis=-1) / _COMFORTABLE, 1.0)
-    return -room / condition.max(axis=-1) * np.where(_above_base(chain), 1.0, 0.1)
+    suits = np.where(_above_base(chain), 1.0, 0.1)
+    return np.asarray(-room / condition.max(axis=-1) * suits)
 
 
 def _above_base(chain: Frames) -> Mask:
@@ -264,7 +266,7 @@ def _posture(robot: Robot, q: Array, chain: Frames) -> tuple[Array, Array, Array
     return condition, values.prod(axis=-1), margin
 
 
-def _explain(robot: Robot, tracks: Array, failures: Array, poses: Array) -> str:
+def _explain(robot: Robot, tracks: Array, failures: NDArray[np.intp], poses: Array) -> str:
     """Return the sentence about the branch that gets farthest."""
     best = int(np.argmax(failures))
     k = int(failures[best])

@@ -143,8 +143,8 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
 def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     """Return every closed-form branch, shape (8, N, n), unwrapped and on its best turn."""
     q = joined(_determined(robot, branches(robot, poses), poses))
-    sound: Mask = np.isfinite(q).all(axis=-1)
-    whole: Mask = sound.all(axis=-1)
+    sound = np.asarray(np.isfinite(q).all(axis=-1))
+    whole = np.asarray(sound.all(axis=-1))
     if whole.any():
         q[whole] = _on_turn(robot, np.unwrap(q[whole], axis=1), seed)
     for track, there in zip(q, sound, strict=True):
@@ -185,7 +185,8 @@ def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:
         return middle
     shift = np.round((np.asarray(seed) - q[..., :1, :]) / TURN)
     near = q + TURN * np.where(robot.prismatic, 0.0, shift)
-    inside: Mask = ((near >= robot.lower) & (near <= robot.upper)).all(axis=(-2, -1))
+    within = (near >= robot.lower) & (near <= robot.upper)
+    inside = np.asarray(within.all(axis=(-2, -1)))
     return np.where(inside[..., None, None], near, middle)
 
 

@@ -57,8 +57,8 @@ class Bound(NamedTuple):
 
 NEVER = 1.01
 """A threshold that no probability reaches."""
-GRID = np.linspace(0.995, 0.5, 100)
-"""Thresholds tried, chosen before any data: half a per cent apart."""
+GRID = np.linspace(0.998, 0.5, 250)
+"""Thresholds tried, chosen before any data: two in a thousand apart."""
 ERROR = 0.1
 """How often the upper limit of the share may fail to hold."""
 
@@ -77,16 +77,26 @@ def bounded(probability: Array, right: Array, risk: float) -> Bound:
 
     """
     p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
-    best = _at(NEVER, p, good)
+    best = NEVER
     for threshold in GRID:
-        tried = _at(float(threshold), p, good)
-        if tried.expected > risk:
+        wrong = int(((p >= threshold) & ~good).sum())
+        if (wrong + 1) / (p.size + 1) > risk:
             break
-        best = tried
-    return best
+        best = float(threshold)
+    return at(best, p, good)
 
 
-def _at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
+def at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
+    """
+    Return what is known of a threshold.
+
+    Parameters
+    ----------
+    threshold : float
+    probability : array, shape (N,)
+    right : array of bool, shape (N,)
+
+    """
     sure = probability >= threshold
     wrong, cases = int((sure & ~right).sum()), probability.size
     expected = (wrong + 1) / (cases + 1)

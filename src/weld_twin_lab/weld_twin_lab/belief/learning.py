@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,31 +13,40 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.trust.model import (
     AS_LOGIT,
+    FROM,
+    LEVELS_BACK,
     PRESENT,
     SCHEMA,
     Trust,
+    comes_back,
     taken,
     trust_from,
     with_products,
 )
 
 from ..blind.statistics import calibration_error
-from .bound import Bound, bounded
+from .bound import Bound, at, bounded
 from .judged import Example
 from .logistic import Weights, fitted, log_loss
-from .terms import RANGES, TERMS
+from .terms import BENT, BENT_LEVELS, RANGES, TERMS
 
-RIDGES = (3.0, 10.0, 30.0, 100.0, 300.0)
+RIDGES = (3.0, 10.0, 30.0, 100.0)
 """Ridges tried, in nats for weights one away from the prior: from as free as a few hundred cases
 allow to hardly moved. The one that predicts unseen folds best is taken."""
 FOLDS = 8
 """Parts of the cases that take turns in being unseen."""
+NOTHING = Bound(1.0, 0, 0, 1.0, 1.0, 0.0)
+"""What is known of a threshold before there is one."""
 FEWEST = 20
 """Examples of a level from which on it is learned at all."""
 FEWEST_NAMED = 5
 """Examples in which a family is named from which on its name is a sign at all."""
 RISK = 0.01
-"""Probability that a case may be sure and wrong."""
+"""Probability that an answer may be sure and wrong."""
+LEVEL_RISK = 0.02
+"""The same of a place, a dependence or a name, where the answer as a whole need not be sure. What
+is told of them is to be as often right as it says; below 1 % most of them would be told as less
+than they are, and above 2 % nothing more is gained."""
 TOLD_UNSURE = 0.8
 """What is not sure by the bound is told as this at the most; above it counts as sure."""
 BEFORE = frozenset({'belief', 'place', 'dependence', 'name'})
@@ -61,12 +71,18 @@ class Level(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Examples of one level: probabilities unseen, what was right, what was told, the bound."""
+    """Examples of one level: probabilities unseen, what was right, told, may be sure; the bound."""
 
     unseen: Array
     right: Array
     told: Array
+    may: Array
     bound: Bound
+
+    @property
+    def bounded(self) -> Array:
+        """Return the probabilities that a threshold is asked of."""
+        return np.where(self.may, self.unseen, np.minimum(self.unseen, TOLD_UNSURE))
 
 
 class Table(NamedTuple):
@@ -79,7 +95,9 @@ class Table(NamedTuple):
     folds: Array
 
 
-def learned(examples: Sequence[Example], card: Mapping[str, Any]) -> dict[str, Any]:
+def learned(
+    examples: Sequence[Example], card: Mapping[str, Any], risk: float = RISK
+) -> dict[str, Any]:
     """
     Return the content of a belief file.
 
@@ -88,6 +106,8 @@ def learned(examples: Sequence[Example], card: Mapping[str, Any]) -> dict[str, A
     examples : sequence of Example
     card : mapping
         Seeds, engines and mix, to be kept with the weights.
+    risk : float
+        Probability that an answer may be sure and wrong.
 
     """
     levels: dict[str, Level] = {}
@@ -97,13 +117,15 @@ def learned(examples: Sequence[Example], card: Mapping[str, Any]) -> dict[str, A
         if len(own) >= FEWEST:
             levels[name] = _level(own, name)
             told, right = (np.array([getattr(e, key) for e in own]) for key in ('told', 'right'))
-            bound = bounded(levels[name].unseen, right, RISK)
-            parts[name] = Part(levels[name].unseen, right, told, bound)
+            may = np.array([_may_be_sure(e) for e in own])
+            parts[name] = Part(levels[name].unseen, right, told, may, NOTHING)
+    parts = _together(parts, risk)
     return {
         'schema': SCHEMA,
         'card': {
             **card,
-            'bounds': {name: _told(part.bound) for name, part in parts.items()},
+            'risk': risk,
+            'bounds': {name: _told(part.bound, name, risk) for name, part in parts.items()},
             'unseen': {
                 level: _unseen_worth([p for n, p in parts.items() if n.startswith(f'{level} ')])
                 for level in dict.fromkeys(name.split()[0] for name in parts)
@@ -138,18 +160,43 @@ def _unseen_worth(parts: Sequence[Part]) -> dict[str, Any]:
 
 def _capped(part: Part) -> Array:
     """Return what is told: no more than `TOLD_UNSURE` where it is not sure."""
-    return np.where(
-        part.unseen >= part.bound.sure_from, part.unseen, np.minimum(part.unseen, TOLD_UNSURE)
-    )
+    sure = part.may & (part.unseen >= part.bound.sure_from)
+    return np.where(sure, part.unseen, np.minimum(part.unseen, TOLD_UNSURE))
 
 
-def _told(bound: Bound) -> dict[str, Any]:
-    return {**bound._asdict(), 'risk': RISK}
+def _together(parts: Mapping[str, Part], risk: float) -> dict[str, Part]:
+    """
+    Return examples with their bounds: one threshold for all groups of a level.
+
+    What counts is how often any answer is sure and wrong. As probabilities mean the same in every
+    group, one threshold for all gives the most sure answers for that.
+    """
+    out = {}
+    for level in dict.fromkeys(name.split()[0] for name in parts):
+        own = {name: part for name, part in parts.items() if name.split()[0] == level}
+        p, right = (
+            np.concatenate([getattr(part, key) for part in own.values()])
+            for key in ('bounded', 'right')
+        )
+        most = bounded(p, right, risk if level == 'answer' else max(risk, LEVEL_RISK))
+        for name, part in own.items():
+            here = at(most.sure_from, part.bounded, part.right)
+            out[name] = part._replace(bound=here._replace(expected=most.expected))
+    return out
+
+
+def _may_be_sure(example: Example) -> bool:
+    return example.level.split()[0] not in LEVELS_BACK or comes_back(example.signs)
+
+
+def _told(bound: Bound, name: str, risk: float) -> dict[str, Any]:
+    own = risk if name.startswith('answer ') else max(risk, LEVEL_RISK)
+    return {**bound._asdict(), 'risk': own}
 
 
 def _level(examples: Sequence[Example], name: str) -> Level:
     table = _table(examples, name)
-    ways = np.array([TERMS[name][sign] for sign in table.names], dtype=float)
+    ways = np.array([TERMS[name][sign.partition(FROM)[0]] for sign in table.names], dtype=float)
     tried = [(_unseen(table, ways, ridge), ridge) for ridge in RIDGES]
     unseen, ridge = min(tried, key=lambda item: log_loss(item[0], table.right, table.weight))
     middle, spread = _scaling(table.values)
@@ -160,8 +207,8 @@ def _level(examples: Sequence[Example], name: str) -> Level:
             'weight': round(float(slope), 5),
             'middle': round(float(middle[k]), 5),
             'spread': round(float(spread[k]), 5),
-            'low': round(float(table.values[:, k].min()), 5),
-            'high': round(float(table.values[:, k].max()), 5),
+            'low': round(float(np.nanmin(table.values[:, k])), 5),
+            'high': round(float(np.nanmax(table.values[:, k])), 5),
         }
         for k, (sign, slope) in enumerate(zip(table.names, weights.slopes, strict=True))
         if abs(slope) > 1e-4
@@ -186,7 +233,19 @@ def _table(examples: Sequence[Example], name: str) -> Table:
         for sign in TERMS[name]
         if not sign.startswith(PRESENT) or sum(sign in s for s in signs) >= FEWEST_NAMED
     ]
-    values = np.array([[entered(s, sign) for sign in names] for s in signs])
+    names = [
+        sign
+        for sign in names
+        if sign.startswith(PRESENT) or sum(sign in s for s in signs) >= FEWEST
+    ]
+    columns = [np.array([entered(s, sign) for s in signs]) for sign in names]
+    if name.split()[1] in BENT_LEVELS:
+        pieces = [(n, c) for n, c in zip(names, columns, strict=True) if n in BENT]
+        for sign, column in pieces:
+            for low, high in _pieces(column):
+                names.append(f'{sign}{FROM}{low:.3g}')
+                columns.append(np.clip(column, low, high))
+    values = np.array(columns).T
     cases = [e.case for e in examples]
     counts = {case: cases.count(case) for case in set(cases)}
     places = {case: k for k, case in enumerate(sorted(counts, key=_scattered))}
@@ -201,7 +260,7 @@ def _table(examples: Sequence[Example], name: str) -> Table:
 
 def entered(signs: Mapping[str, float], sign: str) -> float:
     """
-    Return a sign as it enters, cut to what can tell anything.
+    Return a sign as it enters, cut to what can tell anything; not a number where it is missing.
 
     Parameters
     ----------
@@ -210,7 +269,16 @@ def entered(signs: Mapping[str, float], sign: str) -> float:
 
     """
     low, high = RANGES.get(sign, (-np.inf, np.inf))
-    return float(np.clip(taken(sign, signs.get(sign, 0.0)), low, high))
+    missing = 0.0 if sign.startswith(PRESENT) else np.nan
+    return float(np.clip(taken(sign, signs[sign]), low, high)) if sign in signs else missing
+
+
+def _pieces(column: Array) -> list[tuple[float, float]]:
+    """Return the thirds of a sign's examples, from where to where; none where few values occur."""
+    known = column[~np.isnan(column)]
+    ends = np.quantile(known, (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)) if known.size else np.zeros(4)
+    many = np.unique(known).size >= FEWEST
+    return [(float(a), float(b)) for a, b in pairwise(ends) if many and b - a > 1e-3]
 
 
 def _scattered(case: str) -> str:
@@ -219,12 +287,14 @@ def _scattered(case: str) -> str:
 
 
 def _scaling(values: Array) -> tuple[Array, Array]:
-    spread = values.std(axis=0)
-    return values.mean(axis=0), np.where(spread > 1e-9, spread, 1.0)
+    """Return middle and spread of every sign where it is known."""
+    spread = np.nanstd(values, axis=0)
+    return np.nanmean(values, axis=0), np.where(spread > 1e-9, spread, 1.0)
 
 
 def _weights(table: Table, ways: Array, ridge: float, middle: Array, spread: Array) -> Weights:
-    columns = (table.values - middle) / spread
+    # A sign that is missing counts as at its middle.
+    columns = np.nan_to_num((table.values - middle) / spread)
     prior = np.array(
         [
             spread[k] if name in BEFORE and name in AS_LOGIT else 0.0
@@ -242,8 +312,8 @@ def _unseen(table: Table, ways: Array, ridge: float) -> Array:
         rest = Table(table.names, *(column[~here] for column in table[1:]))
         middle, spread = _scaling(rest.values)
         weights = _weights(rest, ways, ridge, middle, spread)
-        low, high = rest.values.min(axis=0), rest.values.max(axis=0)
-        columns = (np.clip(table.values[here], low, high) - middle) / spread
+        low, high = np.nanmin(rest.values, axis=0), np.nanmax(rest.values, axis=0)
+        columns = np.nan_to_num((np.clip(table.values[here], low, high) - middle) / spread)
         out[here] = 1.0 / (1.0 + np.exp(-(weights.bias + columns @ weights.slopes)))
     return out
 

@@ -14,9 +14,9 @@ from weld_twin_core.diagnosis.trust.model import FILE, Trust, trust_from
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
+from . import learning
 from .goals import goal_measures
 from .judged import Case, Example, cases_of, examples_of
-from .learning import learned
 from .pictures import reliability_picture, risk_picture
 from .rows import seeds_of, slim
 from .table import page
@@ -47,13 +47,15 @@ def rows_of(seed: int, count: int, runner: Runner) -> list[dict[str, Any]]:
     return [slim(row) for row in runner.run(tasks)]
 
 
-def fit(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def fit(rows: Sequence[Mapping[str, Any]], risk: float = learning.RISK) -> dict[str, Any]:
     """
     Return the content of the belief file that some cases teach.
 
     Parameters
     ----------
     rows : sequence of mappings
+    risk : float
+        Probability that an answer may be sure and wrong.
 
     """
     cases = cases_of(rows)
@@ -64,7 +66,7 @@ def fit(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         'kinds': dict(Counter(c.judged.kind for c in cases)),
         'mix': MIX,
     }
-    return learned(examples_of(cases), card)
+    return learning.learned(examples_of(cases), card, risk)
 
 
 def judged(content: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -9,13 +9,15 @@ starts from what was believed of it before, the first of its signs.
 
 from __future__ import annotations
 
-from weld_twin_core.diagnosis.trust.model import PRESENT
+from weld_twin_core.diagnosis.trust.model import ON, PRESENT
 from weld_twin_core.effects.registry import REGISTRY
 
 _FAMILIES = [name for name, kind in REGISTRY.items() if kind.cause]
-_IN_ANSWER = {start + name: 0 for start in PRESENT[:2] for name in _FAMILIES}
-"""Which families an answer names, in a set or alone: either way, as some stand in for others."""
-_IN_CAUSE = {start + name: 0 for start in PRESENT[2:] for name in _FAMILIES}
+_KINDS = sorted({ON + REGISTRY[name].depends_on for name in _FAMILIES})
+_IN_ANSWER = {start + name: 0 for start in PRESENT[:2] for name in (*_FAMILIES, *_KINDS)}
+"""Which families an answer names, in a set or alone, and what they depend on: either way, as some
+stand in for others."""
+_IN_CAUSE = {start + name: 0 for start in PRESENT[2:] for name in (*_FAMILIES, *_KINDS)}
 """The same of one cause."""
 _MOTION = {'moving': 1, 'wide': 1, 'rows': 1, 'static': 0, 'orientation': 1, 'aligned': -1}
 _TRAVELLED = {'travel': 1, 'turns': 0, 'samples': 0}
@@ -28,6 +30,22 @@ _LEFT = {
     'after': -1,
     'elsewhere': -1,
 }
+_FORMULA = {
+    'own_back': 1,
+    'own_margin': 1,
+    'own_apart': 1,
+    'own_elsewhere': 1,
+    'own_formula': 1,
+    'own_left': -1,
+    'own_left_sure': -1,
+    'own_wander': -1,
+    'own_wander_place': -1,
+    'left_at_joint': -1,
+    'left_at_joint_sure': -1,
+    'left_peaks': 0,
+    'left_alike': 0,
+}
+"""Whether formulas hold: of the worst effect of an answer, or of the one a statement is about."""
 _NAMED = {
     'mass': 1,
     'leader': 1,
@@ -59,6 +77,7 @@ _NAMED = {
     'notes': -1,
     'constant_at_rest': -1,
     'constant_in_narrow': -1,
+    **_FORMULA,
     **_LEFT,
     **_MOTION,
     **_TRAVELLED,
@@ -78,7 +97,7 @@ _CAUSE = {
     **_MOTION,
 }
 TERMS: dict[str, dict[str, int]] = {
-    'answer named': {'belief': 1, **_NAMED},
+    'answer named': {'belief': 1, **_NAMED, **_IN_ANSWER},
     'answer unknown': {
         'belief': 1,
         'gap': 0,
@@ -99,6 +118,10 @@ TERMS: dict[str, dict[str, int]] = {
         'margin': 0,
         'nats': 0,
         'slots': 0,
+        'own_left': 0,
+        'own_wander': 0,
+        'left_at_joint': 1,
+        'left_at_joint_sure': 1,
         **_MOTION,
         **_TRAVELLED,
     },
@@ -110,6 +133,8 @@ TERMS: dict[str, dict[str, int]] = {
         'structure_gain': -1,
         'structure_sure': -1,
         'independent': 1,
+        'left_at_joint': -1,
+        'left_at_joint_sure': -1,
         **_MOTION,
     },
     'place named': {
@@ -119,6 +144,7 @@ TERMS: dict[str, dict[str, int]] = {
         'margin': 1,
         'apart': 1,
         **_CAUSE,
+        **_FORMULA,
         **_IN_ANSWER,
         **_IN_CAUSE,
     },
@@ -136,6 +162,7 @@ TERMS: dict[str, dict[str, int]] = {
         'margin': 1,
         'apart': 1,
         **_CAUSE,
+        **_FORMULA,
         **_IN_ANSWER,
         **_IN_CAUSE,
     },
@@ -148,5 +175,43 @@ TERMS: dict[str, dict[str, int]] = {
     'name named': {'name': 1, 'belief': 1, **_CAUSE, **_NAMED, **_IN_ANSWER, **_IN_CAUSE},
 }
 """Signs of each level and group of status, with the way they may count."""
-RANGES = {'curve_gain': (-1.0, 1.0), 'curve_sure': (-3.0, 10.0), 'structure_sure': (-3.0, 10.0)}
+RANGES = {
+    'curve_gain': (-1.0, 1.0),
+    'curve_sure': (-3.0, 10.0),
+    'structure_sure': (-3.0, 10.0),
+    'own_left': (-0.05, 0.3),
+    'own_left_sure': (-3.0, 10.0),
+    'left_at_joint': (-0.05, 0.3),
+    'left_at_joint_sure': (-3.0, 10.0),
+    'own_wander': (-1.0, 3.0),
+    'own_wander_place': (-1.0, 3.0),
+    'own_formula': (-0.5, 2.0),
+}
 """Signs that are cut before anything is learned: far outside only a bad fit is told."""
+BENT = (
+    'belief',
+    'name',
+    'margin',
+    'apart',
+    'nats',
+    'weakest',
+    'strongest',
+    'gap',
+    'left',
+    'after',
+    'structure_gain',
+    'curve_gain',
+    'rows',
+    'travel',
+    'turns',
+    'samples',
+    'cause_size',
+    'cause_share',
+    'own_elsewhere',
+    'own_wander',
+    'own_left_sure',
+)
+"""Signs whose log odds may bend at a third and at two thirds of the examples: a margin of two nats
+says much more than none, one of two hundred no more than one of a hundred."""
+BENT_LEVELS = ('named',)
+"""Groups with examples enough for that: of others, curves told of cases never seen were worse."""

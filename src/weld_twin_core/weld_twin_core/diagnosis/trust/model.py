@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from ...effects.registry import REGISTRY
+
 SCHEMA = 'weld_twin/belief/1'
 FILE = 'belief.json'
 LEAST_LOGIT = 1e-3
@@ -42,6 +44,13 @@ or not widely. What depends on the angle of a joint at rest looks like a constan
 
 PRESENT = ('named_', 'alone_', 'cause_is_', 'cause_only_')
 """Beginnings of signs that say which families are named; one that is not there is not named."""
+ON = 'on_'
+"""After such a beginning: a family is named that depends on this. What is learned of all families
+of a kind holds for one that was seldom seen."""
+FROM = ' from '
+"""Between a sign and where a piece of its curve begins: log odds bend there."""
+LEVELS_BACK = frozenset({'answer', 'name'})
+"""Levels that are sure only where every name comes back on all halves of the data."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +114,10 @@ class Learned:
         """
         total = self.bias
         for name, term in self.terms.items():
-            if name in signs:
-                total += term.nats(taken(name, signs[name]))
-            elif name.startswith(PRESENT):
+            sign = name.partition(FROM)[0]
+            if sign in signs:
+                total += term.nats(taken(sign, signs[sign]))
+            elif sign.startswith(PRESENT):
                 total += term.nats(0.0)
         return float(np.clip(1.0 / (1.0 + np.exp(-total)), self.least, self.most))
 
@@ -145,7 +155,7 @@ def taken(name: str, value: float) -> float:
 
 def with_products(signs: Mapping[str, float]) -> dict[str, float]:
     """
-    Return signs with those that are made of two of them.
+    Return signs with those that are made of two of them, and with the kinds of the families named.
 
     Parameters
     ----------
@@ -158,7 +168,28 @@ def with_products(signs: Mapping[str, float]) -> dict[str, float]:
         for name, (named, share) in PRODUCTS.items()
         if named in signs and share in signs
     }
-    return {**signs, **made}
+    return {**signs, **made, **_kinds(signs)}
+
+
+def _kinds(signs: Mapping[str, float]) -> dict[str, float]:
+    """Return what the families named depend on, as signs."""
+    out = {}
+    for start in PRESENT:
+        named = [REGISTRY.get(sign[len(start) :]) for sign in signs if sign.startswith(start)]
+        out.update({f'{start}{ON}{kind.depends_on}': 1.0 for kind in named if kind is not None})
+    return out
+
+
+def comes_back(signs: Mapping[str, float]) -> bool:
+    """
+    Return whether everything named came back on all halves of the data, as far as any can tell.
+
+    Parameters
+    ----------
+    signs : mapping from str to float
+
+    """
+    return signs.get('own_back', 1.0) >= 1.0
 
 
 @dataclass(frozen=True)
@@ -213,6 +244,7 @@ class Trust:
         if learned.larger(signs):
             probability = max(probability, min(before, self.told_unsure))
         sure = probability >= self.sure_from.get(f'{level} {group}', 1.0)
+        sure = sure and (level not in LEVELS_BACK or comes_back(signs))
         return probability if sure else min(probability, self.told_unsure)
 
 

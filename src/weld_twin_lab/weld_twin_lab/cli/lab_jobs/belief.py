@@ -34,6 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--judge-on', nargs='*', default=[], metavar='TABLE', help='tables kept from other runs'
     )
+    parser.add_argument(
+        '--risk',
+        type=float,
+        default=0.01,
+        metavar='P',
+        help='probability that an answer may be sure and wrong (default: 0.01)',
+    )
     add_pool(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='where everything goes')
 
@@ -61,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     _refuse_shared(taught, tried)
     write_rows(out / LEARNED, taught)
     write_rows(out / JUDGED, tried)
-    content = study.fit(taught)
+    content = study.fit(taught, args.risk)
     print(study.write(out, content, tried), end='')
     return 0
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.trust.model import (
@@ -74,9 +75,9 @@ class Part(NamedTuple):
     """Examples of one level: probabilities unseen, what was right, told, may be sure; the bound."""
 
     unseen: Array
-    right: Array
+    right: NDArray[np.bool_]
     told: Array
-    may: Array
+    may: NDArray[np.bool_]
     bound: Bound
 
     @property

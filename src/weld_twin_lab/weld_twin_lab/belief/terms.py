@@ -9,7 +9,7 @@ starts from what was believed of it before, the first of its signs.
 
 from __future__ import annotations
 
-from weld_twin_core.diagnosis.trust.model import ON, PRESENT
+from weld_twin_core.diagnosis.trust.model import OF_KIND, ON, PRESENT
 from weld_twin_core.effects.registry import REGISTRY
 
 _FAMILIES = [name for name, kind in REGISTRY.items() if kind.cause]
@@ -19,6 +19,9 @@ _IN_ANSWER = {start + name: 0 for start in PRESENT[:2] for name in (*_FAMILIES, 
 stand in for others."""
 _IN_CAUSE = {start + name: 0 for start in PRESENT[2:] for name in (*_FAMILIES, *_KINDS)}
 """The same of one cause."""
+_ANSWER_FORMS = {f'{sign}_{PRESENT[0]}{kind}': -1 for sign in OF_KIND for kind in _KINDS}
+_CAUSE_FORMS = {f'{sign}_{PRESENT[2]}{kind}': -1 for sign in OF_KIND for kind in _KINDS}
+"""Whether formulas hold, of each kind of family named."""
 _MOTION = {'moving': 1, 'wide': 1, 'rows': 1, 'static': 0, 'orientation': 1, 'aligned': -1}
 _TRAVELLED = {'travel': 1, 'turns': 0, 'samples': 0}
 _LEFT = {
@@ -97,7 +100,7 @@ _CAUSE = {
     **_MOTION,
 }
 TERMS: dict[str, dict[str, int]] = {
-    'answer named': {'belief': 1, **_NAMED, **_IN_ANSWER},
+    'answer named': {'belief': 1, **_NAMED, **_IN_ANSWER, **_ANSWER_FORMS},
     'answer unknown': {
         'belief': 1,
         'gap': 0,
@@ -172,7 +175,15 @@ TERMS: dict[str, dict[str, int]] = {
         'curve_sure': 1,
         **_CAUSE,
     },
-    'name named': {'name': 1, 'belief': 1, **_CAUSE, **_NAMED, **_IN_ANSWER, **_IN_CAUSE},
+    'name named': {
+        'name': 1,
+        'belief': 1,
+        **_CAUSE,
+        **_NAMED,
+        **_IN_ANSWER,
+        **_IN_CAUSE,
+        **_CAUSE_FORMS,
+    },
 }
 """Signs of each level and group of status, with the way they may count."""
 RANGES = {
@@ -188,6 +199,12 @@ RANGES = {
     'own_formula': (-0.5, 2.0),
 }
 """Signs that are cut before anything is learned: far outside only a bad fit is told."""
+RANGES |= {
+    name: RANGES[sign]
+    for sign in OF_KIND
+    for name in (*_ANSWER_FORMS, *_CAUSE_FORMS)
+    if name.startswith(sign)
+}
 BENT = (
     'belief',
     'name',

@@ -10,7 +10,7 @@ a few signs. `weld-twin lab belief` fits and writes it.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -47,6 +47,9 @@ PRESENT = ('named_', 'alone_', 'cause_is_', 'cause_only_')
 ON = 'on_'
 """After such a beginning: a family is named that depends on this. What is learned of all families
 of a kind holds for one that was seldom seen."""
+OF_KIND = ('own_wander', 'own_left_sure')
+"""Signs of a formula that tell more of some kinds: friction that imitates play wants another size on
+every stretch."""
 FROM = ' from '
 """Between a sign and where a piece of its curve begins: log odds bend there."""
 LEVELS_BACK = frozenset({'answer', 'name'})
@@ -168,7 +171,8 @@ def with_products(signs: Mapping[str, float]) -> dict[str, float]:
         for name, (named, share) in PRODUCTS.items()
         if named in signs and share in signs
     }
-    return {**signs, **made, **_kinds(signs)}
+    kinds = _kinds(signs)
+    return {**signs, **made, **kinds, **_of_kinds(signs, kinds)}
 
 
 def _kinds(signs: Mapping[str, float]) -> dict[str, float]:
@@ -178,6 +182,12 @@ def _kinds(signs: Mapping[str, float]) -> dict[str, float]:
         named = [REGISTRY.get(sign[len(start) :]) for sign in signs if sign.startswith(start)]
         out.update({f'{start}{ON}{kind.depends_on}': 1.0 for kind in named if kind is not None})
     return out
+
+
+def _of_kinds(signs: Mapping[str, float], kinds: Iterable[str]) -> dict[str, float]:
+    """Return the signs of a formula once more for each kind named: some kinds imitate others."""
+    each = [name for name in OF_KIND if name in signs]
+    return {f'{name}_{kind}': signs[name] for kind in kinds for name in each}
 
 
 def comes_back(signs: Mapping[str, float]) -> bool:

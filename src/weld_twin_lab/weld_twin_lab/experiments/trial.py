@@ -13,7 +13,7 @@ from weld_twin_core.diagnosis.advice import Limits
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
 from weld_twin_nodes.offline.closing import repeat_wanted, third_wanted, weighed
-from weld_twin_nodes.offline.investigation import decided, question
+from weld_twin_nodes.offline.investigation import decided, question, short
 
 from ..blind.recorded_motion import Motion
 from .sealed_cell import STAY, SealedCell, as_motion
@@ -164,7 +164,9 @@ def investigated(
     while True:
         asked = question(found, visit, [step['kind'] for step in rounds], why)
         if not isinstance(asked, dict):
-            return rounds, asked[0], answer
+            # What the visit would allow, the minutes of motion may not.
+            spent = asked[0] == 'nothing would part them' and not why and short(left)
+            return rounds, 'minutes spent' if spent else asked[0], answer
         if len(rounds) == ROUNDS or asked['robot_minutes'] > left:
             return rounds, 'rounds spent' if len(rounds) == ROUNDS else 'minutes spent', answer
         name = f'experiment {len(rounds) + 1}'

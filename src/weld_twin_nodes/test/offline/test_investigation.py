@@ -71,6 +71,9 @@ def test_what_it_says_before_it_is_made_is_kept():
         (found(wanted=stations()), 2.0, 'budget spent'),
         (found(wanted=stations(sigma=0.5)), 30.0, 'nothing would part them'),
         (found(wanted=None), 30.0, 'nothing would part them'),
+        # A minute is left: what would part them does not fit in any more.
+        (found(wanted=None), 1.0, 'budget spent'),
+        (found(wanted=stations(sigma=0.5)), 1.0, 'budget spent'),
         (found(wanted={**stations(), 'motion': None}), 30.0, 'nothing would part them'),
     ],
 )

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
+from weld_twin_core.diagnosis.advice.chosen_pieces import LEAST, NOTHING
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_text
@@ -208,10 +208,15 @@ def question(
         return ('nothing would part them' if why == ALIKE else 'sure'), why
     wanted = found.get('next_experiment')
     by_hand = wanted and 'contact' in (wanted.get('motion') or {})
+    sigma = wanted['expected_separation_sigma'] if wanted else None
+    if (not wanted or (sigma is not None and 0.0 < sigma < NOTHING)) and short(left):
+        return (
+            'budget spent',
+            f'{max(left, 0.0):.1f} min are left, and nothing that fits in would part what is left',
+        )
     if not wanted or wanted.get('motion') is None or by_hand:
         told = '' if not wanted else f': {wanted["sentence"]}'
         return 'nothing would part them', f'no motion decides between what is left{told}'
-    sigma = wanted['expected_separation_sigma']
     if sigma is not None and sigma < NOTHING:
         return (
             'nothing would part them',
@@ -228,6 +233,11 @@ def question(
             f'the next experiment takes {wanted["cost"]:.1f} min and {max(left, 0.0):.1f} are left',
         )
     return _asked(wanted)
+
+
+def short(left: float) -> bool:
+    """Return whether fewer minutes are left than a usual experiment takes at the least."""
+    return 60.0 * left < LEAST
 
 
 def _asked(wanted: Mapping[str, Any]) -> dict[str, Any]:

@@ -156,6 +156,7 @@ def loaded_play(cell):
 def bearing_tilt(cell):
     angle, standard = cell.q[0], cell.robot.convention == 'standard'
     x, y = 2e-3 * np.cos(angle) + 1e-3 * np.sin(angle), 3e-3 * np.sin(angle)
+    x, y = x - 4e-4 * np.sin(2.0 * angle), y + 5e-4 * np.cos(2.0 * angle)
     if standard:
         axes = cell.robot.T_world_base[:3, :2]
         turn = Rotation.from_rotvec(axes @ [x, y]).as_matrix()
@@ -291,7 +292,10 @@ DEFINITIONS = {
     'link_warm_up': ({'joint': 'j2', 'strain': 1e-3, 'warming_time': 2.0}, link_warm_up),
     'drift': ({'xyz_rate': SMALL}, drift),
     'loaded_play': ({'joint': 'j1', 'width': 2e-3, 'torque': 5.0}, loaded_play),
-    'bearing_tilt': ({'joint': 'j0', 'lean': [2e-3, 1e-3, 0.0, 3e-3]}, bearing_tilt),
+    'bearing_tilt': (
+        {'joint': 'j0', 'lean': [2e-3, 1e-3, 0.0, 3e-3], 'second': [0.0, -4e-4, 5e-4, 0.0]},
+        bearing_tilt,
+    ),
     'wear': ({'rate': 1e-3, 'slowing': 0.3}, wear),
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
     'pedestal_tilt': ({'compliance': [1e-5, 3e-5]}, pedestal_tilt),

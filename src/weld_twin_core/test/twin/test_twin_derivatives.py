@@ -43,7 +43,11 @@ ENTRIES = {
     'friction': {'joint': 'j2', 'windup': 5e-3, 'asymmetry': -0.2, 'travel': 0.1},
     'joint_compliance': {'joint': 'j1', 'compliance': 1e-5},
     'loaded_play': {'joint': 'j1', 'width': 1e-4, 'torque': 20.0},
-    'bearing_tilt': {'joint': 'j1', 'lean': [1e-3, 2e-3, 3e-3, -1e-3]},
+    'bearing_tilt': {
+        'joint': 'j1',
+        'lean': [1e-3, 2e-3, 3e-3, -1e-3],
+        'second': [1e-4, 2e-4, -3e-4, 1e-4],
+    },
     'wear': {'rate': 1e-4, 'slowing': 0.2},
     'cartesian_compliance': {'compliance': [1e-6, 2e-6, 3e-6]},
     'payload': {'mass': 2.0, 'com': [0.01, 0.02, 0.03]},

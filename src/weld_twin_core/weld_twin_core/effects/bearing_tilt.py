@@ -1,21 +1,35 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Bearing tilt: an axis that wobbles, its run-out. The axis leans once per turn of its joint.
+Bearing tilt: an axis that wobbles, its run-out. The axis leans once per turn of its joint, or twice.
 
 The lean is a small turn of the frame that the joint turns in, about that frame's x and y axes,
 each a cosine and a sine of the joint's angle. A lean that goes round with the joint is the same
 at every angle seen from the link, and is `link_twist`; a bearing with a high spot rocks instead.
+
+Run-out is read as its first harmonics [1]_: an oval race adds a wave of twice the angle. It is in the model
+only where it earns its numbers beside the first. Left out where it is large, a constant of the arm is
+found in its place.
+
+References
+----------
+.. [1] R. R. Donaldson, "A simple method for separating spindle error from test ball roundness
+   error", Annals of the CIRP 21, 1972: the error motion of an axis as a series in its angle.
+
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..arm.channels import Channel, Shift
+from ..arm.robot import Robot
 from ..arrays import Array
+from ..errors import ModelError
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
@@ -24,10 +38,15 @@ from .view import Parameter, Stage, Value, View
 @register
 @dataclass(frozen=True, eq=False)
 class BearingTilt(Effect):
-    """The axis turns about x by lean[0] cos q + lean[1] sin q, and about y by the other two."""
+    """
+    The axis turns about x by lean[0] cos q + lean[1] sin q, and about y by the other two.
+
+    ``second`` is the same with the cosine and sine of 2 q; empty where it is left out.
+    """
 
     joint: str
     lean: Value = (0.0, 0.0, 0.0, 0.0)
+    second: Value = ()
 
     name = 'bearing_tilt'
     depends_on = 'angle'
@@ -35,12 +54,39 @@ class BearingTilt(Effect):
     stage = Stage.LINK
     common = False
     by_motion = True
-    parameters = (Parameter('lean', 'rad', size=4, typical=2e-4),)
+    parameters = (
+        Parameter('lean', 'rad', size=4, typical=2e-4),
+        Parameter('second', 'rad', size=0, typical=2e-4),
+    )
 
-    def _parts(self, view: View) -> list[Shift]:
-        """Return what a lean of one does, for each of the four."""
+    def check(self, robot: Robot) -> None:
+        """
+        Refuse an effect this robot cannot have.
+
+        Parameters
+        ----------
+        robot : Robot
+
+        Raises
+        ------
+        ModelError
+            As of every effect, or a second wave of other than four numbers.
+
+        """
+        super().check(robot)
+        if np.shape(self.second)[-1:] not in ((0,), (4,)):
+            raise ModelError(
+                f'{self.name}: second needs 4 numbers, or none, got shape {np.shape(self.second)}'
+            )
+
+    def _waves(self) -> Iterable[tuple[str, int]]:
+        """Return which waves there are: a parameter, and how often per turn."""
+        return (('lean', 1), ('second', 2))[: 1 + (np.shape(self.second)[-1] > 0)]
+
+    def _parts(self, view: View, times: int) -> list[Shift]:
+        """Return what a lean of one does, for each of the four of a wave."""
         i = view.robot.index(self.joint)
-        angle = view.joint(i)
+        angle = times * view.joint(i)
         waves = (np.cos(angle), np.sin(angle))
         return [
             {channel: share * wave for channel, share in axis.items()}
@@ -51,14 +97,59 @@ class BearingTilt(Effect):
     def displace(self, view: View) -> Shift:
         """Return the lean of the frame before the joint."""
         out: dict[Channel, Array] = {}
-        for k, part in enumerate(self._parts(view)):
-            for channel, value in part.items():
-                out[channel] = out.get(channel, 0.0) + self.number('lean', k) * value
+        for name, times in self._waves():
+            for k, part in enumerate(self._parts(view, times)):
+                for channel, value in part.items():
+                    out[channel] = out.get(channel, 0.0) + self.number(name, k) * value
         return out
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the waves."""
-        return list(self._parts(view))
+        return [part for _, times in self._waves() for part in self._parts(view, times)]
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Any]:
+        """
+        Yield the wave of once per turn, and both waves.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+            The joint it would sit on.
+        pull : array, shape (N,), optional
+            Not needed.
+
+        """
+        yield cls(str(joint))
+        yield cls(str(joint), second=np.zeros(4))
+
+    @classmethod
+    def small(cls, view: View, joint: str | None, most: int) -> list[BearingTilt]:
+        """
+        Return the wave of once per turn: among many small errors the second is far below them.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+            The joint it sits on.
+        most : int
+            How many numbers the measurements can hold apart; it takes four.
+
+        """
+        return [cls(str(joint))]
+
+    def joined(self, other: BearingTilt) -> BearingTilt:
+        """Return the waves of both in one."""
+        both = [one.second for one in (self, other) if np.size(one.second)]
+        lean = np.asarray(self.lean) + np.asarray(other.lean)
+        return replace(self, lean=lean, second=sum(map(np.asarray, both)) if both else ())
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the entry of an effects file; without a second wave, none is told."""
+        out = super().to_mapping()
+        return out if np.size(self.second) else {k: v for k, v in out.items() if k != 'second'}
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:

@@ -148,6 +148,9 @@ TABLE: dict[tuple[str, str], Plausible] = {
     ('bearing_tilt', 'lean'): _even(
         2e-4, 3e-3, 'derived: two hundredths of a millimetre of run-out on a bearing of 0.1 m'
     ),
+    ('bearing_tilt', 'second'): _even(
+        1e-4, 1.5e-3, 'derived: an oval race leans less than one that is off centre; half of lean'
+    ),
     ('loaded_play', 'width'): Plausible(5e-4, 0.0, 2e-2, f'{RV}; see backlash'),
     ('wear', 'rate'): _even(
         2e-6,

@@ -224,9 +224,8 @@ def parameter_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]
     """Return name and value of every parameter of an effect; a ripple has a row per order."""
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std)
-    return [
-        (p.name, _shown(p, getattr(effect, p.name), std.get(p.name))) for p in effect.parameters
-    ]
+    told = [p for p in effect.parameters if np.size(getattr(effect, p.name))]
+    return [(p.name, _shown(p, getattr(effect, p.name), std.get(p.name))) for p in told]
 
 
 def _shown(parameter: Parameter, value: Any, std: Any) -> str:

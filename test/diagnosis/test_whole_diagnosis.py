@@ -56,6 +56,14 @@ def test_a_single_cause_is_named_on_its_joint_with_its_size(name):
     assert answer.shrink.rms_after_m == pytest.approx(FLOOR, rel=0.1)
 
 
+def test_a_large_wobble_with_a_high_spot_is_one_cause():
+    # The plant's bearing leans by a tenth of its lean twice per turn: far above this noise.
+    answer = solved(flaw('bearing_tilt', joint='shoulder_pan_joint', tilt=8e-4, phase=1.9))
+    assert sites(answer) == [{('bearing_tilt', 'shoulder_pan_joint')}], answer.reasons
+    second = np.asarray(answer.effects[0].effect.second)
+    assert np.linalg.norm(second) == pytest.approx(8e-5, rel=0.2)
+
+
 def test_growth_with_temperature_is_named_on_another_kind_of_arm():
     answer = solved(flaw('thermal_growth', coefficient=5e-5), robot='kuka_kr6_r900', warm=True)
     assert sites(answer) == [{('thermal_growth', None)}]

@@ -7,9 +7,9 @@ The lean is a small turn of the frame that the joint turns in, about that frame'
 each a cosine and a sine of the joint's angle. A lean that goes round with the joint is the same
 at every angle seen from the link, and is `link_twist`; a bearing with a high spot rocks instead.
 
-Run-out is read as its first harmonics [1]_: an oval race adds a wave of twice the angle. It is in the model
-only where it earns its numbers beside the first. Left out where it is large, a constant of the arm is
-found in its place.
+Run-out is read as its first harmonics [1]_: an oval race adds a wave of twice the angle. It is in
+the model only where it earns its numbers beside the first. Left out where it is large, a constant
+of the arm is found in its place.
 
 References
 ----------

@@ -18,6 +18,7 @@ from ...recording import Recording
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival, rivals
 from ..hypotheses.search import Search, refitted
+from ..hypotheses.selection import implausible
 from ..hypotheses.structural_aliases import with_structural_aliases
 from ..result import Site
 from .held_out_shrink import left_on
@@ -38,13 +39,17 @@ def carrying(
     beliefs : Beliefs
 
     """
-    if not holdout or found.dense:
+    # What no machine has is left out of the model and its slots, and still is in the rivals' fits.
+    if not holdout or found.dense or len(found.slots) != len(found.small.model.found):
         return found
     for _ in range(len(found.slots)):
         better = _better(found, holdout, exclude, beliefs)
         if better is None:
             break
-        found = _with(found, better, holdout, exclude, beliefs)
+        tried = _with(found, better, holdout, exclude, beliefs)
+        if implausible(tried.final.model):
+            break
+        found = tried
     return found
 
 

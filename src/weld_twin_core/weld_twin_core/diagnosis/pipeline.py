@@ -24,7 +24,7 @@ from .hypotheses.selection import implausible
 from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.carried import carried
 from .levels.curved import curved
-from .levels.held_against import held_against
+from .levels.formulas import formulas
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
 from .predicting.allowed import allowed
@@ -169,19 +169,18 @@ def _explained(
     evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least)
     verdict = decide(evidence, beliefs)
     rival = curved(found, verdict, beliefs)
-    verdict = held_against(verdict, unseen, rival, beliefs)
+    verdict, missed = formulas(found, unseen, verdict, rival, beliefs)
     back = came_back(found, verdict, stability)
     each = signs_of_found(found, unseen, evidence, verdict, back, holdout)
-    checks = examined.checks
-    signs = Signs(signs_of_answer(found, unseen, evidence, verdict, rival, checks, each), each)
+    own = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks, each)
     unseen.forget_other_parts()
-    places = placed(found, verdict, rival, beliefs)
+    places = placed(found, verdict, rival, missed, beliefs)
     progress('held against curves without a formula')
     found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)
     found = _held(found, examined.given.robot)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
-    told = (signs, rival, places, limits, stability)
+    told = (Signs(own, each), rival, places, limits, stability)
     return answer(found, unseen, evidence, verdict, shrink, examined, posterior, *told)
 
 

@@ -228,7 +228,7 @@ def _plain(
             yield joint, 'acceleration', parts
     if moving:
         yield 'clock', 'speed', [_velocity(problem, k, m) for k, m in enumerate(features)]
-    yield 'instrument', 'place', [_place(problem, k, m) for k, m in enumerate(features)]
+    yield 'instrument', 'place', [smooth_field(problem, k, m) for k, m in enumerate(features)]
     if all(m.view.wrench is not None for m in features):
         yield 'tool', 'load', [_yielding(problem, k, m) for k, m in enumerate(features)]
 
@@ -250,8 +250,19 @@ def _velocity(problem: Problem, k: int, maker: Features) -> Array:
     return problem.seen(k, np.asarray(total))[None]
 
 
-def _place(problem: Problem, k: int, maker: Features) -> Array:
-    """Return every coordinate of the position over the place, up to its squares, (27, c, M)."""
+def smooth_field(problem: Problem, k: int, maker: Features) -> Array:
+    """
+    Return every coordinate of the position over the place, up to its squares, (27, c, M).
+
+    Parameters
+    ----------
+    problem : Problem
+    k : int
+        Which recording, counted from 0.
+    maker : Features
+        Of that recording.
+
+    """
     p = maker.run.poses.position
     x = ((p - p.mean(axis=0)) / np.maximum(p.std(axis=0), 1e-9)).T
     shapes = [*x, *(x[a] * x[b] for a in range(3) for b in range(a, 3))]

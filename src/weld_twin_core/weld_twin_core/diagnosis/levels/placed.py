@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from ..algebra.fit import robust_fit, robust_scale
@@ -11,11 +14,22 @@ from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..verdict.decision import Verdict
 from .curved import ROWS, Curved
-from .free_form import FreeForm, free_form
+from .formulas import Missed
+from .free_form import FreeForm, Part, free_form
+from .groups import Group
+from .scatter import Scatter
+
+ROUNDED, JUMPING = 0.6, 0.4
+"""Belief that noise from a joint is an encoder that rounds its angle, or a link that jumps as its
+direction has it, where nothing else is found there. A judgement."""
 
 
 def placed(
-    found: Search, verdict: Verdict, rival: Curved | None, beliefs: Beliefs
+    found: Search,
+    verdict: Verdict,
+    rival: Curved | None,
+    missed: Missed,
+    beliefs: Beliefs,
 ) -> FreeForm | None:
     """
     Return the groups that tell place and dependence of an unknown gap; None of any other.
@@ -30,11 +44,22 @@ def placed(
     verdict : Verdict
     rival : Curved or None
         The free-form explanation that can be carried; what stays beside it stays here too.
+    missed : Missed
+        What the formulas miss. Joints that noise comes from are places, too, where no group finds
+        any.
     beliefs : Beliefs
 
     """
     if verdict.status != 'unknown':
         return None
+    form = _grouped(found, rival, beliefs)
+    if any(one.on == 'place' for one in missed.forms):
+        form = _with_field(form, beliefs)
+    return _with_scatter(form, missed.scattered)
+
+
+def _grouped(found: Search, rival: Curved | None, beliefs: Beliefs) -> FreeForm:
+    """Return the groups of columns that tell place and dependence."""
     # Curves fitted along with many small errors are what is to be placed, not what stays beside.
     setup = [e for e in found.final.model.found if not (e.cause or e.bends)]
     kept = setup if rival is None else rival.kept
@@ -49,3 +74,39 @@ def placed(
         return rival.form
     # What carries to no other posture may still be told from neighbours in time.
     return free_form(small, scale, bare, none, beliefs, whole_arm=True, wandering=True)
+
+
+def _with_field(form: FreeForm, beliefs: Beliefs) -> FreeForm:
+    """
+    Return a form in which a moved base and a bent field are one cause of the instrument.
+
+    To first order a field over the workspace moves and turns the base, and scales.
+    """
+    one = [part for part in form.parts if part.group.at in ('base', 'instrument')]
+    rest = tuple(part for part in form.parts if part not in one)
+    share = sum(part.share for part in one) or form.gain
+    field, base = (
+        Group(at, on, (), np.zeros((0, 0)), np.zeros(0))
+        for at, on in (('instrument', 'place'), ('base', 'constant'))
+    )
+    belief = beliefs.level_shared
+    part = Part(field, 1.0, ((field, belief), (base, 1.0 - belief)), share)
+    return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
+
+
+def _with_scatter(form: FreeForm, scattered: Sequence[Scatter]) -> FreeForm:
+    """Return a form with a part for every joint that noise comes from and that has none yet."""
+    seen = {part.group.at for part in form.parts}
+    more = [_scattering(one) for one in scattered if one.joint not in seen]
+    if not more:
+        return form
+    gain = form.gain + (1.0 - form.gain) * sum(part.share for part in more)
+    steady = form.steady or min(one.steady for one in scattered)
+    return replace(form, parts=(*form.parts, *more), gain=gain, steady=steady)
+
+
+def _scattering(one: Scatter) -> Part:
+    rounded, jumping = (
+        Group(one.joint, on, (), np.zeros((0, 0)), np.zeros(0)) for on in ('angle', 'direction')
+    )
+    return Part(rounded, 1.0, ((rounded, ROUNDED), (jumping, JUMPING)), one.share)

@@ -1,0 +1,179 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Noise that comes from a joint: what is left is larger along the way that the joint moves the tool.
+
+A link that sticks and jumps, or an encoder that rounds, is too quick for any curve: between one
+measurement and the next it has gone through whole periods. Its scatter still lies along the one
+direction in which that joint moves the tool, wherever that points. Third differences take away
+what is slow. Their squares are shared out among the instrument's noise, of each coordinate and along,
+beside and above the line of sight, stamps that are off, along the tool's velocity, and every joint
+while it moves: variances that add up, fitted to all products of two coordinates by least squares
+[1]_.
+
+References
+----------
+.. [1] C. R. Rao, "Estimation of variance and covariance components in linear models", J. Amer.
+   Statist. Assoc. 67, 1972.
+
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import nnls
+
+from ...arrays import Array
+from ...effects.curve import QUANTITIES
+from ...twin.features import Features
+from ..algebra.robust_spread import measured_axes
+from ..hypotheses.search import Search
+from ..unseen.unseen_stretches import Unseen
+
+STRETCHES = 8
+"""Stretches of time left out in turn for the standard errors."""
+LEAST = 80
+"""Measurements of a recording from which on variances are told: ten for each stretch."""
+GROSS = 6.0
+"""Squared length over its median from which on a difference holds a stray reading: of three
+coordinates one in 500 does by chance."""
+THIRD = 20.0
+"""Variance of a third difference, 1 -3 3 -1, over that of what it is taken of."""
+TINY = 1e-9
+"""Part of the diagonal added to a system of variances: two joints may move the tool alike."""
+
+
+class Scatter(NamedTuple):
+    """
+    Scatter along one joint.
+
+    Attributes
+    ----------
+    joint : str
+    share : float
+        Of the squared noise.
+    size : float
+        RMS in units of noise.
+    steady : float
+        The share in its standard errors between stretches.
+
+    """
+
+    joint: str
+    share: float
+    size: float
+    steady: float
+
+
+def scatter(found: Search, unseen: Unseen) -> list[Scatter]:
+    """
+    Return the scatter of every joint; none where the data cannot tell it from the instrument's.
+
+    Parameters
+    ----------
+    found : Search
+    unseen : Unseen
+        Of its final model.
+
+    """
+    problem, model = unseen.problem, found.final.model
+    features = problem.features(model)
+    parts = problem.by_sample(unseen.targets[0])
+    if problem.touched or features[0].run.view.static or min(problem.samples) < LEAST:
+        return []
+    if any(len(measured_axes(part[:, :3].T)) < 3 for part in parts):
+        return []
+    noise = np.repeat([unseen.scale.position, unseen.scale.orientation], 3)
+    sums = []
+    for k, part in enumerate(parts):
+        ways = problem.seen(k, _ways(features[k])) / noise[: problem.rows[k], None]
+        sums.append(_products(np.diff(part, n=3, axis=0) / np.sqrt(THIRD), ways[..., 1:-2]))
+    normal, right, sizes = (np.sum(parts, axis=0) for parts in zip(*sums, strict=True))
+    whole = _shared_out(normal.sum(axis=0), right.sum(axis=0))
+    error = _errors(normal, right)
+    names = model.robot.joint_names
+    return [
+        Scatter(
+            joint,
+            float(whole[at] * sizes[at] / sizes[-2]),
+            float(np.sqrt(whole[at] * sizes[at] / sizes[-1])),
+            float(whole[at] / max(error[at], 1e-300)),
+        )
+        for at, joint in enumerate(names, start=whole.size - len(names))
+    ]
+
+
+def _ways(maker: Features) -> Array:
+    """
+    Return the ways along which noise may lie, shape (K, 6, M), the joints last.
+
+    Each coordinate; along the line of sight, beside and above it; the velocity of the tool; and
+    every joint while it moves.
+    """
+    view, count = maker.run.view, maker.at.size
+    coordinates = np.broadcast_to(np.eye(6)[:, :, None], (6, 6, count))
+    sight = np.zeros((3, 6, count))
+    along = maker.run.poses.position.T
+    beside = np.cross(along.T, (0.0, 0.0, 1.0)).T
+    for k, way in enumerate((along, beside, np.cross(along.T, beside.T).T)):
+        sight[k, :3] = way / np.maximum(np.linalg.norm(way, axis=0), 1e-9)
+    joints = range(maker.twin.robot.n)
+    columns = [maker.column(('q', i)) for i in joints]
+    velocity = np.sum([column * view.qd[:, i] for i, column in enumerate(columns)], axis=0)
+    moved = [np.abs(QUANTITIES['direction'](view, i)) * columns[i] for i in joints]
+    return np.concatenate([coordinates, sight, velocity[None], np.array(moved)])
+
+
+def _products(left: Array, ways: Array) -> tuple[Array, Array, Array]:
+    """
+    Return the normal equations of the variances, for every stretch.
+
+    Parameters
+    ----------
+    left : array, shape (M, c)
+        Differences in units of noise.
+    ways : array, shape (K, c, M)
+
+    Returns
+    -------
+    normal : array, shape (stretches, K, K)
+    right : array, shape (stretches, K)
+    sizes : array, shape (K + 2,)
+        Sum of squares of each way, then of the differences, then the number of rows.
+
+    """
+    length = (left**2).sum(axis=1)
+    kept = length < GROSS * np.median(length)
+    left, ways = left[kept], ways[..., kept]
+    cross = np.einsum('acm,bcm->abm', ways, ways, optimize=True) ** 2
+    along = np.einsum('acm,mc->am', ways, left) ** 2
+    ends = [part[0] for part in np.array_split(np.arange(len(left)), STRETCHES)]
+    return (
+        np.moveaxis(np.add.reduceat(cross, ends, axis=-1), -1, 0),
+        np.moveaxis(np.add.reduceat(along, ends, axis=-1), -1, 0),
+        np.array([*(ways**2).sum(axis=(1, 2)), float((left**2).sum()), float(left.size)]),
+    )
+
+
+def _shared_out(normal: Array, right: Array) -> Array:
+    """Return the variances along every way, none below zero, shape (K,)."""
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    live = np.diag(normal) > 0.0
+    out = np.zeros(right.size)
+    scaled = (normal / np.outer(size, size))[np.ix_(live, live)]
+    half = cholesky(scaled + TINY * np.eye(len(scaled)), lower=True)
+    out[live] = nnls(half.T, solve_triangular(half, (right / size)[live], lower=True))[0]
+    return np.asarray(out / size)
+
+
+def _errors(normal: Array, right: Array) -> Array:
+    """Return the standard errors of the variances, by leaving out one stretch at a time."""
+    whole, pulls = normal.sum(axis=0), right.sum(axis=0)
+    tries = np.array(
+        [_shared_out(whole - a, pulls - b) for a, b in zip(normal, right, strict=True)]
+    )
+    spread = ((tries - tries.mean(axis=0)) ** 2).sum(axis=0)
+    return np.asarray(np.sqrt((len(tries) - 1) / len(tries) * spread))

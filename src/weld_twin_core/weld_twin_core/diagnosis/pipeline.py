@@ -149,11 +149,7 @@ def _explained(
     progress: Progress,
 ) -> Diagnosis:
     """Return the diagnosis of recordings that were found sound."""
-    assert examined.posed is not None
-    found = search(*examined.posed, exclude, beliefs, progress)
-    found = fitted_together(found, exclude, beliefs, progress)
-    found = settled_between(found, examined.given.may_change, beliefs)
-    found = with_structural_aliases(found, exclude, beliefs)
+    found = _searched(examined, exclude, beliefs, progress)
     examined = examined.torn(found.problem, found.final.model)
     if examined.posed is None:
         return refusal(examined)
@@ -182,6 +178,17 @@ def _explained(
     progress('weighed what the data leave open')
     told = (Signs(own, each), rival, places, limits, stability)
     return answer(found, unseen, evidence, verdict, shrink, examined, posterior, *told)
+
+
+def _searched(
+    examined: Examined, exclude: Sequence[str], beliefs: Beliefs, progress: Progress
+) -> Search:
+    """Return what was found, few effects or many, each with what could take its place."""
+    assert examined.posed is not None
+    found = search(*examined.posed, exclude, beliefs, progress)
+    found = fitted_together(found, exclude, beliefs, progress)
+    found = settled_between(found, examined.given.may_change, beliefs)
+    return with_structural_aliases(found, exclude, beliefs)
 
 
 def _held(found: Search, robot: Robot) -> Search:

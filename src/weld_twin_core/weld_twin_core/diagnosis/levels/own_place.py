@@ -136,7 +136,7 @@ def _lost(problem: Problem, k: int, maker: Features, features: list[Features], i
         *about,
         *(rest, np.abs(rest), speed, way * QUANTITIES['load'](view, i)),
     ]
-    return problem.seen(k, maker.column(('q', i))) * np.array(shapes)[:, None, :]
+    return np.asarray(problem.seen(k, maker.column(('q', i))) * np.array(shapes)[:, None, :])
 
 
 def _told(base: Base, columns: Array) -> tuple[float, float, float]:

@@ -142,6 +142,7 @@ def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
         told.append(f'; {all_of_it} {millimetres(after)} at most')
         told.append(mark(rule, after, _APART))
     link = 'Each combination' if len(switches(diagnosis)) > 1 else 'How it is judged'
+    link = 'Write it here' if rule.tolerance_m is None else link
     told.append(joined(['. ', tag('a', link, href='#acceptance')]))
     return 'May we weld with it', mark(rule, before), joined(told)
 

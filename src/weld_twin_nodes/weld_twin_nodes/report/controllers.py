@@ -54,11 +54,16 @@ _PLACES = {
     ('yaskawa', 'base'): 'ROBOT > USER COORDINATE: teach or change the user frame.',
     ('yaskawa', 'tool'): 'ROBOT > TOOL: change X, Y, Z, Rx, Ry, Rz of the tool file.',
     ('yaskawa', 'load'): 'ROBOT > TOOL: change weight and centre of gravity of the tool file.',
-    ('ur', 'zero'): 'Zeros stand as delta_theta, in radians ({radians} rad here), in '
-    'calibration.conf of the controller; a service engineer changes them by a new kinematic '
-    'calibration.',
-    ('ur', 'model'): 'It stands as a delta of the link in calibration.conf of the controller; a '
-    'service engineer changes it by a new kinematic calibration.',
+    (
+        'ur',
+        'zero',
+    ): 'By a new kinematic calibration, which a service engineer makes. Zeros stand as '
+    'delta_theta, in radians ({radians} rad here), in calibration.conf of the controller.',
+    (
+        'ur',
+        'model',
+    ): 'By a new kinematic calibration, which a service engineer makes. It stands as a '
+    'delta of the link in calibration.conf of the controller.',
     ('ur', 'base'): 'Installation > Features: change the feature that the program moves in.',
     ('ur', 'tool'): 'Installation > General > TCP: change position and orientation.',
     ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',

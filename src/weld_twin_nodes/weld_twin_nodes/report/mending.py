@@ -8,6 +8,7 @@ import re
 from collections.abc import Collection
 from itertools import combinations
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -73,6 +74,10 @@ class Left(NamedTuple):
         return self.rms_after > (1.0 + UNCHANGED) * self.rms
 
 
+_KEPT: WeakKeyDictionary[Diagnosis, dict[tuple[int, ...], Left]] = WeakKeyDictionary()
+"""What was asked for, by diagnosis and by the switches thrown."""
+
+
 def left_without(diagnosis: Diagnosis, k: int) -> Left | None:
     """Return what is left with cause ``k`` alone mended; None where it cannot be thought away."""
     for at, switch in enumerate(switches(diagnosis)):
@@ -85,8 +90,17 @@ def left_with(diagnosis: Diagnosis, mended: Collection[int]) -> Left:
     """
     Return what is left with some of the `switches` thrown, counted from 0.
 
-    The page has these figures from nowhere else, so that one is the same wherever it stands.
+    The page has these figures from nowhere else, so that one is the same wherever it stands; they are
+    kept as long as the diagnosis is, as many parts of the page ask.
     """
+    kept = _KEPT.setdefault(diagnosis, {})
+    key = tuple(sorted(mended))
+    if key not in kept:
+        kept[key] = _left_with(diagnosis, key)
+    return kept[key]
+
+
+def _left_with(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Left:
     products = np.array(squares(diagnosis))
     on = np.ones(products.shape[0])
     before = np.sqrt(on @ products @ on)

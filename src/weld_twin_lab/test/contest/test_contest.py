@@ -13,7 +13,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_lab.contest.course import commands, run_all
+from weld_twin_lab.contest.course import Run, commands, run_all
 from weld_twin_lab.contest.entrants import geometry, never_knows, zero_offset
 from weld_twin_lab.contest.open_form import (
     Answer,
@@ -22,7 +22,10 @@ from weld_twin_lab.contest.open_form import (
     write_answer,
     write_case,
 )
-from weld_twin_lab.contest.scores import Sealed, page, point
+from weld_twin_lab.contest.processes import Warm
+from weld_twin_lab.contest.scores import Sealed, page, point, summary
+from weld_twin_lab.contest.told import closer
+from weld_twin_lab.contest.told import page as told_page
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 
 SIZE = 4e-4
@@ -127,6 +130,34 @@ def test_anybody_can_enter_and_a_failure_is_told(case, truth, tmp_path):
     assert {name: said['one'].seconds for name, said in again.items()} == {
         name: said['one'].seconds for name, said in runs.items()
     }
+
+
+def test_the_page_says_where_others_are_better_and_who_is_best_on_the_measured_arms(truth):
+    floor = truth.positions + NOISE
+    half = {'weld_twin': 2.0, 'mine': 1.0, 'close': 1.95, 'never_knows': 0.5}
+    runs = {
+        name: {'one': Run(Answer(truth.positions + size * NOISE, unknown=1.0), 3.0 / size, 10**8)}
+        for name, size in half.items()
+    }
+    near = closer(runs, {'one': truth})
+    assert near == {'mine': ['one'], 'close': []}
+    found = {name: summary(said, {'one': truth}) for name, said in runs.items()}
+    errors = {'weld_twin': {'arm_odd': 2e-4, 'arm_n30': 1e-4}, 'mine': {'arm_odd': 1e-4}}
+    told = told_page('TABLE', found, near, errors, {'arm_odd': floor, 'arm_n30': floor})
+    assert '| weld_twin | 0.200 | **0.100** |' in told and '| mine | **0.100** | - |' in told
+    better = told[told.index('## Where others are better') :]
+    assert '- arm_odd: `mine` 0.100 mm; `weld_twin` 0.200 mm.' in better
+    assert '- `mine` leaves less than 0.9 of the gap on 1 of 1 cases: one.' in better
+    assert 'gap left: `mine`' in better and '`never_knows`' not in better
+    alone = told_page('TABLE', {'weld_twin': found['weld_twin']}, {}, {}, {})
+    assert '- Nowhere.' in alone and 'measured arms' not in alone
+
+
+def test_a_method_that_cannot_start_is_one_sentence(case):
+    folder, _ = case
+    broken = Warm([sys.executable, '-c', '1/0', 'ghost'])
+    with pytest.raises(DataError, match=r"method 'ghost' ended with 1 .* leave it out"):
+        broken.run(folder, folder)
 
 
 @pytest.mark.parametrize('text', ['mine', 'mine=run {case}', '=run {case} {out}'])

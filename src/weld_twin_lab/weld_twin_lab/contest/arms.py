@@ -105,9 +105,20 @@ def lefts(runs: Mapping[str, Mapping[str, Run]], measured: Mapping[str, Array]) 
 
 
 def arm_table(found: Mapping[str, Mapping[str, float]], names: list[str]) -> str:
-    """Return mean errors in millimetres, a row for each method, in Markdown."""
+    """Return mean errors in millimetres, a row for each method, the least bold, in Markdown."""
+    best = {
+        name: min((errors[name] for errors in found.values() if name in errors), default=0.0)
+        for name in names
+    }
     rows: list[list[object]] = [['method', *names]]
     for method, errors in found.items():
-        told = [f'{1e3 * errors[name]:.3f}' if name in errors else '-' for name in names]
+        told = [_millimetres(errors.get(name), best[name]) for name in names]
         rows.append([method, *told])
     return table(*rows)
+
+
+def _millimetres(error: float | None, best: float) -> str:
+    """Return an error [m] in millimetres; '-' where there is none, bold where it is the least."""
+    if error is None:
+        return '-'
+    return f'**{1e3 * error:.3f}**' if error == best else f'{1e3 * error:.3f}'

@@ -14,6 +14,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from weld_twin_core.errors import DataError
+
 from ..benchmark.costs import cost_of
 
 SAID = 'said.txt'
@@ -117,7 +119,11 @@ class Warm:
         assert self._process.stdout is not None
         told = self._process.stdout.readline()
         if not told:
-            raise RuntimeError(f'{" ".join(self._words)} ended with {self._process.wait()}')
+            code = self._process.wait()
+            raise DataError(
+                f'the method {self._words[-1]!r} ended with {code} before it could answer; run '
+                "pip install 'weld-twin[bench,contest]', or leave it out of --entrants"
+            )
         out: list[float] = json.loads(told)
         return out
 

@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from weld_twin_core.arrays import Array
+
     from ...contest.arms import Errors
     from ...contest.processes import Starter
 
@@ -42,15 +44,15 @@ def run(args: argparse.Namespace) -> int:
 
     from weld_twin_msgs_py.files.whole_files import write_text
 
-    from ...contest import course
+    from ...contest import course, told
 
     out = Path(args.out)
     listed = [name.strip() for name in args.entrants.split(',') if name.strip()]
     methods = course.commands(listed or list(course.ENTRANTS), args.enter)
-    content, text = _sealed(args, methods)
-    if args.ur5 and args.ur10:
-        content['arms_mean_m'], more = _arms(args, methods)
-        text += '\n' + more
+    content, table = _sealed(args, methods)
+    errors, measured = _arms(args, methods) if args.ur5 and args.ur10 else ({}, {})
+    content['arms_mean_m'] = errors
+    text = told.page(table, content['methods'], content['closer'], errors, measured)
     write_text(out / 'contest.json', json.dumps(content, indent=1) + '\n', overwrite=True)
     write_text(out / 'contest.md', text, overwrite=True)
     print(text, end='')
@@ -59,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _sealed(args: argparse.Namespace, methods: dict[str, Starter]) -> tuple[dict[str, Any], str]:
     """Return what all methods are worth on the sealed cases, and the table."""
-    from ...contest import course, scores
+    from ...contest import course, scores, told
     from ...contest.entrants.never_knows import answer as silent
     from ...contest.open_form import read_case
 
@@ -77,20 +79,22 @@ def _sealed(args: argparse.Namespace, methods: dict[str, Starter]) -> tuple[dict
         method: {name: run.trouble for name, run in said.items() if run.trouble}
         for method, said in runs.items()
     }
-    content = {'methods': found, 'troubles': troubles, 'cases': names}
+    near = told.closer(runs, truth)
+    content = {'methods': found, 'troubles': troubles, 'closer': near, 'cases': names}
     return content, scores.page(runs, truth, f'{len(names)} cases.')
 
 
-def _arms(args: argparse.Namespace, methods: dict[str, Starter]) -> tuple[Errors, str]:
-    """Return the mean errors of all methods on the measured arms, and the table."""
+def _arms(
+    args: argparse.Namespace, methods: dict[str, Starter]
+) -> tuple[Errors, dict[str, Array]]:
+    """Return the mean errors of all methods on the measured arms, and what was measured."""
     from ...contest import arms, course
 
     place, out = Path(args.out) / 'arms', Path(args.out) / 'arm_answers'
     measured = arms.arm_cases(Path(args.ur5), Path(args.ur10), place)
     counts = {name: len(rows) for name, rows in measured.items()}
     runs = course.run_all(place, list(measured), methods, out, counts, _tell)
-    found = arms.lefts(runs, measured)
-    return found, arms.arm_table(found, list(measured))
+    return arms.lefts(runs, measured), measured
 
 
 def _tell(text: str) -> None:

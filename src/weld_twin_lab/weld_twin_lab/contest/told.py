@@ -123,10 +123,12 @@ def _by_measure(methods: Mapping[str, Mapping[str, Any]]) -> list[str]:
     own, out = methods.get(OWN, {}), []
     for key, (words, sign, form, unit) in MEASURES.items():
         mine = own.get(key)
+        if mine is None:  # the question does not arise in these cases
+            continue
         ahead = [
             f'`{name}` {form.format(found[key] * unit)}'
             for name, found in _rivals(methods).items()
-            if mine is not None and found[key] is not None and sign * (found[key] - mine) > 0.0
+            if found[key] is not None and sign * (found[key] - mine) > 0.0
         ]
         if ahead:
             out.append(f'{words}: {", ".join(ahead)}; `{OWN}` {form.format(mine * unit)}.')

@@ -5,72 +5,79 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from statistics import median
 from typing import Any, NamedTuple
-
-from weld_twin_core.diagnosis.levels.causes import covering
-from weld_twin_core.diagnosis.result import Cause
 
 
 class Held(NamedTuple):
-    """How many causes the case has, and whether the interval of one of them holds its share."""
+    """
+    A cause that was named rightly.
+
+    Attributes
+    ----------
+    causes : int
+        How many the case has.
+    held : bool
+        Whether the interval holds the true share.
+    complete : bool
+        Whether all causes of the case were named, and nothing else. Where one is missed or made
+        up, the others hold what belongs to it.
+    width : float
+        Of the interval.
+
+    """
 
     causes: int
     held: bool
+    complete: bool
+    width: float
 
 
 def told_and_true(rows: Iterable[Mapping[str, Any]]) -> Iterator[Held]:
     """
-    Yield every cause that was named, in sound and rich cases whose frames are known.
+    Yield every cause that was named rightly, in sound and rich cases whose frames are known.
 
     Parameters
     ----------
     rows : iterable of mapping
-        As `rows.read_rows` gives them: of `share_trial`, or of belief. The latter say how large
-        each cause is alone, which is its share where it is the only one.
+        Of `share_trial`, as `rows.read_rows` gives them.
 
     """
     for row in rows:
         if row.get('error'):
             continue
-        if 'shares' in row:
-            yield from _of_several(row)
-        else:
-            yield from _of_one(row)
-
-
-def _of_several(row: Mapping[str, Any]) -> Iterator[Held]:
-    true = row['shares']
-    for cause in row['told']:
-        if cause['site'] in true:
-            low, high = cause['share_ci90']
-            yield Held(len(true), low <= true[cause['site']] <= high)
-
-
-def _of_one(row: Mapping[str, Any]) -> Iterator[Held]:
-    truth = row['truth']
-    ratios = truth.get('ratios')
-    if not ratios or len(ratios) > 1 or row['poor'] or truth['align']:
-        return
-    # A ratio is that of the cause to the noise, as RMS of the whole deviation.
-    true = ratios[0] ** 2 / (ratios[0] ** 2 + 1.0)
-    for cause in row['verdict']['causes']:
-        first = [(n['effect'], n['joint']) for n in cause['name']][:1]
-        if first == [tuple(truth['sites'][0])]:
-            yield Held(1, _holds(cause['share_ci90'], true))
-
-
-def _holds(interval: Iterable[float], true: float) -> bool:
-    # Tables of belief have what stretches tell; the answer adds what they share.
-    low, high = covering(Cause((), (), (), true, tuple(interval))).share_ci90  # type: ignore[arg-type]
-    return low <= true <= high
+        true = row['shares']
+        complete = {cause['site'] for cause in row['told']} == set(true)
+        for cause in row['told']:
+            if cause['site'] in true:
+                low, high = cause['share_ci90']
+                inside = low <= true[cause['site']] <= high
+                yield Held(len(true), inside, complete, high - low)
 
 
 def cover_table(held: Iterable[Held]) -> str:
     """Return a row for each number of causes, and one for all."""
     every = list(held)
-    lines = ['| causes | shares | held by the 90 % interval |', '|---|---|---|']
+    lines = [
+        '| causes | shares | held by the 90 % interval | usual interval '
+        '| all causes named, no other | held |',
+        '|---|---|---|---|---|---|',
+    ]
     for count in [*sorted({item.causes for item in every}), None]:
-        own = [item.held for item in every if count in (None, item.causes)]
-        part = f'{100.0 * sum(own) / len(own):.0f} %' if own else '-'
-        lines.append(f'| {"all" if count is None else count} | {len(own)} | {part} |')
+        own = [item for item in every if count in (None, item.causes)]
+        complete = [item for item in own if item.complete]
+        name = 'all' if count is None else count
+        lines.append(
+            f'| {name} | {len(own)} | {_part(own)} | {_usual(own)} '
+            f'| {len(complete)} | {_part(complete)} |'
+        )
     return '\n'.join(lines) + '\n'
+
+
+def _part(held: list[Held]) -> str:
+    return f'{100.0 * sum(item.held for item in held) / len(held):.0f} %' if held else '-'
+
+
+def _usual(held: list[Held]) -> str:
+    """Return half the median width."""
+    return f'± {50.0 * median(item.width for item in held):.1f} %' if held else '-'

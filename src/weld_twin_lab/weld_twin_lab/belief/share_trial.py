@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Cases whose true shares are known, however much their causes overlap."""
+"""Cases whose true shares are known, however much their causes overlap or cancel."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ from typing import Any
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
-from ..blind.blind_cell import deviation
+from ..blind.blind_cell import deviation, floor
 from ..blind.making import Case
 from .mix import drawn, mixed
 from .trial import tried
 
-KINDS = ('double', 'triple')
-"""Kinds of cases with several causes; of one alone its square is its share."""
+KINDS = {'single': 1, 'double': 2, 'triple': 3}
+"""Kinds of cases, and how many causes each has."""
 
 
 def true_shares(case: Case) -> list[float]:
     """
     Return the true share of every cause of a case.
 
-    As a diagnosis tells it: how far the cause moves the tool along with all of them together, of
-    the squared gap with its noise. One that works against the others has a share below zero.
+    As a diagnosis tells it: of the squared gap with its noise, what is no noise is parted by how
+    far each cause moves the tool along with all of them together. One that works against the
+    others takes nothing off the gap beside them, and has a share of zero. The noise is all that
+    is not the causes': the instrument's, and that of stamps that jitter.
 
     Parameters
     ----------
@@ -32,11 +34,14 @@ def true_shares(case: Case) -> list[float]:
 
     """
     whole = deviation(case.cell, case.causes, case.train)
-    size = float((whole**2).sum(axis=-1).mean()) + case.cell.noise**2
-    return [
-        float((deviation(case.cell, [cause], case.train) * whole).sum(axis=-1).mean()) / size
+    noise, _ = floor(case.cell, case.causes, case.train)
+    square = float((whole**2).sum(axis=-1).mean())
+    along = [
+        max(float((deviation(case.cell, [cause], case.train) * whole).sum(axis=-1).mean()), 0.0)
         for cause in case.causes
     ]
+    explained = square / (square + noise**2) / max(sum(along), 1e-300)
+    return [explained * part for part in along]
 
 
 def shared(seed: int, number: int) -> dict[str, Any] | None:
@@ -79,20 +84,24 @@ def _named(name: dict[str, Any]) -> str:
     return _site((name['effect'], name['joint']))
 
 
-def rows_of(seed: int, count: int, runner: Runner) -> list[dict[str, Any]]:
+def rows_of(
+    seed: int, count: int, runner: Runner, causes: Sequence[int] = (1, 2, 3)
+) -> list[dict[str, Any]]:
     """
-    Return rows of the cases with several causes and rich motion among the first of a seed.
+    Return rows of the cases with causes and rich motion among the first of a seed.
 
     Parameters
     ----------
     seed, count : int
     runner : Runner
+    causes : sequence of int
+        Only cases with so many.
 
     """
     kinds = [lot.kind for lot in mixed(seed, count)]
     tasks = [
         Task(shared, (seed, number), f'case {number}')
         for number in range(count)
-        if kinds[number] in KINDS
+        if KINDS.get(kinds[number]) in causes
     ]
     return [row for row in runner.run(tasks) if row is not None]

@@ -12,7 +12,7 @@ from ..advice import Limits, actions
 from ..advice.next_step import next_step
 from ..frames.places import NOT_TOLD, not_told
 from ..hypotheses.search import Search
-from ..levels.causes import causes, covering
+from ..levels.causes import causes
 from ..levels.contributions import contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
@@ -30,6 +30,7 @@ from .changed import changed, untold_check
 from .contact_spreads import contact_spreads
 from .gap import gap, traces
 from .named_effects import named_effects
+from .share_intervals import with_intervals
 from .weighed_candidates import unexplained, weighed_candidates
 
 
@@ -141,7 +142,7 @@ def _trusted(
     verdict, told = bounded(verdict, told, stability, found.work.beliefs)
     if evidence.families is not None:
         told = of_families(told, evidence.families, found.work.beliefs)
-    return verdict, tuple(covering(cause) for cause in told), shares, known
+    return verdict, with_intervals(told, found, unseen, verdict, evidence.floor), shares, known
 
 
 def _of_effect(cause: Cause, verdict: Verdict, signs: Signs) -> Mapping[str, float]:

@@ -35,6 +35,8 @@ BLOCKS = 24
 """Stretches whose scores are held apart: enough to tell a variance to a third."""
 SINGULAR = 1e-12
 """Share of the largest eigenvalue below which a direction is one that columns repeat."""
+TINY = 1e-300
+"""Keeps a division by the variance of a coordinate that nothing moves finite."""
 UNSEEN = 1e-2
 """A coordinate a thousand times its typical size must move some row by this much noise."""
 
@@ -59,21 +61,32 @@ def standard_errors(
     """
     if not model.found:
         return []
-    variance = _variance(problem, model, scale, precision, share)
+    variance = np.diag(covariance(problem, model, scale, precision, share))
     at, out = 0, []
     for k, effect in enumerate(model.found):
         size = effect.coordinates().size
         own = np.sqrt(variance[at : at + size])
         at += size
         own = np.maximum(own, _elsewhere(problem, model, scale, k, share))
-        out.append(effect.errors(np.hypot(own, _idealised(effect))))
+        out.append(effect.errors(np.hypot(own, idealised(effect))))
     return out
 
 
-def _variance(
+def covariance(
     problem: Problem, model: Model, scale: Scale, precision: Array, share: float
 ) -> Array:
-    """Return the variance of every fit coordinate, shape (K,); NaN where there is none."""
+    """
+    Return the covariance of all fit coordinates, shape (K, K); NaN for those that have none.
+
+    As wide as the noise makes it or as scores that differ between stretches do, each coordinate by
+    the larger; they hang together as their columns do.
+
+    Parameters
+    ----------
+    problem, model, scale, precision, share
+        As `standard_errors` takes them.
+
+    """
     columns, _ = designed(problem, model, scale)
     count = coordinates(model).size
     prior = precision if precision.size else np.zeros(count)
@@ -92,9 +105,11 @@ def _variance(
     scores = inverse @ np.stack(each, axis=1)
     blocks = max(len(stretches), 2)
     together = (scores**2).sum(axis=1) * blocks / (blocks - 1)
-    out = np.full(live.size, np.nan)
-    out[live] = np.maximum(np.diag(inverse) / share, together) / size**2
-    return out[live.size - count :]
+    own = np.diag(inverse)
+    wider = np.sqrt(np.maximum(own / share, together) / np.maximum(own, TINY)) / size
+    out = np.full((live.size, live.size), np.nan)
+    out[np.ix_(live, live)] = inverse * np.outer(wider, wider)
+    return out[live.size - count :, live.size - count :]
 
 
 def _inverse(normal: Array) -> tuple[Array, Array]:
@@ -135,7 +150,14 @@ def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: floa
     return np.asarray(np.sqrt(weight @ apart**2 / (1.0 + weight.sum())))
 
 
-def _idealised(effect: Effect) -> Array:
-    """Return how far real arms differ from the formulas, per coordinate."""
+def idealised(effect: Effect) -> Array:
+    """
+    Return how far real arms differ from the formulas, per coordinate.
+
+    Parameters
+    ----------
+    effect : Effect
+
+    """
     specs = [effect.components()[k][0] for k in effect.fitted()]
     return np.array([p.idealised for p in specs]) * np.abs(effect.coordinates())

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How often the 90 % interval of a share holds the true share, from tables of cases.
 
-A table is what `weld-twin lab belief` keeps (cases.jsonl, held_out.jsonl), which tells of cases with
-one cause; or what this job makes with --cases: cases with two or three causes, however much they
-overlap. Counted are causes that were named, frames known. Stopped, it goes on when run again.
+A table is what this job makes with --cases: cases with one, two or three causes, however much they
+overlap. Counted are causes that were named rightly, frames known. Stopped, it goes on when run
+again.
 """
 
 from __future__ import annotations
@@ -24,6 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--cases', type=int, default=0, metavar='N', help='look at the first N cases of a seed'
     )
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='their seed')
+    parser.add_argument(
+        '--causes',
+        type=int,
+        nargs='+',
+        default=[1, 2, 3],
+        metavar='K',
+        help='only cases with so many causes (default: 1 2 3)',
+    )
     add_pool(parser)
     parser.add_argument('--out', metavar='DIR', help=f'where {TABLE} goes; needed with --cases')
 
@@ -44,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
         require_simulator()
         out = Path(args.out)
         with runner_of(args, out / STORE, 'diagnosing') as runner:
-            made = rows_of(args.seed, args.cases, runner)
+            made = rows_of(args.seed, args.cases, runner, args.causes)
         write_rows(out / TABLE, made)
         rows += made
     print(cover_table(told_and_true(rows)), end='')

@@ -1,0 +1,197 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How sure the shares of named causes are, for the motion that was recorded.
+
+Four doubts are drawn together: the coordinates of all causes, which hang together as their columns
+do; which member of a set it is; how much of what is left above the noise belongs to the causes;
+and how large the noise is and how it happens to lie along the gap. Every
+draw is parted as the shares themselves are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...arrays import Array
+from ..algebra.fit import Fit, trusted
+from ..algebra.independent_rows import effective_share
+from ..algebra.problem import Problem, Scale
+from ..hypotheses.rivals import Rival
+from ..hypotheses.search import Search
+from ..levels.causes import LISTED, covering
+from ..result import Cause, Site
+from ..unseen.unseen_stretches import Unseen
+from ..verdict.decision import Verdict
+from .standard_errors import covariance, idealised
+
+DRAWS = 1000
+"""Enough for the ends of an interval to be good to a few per cent of its width."""
+SEED = 1
+"""Of the draws: the same recordings give the same intervals."""
+ENDS = (0.05, 0.95)
+"""Quantiles between which nine draws of ten lie."""
+TOLD = 5e-4
+"""Half of the last digit of a share as pages tell it, 0.1 %: no interval is finer."""
+
+
+def with_intervals(
+    told: Sequence[Cause], found: Search, unseen: Unseen, verdict: Verdict, floor: float
+) -> tuple[Cause, ...]:
+    """
+    Return causes with the 90 % intervals of their shares.
+
+    Where curves or many small errors stand for the causes, intervals are those that stretches
+    tell.
+
+    Parameters
+    ----------
+    told : sequence of Cause
+    found : Search
+    unseen : Unseen
+        Of its final model.
+    verdict : Verdict
+    floor : float
+        RMS of the noise alone [m].
+
+    """
+    if verdict.status == 'unknown' or not any(found.slots) or not unseen.parts:
+        return tuple(covering(cause) for cause in told)
+    tries = _tries(found, unseen, floor)
+    return tuple(_held(cause, tries[:, list(cause.members)].sum(axis=1)) for cause in told)
+
+
+def _held(cause: Cause, tries: Array) -> Cause:
+    """Return a cause whose interval holds its own share and nine tries of ten."""
+    low, high = np.quantile(tries, ENDS)
+    low, high = min(low, cause.share) - TOLD, max(high, cause.share) + TOLD
+    return replace(cause, share_ci90=(float(max(low, 0.0)), float(min(high, 1.0))))
+
+
+def _tries(found: Search, unseen: Unseen, floor: float) -> Array:
+    """Return draws of the share of every effect, (DRAWS, K)."""
+    rng = np.random.default_rng(SEED)
+    before = float(unseen.squares(unseen.predict([])).mean())
+    after = float(unseen.squares(unseen.predict(range(len(unseen.parts)))).mean())
+    noise = min(floor**2, after)
+    moved = _coordinates(rng, found, (after - noise) / max(after, 1e-300))
+    parted = _parted(_along(unseen, moved))
+    unsure = _noise_unsure(found, unseen, noise, before, after)
+    # Of what is left above the noise any part may be the causes'.
+    left = rng.uniform(noise, after, DRAWS) + unsure * rng.standard_normal(DRAWS)
+    explained = 1.0 - left[:, None] / before
+    return parted * explained + _of_members(rng, found) * (1.0 - after / before)
+
+
+def _coordinates(rng: np.random.Generator, found: Search, missed: float) -> Array:
+    """
+    Return how far the coordinates of all effects may be off, (DRAWS, K).
+
+    Parameters
+    ----------
+    rng : Generator
+    found : Search
+    missed : float
+        Share of what is left that is no noise. It spreads over a number of directions, as what
+        formulas are believed to miss does.
+
+    """
+    rows = found.small.residual.size
+    doubt = 1.0 / found.effective(found.small) + missed / found.work.beliefs.misfit_directions
+    model = found.final.model
+    spread = covariance(found.problem, model, found.scale, found.precision, 1.0 / (rows * doubt))
+    # A coordinate on a bound, or that the data do not show, stays.
+    spread = np.nan_to_num(spread) + np.diag(
+        np.concatenate([idealised(effect) for effect in model.found]) ** 2
+    )
+    variances, ways = np.linalg.eigh(spread)
+    unit = rng.standard_normal((DRAWS, variances.size))
+    return np.asarray(unit @ (ways * np.sqrt(np.maximum(variances, 0.0))).T)
+
+
+def _along(unseen: Unseen, moved: Array) -> Array:
+    """Return how far each effect moves the tool along with all of them, (DRAWS, K) [m^2]."""
+    count, first = len(unseen.parts), unseen.frames
+    own_columns = unseen.columns.chosen(np.arange(first, unseen.columns.count)).written_out()
+    rows = (*unseen.targets[1:], *own_columns)
+    each = np.array([_positions(unseen.problem, unseen.scale, row) for row in rows])
+    products = each @ each.T
+    together = np.hstack([np.ones((len(moved), count)), moved]) @ products
+    out = together[:, :count].copy()
+    for k, part in enumerate(unseen.parts):
+        own = slice(part.start - first, part.stop - first)
+        out[:, k] += (together[:, count:][:, own] * moved[:, own]).sum(axis=1)
+    return np.asarray(out)
+
+
+def _parted(along: Array) -> Array:
+    """Return the part of every effect in what all explain; none where one works against them."""
+    sizes = np.maximum(along, 0.0)
+    return np.asarray(sizes / np.maximum(sizes.sum(axis=-1, keepdims=True), 1e-300))
+
+
+def _noise_unsure(
+    found: Search, unseen: Unseen, noise: float, before: float, after: float
+) -> float:
+    """Return how far off the noise's part of the gap may be, standard deviation [m^2]."""
+    share = effective_share(found.final.residual, found.problem.rows, found.problem.samples)
+    count = 3.0 * share * unseen.trusted_labels().size
+    # It happens to lie along the gap or against it; and its square is known from so many rows.
+    along = 2.0 * np.sqrt(noise * before / count) * after / before
+    return float(np.hypot(along, noise * np.sqrt(2.0 / count)))
+
+
+def _of_members(rng: np.random.Generator, found: Search) -> Array:
+    """Return what other members of the sets would change in the part of every effect, drawn."""
+    model = found.final.model.found
+    sites = [Site(effect.name, effect.site) for effect in model]
+    out = np.zeros((DRAWS, len(sites)))
+    for k, slot in enumerate(found.slots[: len(sites)]):
+        likely = [rival for rival in slot if rival.probability >= LISTED]
+        if len(likely) < 2 or sites[k] not in [rival.site for rival in likely]:
+            continue
+        parts = np.array([_with_member(found, rival, sites, k) for rival in likely])
+        own = parts[[rival.site for rival in likely].index(sites[k])]
+        belief = np.array([rival.probability for rival in likely])
+        out += (parts - own)[rng.choice(len(likely), DRAWS, p=belief / belief.sum())]
+    return out
+
+
+def _with_member(found: Search, rival: Rival, sites: list[Site], k: int) -> Array:
+    """Return the part of every effect, (K,), where a rival stands in the place of effect k."""
+    out = np.zeros(len(sites))
+    parts = _fitted_parts(found.work.problem, found.work.scale, rival.fit)
+    for effect, part in zip(rival.fit.model.found, parts, strict=True):
+        site = Site(effect.name, effect.site)
+        out[sites.index(site) if site in sites else k] += part
+    return out
+
+
+def _fitted_parts(problem: Problem, scale: Scale, fit: Fit) -> Array:
+    """Return the part of every effect of a fit in what all of them explain."""
+    model = fit.model
+    each = np.array(
+        [
+            _positions(
+                problem,
+                scale,
+                problem.whitened(problem.residuals(model.without(k)), scale) - fit.residual,
+            )
+            for k in range(len(model.found))
+        ]
+    )
+    return _parted(each @ each.sum(axis=0))
+
+
+def _positions(problem: Problem, scale: Scale, rows: Array) -> Array:
+    """Return the position part of whitened rows in every trusted sample, (3 samples,) [m]."""
+    parts = zip(problem.by_sample(rows), scale.weights, trusted(scale.weights), strict=True)
+    return np.concatenate(
+        [
+            (part[good, :3] * (scale.position / np.sqrt(weight[good]))[:, None]).ravel()
+            for part, weight, good in parts
+        ]
+    )

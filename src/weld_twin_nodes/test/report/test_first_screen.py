@@ -120,6 +120,29 @@ def test_without_a_maker_it_is_told_what_takes_the_correction():
     assert 'correct the points of the program' in correction(gear, None)
 
 
+def test_what_imitates_an_unknown_cause_says_nothing_of_it():
+    robot = load('kuka_kr6_r900')
+    play = {'effect': 'backlash', 'joint': 'joint_a3', 'width': 8e-4}
+    lag = {'effect': 'servo_lag', 'joint': 'joint_a3', 'time_constant': 5e-4}
+    seam = [diagnoses.moving(robot, 'circle')]
+    case = diagnoses.diagnosis('unknown', robot, [play], [lag], seam, effects=())
+    own = replace(case.causes[0], name=((Site('joint_curve', 'joint_a3'), 0.9),))
+    case = replace(case, causes=(own,), contributions=None)
+    page = plain(report_page(case))
+    assert 'trails by' not in page and 'Nothing to enter' not in page
+    assert 'Left with what fits best' in page and 'with this mended' not in page
+    assert 'comes mostly from joint_a3' in page and 'Look at joint_a3' in page
+
+
+def test_a_gear_ratio_has_degrees_and_no_two_minds_about_the_controller():
+    robot = load('abb_irb1600')
+    gear = {'effect': 'gear_ratio', 'joint': robot.joint_names[1], 'scale': 1.2e-3}
+    seam = [diagnoses.moving(robot)]
+    page = plain(report_page(diagnoses.diagnosis('identified', robot, [gear], [gear], seam)))
+    assert 'off by 0.108° in every 90°' in page and 'takes no such value' not in page
+    assert 'Where the controller has a field for ratios of gears' in page
+
+
 def test_the_circle_has_a_key():
     page = report_page(CIRCLE)
     key = plain(page[page.index('class="key"') : page.index('id="where"')])

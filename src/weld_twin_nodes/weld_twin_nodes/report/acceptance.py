@@ -160,7 +160,7 @@ def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
     if not switches(diagnosis):
         left = left_with(diagnosis, ())
         first = _row(f'as it is{_where(diagnosis)}', left.rms, left.largest, rule)
-        if not diagnosis.model.found:
+        if not diagnosis.effects:
             return [first]
         return [
             first,
@@ -180,7 +180,8 @@ def _told(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
         return f'as it is{_where(diagnosis)}'
     if len(mended) == len(labels) > 1:
         return f'mended: all {len(labels)}'
-    return f'mended: only {listed([f"{k + 1}. {labels[k]}" for k in mended])}'
+    only = 'only ' if len(labels) > 1 else ''
+    return f'mended: {only}{listed([f"{k + 1}. {labels[k]}" for k in mended])}'
 
 
 def _more(diagnosis: Diagnosis) -> Html | None:

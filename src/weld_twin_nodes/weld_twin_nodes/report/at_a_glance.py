@@ -137,7 +137,7 @@ def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
         return None
     before, after = largest(diagnosis)
     told: list[Child] = ['as it is, on what was recorded']
-    if diagnosis.model.found:
+    if diagnosis.effects or switches(diagnosis):
         all_of_it = 'with this mended' if len(switches(diagnosis)) == 1 else 'with all mended'
         told.append(f'; {all_of_it} {millimetres(after)} at most')
         told.append(mark(rule, after, _APART))
@@ -148,7 +148,9 @@ def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
 
 
 def _left(diagnosis: Diagnosis) -> Figure:
-    return 'Left with all mended', millimetres(diagnosis.shrink.rms_after_m), _how_much(diagnosis)
+    mended = diagnosis.effects or switches(diagnosis) or not diagnosis.model.found
+    name = 'Left with all mended' if mended else 'Left with what fits best'
+    return name, millimetres(diagnosis.shrink.rms_after_m), _how_much(diagnosis)
 
 
 def _how_much(diagnosis: Diagnosis) -> str:
@@ -221,7 +223,7 @@ def _row(diagnosis: Diagnosis, k: int, brand: str | None, rule: Rule) -> Html:
         joined([tag('b', value), f' ({ends})']),
         _lines(off) or 'open',
         _lines(sure) or 'not judged',
-        _alone(diagnosis, k, rule) or 'cannot be thought away',
+        _alone(diagnosis, k, rule) or 'cannot be told: nothing that was tried stands for it',
         _enter(diagnosis, k, brand),
     ]
     first = tag('a', f'{k + 1}. {name[:1].upper()}{name[1:]}', href=f'#cause-{k + 1}')

@@ -248,14 +248,14 @@ def _action(diagnosis: Diagnosis, k: int) -> Html | str | None:
     effects = effects_of(diagnosis, cause)[:_VALUES]
     if diagnosis.families and len(effects) > 1:
         return TOGETHER
-    if not effects:
-        return 'Measure as told under "What to measure next".' if cause.name else None
+    if not effects and not unnamed(cause):
+        return 'Measure as told under "What to measure next".'
     if unnamed(cause):
         sentences = look_at(diagnosis, k)
     else:
         told = dict.fromkeys(actions(effects, diagnosis.model.robot))
         sentences = [*told, *filter(None, [warning(diagnosis, k)])]
-    if alternatives(diagnosis, cause):
+    if effects and alternatives(diagnosis, cause):
         sentences = [
             'Which of them it is must be measured first. Should it be '
             f'{one_of(diagnosis, cause)}:',

@@ -13,15 +13,25 @@ from weld_twin_core.effects.joint_curve import JointCurve
 from weld_twin_core.effects.servo_lag import ServoLag
 
 from .curve_plot import furthest, furthest_frame
-from .quantities import DEGREES, millimetres, short_rows, turned
-from .words import CURVES, parameter_word
+from .quantities import DEGREES, in_short, millimetres, short_rows, turned
+from .words import CURVES, parameter_word, unnamed
 from .words import cause as named
+
+_SHARES = ('scale', 'ratio', 'difference')
+"""Parameters of joints that are a share of an angle."""
+_QUARTER = 90.0
+"""Degrees that such a share is told of."""
 
 
 def effects_of(diagnosis: Diagnosis, cause: Cause) -> list[Effect]:
-    """Return the effects in the twin that stand for a cause."""
+    """
+    Return the effects in the twin that stand for a cause.
+
+    Of a cause without a name only curves do: what imitates it says nothing of it.
+    """
     found = diagnosis.model.found
-    return [found[m] for m in cause.members if m < len(found)]
+    held = [found[m] for m in cause.members if m < len(found)]
+    return [effect for effect in held if effect.name in CURVES] if unnamed(cause) else held
 
 
 def values(diagnosis: Diagnosis, cause: Cause) -> list[str]:
@@ -37,9 +47,18 @@ def values(diagnosis: Diagnosis, cause: Cause) -> list[str]:
             continue
         if isinstance(effect, ServoLag):
             rows.append(_trail(diagnosis, effect))
+        rows += _in_a_quarter(effect)
         for name, value in short_rows(effect, errors.get((effect.name, effect.site), {})):
             rows.append(f'{parameter_word(name)} {value}')
     return rows
+
+
+def _in_a_quarter(effect: Effect) -> list[str]:
+    """Return what an error that grows with the angle makes of a quarter turn, in degrees."""
+    share = next((getattr(effect, n) for n in _SHARES if hasattr(effect, n)), None)
+    if share is None or effect.of != 'joint':
+        return []
+    return [f'off by {in_short(_QUARTER * float(share), None, 1.0, "°")} in every 90°']
 
 
 def one_of(diagnosis: Diagnosis, cause: Cause) -> str:

@@ -69,6 +69,12 @@ _PLACES = {
     ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',
 }
 """Menus as they are usually called. docs/sheet.md tells which names were found where."""
+_GEARED = ('gear_ratio', 'joint_coupling')
+"""Errors that some controllers have a field for."""
+_RATIO = (
+    'Where the controller has a field for ratios of gears; else correct the points of the program '
+    '(weld-twin correct-program).'
+)
 _ANYWHERE = {
     'zero': 'As the zero of this axis, by mastering it anew',
     'base': 'As the frame of the base or of the work object',
@@ -96,6 +102,8 @@ def correction(effect: Effect, brand: str | None) -> str:
     kind = _KINDS.get(effect.name)
     if kind is None and effect.name not in _BY_PROGRAM:
         return f'Nothing to enter: {_MATTERS.get(effect.name, _OWN)}.'
+    if effect.name in _GEARED:
+        return _RATIO
     if brand is None and kind is not None:
         return f'{_ANYWHERE[kind]}; --controller with the name of its maker tells the menu.'
     place = _PLACES.get((str(brand), str(kind)))

@@ -26,6 +26,7 @@ from .words import (
     site_name,
     site_of,
     unnamed,
+    untried_in_short,
 )
 
 _LARGEST = 3
@@ -43,7 +44,10 @@ def worth_doing(diagnosis: Diagnosis, rule: Rule | None = None) -> list[str]:
     What is certain and smaller comes first only if the tolerance of ``rule`` is met by it alone.
     """
     again = _again(diagnosis) if diagnosis.status == 'unknown' else []
-    return [*again, *_with_these(diagnosis, rule)]
+    # The first step names them all.
+    short = f' ({untried_in_short(diagnosis)}, as asked)' if again else ''
+    steps = _with_these(diagnosis, rule)
+    return [*again, *(step.replace(short, '') if short else step for step in steps)]
 
 
 def _with_these(diagnosis: Diagnosis, rule: Rule | None) -> list[str]:

@@ -327,7 +327,7 @@ def depending(*on: str) -> str:
 
 
 def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
-    if diagnosis.causes and carries_curves(diagnosis):
+    if diagnosis.causes and not (diagnosis.effects or diagnosis.families):
         return _placed(diagnosis)
     size, left = millimetres(diagnosis.gap.rms_m), millimetres(diagnosis.unexplained.rms_m)
     if diagnosis.effects:
@@ -354,7 +354,7 @@ def carries_curves(diagnosis: Diagnosis) -> bool:
 
 
 def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
-    """Return where an unknown cause sits and what its curve brings."""
+    """Return where an unknown cause sits, and what its curve or what fits best brings."""
     first, *others = (diagnosis.causes[k] for k in in_order(diagnosis))
     shrink = diagnosis.shrink
     told = f'comes mostly from {cause_words(first)};'
@@ -365,10 +365,11 @@ def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
     if not_to_be_tried(diagnosis):
         why = f'what causes it is open: {untried_in_short(diagnosis)}, as asked'
     before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)
+    what = 'a curve that was measured' if carries_curves(diagnosis) else 'what fits best'
     change = (
-        f'Corrected by a curve that was measured in its place, {before} shrinks to {after}'
+        f'Corrected by {what} in its place, {before} shrinks to {after}'
         if shrink.ratio < STAYS
-        else f'No curve measured in its place takes it off: {before} becomes {after}'
+        else f'Nothing that was tried in its place takes it off: {before} becomes {after}'
     )
     return (
         f'The gap of {millimetres(diagnosis.gap.rms_m)} {told} {why}.',

@@ -132,6 +132,9 @@ def test_what_imitates_an_unknown_cause_says_nothing_of_it():
     assert 'trails by' not in page and 'Nothing to enter' not in page
     assert 'Left with what fits best' in page and 'with this mended' not in page
     assert 'comes mostly from joint_a3' in page and 'Look at joint_a3' in page
+    # Nothing can be thought mended, so the table has the gap of the headline alone.
+    gap = f'{1e3 * case.gap.rms_m:.3f} mm'
+    assert re.search(rf'as it is, worst at [\d.]+ s {gap} ', page) and 'mended:' not in page
 
 
 def test_a_gear_ratio_has_degrees_and_no_two_minds_about_the_controller():

@@ -189,7 +189,7 @@ def _more(diagnosis: Diagnosis) -> Html | None:
     parts = []
     if len(thought_mended(diagnosis)) < 2 ** len(switches(diagnosis)):
         parts.append('Any other combination: tick it under "What if".')
-    if any(unnamed(cause) for cause in diagnosis.causes if cause.members):
+    if switches(diagnosis) and any(unnamed(c) for c in diagnosis.causes if c.members):
         parts.append(
             'Mended, of what has no name: programs corrected by the curve that was measured in its '
             'place.'

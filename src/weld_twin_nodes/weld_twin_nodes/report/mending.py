@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 
 from .html import Child, tag
 from .quantities import STAYS, UNCHANGED, millimetres
-from .switches import as_it_is, parted, squares, switches, trusted
+from .switches import as_it_is, parted, switches, trusted
 from .words import (
     depending,
     leading,
@@ -101,19 +101,22 @@ def left_with(diagnosis: Diagnosis, mended: Collection[int]) -> Left:
 
 
 def _left_with(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Left:
-    products = np.array(squares(diagnosis))
-    on = np.ones(products.shape[0])
-    before = np.sqrt(on @ products @ on)
-    on[[1 + at for at in mended]] = 0.0
-    after = np.sqrt(max(float(on @ products @ on), 0.0))
-    most = [0.0, 0.0]
+    runs: list[tuple[np.ndarray, np.ndarray]] = []
     for run, (left, parts) in enumerate(zip(*parted(diagnosis), strict=True)):
         good = trusted(diagnosis, run)
         there = [k for k in range(len(parts)) if k not in mended]
-        for i, whole in enumerate((as_it_is(diagnosis, run), left + parts[there].sum(axis=0))):
-            size = float(np.linalg.norm(whole[good], axis=1).max(initial=0.0))
-            most[i] = max(most[i], size)
-    return Left(1e-3 * float(before), 1e-3 * float(after), *most)
+        before, after = as_it_is(diagnosis, run), left + parts[there].sum(axis=0)
+        runs.append((_sizes(before[good]), _sizes(after[good])))
+    sides = zip(*runs, strict=True) if runs else ((), ())
+    both = [np.concatenate([np.zeros(0), *side]) for side in sides]
+    (rms, largest), (rms_after, largest_after) = (
+        (float(np.sqrt((s**2).mean())) if s.size else 0.0, float(s.max(initial=0.0))) for s in both
+    )
+    return Left(rms, rms_after, largest, largest_after)
+
+
+def _sizes(vectors: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 def thought_mended(diagnosis: Diagnosis) -> list[tuple[int, ...]]:

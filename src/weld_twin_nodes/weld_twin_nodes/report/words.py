@@ -362,6 +362,8 @@ def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
         # What another place holds is more: "mostly" would say the opposite of the bars below.
         told = f'comes in part from {cause_words(first)}, in part from {cause_words(others[0])};'
     why = 'no known effect explains it'
+    if diagnosis.confidence < HALF:
+        why = 'no known effect was found that explains it, which is not sure'
     if not_to_be_tried(diagnosis):
         why = f'what causes it is open: {untried_in_short(diagnosis)}, as asked'
     before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)

@@ -16,6 +16,7 @@ from weld_twin_core.effects import effect_from_mapping
 from weld_twin_nodes.report import report_page
 from weld_twin_nodes.report.acceptance import Demand
 from weld_twin_nodes.report.controllers import correction
+from weld_twin_nodes.report.curve_plot import furthest
 from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.footing import next_section, parts_what
 from weld_twin_nodes.report.mending import left_with, warned
@@ -71,6 +72,13 @@ def test_of_dependences_that_fit_alike_both_are_looked_at():
 def test_a_constant_without_a_name_has_a_value():
     page = plain(report_page(nameless('constant', dependence=(('constant', 0.9),))))
     assert 'By how much off by 0.0229° everywhere' in page
+
+
+def test_a_flat_curve_is_the_same_everywhere():
+    flat = {'effect': 'joint_curve', 'joint': 'j', 'over': 'direction', 'knots': [-1.0, 1.0]}
+    told = [furthest(effect_from_mapping({**flat, 'values': values}))
+            for values in ([-5e-4, -4.99e-4], [-5e-4, 1e-4])]  # fmt: skip
+    assert told == ['-0.0286° everywhere', 'up to 0.0286° going backward']
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,8 @@ window.charts = (() => {
     const one = { figure, spec, place, chart };
     drawn.push(one);
     // Until an instant is looked at, a curve has the values of where it is furthest off.
-    if (spec.band) chart.setCursor({ left: chart.valToPos(spec.x[furthest(data[1])], 'x'), top: 1 });
+    // At the very edge there is no cursor.
+    if (spec.band) chart.setCursor({ left: Math.max(chart.valToPos(spec.x[furthest(data[1])], 'x'), 1), top: 1 });
     new ResizeObserver(() => fit(one)).observe(place);
     return one;
   }

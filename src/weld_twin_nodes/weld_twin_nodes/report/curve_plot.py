@@ -16,6 +16,8 @@ from .html import Html
 
 _SAMPLES = 60
 """Points of a drawn curve: one for every four units of its width."""
+_FLAT = 0.05
+"""Part of a curve's size within which it is told as the same everywhere."""
 _NINETY = 1.645
 """Standard deviations to either side that hold 90 % of a Gaussian."""
 _DEGREES = 180.0 / np.pi
@@ -71,6 +73,8 @@ def furthest(curve: JointCurve) -> str:
         return f'{size * float(np.ravel(curve.values)[0]):.3g}{_spaced(unit)} everywhere'
     x, _, y = _sampled(curve)
     at = int(np.argmax(np.abs(y)))
+    if float(np.ptp(y)) < _FLAT * abs(float(y[at])):
+        return f'{size * float(y.mean()):.3g}{_spaced(unit)} everywhere'
     return (
         f'up to {size * abs(float(y[at])):.3g}{_spaced(unit)} {_where(curve.over, float(x[at]))}'
     )

@@ -74,7 +74,7 @@ def furthest(curve: JointCurve) -> str:
     x, _, y = _sampled(curve)
     at = int(np.argmax(np.abs(y)))
     if float(np.ptp(y)) < _FLAT * abs(float(y[at])):
-        return f'{size * float(y.mean()):.3g}{_spaced(unit)} everywhere'
+        return f'{size * float(y[at]):.3g}{_spaced(unit)} everywhere'
     return (
         f'up to {size * abs(float(y[at])):.3g}{_spaced(unit)} {_where(curve.over, float(x[at]))}'
     )

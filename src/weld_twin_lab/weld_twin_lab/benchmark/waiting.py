@@ -253,18 +253,23 @@ def summary(entries: Sequence[Entry]) -> str:
                 entry['job'],
                 f'{now["wall"]:.3g}',
                 f'{now["cpu"]:.3g}',
-                f'{now["peak"] / 1e6:.0f}',
+                _megabytes(now['peak']),
                 '' if before is None else _told(before),
                 '' if ratio is None else f'{1 / ratio["wall"]:.2f}, {1 / ratio["cpu"]:.2f}',
-                '' if ratio is None else f'{ratio["peak"]:.2f}',
+                '' if ratio is None or ratio['peak'] is None else f'{ratio["peak"]:.2f}',
                 _when(entry),
             )
         )
     return table(*rows)
 
 
-def _told(cost: dict[str, float]) -> str:
-    return f'{cost["wall"]:.3g}, {cost["cpu"]:.3g}, {cost["peak"] / 1e6:.0f}'
+def _told(cost: dict[str, Any]) -> str:
+    return f'{cost["wall"]:.3g}, {cost["cpu"]:.3g}, {_megabytes(cost["peak"])}'
+
+
+def _megabytes(peak: float | None) -> str:
+    """Return memory [bytes] in MB; '-' where only the process that measured was seen."""
+    return '-' if peak is None else f'{peak / 1e6:.0f}'
 
 
 def _when(entry: Entry) -> str:
@@ -272,4 +277,5 @@ def _when(entry: Entry) -> str:
     if about is None:  # entries of earlier versions do not say
         return ''
     beside = f' beside {about["base"]}' if about.get('base') else ''
-    return f'{about["on"]}, {about["commit"]}{beside}, load {about["load"]:.1f}'
+    load = '' if about.get('load') is None else f', load {about["load"]:.1f}'
+    return f'{about["on"]}, {about["commit"]}{beside}{load}'

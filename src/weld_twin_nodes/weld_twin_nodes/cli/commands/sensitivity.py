@@ -214,11 +214,12 @@ def _robot(args: argparse.Namespace) -> Robot:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arm.rotation import rotation_matrix, transform
     from weld_twin_core.errors import DataError
-    from weld_twin_msgs_py.bags import provenance
 
     if args.robot:
         robot = robot_of(args)
     else:
+        from weld_twin_msgs_py.bags import provenance  # the readers of bags take their time
+
         model = provenance(args.bag).get('robot')
         if not isinstance(model, dict):
             raise DataError(f"bag '{args.bag}' holds no robot model; give --robot R")

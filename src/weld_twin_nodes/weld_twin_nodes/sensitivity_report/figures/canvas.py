@@ -101,12 +101,22 @@ def from_zero(axes: Axes, headroom: float = 1.12) -> None:
     axes.set_ylim(0.0, headroom * top if top > 0.0 else None)
 
 
+def plain_powers(axes: Axes) -> None:
+    """Write the powers of a vertical axis as plain numbers; formulas take as long as a figure."""
+    axes.yaxis.set_major_formatter(lambda value, _: f'{value:g}')
+
+
 def svg(figure: Figure) -> str:
     """Return the picture; equal data give equal text."""
     from matplotlib import rc_context
 
     out = io.StringIO()
+    engine = figure.get_layout_engine()
     with rc_context(_STYLE):
+        # Laid out here, the figure is drawn once; left to matplotlib, once more before, for nothing.
+        if engine is not None:
+            engine.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(out, format='svg', metadata={'Date': None, 'Creator': None})
     text = out.getvalue()
     return text[text.index('<svg') :]

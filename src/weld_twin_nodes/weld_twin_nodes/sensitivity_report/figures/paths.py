@@ -19,7 +19,7 @@ from weld_twin_core.sensitivity import Sizes, Study, study_of_plan
 from weld_twin_core.sensitivity.sweep import DEGREE
 
 from ..setting import RECORDED, Setting
-from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, svg
+from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, plain_powers, svg
 
 _SIZES = Sizes()
 _TURN = 1e-3
@@ -89,6 +89,7 @@ def _closure(axis: Any, s: Array, d_norm: Array) -> None:
         fontsize=8,
     )
     axis.set_ylim(1e-17, 1e-9)
+    plain_powers(axis)
     label(axis, 'D(t) over path length', 'arc length [mm]', 'D(t) / L')
 
 

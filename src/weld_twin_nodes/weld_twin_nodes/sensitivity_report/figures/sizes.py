@@ -21,7 +21,7 @@ from weld_twin_core.sensitivity import (
 from weld_twin_core.sensitivity.sweep import DEGREE
 
 from ..setting import Setting
-from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, svg
+from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, plain_powers, svg
 
 
 def angles(setting: Setting) -> Drawing:
@@ -53,6 +53,7 @@ def angles(setting: Setting) -> Drawing:
     )
     label(right, 'Departure from proportional', 'angle of the error [deg]', 'parts per million')
     right.set_yscale('symlog', linthresh=1.0)
+    plain_powers(right)
     legend(left)
     legend(right)
     caption = (

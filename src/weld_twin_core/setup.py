@@ -14,7 +14,7 @@ setup(
         ('share/' + NAME, ['package.xml']),
     ],
     install_requires=['setuptools', 'numpy', 'scipy'],
-    extras_require={'sensitivity': ['SALib'], 'test': ['pytest']},
+    extras_require={'test': ['pytest']},
     zip_safe=False,
     maintainer='weld_twin contributors',
     maintainer_email='maintainers@example.org',

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sobol and Morris against functions whose indices are known on paper."""
 
+from importlib.metadata import version
+
 import numpy as np
 import pytest
 from SALib.analyze import morris as salib_screening
@@ -102,6 +104,7 @@ def test_morris_keeps_to_seed_zero_as_well():
     assert runs[0] == runs[1]
 
 
+@pytest.mark.skipif(version('SALib') < '1.6', reason='earlier ones draw from other numbers')
 def test_ways_and_measures_of_morris_are_those_of_salib():
     names = tuple('abcde')
     design = MorrisDesign(names, 6, seed=4)

@@ -96,12 +96,12 @@ JOBS = (
     ),
     Job(
         'sensitivity study with page',
-        (*_CLI, 'sensitivity', '--robot', 'ur5', '--workers', '1', '--out', '{out}'),
+        (*_CLI, 'sensitivity', '--robot', 'ur5', '--out', '{out}'),
         once=True,
     ),
     Job(
         'claims of the paper, 7 robots x 3 seams',
-        (*_CLI, 'sensitivity', '--claims', '--workers', '1', '--out', '{out}'),
+        (*_CLI, 'sensitivity', '--claims', '--out', '{out}'),
         once=True,
     ),
     Job(

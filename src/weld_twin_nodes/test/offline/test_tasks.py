@@ -3,6 +3,7 @@
 """Tasks: the same numbers wherever they run, and nothing run twice."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -50,6 +51,23 @@ def loopback():
     )
     with cluster:
         yield cluster.scheduler_address
+
+
+def test_who_is_interrupted_while_others_work_does_not_wait_for_them():
+    def interrupted():
+        raise KeyboardInterrupt
+
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), Runner(Cores(1, ahead='json')) as runner:
+        runner.run([Task(time.sleep, (60.0,))] * 3, interrupted)
+    assert time.monotonic() - start < 30.0
+
+
+def test_this_process_works_while_others_do():
+    done = []
+    with Runner(Cores(1)) as runner:
+        found = runner.run([Task(abs, (-3,))], lambda: done.append('drawn'))
+    assert (found, done) == ([3], ['drawn'])
 
 
 def studied(setting, pool):

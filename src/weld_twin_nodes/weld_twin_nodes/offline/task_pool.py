@@ -175,6 +175,7 @@ class Cores:
     def __init__(self, workers: int = 0, ahead: str = '') -> None:
         self._workers = workers or available_cores()
         self._pool: ProcessPoolExecutor | None = None
+        self._asked: list[Future[Any]] = []
         if ahead:
             self._submitted([(import_module, (ahead,))] * self._workers)
 
@@ -190,27 +191,23 @@ class Cores:
                 self._workers, mp_context=context, initializer=_leave_interrupts
             )
         with environment(**dict.fromkeys(THREADS, '1')):
-            return [self._pool.submit(function, *arguments) for function, arguments in asked]
+            new = [self._pool.submit(function, *arguments) for function, arguments in asked]
+        self._asked = [*(future for future in self._asked if not future.done()), *new]
+        return new
 
     def _completed(self, futures: dict[Future[str], int]) -> Iterator[tuple[int, str]]:
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except KeyboardInterrupt:
-            self._terminate()
-            raise
-
-    def _terminate(self) -> None:
-        """End the processes at once: nobody waits for what they have begun."""
-        if self._pool is not None:
-            for process in [*self._pool._processes.values()]:  # no public way before Python 3.14
-                process.terminate()
+        for future in as_completed(futures):
+            yield futures[future], future.result()
 
     def close(self) -> None:
-        """Stop the processes; what has not begun is not run."""
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
-            self._pool = None
+        """Stop the processes; what has not ended is given up, as nobody waits for it any more."""
+        if self._pool is None:
+            return
+        if not all(future.done() for future in self._asked):
+            for process in [*self._pool._processes.values()]:  # no public way before Python 3.14
+                process.terminate()
+        self._pool.shutdown(cancel_futures=True)
+        self._pool, self._asked = None, []
 
 
 class Cluster:

@@ -42,7 +42,7 @@ _LOOK = {
     'load': 'what yields (gear, bearing, mount)',
     'temperature': 'what grows warm',
     'time': 'what creeps, slips or wears',
-    'place': 'the instrument and its line of sight',
+    'place': 'the line of sight',
 }
 """Where a fitter looks first when a cause has no name, by what it depends on."""
 _DEGREES = re.compile(r'(?<=\d) deg\b')

@@ -21,7 +21,16 @@ from weld_twin_core.sensitivity import (
 
 from ..offline.task_pool import Runner, Task
 from .setting import RECORDED, Setting, recorded_deviations
-from .work import Job, local, placement, profiles, run_all, sweeps
+from .work import (
+    Design,
+    Job,
+    StackDesign,
+    local,
+    placement,
+    profiles,
+    run_all,
+    sweeps,
+)
 
 SCHEMA = 'weld_twin/sensitivity/1'
 OUTPUTS = ('d_norm', 'across_m', 'stickout_m')
@@ -102,14 +111,17 @@ class _Designs:
         return f'{self._motion}: {what}'
 
     def jobs(self, study: Study) -> dict[str, Job]:
-        """Return probabilities to run, by label."""
+        """Return designs to run, by label."""
         effort, tolerances = self._setting.effort, self._setting.tolerances
-        units = {f'Sobol by {by}': design.samples() for by, design in self._sobol.items()}
-        units['Morris'] = self._morris.samples()
-        stack = sensitivity.probabilities(effort.runs, len(tolerances), effort.seed)
-        units['stack'] = stack
+        stack = StackDesign(effort.runs, len(tolerances), effort.seed)
+        designs: dict[str, Design] = {
+            **{f'Sobol by {by}': design for by, design in self._sobol.items()},
+            'Morris': self._morris,
+            'stack': stack,
+        }
         out: dict[str, Job] = {
-            self._label(what): (study, tolerances, unit, None) for what, unit in units.items()
+            self._label(what): (study, tolerances, design, None)
+            for what, design in designs.items()
         }
         for effect in self._effects:
             halved = sensitivity.scaled(tolerances, {effect: 0.5})

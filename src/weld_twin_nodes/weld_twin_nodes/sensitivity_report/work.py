@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,14 @@ from weld_twin_core import sensitivity
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.motion.paths import Path, Torch, default_seam
-from weld_twin_core.sensitivity import Model, Outcomes, Study, Tolerance
+from weld_twin_core.sensitivity import (
+    Model,
+    MorrisDesign,
+    Outcomes,
+    SobolDesign,
+    Study,
+    Tolerance,
+)
 from weld_twin_core.sensitivity.outcome import joined
 
 from ..offline.content_hash import digest
@@ -38,20 +46,53 @@ def _model(study: Study, tolerances: tuple[Tolerance, ...]) -> Model:
     return _models[key]
 
 
+@dataclass(frozen=True)
+class StackDesign:
+    """Which runs a tolerance stack needs: independent ones, as many as were asked for."""
+
+    runs: int
+    inputs: int
+    seed: int = 0
+
+    def samples(self) -> Array:
+        """Return probabilities of every input, shape (runs, P)."""
+        return sensitivity.probabilities(self.runs, self.inputs, self.seed)
+
+
+Design = SobolDesign | MorrisDesign | StackDesign
+"""Which runs are wanted: small to send, where its samples are not."""
+
+
+def count_of(design: Design) -> int:
+    """Return how many runs a design has."""
+    if isinstance(design, SobolDesign):
+        return design.base_samples * (len(design.labels) + 2)
+    if isinstance(design, MorrisDesign):
+        return design.trajectories * (len(design.names) + 1)
+    return design.runs
+
+
+@lru_cache(maxsize=1)
+def _samples(design: Design) -> Array:
+    return design.samples()
+
+
 def run_packed(
     study: Study,
     tolerances: tuple[Tolerance, ...],
-    unit: Array,
+    design: Design,
+    start: int,
     drawn: tuple[Tolerance, ...] | None = None,
 ) -> dict[str, Any]:
     """
-    Return what the runs at probabilities (D, P) come to, `packed`, and how exact the model is.
+    Return what a block of a design's runs comes to, `packed`, and how exact the model is.
 
     ``drawn`` are narrower tolerances of the same errors that the runs are drawn from: the model of
     the wider ones holds for them.
     """
     model = _model(study, tolerances)
-    found = model(sensitivity.draws_at(drawn or tolerances, unit))
+    block = _samples(design)[start : start + BLOCK]
+    found = model(sensitivity.draws_at(drawn or tolerances, block))
     return {'model_error': model.error, 'outcomes': packed(found)}
 
 
@@ -122,9 +163,8 @@ def claim_case(robot: Robot, seam: str, seed: int) -> dict[str, float]:
     return measure_case(robot, default_seam(robot, seam), seed)
 
 
-Job = tuple[Study, tuple[Tolerance, ...], Array, tuple[Tolerance, ...] | None]
-"""A study, its tolerances, probabilities (D, P) of its runs, and what they are drawn from if from
-narrower ones."""
+Job = tuple[Study, tuple[Tolerance, ...], Design, tuple[Tolerance, ...] | None]
+"""A study, its tolerances, its runs, and what they are drawn from if from narrower ones."""
 
 
 def run_all(
@@ -147,11 +187,11 @@ def run_all(
 
     """
     tasks, owners = list(pieces), []
-    for label, (study, tolerances, unit, drawn) in jobs.items():
-        for start in range(0, len(unit), BLOCK):
-            block = unit[start : start + BLOCK]
-            text = f'{label}: runs {start} to {start + len(block)}'
-            tasks.append(Task(run_packed, (study, tolerances, block, drawn), text))
+    for label, (study, tolerances, design, drawn) in jobs.items():
+        count = count_of(design)
+        for start in range(0, count, BLOCK):
+            text = f'{label}: runs {start} to {min(start + BLOCK, count)}'
+            tasks.append(Task(run_packed, (study, tolerances, design, start, drawn), text))
             owners.append(label)
     parts: dict[str, list[dict[str, Any]]] = {label: [] for label in jobs}
     results = runner.run(tasks, meanwhile)

@@ -9,7 +9,6 @@ What one piece of work costs, larger and larger: each size in a process of its o
 from __future__ import annotations
 
 import json
-import resource
 import sys
 from collections.abc import Callable
 from time import process_time
@@ -28,6 +27,7 @@ from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.sensitivity import default_tolerances, model, planned_study
 
 from .arms import arm_of
+from .costs import own_peak
 from .waiting_data import JOINT_RATE, POSE_RATE, moving, seen, stations
 
 Work = Callable[[], object]
@@ -113,8 +113,7 @@ def cost(kind: str, size: float) -> dict[str, float]:
     start = process_time()
     work()
     seconds = process_time() - start
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0
-    return {'size': size, 'seconds': seconds, 'bytes': peak}
+    return {'size': size, 'seconds': seconds, 'bytes': own_peak()}
 
 
 if __name__ == '__main__':

@@ -138,6 +138,8 @@ def test_what_imitates_an_unknown_cause_says_nothing_of_it():
     case = replace(case, causes=(own,), contributions=None)
     page = plain(report_page(case))
     assert 'trails by' not in page and 'Nothing to enter' not in page
+    assert 'Nothing can be corrected yet' in page and 'corrected robot' not in page
+    assert 'with that mended' not in page
     assert 'Left with what fits best' in page and 'with this mended' not in page
     assert 'comes mostly from joint_a3' in page and 'Look at joint_a3' in page
     # Nothing can be thought mended, so the table has the gap of the headline alone.

@@ -17,7 +17,8 @@ from weld_twin_nodes.report import print_summary, report_page
 from weld_twin_nodes.report.footing import next_section
 from weld_twin_nodes.report.quantities import millimetres, odds, parameter_rows, percent, uncertain
 from weld_twin_nodes.report.to_do import worth_doing
-from weld_twin_nodes.report.words import CAUSES, again_words, cause, in_words, listed, verdict
+from weld_twin_nodes.report.verdict import verdict
+from weld_twin_nodes.report.words import CAUSES, again_words, cause, in_words, listed
 
 
 def plain(text):

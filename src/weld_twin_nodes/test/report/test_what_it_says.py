@@ -25,7 +25,7 @@ from weld_twin_nodes.report.diagnosis_page import Sheet
 from weld_twin_nodes.report.mending import left_without
 from weld_twin_nodes.report.quantities import counted
 from weld_twin_nodes.report.to_do import worth_doing
-from weld_twin_nodes.report.words import verdict
+from weld_twin_nodes.report.verdict import verdict
 
 PLAY = diagnoses.backlash()
 CIRCLE = diagnoses.circle()
@@ -133,6 +133,28 @@ def test_a_curve_that_makes_the_worst_spot_worse_is_never_advised(size):
     if size < 0.0:
         card = part(report_page(case), 'class="cards"', 'id="seam"')
         assert 'the curve makes the worst spot worse' in card and 'can be corrected' not in card
+
+
+def test_what_is_left_counts_in_no_curve_that_is_advised_against():
+    robot = load('kuka_kr6_r900')
+    seam = [diagnoses.moving(robot, 'circle')]
+
+    def curves(*sizes):
+        return [{'effect': 'joint_curve', 'joint': f'joint_a{k}', 'values': [size, size],
+                 'knots': [-4.0, 4.0]} for k, size in zip((2, 3), sizes, strict=True)]  # fmt: skip
+
+    case = diagnoses.diagnosis(
+        'unknown', robot, curves(6e-4, 2e-4), curves(6e-4, -8e-4), seam, effects=()
+    )
+    joints = [cause.place[0][0] for cause in case.causes]
+    good = joints.index('joint_a2')
+    left = left_without(case, good)
+    second = plain(verdict(case)[1])
+    assert f'by the curve of joint_a2 alone, {1e3 * left.rms:.3f} mm' in second
+    assert f'shrinks to {1e3 * left.rms_after:.3f} mm' in second
+    page = plain(report_page(case))
+    assert f'Left with only cause {good + 1} mended {1e3 * left.rms_after:.3f} mm' in page
+    assert 'with what "found" says of joint_a3 taken out' in page and 'all 2 (not advised)' in page
 
 
 def test_the_controller_is_not_to_be_given_a_curve_that_takes_hardly_anything_off():

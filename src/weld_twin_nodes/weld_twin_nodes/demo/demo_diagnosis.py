@@ -8,7 +8,7 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_msgs_py.files.input_files import hashed
 
 from ..report.diagnosis_files import PAGE, write_results
-from ..report.words import verdict
+from ..report.verdict import verdict
 from .hand_over import Job, Progress
 
 STEPS = 12

@@ -110,7 +110,8 @@ def find(job: Job) -> Finding:
     """Return the finding of a job."""
     from weld_twin_core.diagnosis import diagnose
 
-    from ..report.words import found_name, verdict
+    from ..report.verdict import verdict
+    from ..report.words import found_name
 
     diagnosis = diagnose(
         [job.recording], job.robot, align=job.align, known=job.known, exclude=job.exclude

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from weld_twin_core.twin.posterior import Posterior
 
+_BESIDES = 'noise and what no parameter explains come on top'
+
 
 def where_it_holds(posterior: Posterior) -> list[str]:
     """Return how far a model can be relied on, what was left open, and where it was measured."""
@@ -13,13 +15,29 @@ def where_it_holds(posterior: Posterior) -> list[str]:
         f'{v * 1e3:.2g} mm' for v in (posterior.recorded_m, posterior.anywhere_m)
     )
     out = [
-        f'Corrected, the robot is right within {recorded} where it was measured, but only within '
-        f'{anywhere} elsewhere in its reach (one standard deviation each).'
+        f'The model is known to {recorded} where it was measured, but only to {anywhere} '
+        f'elsewhere in its reach (one standard deviation each); {_BESIDES}.'
         if anywhere != recorded
-        else f'Corrected, the robot is right within {recorded} (one standard deviation).'
+        else f'The model is known to {recorded} (one standard deviation); {_BESIDES}.'
     ]
     out += left_open(posterior)
     return [*out, 'Measured at ' + '; '.join(posterior.domain.sentences()) + '.']
+
+
+def elsewhere(posterior: Posterior, corrected: bool) -> str:
+    """
+    Return that what is said holds where it was measured, in a sentence, and how wide it is beyond.
+
+    How far it is off where it was measured is what is left of the gap, which is told as that. What
+    is told of elsewhere is of the ``corrected`` robot, and of no other.
+    """
+    if not corrected:
+        return 'All this holds where it was measured, and says nothing of elsewhere in its reach.'
+    return (
+        'All this holds where it was measured. Elsewhere in its reach the corrected robot may still '
+        f'be off by {posterior.anywhere_m * 1e3:.2g} mm (one standard deviation), by errors that '
+        'these recordings do not show: measure there before you weld there.'
+    )
 
 
 def left_open(posterior: Posterior) -> list[str]:

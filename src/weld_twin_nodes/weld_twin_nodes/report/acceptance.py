@@ -16,7 +16,7 @@ from weld_twin_core.metrics.performance import Performance, performance_of
 
 from .directions import worst
 from .html import Html, joined, section, table, tag
-from .mending import left_with, thought_mended
+from .mending import advised, left_with, thought_mended
 from .performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows
 from .quantities import millimetres
 from .seam_view import at_rest, instant
@@ -65,10 +65,9 @@ def rule_of(diagnosis: Diagnosis, demand: Demand) -> Rule:
     return Rule(demand.tolerance_m, max(noise, demand.uncertainty_m or 0.0), max(readings, 1))
 
 
-def largest(diagnosis: Diagnosis) -> tuple[float, float]:
-    """Return the largest deviation as it is, and with all causes mended, [m]."""
-    left = left_with(diagnosis, range(len(switches(diagnosis))))
-    return left.largest, left.largest_after
+def largest(diagnosis: Diagnosis) -> float:
+    """Return the largest deviation as it is [m]."""
+    return left_with(diagnosis, ()).largest
 
 
 def on_what(diagnosis: Diagnosis) -> str:
@@ -116,7 +115,7 @@ def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
     if diagnosis.contacts is not None or not diagnosis.traces.t:
         return None
     rule = rule_of(diagnosis, demand)
-    before = largest(diagnosis)[0]
+    before = largest(diagnosis)
     heads = ('the robot', 'RMS', 'largest deviation', 'verdict')
     return section(
         'Does it pass',
@@ -166,10 +165,12 @@ def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
             first,
             _row('with what was found mended', left.rms_after, left.largest_after, rule),
         ]
-    out = []
+    out, taken = [], set(advised(diagnosis))
     for mended in thought_mended(diagnosis):
         left = left_with(diagnosis, mended)
-        out.append(_row(_told(diagnosis, mended), left.rms_after, left.largest_after, rule))
+        against = '' if set(mended) <= taken else ' (not advised)'
+        told = f'{_told(diagnosis, mended)}{against}'
+        out.append(_row(told, left.rms_after, left.largest_after, rule))
     return out
 
 

@@ -9,20 +9,21 @@ import re
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
 
-from ..offline.where_it_holds import where_it_holds
+from ..offline.where_it_holds import elsewhere, left_open
 from .acceptance import largest, mark
 from .belief import belief_lines, together
 from .cause_values import effects_of, one_of, values
 from .controllers import UNCHECKED, correction
 from .directions import components, sides_words, worst
 from .html import Child, Html, joined, tag
-from .mending import curve_fault, left_with, left_without, thought_mended
+from .mending import advised, correctable, curve_fault, left_with, left_without, thought_mended
 from .quantities import (
     counted,
     ends_to,
     left_of,
     millimetres,
     odds,
+    percent,
     small_turn,
     turns_only,
 )
@@ -128,18 +129,18 @@ def _worst(diagnosis: Diagnosis) -> Figure | None:
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
     if parts is not None:
         told += f': {sides_words(parts[sample])}'
-    return 'At the worst spot', millimetres(largest(diagnosis)[0]), told
+    return 'At the worst spot', millimetres(largest(diagnosis)), told
 
 
 def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
     """Return whether it passes as it is, and what would be left with everything mended."""
     if rule is None or diagnosis.contacts is not None or not diagnosis.traces.t:
         return None
-    before, after = largest(diagnosis)
+    before, taken = largest(diagnosis), advised(diagnosis)
     told: list[Child] = ['as it is, on what was recorded']
-    if diagnosis.effects or switches(diagnosis):
-        all_of_it = 'with this mended' if len(switches(diagnosis)) == 1 else 'with all mended'
-        told.append(f'; {all_of_it} {millimetres(after)} at most')
+    if taken or (diagnosis.effects and not switches(diagnosis)):
+        after = left_with(diagnosis, taken).largest_after
+        told.append(f'; with {_which(diagnosis, taken)} mended {millimetres(after)} at most')
         told.append(mark(rule, after, _APART))
     link = 'Each combination' if len(switches(diagnosis)) > 1 else 'How it is judged'
     link = 'Write it here' if rule.tolerance_m is None else link
@@ -147,8 +148,22 @@ def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
     return 'May we weld with it', mark(rule, before), joined(told)
 
 
+def _which(diagnosis: Diagnosis, taken: tuple[int, ...]) -> str:
+    """Return what is mended in words: all, or the causes that may be by their number."""
+    count = len(switches(diagnosis))
+    if len(taken) == count:
+        return 'this' if count == 1 else 'all'
+    return f'only cause{"s" if len(taken) > 1 else ""} {listed([str(k + 1) for k in taken])}'
+
+
 def _left(diagnosis: Diagnosis) -> Figure:
-    mended = diagnosis.effects or switches(diagnosis) or not diagnosis.model.found
+    every, taken = switches(diagnosis), advised(diagnosis)
+    if taken and len(taken) < len(every):
+        left = left_with(diagnosis, taken)
+        told = f'RMS, {percent(left.rms_after / left.rms)} of the RMS gap, on data not used for fitting'
+        name = f'Left with {_which(diagnosis, taken)} mended'
+        return name, millimetres(left.rms_after), told
+    mended = diagnosis.effects or every or not diagnosis.model.found
     name = 'Left with all mended' if mended else 'Left with what fits best'
     return name, millimetres(diagnosis.shrink.rms_after_m), _how_much(diagnosis)
 
@@ -159,9 +174,9 @@ def _how_much(diagnosis: Diagnosis) -> str:
         return 'RMS: nothing was found that could be mended'
     if turns_only(diagnosis):
         return 'RMS on data not used for fitting; what was found turns the tool'
-    with_what = '' if diagnosis.effects else ', with what fits best in place of the cause'
+    with_what = '' if diagnosis.effects or switches(diagnosis) else ', and nothing to be entered'
     value, interval = left_of(shrink)
-    return f'RMS, {value} of the gap, on data not used for fitting{with_what} ({interval})'
+    return f'RMS, {value} of the RMS gap, on data not used for fitting{with_what} ({interval})'
 
 
 def _among(diagnosis: Diagnosis) -> str:
@@ -269,7 +284,9 @@ def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
         tag('th', 'All mended', scope='row'),
         *(tag('td', '', class_='blank') for _ in range(3)),
         tag('td', told, data_head='If all are mended'),
-        tag('td', '', class_='blank'),
+        tag('td', '', class_='blank')
+        if len(advised(diagnosis)) == len(switches(diagnosis))
+        else tag('td', 'not advised', data_head=_HEADS[-1]),
     )
 
 
@@ -285,13 +302,13 @@ def _more(diagnosis: Diagnosis) -> Html:
 
 
 def holds(diagnosis: Diagnosis) -> Html | None:
-    """Return how far the corrected robot can be relied on, and what the data left open."""
+    """Return where what is said holds, how wide it is beyond, and what the data left open."""
     posterior = diagnosis.posterior
     if posterior is None:
         return None
-    first, *rest = where_it_holds(posterior)[:-1]
+    rest = left_open(posterior)
     wide = rest or posterior.anywhere_m > _WIDER * posterior.recorded_m
-    sentences = [first, 'What is said of the tolerance holds for what was recorded.', *rest]
+    sentences = [elsewhere(posterior, correctable(diagnosis)), *rest]
     return tag('p', ' '.join(sentences), class_='warn' if wide else 'note')
 
 

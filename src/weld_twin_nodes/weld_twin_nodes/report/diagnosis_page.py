@@ -139,7 +139,7 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
     """Return the verdict on the tolerance; it stays hidden until one is given, here or there."""
     if diagnosis.contacts is not None or not diagnosis.traces.t:
         return None
-    size = largest(diagnosis)[0]
+    size = largest(diagnosis)
     verdict = rule.judged(size)
     where = f'as it is, {on_what(diagnosis)}'
     out, _ = left_out(diagnosis)

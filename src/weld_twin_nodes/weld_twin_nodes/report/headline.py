@@ -15,7 +15,8 @@ from .at_a_glance import causes_table, figures, holds, words_told
 from .html import Html, tag
 from .mending import warned
 from .to_do import worth_doing
-from .words import STATUS, mended, verdict
+from .verdict import verdict
+from .words import STATUS, mended
 
 _FIRST_REAL_STAMP = 10**18
 """Stamps [ns] before 2001 count from something else than the epoch."""

@@ -21,6 +21,7 @@ from .words import (
     depending,
     leading,
     likely,
+    listed,
     not_to_be_tried,
     unnamed,
     untried_in_short,
@@ -126,6 +127,20 @@ def thought_mended(diagnosis: Diagnosis) -> list[tuple[int, ...]]:
     return [mended for size in sizes for mended in combinations(range(count), size)]
 
 
+def advised(diagnosis: Diagnosis) -> tuple[int, ...]:
+    """Return the `switches` that may be thrown: all but those of curves that are advised against."""
+    return tuple(
+        at
+        for at, switch in enumerate(switches(diagnosis))
+        if not any(k < len(diagnosis.causes) and curve_fault(diagnosis, k) for k in switch.members)
+    )
+
+
+def correctable(diagnosis: Diagnosis) -> bool:
+    """Tell whether anything was found that may be corrected."""
+    return bool(diagnosis.effects or diagnosis.families or advised(diagnosis))
+
+
 def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
     """
     Return the share of the squared gap that the curve of a cause without a name takes off.
@@ -186,9 +201,25 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
         return [first, f'Its curve {fault}: do not correct programs by it.']
     return [
         first,
-        'Until that is found, programs can be corrected by its curve (weld-twin correct-program): '
-        f'the largest deviation goes from {_both(left)}.',
+        f'Until that is found, programs can be corrected by its curve{_alone(diagnosis)}: the largest '
+        f'deviation goes from {_both(left)}.',
     ]
+
+
+def _alone(diagnosis: Diagnosis) -> str:
+    """Return the command, and what to take out of its model where not every curve is to be in."""
+    every, taken = switches(diagnosis), advised(diagnosis)
+    against = [
+        likely(diagnosis.causes[switch.members[0]].place)
+        for at, switch in enumerate(every)
+        if at not in taken
+    ]
+    if not against:
+        return ' (weld-twin correct-program)'
+    return (
+        f' alone (weld-twin correct-program, with what "found" says of {listed(against)} taken out '
+        'of a copy of diagnosis.json)'
+    )
 
 
 def _no_effect(diagnosis: Diagnosis) -> str:

@@ -107,7 +107,9 @@ def _counting(diagnosis: Diagnosis) -> str:
 
 def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:
     after = (
-        'With what is ticked mended' if switches(diagnosis) else 'With what was found taken off'
+        'With what is ticked mended'
+        if switches(diagnosis)
+        else _after_words(diagnosis).capitalize()
     )
     told = [('before', 'As it is', 'Seam coloured by deviation as it is')]
     if changes:
@@ -163,7 +165,7 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     dots = static(diagnosis, k)
     lines = [Line('as it is', _size(before[index]), 'before', points=dots)]
     if switches(diagnosis) or diagnosis.model.found:
-        lines.append(Line('with that mended', _size(left[index]), 'after', points=dots))
+        lines.append(Line(_after_words(diagnosis), _size(left[index]), 'after', points=dots))
     floor = np.full(index.size, 1e3 * diagnosis.gap.noise_floor_m)
     lines.append(Line('measuring noise', floor, 'soft', dashed=True))
     axes = (Axis('station') if dots else Axis('time', 's'), Axis('deviation', 'mm'))
@@ -173,6 +175,12 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     if outliers:
         title += f' ({counted(outliers, "sample")} left out: see the data)'
     return chart(title, along(diagnosis, k)[index], lines, axes, key=f'run{k}', from_zero=True)
+
+
+def _after_words(diagnosis: Diagnosis) -> str:
+    """Return what the second line and picture show: what may be mended, or what only fits best."""
+    named = diagnosis.effects or diagnosis.families or switches(diagnosis)
+    return 'with that mended' if named else 'as far as what fits best leaves it'
 
 
 def _size(deviation: np.ndarray) -> np.ndarray:

@@ -13,17 +13,19 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from ..offline.where_it_holds import where_it_holds
+from ..offline.where_it_holds import elsewhere, left_open
 from .acceptance import Demand, rule_of
 from .cause_levels import LEVEL_HEADS, level_row
 from .cause_list import rivalry, slots
 from .changed_section import CHANGED_HEADS, changed_rows, nothing_changed
 from .contact_clouds import contacts_told
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
+from .mending import correctable
 from .quantities import change, millimetres, parameter_rows
 from .to_do import worth_doing
 from .untried import weighed
-from .words import STATUS, found_name, listed, mended, open_sets, site_name, verdict
+from .verdict import verdict
+from .words import STATUS, found_name, listed, mended, open_sets, site_name
 
 _COLOURS = {
     'identified': 'green',
@@ -89,12 +91,11 @@ def _print_changed(diagnosis: Diagnosis, console: Console) -> None:
 
 
 def _print_holds(diagnosis: Diagnosis, console: Console) -> None:
-    """Print how far the corrected robot can be relied on, and what the data left open."""
+    """Print where what is said holds, how wide it is beyond, and what the data left open."""
     if diagnosis.posterior is None:
         return
-    first, *left = where_it_holds(diagnosis.posterior)[:-1]
-    console.print(escape(first))
-    for sentence in left:
+    console.print(escape(elsewhere(diagnosis.posterior, correctable(diagnosis))))
+    for sentence in left_open(diagnosis.posterior):
         console.print(f'[yellow]open:[/] {escape(sentence)}')
 
 

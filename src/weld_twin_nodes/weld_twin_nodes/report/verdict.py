@@ -1,0 +1,210 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The verdict in two sentences: the cause, and what knowing it brings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from weld_twin_core.diagnosis.result import Diagnosis, Site
+
+from .leading import in_order
+from .mending import advised, left_with
+from .quantities import STAYS, both_angles, millimetres, odds, turns_only
+from .switches import switches
+from .words import (
+    CAUSES,
+    HALF,
+    carries_curves,
+    cause,
+    cause_words,
+    found_name,
+    in_words,
+    likely,
+    listed,
+    not_to_be_tried,
+    open_sets,
+    open_sites,
+    share_by_site,
+    site_name,
+    site_of,
+    untried_in_short,
+)
+
+_NAMED = 3
+"""Names in a sentence; more are counted."""
+
+
+def verdict(diagnosis: Diagnosis) -> tuple[str, str]:
+    """Return the verdict in two sentences: the cause, and what knowing it brings."""
+    return {
+        'identified': _identified,
+        'ambiguous': _ambiguous,
+        'unknown': _unknown,
+        'none': _none,
+        'unsound': _unsound,
+    }[diagnosis.status](diagnosis)
+
+
+def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
+    size = _size(diagnosis)
+    names = [found_name(found) for found in diagnosis.effects]
+    sure = odds(diagnosis.confidence)
+    if diagnosis.families:
+        kinds = [
+            f'{cause(f.effect, None)} ({millimetres(f.rms_m)})'
+            for f in diagnosis.families
+            if f.named
+        ]
+        first = (
+            f'The {size} comes from many small errors together ({sure} sure), mostly '
+            f'{listed(kinds[:_NAMED])}.'
+        )
+        return first, _gain(diagnosis)
+    if len(names) <= _NAMED:
+        return f'The {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
+    first = (
+        f'The {size} comes from {len(names)} errors together, mostly '
+        f'{_families(diagnosis)}; the largest is {names[0]} ({sure} sure).'
+    )
+    return first, _gain(diagnosis)
+
+
+def _families(diagnosis: Diagnosis) -> str:
+    counts = Counter(found.effect.name for found in diagnosis.effects)
+    return listed([f'{CAUSES.get(name, name)} ({n})' for name, n in counts.most_common(2)])
+
+
+def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
+    size = _size(diagnosis)
+    choices = '; and from '.join(_either(group) for group in open_sets(diagnosis)[:2])
+    unsure = open_sites(diagnosis)
+    sure = [found for found in diagnosis.effects if site_of(found) not in unsure]
+    settled = listed([found_name(found) for found in sure])
+    after = _gain(diagnosis, 'Either way')
+    if not sure:
+        return f'The {size} comes from {choices}: these data do not tell which.', after
+    # The largest first, as the cards have it; what has no card of its own stays in front.
+    share = share_by_site(diagnosis)
+    largest = max(share.get(site_of(found), 1.0) for found in sure)
+    if largest < max((share.get(site, 0.0) for site in unsure), default=0.0):
+        first = f'from {choices} (these data do not tell which), in part from {settled}.'
+    else:
+        first = f'from {settled}, in part from {choices}: these data do not tell which.'
+    return f'The {size} comes in part {first}', after
+
+
+def _either(group: Sequence[Site]) -> str:
+    names = [site_name(site) for site in group]
+    if len(names) > _NAMED:
+        names = [*names[:_NAMED], f'{len(names) - _NAMED} more']
+    return listed(names, 'or')
+
+
+def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
+    if diagnosis.causes and not (diagnosis.effects or diagnosis.families):
+        return _placed(diagnosis)
+    size, left = millimetres(diagnosis.gap.rms_m), millimetres(diagnosis.unexplained.rms_m)
+    if diagnosis.effects:
+        names = listed([found_name(found) for found in diagnosis.effects[:_NAMED]])
+        first = (
+            f'Part of the gap of {size} comes from {names}, but {left} above the noise remains '
+            'that no effect in the library explains.'
+        )
+    else:
+        first = f'No effect in the library{_without(diagnosis)} explains the gap of {size}.'
+    structure = diagnosis.unexplained.structure
+    if not structure:
+        if diagnosis.reasons and not diagnosis.unexplained.above_noise:
+            return first, in_words(diagnosis.reasons[0], ())
+        return first, 'What remains is above the noise, but shows no simple dependence.'
+    return first, f'What remains depends on {listed(structure[:_NAMED])}.'
+
+
+def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
+    """Return where an unknown cause sits, and what its curve or what fits best brings."""
+    first, *others = (diagnosis.causes[k] for k in in_order(diagnosis))
+    told = f'comes mostly from {cause_words(first)};'
+    if first.share < HALF and others:
+        # What another place holds is more: "mostly" would say the opposite of the bars below.
+        told = f'comes in part from {cause_words(first)}, in part from {cause_words(others[0])};'
+    why = 'no known effect explains it'
+    if diagnosis.confidence < HALF:
+        why = 'no known effect was found that explains it, which is not sure'
+    if not_to_be_tried(diagnosis):
+        why = f'what causes it is open: {untried_in_short(diagnosis)}, as asked'
+    return (
+        f'The gap of {millimetres(diagnosis.gap.rms_m)} {told} {why}.',
+        f'{_instead(diagnosis)} on data not used for fitting; {_noise(diagnosis)}.',
+    )
+
+
+def _instead(diagnosis: Diagnosis) -> str:
+    """Return what those curves bring that programs may be corrected by, or that nothing does."""
+    every, taken = switches(diagnosis), advised(diagnosis)
+    if taken and len(taken) < len(every):
+        where = [likely(diagnosis.causes[every[at].members[0]].place) for at in taken]
+        told = f'the curve{"s" if len(where) > 1 else ""} of {listed(where)} alone'
+        left = left_with(diagnosis, taken)
+        before, after = millimetres(left.rms), millimetres(left.rms_after)
+        return f'Programs corrected by {told}, {before} shrinks to {after}'
+    shrink = diagnosis.shrink
+    before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)
+    if shrink.ratio >= STAYS:
+        return f'Nothing that was tried in its place takes it off: {before} becomes {after}'
+    if not carries_curves(diagnosis):
+        return f'Nothing can be corrected yet: even what fits best leaves {after} of {before}'
+    if every and not taken:
+        return f'No curve is worth correcting programs by; all together leave {after} of {before}'
+    return f'Programs corrected by what was measured in its place, {before} shrinks to {after}'
+
+
+def _noise(diagnosis: Diagnosis) -> str:
+    return f'measuring noise alone is {millimetres(diagnosis.gap.noise_floor_m)}'
+
+
+def _without(diagnosis: Diagnosis) -> str:
+    """Return which effects were asked not to be tried: one of them may well explain the gap."""
+    names = not_to_be_tried(diagnosis)
+    return f' (tried without {listed(names)}, as asked)' if names else ''
+
+
+def _none(diagnosis: Diagnosis) -> tuple[str, str]:
+    first = (
+        f'There is no gap above the noise: measured and model differ by '
+        f'{millimetres(diagnosis.gap.rms_m)}, of which {millimetres(diagnosis.gap.noise_floor_m)} '
+        'is noise.'
+    )
+    return first, 'As far as these data reach, the model is the robot.'
+
+
+def _unsound(diagnosis: Diagnosis) -> tuple[str, str]:
+    """Return what is wrong with data or set-up, and that nothing else is said."""
+    wrong = ' '.join(item.sentence for item in diagnosis.unsound)
+    remedies = list(dict.fromkeys(item.remedy for item in diagnosis.unsound))
+    return wrong, f'{"; ".join(remedies)}. No cause is looked for in such data.'
+
+
+def _size(diagnosis: Diagnosis) -> str:
+    """Return what the effects found account for: the gap in position, or in orientation."""
+    turn = diagnosis.gap.orientation_rms_rad
+    if turn is not None and turns_only(diagnosis):
+        return f'orientation gap of {both_angles(turn)}'
+    return f'gap of {millimetres(diagnosis.gap.rms_m)}'
+
+
+def _gain(diagnosis: Diagnosis, start: str = '') -> str:
+    shrink = diagnosis.shrink
+    what = 'it' if len(diagnosis.effects) == 1 else 'them'
+    opening = f'{start}, with {what} mended' if start else f'With {what} mended'
+    if shrink.orientation_rad is not None and turns_only(diagnosis):
+        before, after = map(both_angles, shrink.orientation_rad)
+        return (
+            f'{opening}, {before} shrinks to {after} on data not used for fitting; the position '
+            f'gap, {millimetres(shrink.rms_after_m)}, stays as it is; {_noise(diagnosis)}.'
+        )
+    return (
+        f'{opening}, {millimetres(shrink.rms_before_m)} shrinks to '
+        f'{millimetres(shrink.rms_after_m)} on data not used for fitting; {_noise(diagnosis)}.'
+    )

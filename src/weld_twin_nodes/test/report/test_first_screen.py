@@ -64,7 +64,7 @@ def test_every_combination_of_three_causes_stands_in_the_table():
 def test_of_dependences_that_fit_alike_both_are_looked_at():
     case = nameless('direction', dependence=(('load', 0.35), ('angle', 0.35), ('time', 0.2)))
     (first, *_) = worth_doing(case)
-    assert 'at what yields (gear, bearing, mount) and at gear and encoder first' in first
+    assert 'first at what yields (gear, bearing, mount); then at gear and encoder' in first
     assert 'depends on the load or the angle' in first
     assert '70 % that it depends on the load or the angle' in plain(report_page(case))
 
@@ -85,7 +85,7 @@ def test_a_flat_curve_is_the_same_everywhere():
     ('one', 'other', 'told'),
     [
         (('joint_curve', 'j2', 'speed'), ('joint_curve', 'j3', 'speed'),
-         'It shows whether it is something at j2 or something at j3.'),
+         'It tells something at j2 from something at j3.'),
         (('joint_curve', 'j2', 'speed'), ('joint_curve', 'j2', 'load'),
          'It shows whether it is something at j2 that depends on the speed or something at j2 that '
          'depends on the load.'),
@@ -98,7 +98,11 @@ def test_a_measurement_is_told_by_what_it_parts(one, other, told):
     wanted = {'between': sides, 'reason': 'by 22 standard deviations', 'promise': 0.48}
     assert parts_what(wanted) == told
     page = plain(next_section(replace(CIRCLE, next_experiment=wanted)))
-    assert told in page and 'Likely to decide 48 %' in page and 'standard deviations' not in page
+    assert (
+        told in page
+        and 'Chance that it decides 48 %' in page
+        and 'standard deviations' not in page
+    )
 
 
 @pytest.mark.parametrize(
@@ -152,8 +156,9 @@ def test_a_gear_ratio_has_degrees_and_no_two_minds_about_the_controller():
     gear = {'effect': 'gear_ratio', 'joint': robot.joint_names[1], 'scale': 1.2e-3}
     seam = [diagnoses.moving(robot)]
     page = plain(report_page(diagnoses.diagnosis('identified', robot, [gear], [gear], seam)))
-    assert 'off by 0.108° in every 90°' in page and 'takes no such value' not in page
+    assert 'off by 0.108° in every 90°' in page and 'has no field for it' not in page
     assert 'Where the controller has a field for ratios of gears' in page
+    assert 'turns of the motor per turn of the joint, divide' in page
 
 
 def test_the_circle_has_a_key():

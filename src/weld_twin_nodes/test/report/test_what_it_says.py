@@ -91,7 +91,7 @@ def test_of_several_curves_at_a_place_the_one_furthest_off_is_drawn():
     case = diagnoses.diagnosis('unknown', robot, [large], [small, large], seam, effects=())
     both = replace(case.causes[0], members=(0, 1))
     page = report_page(replace(case, causes=(both,)))
-    assert 'joint_a3: zero over direction' in page and 'zero over speed' not in page
+    assert 'joint_a3: how far off by direction' in page and 'far off by speed' not in page
 
 
 def test_a_place_that_is_not_likelier_than_not_is_never_told_alone():
@@ -102,7 +102,7 @@ def test_a_place_that_is_not_likelier_than_not_is_never_told_alone():
     told = 'joint_a5 or joint_a6'
     assert f'comes mostly from {told};' in verdict(case)[0]
     assert (
-        f'Look at {told}, at zeros and frames first: what is found there is constant'
+        f'Look at {told}, first at zeros and frames: what is found there is constant'
         in (worth_doing(case)[0])
     )
     assert f'that it sits at {told}.' in report_page(case)
@@ -118,7 +118,7 @@ def test_what_takes_most_off_unseen_data_leads_though_another_place_has_the_larg
     case = replace(case, causes=tuple(causes[::-1]), effects=(), status='unknown',
                    contributions=replace(case.contributions, parts=tuple(
                        p[::-1] for p in case.contributions.parts)))  # fmt: skip
-    assert worth_doing(case)[0].startswith('Look at joint_a2, at gains and feed-forward')
+    assert worth_doing(case)[0].startswith('Look at joint_a2, first at gains and feed-forward')
 
 
 @pytest.mark.parametrize('size', [-8e-4, 1e-4])
@@ -129,7 +129,7 @@ def test_a_curve_that_makes_the_worst_spot_worse_is_never_advised(size):
     assert ('Do not correct programs by its curve' in told) is (
         worse.largest_after > 1.02 * worse.largest or worse.rms_after > 1.005 * worse.rms
     )
-    assert 'Look at joint_a3, at gear, belt and bearing' in told
+    assert 'Look at joint_a3, first at gear, belt and bearing' in told
     if size < 0.0:
         card = part(report_page(case), 'class="cards"', 'id="seam"')
         assert 'the curve makes the worst spot worse' in card and 'can be corrected' not in card
@@ -154,7 +154,7 @@ def test_what_is_left_counts_in_no_curve_that_is_advised_against():
     assert f'shrinks to {1e3 * left.rms_after:.3f} mm' in second
     page = plain(report_page(case))
     assert f'Left with only cause {good + 1} mended {1e3 * left.rms_after:.3f} mm' in page
-    assert 'with what "found" says of joint_a3 taken out' in page and 'all 2 (not advised)' in page
+    assert 'without the entries of joint_a3 under found' in page and 'all 2 (not advised)' in page
 
 
 def test_the_controller_is_not_to_be_given_a_curve_that_takes_hardly_anything_off():
@@ -179,7 +179,7 @@ def test_a_curve_is_told_by_where_it_is_furthest_off():
     card = part(report_page(case), 'class="cards"', 'id="seam"')
     row = re.search(r'By how much off by up to (0\.0229)° at (\S+)° ', card)
     assert row and row[2] in (low, high)
-    assert f'zero over angle, up to 0.0229° at {row[2]}°' in card
+    assert f'how far off by angle, up to 0.0229° at {row[2]}°' in card
 
 
 def test_an_unknown_cause_is_unknown_only_among_what_was_to_be_tried():

@@ -35,8 +35,8 @@ def elsewhere(posterior: Posterior, corrected: bool) -> str:
         return 'All this holds where it was measured, and says nothing of elsewhere in its reach.'
     return (
         'All this holds where it was measured. Elsewhere in its reach the corrected robot may still '
-        f'be off by {posterior.anywhere_m * 1e3:.2g} mm (one standard deviation), by errors that '
-        'these recordings do not show: measure there before you weld there.'
+        f'be off by {posterior.anywhere_m * 1e3:.2g} mm (one standard deviation): measure there '
+        'before you weld there.'
     )
 
 

@@ -34,8 +34,8 @@ _ROWS = 6
 
 
 _REMEDY = (
-    'Where it cannot be said, what to do: measure again with a better instrument, mend the causes '
-    'and measure anew, or agree on another tolerance.'
+    'To be able to say it: a better instrument, a mended robot measured anew, or another tolerance '
+    'agreed on.'
 )
 
 
@@ -191,10 +191,7 @@ def _more(diagnosis: Diagnosis) -> Html | None:
     if len(thought_mended(diagnosis)) < 2 ** len(switches(diagnosis)):
         parts.append('Any other combination: tick it under "What if".')
     if switches(diagnosis) and any(unnamed(c) for c in diagnosis.causes if c.members):
-        parts.append(
-            'Mended, of what has no name: programs corrected by the curve that was measured in its '
-            'place.'
-        )
+        parts.append('Where a cause has no name, mended means: programs corrected by its curve.')
     return tag('p', ' '.join(parts), class_='note') if parts else None
 
 
@@ -250,8 +247,8 @@ def _unequal(rule: Rule) -> str:
     if rule.readings < 2:
         return ''
     return (
-        'The second margin is wider: noise alone makes the largest of '
-        f'{rule.readings} readings larger, and that must not fail a good robot. '
+        f'The second margin is wider: of {rule.readings} readings the largest has much noise in it, '
+        'and a good robot must not fail by that. '
     )
 
 

@@ -13,7 +13,7 @@ from ..offline.where_it_holds import elsewhere, left_open
 from .acceptance import largest, mark
 from .belief import belief_lines, together
 from .cause_values import effects_of, one_of, values
-from .controllers import UNCHECKED, correction
+from .controllers import UNCHECKED, UNNAMED, correction
 from .directions import components, sides_words, worst
 from .html import Child, Html, joined, tag
 from .mending import advised, correctable, curve_fault, left_with, left_without, thought_mended
@@ -30,7 +30,7 @@ from .quantities import (
 from .remainder import places
 from .seam_view import at_rest, instant, left_out
 from .switches import alternatives, as_it_is, cause_name, switches
-from .words import listed, not_to_be_tried, untried_in_short
+from .words import leading, likely, listed, not_to_be_tried, unnamed, untried_in_short
 
 _CAUSES = 4
 """Causes in the table; the cards have more."""
@@ -112,7 +112,7 @@ def _off(diagnosis: Diagnosis) -> Figure:
         told += f'. The tool is turned by {small_turn(gap.orientation_rms_rad)}'
         left = diagnosis.shrink.orientation_rad
         if left is not None and diagnosis.effects:
-            told += f', {small_turn(left[1])} of it left over'
+            told += f', with all mended by {small_turn(left[1])}'
     return 'How far off', millimetres(gap.rms_m), told
 
 
@@ -126,10 +126,17 @@ def _worst(diagnosis: Diagnosis) -> Figure | None:
     told = f'at {when}' if at_rest(diagnosis) else f'{when} after the start'
     if len(diagnosis.recordings) > 1:
         told = f'{diagnosis.recordings[k].name}, {told}'
+    told += _place(diagnosis, k, sample)
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
     if parts is not None:
         told += f': {sides_words(parts[sample])}'
     return 'At the worst spot', millimetres(largest(diagnosis)), told
+
+
+def _place(diagnosis: Diagnosis, k: int, sample: int) -> str:
+    """Return where in space a sample was measured."""
+    x, y, z = (f'{1e3 * float(v):.0f}' for v in diagnosis.traces.measured[k][sample])
+    return f', at x {x}, y {y}, z {z} mm'
 
 
 def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
@@ -200,12 +207,23 @@ def _data(diagnosis: Diagnosis) -> Figure | None:
     out, every = left_out(diagnosis)
     if out:
         told.append(f'{out} of {counted(every, "sample")} left out')
+    told += _instrument(diagnosis)
     word = 'yes, see the notes' if told else 'yes'
     word = 'see the warnings' if counts['warning'] else word
     words = (
         f'{fine} of {len(checks)} checks found nothing{"; " if told else ""}{"; ".join(told)}. '
     )
     return 'Were the data good', word, joined([words, tag('a', 'Which', href='#checks')])
+
+
+def _instrument(diagnosis: Diagnosis) -> list[str]:
+    """Return which cause sits with what measured, and how much of the gap that makes."""
+    return [
+        f'but cause {k + 1}, {percent(cause.share, places(diagnosis))} of the gap, sits at '
+        f'{likely(cause.place)}'
+        for k, cause in enumerate(diagnosis.causes[:_CAUSES])
+        if {at for at, _ in leading(cause.place)} & {'instrument', 'clock'}
+    ]
 
 
 def causes_table(diagnosis: Diagnosis, brand: str | None, rule: Rule | None) -> Html | None:
@@ -272,7 +290,7 @@ def _enter(diagnosis: Diagnosis, k: int, brand: str | None) -> str:
         return 'nothing yet'
     if alternatives(diagnosis, cause):
         return 'nothing before it is known which it is'
-    told = correction(found[0], brand)
+    told = UNNAMED if unnamed(cause) else correction(found[0], brand)
     return _SENTENCE.split(told.removesuffix(UNCHECKED).rstrip())[0]
 
 

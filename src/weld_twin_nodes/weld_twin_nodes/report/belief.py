@@ -67,7 +67,7 @@ def sure_entry(diagnosis: Diagnosis, cause: Cause) -> Html | None:
     return tag(
         'span',
         *(tag('span', line) for line in lines),
-        tag('details', tag('summary', 'level by level'), levels, class_='detail')
+        tag('details', tag('summary', 'place, dependence and name'), levels, class_='detail')
         if levels
         else None,
         class_='lines',

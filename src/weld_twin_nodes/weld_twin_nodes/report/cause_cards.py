@@ -15,11 +15,11 @@ from .belief import sure_entry
 from .cause_levels import LEVEL_HEADS, level_row, spreads
 from .cause_values import effects_of, furthest_off, one_of, values
 from .charts import Axis, Line, chart
-from .controllers import BRANDS, correction
+from .controllers import BRANDS, UNNAMED, correction, gearing
 from .curve_plot import curve_figure
 from .directions import components, rms_words, sides_words
 from .html import Child, Html, joined, section, table, tag
-from .mending import curve_fault, left_without, look_at, taken_by_curve, warned, warning
+from .mending import against, curve_fault, left_without, look_at, taken_by_curve, warned, warning
 from .quantities import counted, ends_to, millimetres, percent
 from .remainder import places, remainder
 from .seam_view import seen_at
@@ -254,7 +254,8 @@ def _action(diagnosis: Diagnosis, k: int) -> Html | str | None:
         sentences = look_at(diagnosis, k)
     else:
         told = dict.fromkeys(actions(effects, diagnosis.model.robot))
-        sentences = [*told, *filter(None, [warning(diagnosis, k)])]
+        ways = dict.fromkeys(map(gearing, effects))
+        sentences = [*told, *filter(None, [*ways, warning(diagnosis, k)])]
     if effects and alternatives(diagnosis, cause):
         sentences = [
             'Which of them it is must be measured first. Should it be '
@@ -275,11 +276,19 @@ def _at_the_controller(
     fault = curve_fault(diagnosis, k)
     if fault:
         return [(head, f'Nothing is to be entered: the curve {fault}.')]
-    told = correction(effects[0], brand)
+    told = f'{UNNAMED}{_taken_out(diagnosis)}' if unnamed(cause) else correction(effects[0], brand)
     if alternatives(diagnosis, cause):
         which = one_of(diagnosis, cause)
         told = f'Nothing before it is known which it is. Should it be {which}: {told}'
     return [(head, told)]
+
+
+def _taken_out(diagnosis: Diagnosis) -> str:
+    """Return how a correction is made without the curves that are advised against."""
+    others = against(diagnosis)
+    if not others:
+        return ''
+    return f' Its model is a copy of diagnosis.json without the entries of {others} under found.'
 
 
 def _picture(diagnosis: Diagnosis, k: int) -> Html | None:

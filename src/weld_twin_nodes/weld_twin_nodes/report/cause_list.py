@@ -218,10 +218,17 @@ def leftover(diagnosis: Diagnosis) -> Html:
         text = f'What remains, {millimetres(rest.rms_m)}, is at the level of the noise.'
         return tag('p', text)
     text = (
-        f'What remains, {millimetres(rest.rms_m)} at a noise floor of {millimetres(floor)}, is more '
-        'than noise. It depends on:'
+        f'{_with(diagnosis)}{millimetres(rest.rms_m)} remain at a noise floor of {millimetres(floor)}, '
+        'which is more than noise. It depends on:'
     )
     return joined([tag('p', text), _dependent(rest.structure)])
+
+
+def _with(diagnosis: Diagnosis) -> str:
+    """Return what was taken off, where it has no name."""
+    if diagnosis.effects or diagnosis.families or not diagnosis.model.found:
+        return ''
+    return 'With the curves, ' if carries_curves(diagnosis) else 'With what fits best, '
 
 
 def _dependent(structure: Sequence[str]) -> Html:

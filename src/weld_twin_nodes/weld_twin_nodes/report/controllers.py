@@ -30,7 +30,15 @@ _KINDS = {
     'link_twist': 'model',
     'axis_parallelism': 'model',
 }
-_PROGRAM = 'It takes no such value: correct the points of the program (weld-twin correct-program).'
+_PROGRAM = (
+    'The controller has no field for it: correct the points of the program (weld-twin '
+    'correct-program).'
+)
+UNNAMED = (
+    'No field before the cause is known; so long, correct the points of the program (weld-twin '
+    'correct-program).'
+)
+"""Of a curve: a joint that is off alike everywhere need not be so for its zero."""
 _PLACES = {
     ('kuka', 'zero'): 'Start-up > Master: master the axis again; its zero lies in $MAMES, in '
     'degrees.',
@@ -111,6 +119,16 @@ def correction(effect: Effect, brand: str | None) -> str:
         return _PROGRAM
     place = place.format(**_off(effect))
     return f'{place} {UNCHECKED}' if ' > ' in place else place
+
+
+def gearing(effect: Effect) -> str:
+    """Return which way round a ratio of a gear is meant; nothing for another effect."""
+    if effect.name != 'gear_ratio':
+        return ''
+    return (
+        'Times is for turns of the joint per turn of the motor; where the field has turns of the '
+        'motor per turn of the joint, divide. Measure again: the wrong way round doubles the error.'
+    )
 
 
 def _off(effect: Effect) -> dict[str, str]:

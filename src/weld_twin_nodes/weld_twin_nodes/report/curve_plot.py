@@ -54,10 +54,10 @@ def curve_figure(curve: JointCurve, covariance: Array | None, joint: int) -> Htm
         )
     size, unit = _VALUES.get(curve.channel, (_DEGREES, '°'))
     across, label = _AXES[curve.over]
-    what = 'zero' if curve.channel == 'q' else curve.channel
+    what = 'how far off' if curve.channel == 'q' else curve.channel
     middle, half = y * size, band * size
     return chart(
-        f'{curve.joint}: {what} over {curve.over}, {furthest(curve)}',
+        f'{curve.joint}: {what} by {curve.over}, {furthest(curve)}',
         x * across,
         [Line('off by', middle), Line('not off', 0.0 * middle, 'soft', dashed=True)],
         (label, Axis('off by', unit)),

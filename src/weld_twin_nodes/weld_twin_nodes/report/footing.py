@@ -36,6 +36,7 @@ _ENOUGH = (
     'Between what was tried, no further measurement is needed.',
 )
 """What is said where none is proposed: all effects were tried, or some could not be."""
+_SURER = 'The verdict stands without it; who wants to be surer measures this.'
 _ORDER = {'unsound': 0, 'warning': 1, 'note': 2, 'ok': 3}
 """What needs attention comes first."""
 
@@ -44,7 +45,12 @@ def next_section(diagnosis: Diagnosis) -> Html:
     """Return the measurement that would decide, or that none is needed."""
     wanted = diagnosis.next_experiment
     if wanted is not None:
-        content = joined([_wanted(wanted, _sites(diagnosis)), *_left_open(diagnosis, wanted)])
+        sure = diagnosis.status == 'identified'
+        content = joined([
+            tag('p', _SURER) if sure else None,
+            _wanted(wanted, _sites(diagnosis)),
+            *_left_open(diagnosis, wanted),
+        ])  # fmt: skip
     elif diagnosis.status in ('ambiguous', 'unknown'):
         content = tag('p', 'No measurement that would decide has been found.')
     else:
@@ -79,7 +85,7 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     if minutes(wanted):
         rest['takes'] = minutes(wanted)
     if wanted.get('promise'):
-        rest['likely to decide'] = odds(wanted['promise'])
+        rest['chance that it decides'] = odds(wanted['promise'])
     elif wanted.get('expected_separation_sigma'):
         sigma = f'{wanted["expected_separation_sigma"]:.0f}'
         rest['tells them apart by'] = f'{sigma} standard deviations, as far as can be foreseen'
@@ -103,7 +109,12 @@ def parts_what(wanted: Mapping[str, Any]) -> str:
     same = {item.get('at') for item in one} == {item.get('at') for item in other}
     sides = [listed(list(dict.fromkeys(_side(item, same) for item in side)))
              for side in (one, other)]  # fmt: skip
-    return '' if sides[0] == sides[1] else f'It shows whether it is {sides[0]} or {sides[1]}.'
+    if sides[0] == sides[1]:
+        return ''
+    if not same and all(item['effect'] in CURVES for item in (*one, *other)):
+        # Both may be there side by side.
+        return f'It tells {sides[0]} from {sides[1]}.'
+    return f'It shows whether it is {sides[0]} or {sides[1]}.'
 
 
 def _side(item: Mapping[str, Any], same: bool) -> str:
@@ -194,8 +205,8 @@ def _left_out(diagnosis: Diagnosis) -> list[Html]:
             out.append(
                 tag(
                     'li',
-                    tag('span', 'note', class_='level note'),
-                    tag('span', tag('b', 'left out'), ' ', text),
+                    tag('span', 'left out', class_='level note'),
+                    tag('span', text),
                 )
             )
     return out

@@ -19,9 +19,12 @@ from .seam_view import at_rest, seen_at
 from .switches import alternatives, as_it_is
 from .words import DEPENDENCES, HALF, REGIMES, likely, listed, place_name
 
+_FRAMED = (
+    ' Framed: the one that holds the instant looked at, at first the largest single deviation.'
+)
 _STRIP = (
-    'RMS gap of each stretch, and its time. ▼ the worst stretch by RMS. Framed: the one that '
-    'holds the instant looked at, at first the largest single deviation.',
+    f'RMS gap of each stretch, and its time. ▼ the worst stretch by RMS.{_FRAMED} That one can be '
+    'in another stretch than the worst.',
     'RMS gap of stations, and their numbers. ▼ the worst by RMS.',
 )
 """What stands under the stretches of a motion, and of stations at rest."""
@@ -101,7 +104,7 @@ def _whole(diagnosis: Diagnosis) -> str:
     rest = [
         f'{percent(share, places(diagnosis))} is {name}' for name, share in remainder(diagnosis)
     ]
-    held = 'The causes explain' if diagnosis.effects else 'What could be placed holds'
+    held = 'The causes explain' if diagnosis.effects else 'The places found hold'
     return (
         f'{held} {percent(told, places(diagnosis))} of the squared gap; '
         f'{listed(rest)}. So a place can be certain and still hold less than the whole.'
@@ -166,7 +169,9 @@ def _map(diagnosis: Diagnosis) -> Html | None:
 
 def _heads(names: Sequence[str]) -> Html:
     heads = [tag('th', tag('span', name), scope='col') for name in names]
-    heads.append(tag('th', tag('span', 'at the cursor'), scope='col', class_='now'))
+    heads.append(
+        tag('th', tag('span', 'position at the instant looked at'), scope='col', class_='now')
+    )
     first = tag('th', 'Joint', tag('span', ' [%]', class_='narrow'), scope='col')
     return tag('thead', tag('tr', first, *heads))
 
@@ -222,7 +227,7 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
     where = _WHERE[at_rest(diagnosis)]
     spread = f'{millimetres(min(sizes))} to {millimetres(largest)} RMS'
     note = (
-        f'Evenly along {where}: {spread}, so no stretch stands out.'
+        f'Evenly along {where}: {spread}, so no stretch stands out.{_FRAMED * (not at_rest(diagnosis))}'
         if even
         else _STRIP[at_rest(diagnosis)]
     )

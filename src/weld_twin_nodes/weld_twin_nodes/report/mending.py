@@ -37,7 +37,7 @@ _EVERY = 3
 _LOOK = {
     'constant': 'zeros and frames',
     'angle': 'gear and encoder',
-    'direction': 'gear, belt and bearing, for play and friction',
+    'direction': 'gear, belt and bearing (play, friction)',
     'speed': 'gains and feed-forward of the drive',
     'acceleration': 'what is loose or soft',
     'load': 'what yields (gear, bearing, mount)',
@@ -188,7 +188,7 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
         at = [_LOOK.get(name, 'all that moves') for name in on]
         at += ['the clocks'] * ('speed' in on and not _one_clock(diagnosis))
         first = (
-            f'Look at {where}, at {" and at ".join(dict.fromkeys(at))} first: what is found there '
+            f'Look at {where}, first at {"; then at ".join(dict.fromkeys(at))}: what is found there '
             f'{depending(*on)}, and {_no_effect(diagnosis)} gives it.'
         )
     left = left_without(diagnosis, k)
@@ -199,26 +199,24 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
     fault = curve_fault(diagnosis, k)
     if fault:
         return [first, f'Its curve {fault}: do not correct programs by it.']
+    others = against(diagnosis)
+    without = f', without that of {others}' if others else ''
     return [
         first,
-        f'Until that is found, programs can be corrected by its curve{_alone(diagnosis)}: the largest '
-        f'deviation goes from {_both(left)}.',
+        f'Until that is found, programs can be corrected by its curve{without} (weld-twin '
+        f'correct-program): the largest deviation goes from {_both(left)}.',
     ]
 
 
-def _alone(diagnosis: Diagnosis) -> str:
-    """Return the command, and what to take out of its model where not every curve is to be in."""
-    every, taken = switches(diagnosis), advised(diagnosis)
-    against = [
-        likely(diagnosis.causes[switch.members[0]].place)
-        for at, switch in enumerate(every)
-        if at not in taken
-    ]
-    if not against:
-        return ' (weld-twin correct-program)'
-    return (
-        f' alone (weld-twin correct-program, with what "found" says of {listed(against)} taken out '
-        'of a copy of diagnosis.json)'
+def against(diagnosis: Diagnosis) -> str:
+    """Return of which places no curve is to be in a correction; nothing where all may."""
+    taken = advised(diagnosis)
+    return listed(
+        [
+            likely(diagnosis.causes[switch.members[0]].place)
+            for at, switch in enumerate(switches(diagnosis))
+            if at not in taken
+        ]
     )
 
 

@@ -26,7 +26,9 @@ def remainder(diagnosis: Diagnosis) -> tuple[tuple[str, float], ...]:
     rest = diagnosis.shares
     left = max(_left(diagnosis) - rest.noise, 0.0)
     unnamed = rest.unexplained - left
-    rows = [('not explained', rest.unexplained), ('noise', rest.noise)]
+    # What has a place and no name is not explained by that.
+    named = bool(diagnosis.effects or diagnosis.families or not diagnosis.causes)
+    rows = [('not explained' if named else 'not placed', rest.unexplained), ('noise', rest.noise)]
     if unnamed >= _SPLIT:
         rows[:1] = [('fitted, but not to be named', unnamed), ('not explained', left)]
     return tuple(rows)

@@ -142,7 +142,13 @@ def _controls(stations: bool) -> Html:
         tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
         tag('div', *views, class_='views'),
         slider,
-        tag('span', signs if stations else f'▲ direction of travel   {signs}', class_='signs'),
+        tag(
+            'span',
+            signs
+            if stations
+            else f'▲ direction of travel (both ways where it goes to and fro)   {signs}',
+            class_='signs',
+        ),
         class_='controls',
     )
 

@@ -65,9 +65,9 @@ def _judged(diagnosis: Diagnosis) -> str:
         before, after = map(both_angles, shrink.orientation_rad)
         return f'The position gap stays; the orientation gap of {before} shrinks to {after}.'
     value, interval = left_of(shrink)
-    left = f'{value} of the gap is left ({interval})'
+    left = f'{value} of the RMS gap is left ({interval})'
     if not _apart(diagnosis):
-        return f'Judged by {shrink.held_out}, {left}.'
+        return f'Judged on stretches left out in turn, {left}.'
     return (
         f'On {shrink.held_out}, which was not fitted, {millimetres(shrink.rms_before_m)} shrinks '
         f'to {millimetres(shrink.rms_after_m)}: {left}.'

@@ -12,6 +12,7 @@ from weld_twin_core.diagnosis.advice.inseparable import ELSE, way
 from weld_twin_core.diagnosis.result import Diagnosis, Site
 from weld_twin_core.metrics.conformity import PASS, Rule
 
+from .controllers import gearing
 from .leading import in_order
 from .mending import left_without, look_at, warning
 from .quantities import millimetres
@@ -129,6 +130,7 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
     for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
         if site_of(named) in unsure:
             action = f'Should it be {found_name(named)}: {action[:1].lower()}{action[1:]}'
+        action = f'{action} {gearing(named.effect)}'.rstrip()
         worse = warning(diagnosis, held[site_of(named)]) if site_of(named) in held else ''
         out.append(f'{action} {worse}'.rstrip())
     return out
@@ -154,7 +156,8 @@ def _again(diagnosis: Diagnosis) -> list[str]:
     one = len(names) == 1
     return [
         f'Diagnose again with {listed(names)}: {"it was" if one else "they were"} left out as asked '
-        f'(--exclude-effect), and {"it" if one else "one of them"} may be the cause.'
+        '(option --exclude-effect of weld-twin diagnose), and '
+        f'{"it" if one else "one of them"} may be the cause.'
     ]
 
 

@@ -364,7 +364,7 @@ def test_the_table_of_joints_has_no_empty_columns():
     where = replace(PLAY.where, map_shares=tuple(map(tuple, shares)))
     page = report_page(replace(PLAY, where=where))
     heads = re.findall('scope="col">(.*?)</th>', page[page.index('class="map"') :])
-    assert [plain(h).strip() for h in heads[:2]] == ['Joint [%]', 'reversal']
+    assert [plain(h).strip() for h in heads[:2]] == ['Joint [%]', 'direction of motion']
     assert page.count('data-joint=') == 6 and 'acceleration' not in heads
     assert (
         'No joint alone could explain 0.5 % by constant, angle of low order, angle of high order'

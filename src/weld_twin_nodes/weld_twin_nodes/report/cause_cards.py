@@ -45,10 +45,7 @@ _LATE = {'servo_lag', 'time_delay'}
 """Causes that read otherwise where the joints were commanded, not measured."""
 _SOURCE = 'source of the joints'
 """Name of the check that tells so."""
-_BY_CURVE = (
-    'As the cause is not known, this is with programs corrected by the curve that was measured in its '
-    'place.'
-)
+_BY_CURVE = 'That is with programs corrected by the curve.'
 _SHORT = ' That curve follows only part of what happens here, so it takes off less than the share.'
 _VALUES = 4
 """Parameters told on a card; effects.yaml has all."""

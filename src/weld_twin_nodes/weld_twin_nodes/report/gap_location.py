@@ -32,6 +32,8 @@ _WHERE = ('the seam', 'the stations')
 _EVEN = 1.25
 """Ratio of the worst stretch to the best below which neither stands out: that much a dozen short
 stretches of one motion differ by for no other reason than posture and noise."""
+_DIRECTION = {'reversal': 'direction of motion'}
+"""What the causes above are told to depend on, where the map has another word for it."""
 _VISIBLE = 0.005
 """Share below which a cell of the map stays empty: it would read 0."""
 
@@ -159,7 +161,9 @@ def _map(diagnosis: Diagnosis) -> Html | None:
         aria_label='Share by joint and regressor',
     )  # fmt: skip
     empty = [
-        name.replace(', ', ' of ') for k, name in enumerate(where.map_regressors) if k not in full
+        _DIRECTION.get(name, name.replace(', ', ' of '))
+        for k, name in enumerate(where.map_regressors)
+        if k not in full
     ]
     blank = 'A cell is blank below 0.5 %.' if full else ''
     none = f'No joint alone could explain 0.5 % by {listed(empty, "or")}.' if empty else ''
@@ -168,7 +172,7 @@ def _map(diagnosis: Diagnosis) -> Html | None:
 
 
 def _heads(names: Sequence[str]) -> Html:
-    heads = [tag('th', tag('span', name), scope='col') for name in names]
+    heads = [tag('th', tag('span', _DIRECTION.get(name, name)), scope='col') for name in names]
     heads.append(
         tag('th', tag('span', 'position at the instant looked at'), scope='col', class_='now')
     )

@@ -131,7 +131,7 @@ def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
         told = f'comes in part from {cause_words(first)}, in part from {cause_words(others[0])};'
     why = 'no known effect explains it'
     if diagnosis.confidence < HALF:
-        why = 'whether a known effect explains it is not sure'
+        why = 'what causes it is open'
     if not_to_be_tried(diagnosis):
         why = f'what causes it is open: {untried_in_short(diagnosis)}, as asked'
     return (

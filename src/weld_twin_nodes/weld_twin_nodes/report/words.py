@@ -48,8 +48,8 @@ CAUSES = {
     'joint_slip': 'slip',
     'tool_slip': 'slipped tool or reflector',
     'instrument_knock': 'knocked instrument or base',
-    'joint_curve': 'curve without a name',
-    'frame_curve': 'motion without a name',
+    'joint_curve': 'measured curve',
+    'frame_curve': 'measured motion',
 }
 _PARAMETERS = {
     'da': 'length off by',

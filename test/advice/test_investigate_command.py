@@ -28,7 +28,7 @@ def measured(robot, place, q, seed, load=0.0):
 
 def test_what_is_asked_for_is_taken_in_and_judged(ur5, tmp_path):
     rng = np.random.default_rng(1)
-    near = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + 0.05 * rng.uniform(-1, 1, (25, 6))
+    near = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + 0.03 * rng.uniform(-1, 1, (25, 6))
     first = measured(ur5, tmp_path / 'monday', near, 1)
     place = tmp_path / 'cell'
     said = weld_twin(

@@ -82,7 +82,9 @@ def test_nothing_is_told_in_milliradians_or_with_an_exponent(ur5):
         where = {'joint': 'elbow_joint'} if kind.of in ('joint', 'link') else {}
         more = {'source': 'wrist_1_joint'} if name == 'joint_coupling' else {}
         sizes = {
-            p.name: p.typical if p.size < 2 else [p.typical] * p.size for p in kind.parameters
+            # `second`, a wave that may be left out, takes four
+            p.name: p.typical if p.size == 1 else [p.typical] * (p.size or 4)
+            for p in kind.parameters
         }
         if kind.__module__.startswith('weld_twin_core') and not name.endswith(('curve', 'noise')):
             sentence = said(ur5, effect=name, **where, **more, **sizes)

@@ -245,7 +245,8 @@ def test_an_effect_survives_its_file(name, arm):
     fields = set(kind.__dataclass_fields__)
     entry = {'effect': name} | {key: value for key, value in given.items() if key in fields}
     for parameter in kind.parameters:
-        values = [0.1, 0.2, 0.3, 0.4][: parameter.size] if parameter.size > 2 else [0.5, 0.6]
+        wave = parameter.size > 2 or parameter.name == 'second'
+        values = [0.1, 0.2, 0.3, 0.4][: parameter.size or 4] if wave else [0.5, 0.6]
         entry[parameter.name] = values if parameter.size != 1 else 0.25
         if name == 'frame_curve':  # two knots for each of three axes
             entry[parameter.name] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]

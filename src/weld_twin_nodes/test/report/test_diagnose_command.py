@@ -29,7 +29,6 @@ FILES = {
     'robot.urdf',
     'joint_offsets.csv',
     'robot_effects.yaml',
-    'next_experiment.yaml',  # four seconds along a line name a cause, but are not sure of it
 }
 
 

@@ -100,7 +100,10 @@ def _coordinates(rng: np.random.Generator, found: Search, missed: float) -> Arra
 
     """
     rows = found.small.residual.size
-    doubt = 1.0 / found.effective(found.small) + missed / found.work.beliefs.misfit_directions
+    doubt = (
+        1.0 / max(found.effective(found.small), 1.0)
+        + missed / found.work.beliefs.misfit_directions
+    )
     model = found.final.model
     spread = covariance(found.problem, model, found.scale, found.precision, 1.0 / (rows * doubt))
     # A coordinate on a bound, or that the data do not show, stays.

@@ -23,6 +23,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
@@ -90,7 +91,11 @@ def scatter(found: Search, unseen: Unseen) -> list[Scatter]:
     sums = []
     for k, part in enumerate(parts):
         ways = problem.seen(k, _ways(features[k])) / noise[: problem.rows[k], None]
-        sums.append(_products(np.diff(part, n=3, axis=0) / np.sqrt(THIRD), ways[..., 1:-2]))
+        left = np.diff(part, n=3, axis=0) / np.sqrt(THIRD)
+        usual = _usual(left)
+        if usual.sum() < STRETCHES:  # repeats with jumps between
+            return []
+        sums.append(_products(left[usual], ways[..., 1:-2][..., usual]))
     normal, right, sizes = (np.sum(parts, axis=0) for parts in zip(*sums, strict=True))
     whole = _shared_out(normal.sum(axis=0), right.sum(axis=0))
     error = _errors(normal, right)
@@ -127,6 +132,12 @@ def _ways(maker: Features) -> Array:
     return np.concatenate([coordinates, sight, velocity[None], np.array(moved)])
 
 
+def _usual(left: Array) -> NDArray[np.bool_]:
+    """Return which differences do not stand out, shape (M,)."""
+    length = (left**2).sum(axis=1)
+    return np.asarray(length < GROSS * np.median(length))
+
+
 def _products(left: Array, ways: Array) -> tuple[Array, Array, Array]:
     """
     Return the normal equations of the variances, for every stretch.
@@ -145,9 +156,6 @@ def _products(left: Array, ways: Array) -> tuple[Array, Array, Array]:
         Sum of squares of each way, then of the differences, then the number of rows.
 
     """
-    length = (left**2).sum(axis=1)
-    kept = length < GROSS * np.median(length)
-    left, ways = left[kept], ways[..., kept]
     cross = np.einsum('acm,bcm->abm', ways, ways, optimize=True) ** 2
     along = np.einsum('acm,mc->am', ways, left) ** 2
     ends = [part[0] for part in np.array_split(np.arange(len(left)), STRETCHES)]

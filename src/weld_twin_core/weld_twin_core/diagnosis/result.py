@@ -17,7 +17,8 @@ from ..twin.posterior import Posterior, as_dict
 from .algebra.problem import Model
 
 SCHEMA = 'weld_twin/diagnosis/1'
-STATUSES = ('identified', 'ambiguous', 'unknown', 'none', 'unsound')
+NAMING = ('identified', 'ambiguous')
+"""Verdicts that name something; the others are unknown, none and unsound."""
 MISTAKES = (
     'units',
     'joints_swapped',

@@ -12,7 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from weld_twin_core.diagnosis.trust.trusted import NAMING, group_of, level_group_of
+from weld_twin_core.diagnosis.result import NAMING
+from weld_twin_core.diagnosis.trust.trusted import group_of, level_group_of
 
 from ..blind.judging import Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers

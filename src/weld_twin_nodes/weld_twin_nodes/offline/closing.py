@@ -14,9 +14,8 @@ from typing import Any
 
 from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
 from weld_twin_core.diagnosis.advice.next_step import SURE
+from weld_twin_core.diagnosis.result import NAMING
 
-NAMING = ('identified', 'ambiguous')
-"""Verdicts that name causes."""
 AGREED = 0.7
 """Confidence that two diagnoses of different recordings each need where only both together are sure:
 two that are wrong seldom name the same."""

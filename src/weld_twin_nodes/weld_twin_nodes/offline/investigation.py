@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core.diagnosis.advice.chosen_pieces import LEAST, NOTHING
+from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_text
 
-from .closing import ALIKE, NAMING, closes
+from .closing import ALIKE, closes
 
 STATE, PAGE = 'investigation.json', 'investigation.html'
 SCHEMA = 'weld_twin/investigation/1'

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from weld_twin_core.diagnosis.result import Cause, Diagnosis
+from weld_twin_core.diagnosis.result import NAMING, Cause, Diagnosis
 
 from .html import Html, tag
 from .quantities import odds
@@ -31,7 +31,7 @@ def belief_of(diagnosis: Diagnosis, cause: Cause) -> float | None:
         return sum(p for _, p in leading(cause.place)) if cause.place else None
     alike = alternatives(diagnosis, cause)
     own = sum(named.get(site, 0.0) for site in alike) if alike else max(named.values())
-    whole = diagnosis.confidence if diagnosis.status in ('identified', 'ambiguous') else 0.0
+    whole = diagnosis.confidence if diagnosis.status in NAMING else 0.0
     return min(max(own, whole), 1.0)
 
 
@@ -100,7 +100,7 @@ def _list(head: str, told: list[tuple[str, float]]) -> str:
 
 def together(diagnosis: Diagnosis) -> str:
     """Return why the verdict as a whole is less sure than its causes; nothing where it is not."""
-    if diagnosis.status not in ('identified', 'ambiguous') or diagnosis.families:
+    if diagnosis.status not in NAMING or diagnosis.families:
         return ''
     each = [belief_of(diagnosis, cause) for cause in diagnosis.causes if cause.name]
     sure = [p for p in each if p is not None]

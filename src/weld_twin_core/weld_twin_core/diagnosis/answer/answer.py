@@ -16,12 +16,12 @@ from ..levels.causes import causes
 from ..levels.contributions import contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
-from ..result import Cause, Diagnosis, Shares, Shrink
+from ..result import NAMING, Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
 from ..stability.steadied import Stability, bounded, of_families
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
-from ..trust.trusted import NAMING, trusted
+from ..trust.trusted import trusted
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict

@@ -11,15 +11,13 @@ import numpy as np
 
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
+from ..result import NAMING
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
 from .held_against import held_against
 from .own_place import Beside, beside_names
 from .scatter import Scatter, scatter
-
-NAMING = ('identified', 'ambiguous')
-"""Verdicts that name something."""
 
 
 class Missed(NamedTuple):

@@ -148,9 +148,10 @@ def _told(base: Base, columns: Array) -> tuple[float, float, float]:
     for residual in base.extended(columns, RIDGES):
         after = residual**2
         fall = float(before.mean() - after.mean())
-        if fall / max(float(before.mean()), 1e-300) > told[0]:
+        gain = fall / max(float(before.mean()), 1e-300)
+        if gain > told[0]:
             two = np.array([after[labels == n].mean() for n in names])
-            told = (fall / max(float(before.mean()), 1e-300), steadiness(one, two), fall)
+            told = (gain, steadiness(one, two), fall)
     return told
 
 

@@ -18,8 +18,7 @@ from ..hypotheses.rivals import Rival, nats_in_place
 from ..hypotheses.search import Search
 from ..hypotheses.selection import fitted_with, implausible
 from ..many.weighed_families import WeighedFamily
-from ..result import CameBack, Cause, Site
-from ..trust.trusted import NAMING
+from ..result import NAMING, CameBack, Cause, Site
 from ..verdict.decision import Verdict, leaders
 from .repeated import Repeated
 

@@ -8,13 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from ..result import Cause
+from ..result import NAMING, Cause
 from ..verdict.decision import Verdict
 from .model import Trust
 from .signs import Signs
 
 Key = TypeVar('Key')
-NAMING = ('identified', 'ambiguous')
 
 
 def group_of(status: str, signs: Mapping[str, float]) -> str:

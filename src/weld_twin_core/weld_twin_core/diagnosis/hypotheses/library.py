@@ -17,7 +17,7 @@ from ..algebra.atoms import Amounts, Columns, MovedJoint, Whole, amounts, gather
 from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
 from .seed_systems import SeedSystems
-from .still_joints import REASON, hardly_moves
+from .still_joints import REASON, hardly_moves, moved_most
 
 EXCLUDED = 'excluded by the user'
 
@@ -127,11 +127,8 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
 
     """
     features = problem.features(model)
-    residual = problem.residuals(model)[0]
-    residual[:3] *= scale.weights[0] / scale.position**2
-    residual[3:] *= scale.weights[0] / scale.orientation**2
-    residual = problem.pulled(0, residual)
-    shelf = _Shelf(problem, scale, features, residual, dict.fromkeys(exclude, EXCLUDED))
+    pulls = _pulls(problem, model, scale)
+    shelf = _Shelf(problem, scale, features, pulls, dict.fromkeys(exclude, EXCLUDED))
     for kind in candidate_kinds(exclude, problem.align):
         for joint in joints_of(kind, model.robot.joint_names):
             shelf.add(kind, joint)
@@ -141,6 +138,15 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
     columns = [index for unit in shelf.units for index in unit.columns]
     systems = SeedSystems.of(columns, [piece.normal() for piece in shelf.pieces])
     return Library(tuple(gathered(shelf.pieces)), systems, tuple(shelf.units), shelf.absent)
+
+
+def _pulls(problem: Problem, model: Model, scale: Scale) -> list[Array]:
+    """Return how strongly what is left pulls at the tool of every recording, (3 or 6, M) each."""
+    residuals = problem.residuals(model)
+    for residual, weights in zip(residuals, scale.weights, strict=True):
+        residual[:3] *= weights / scale.position**2
+        residual[3:] *= weights / scale.orientation**2
+    return [problem.pulled(k, residual) for k, residual in enumerate(residuals)]
 
 
 def _applicable(kind: type[Effect], joint: str | None, features: list[Features]) -> str | None:
@@ -156,11 +162,11 @@ class _Shelf:
         problem: Problem,
         scale: Scale,
         features: list[Features],
-        pull: Array,
+        pulls: Sequence[Array],
         absent: dict[str, str],
     ) -> None:
         self.problem, self.scale, self.features = problem, scale, features
-        self.pull, self.absent = pull, absent
+        self.pulls, self.absent = pulls, absent
         self.pieces: list[Columns] = []
         self.units: list[Unit] = []
         self._count = 0
@@ -172,7 +178,8 @@ class _Shelf:
         if reason is not None:
             self.absent[kind.name] = reason
             return
-        found, trials = self.features[0].seeds(kind, joint, self.pull)
+        k = moved_most(self.features, joint)
+        found, trials = self.features[k].seeds(kind, joint, self.pulls[k])
         seeds = [seed for seed in found if not hardly_moves(self.features, seed)]
         if len(seeds) < len(found):
             self._leave_out(kind.name, str(joint))

@@ -15,6 +15,7 @@ from ...twin.features import Features
 from ...twin.resampling import Picker
 from ..algebra.fit import design
 from ..algebra.problem import Model, Problem, Scale
+from .still_joints import moved_most
 
 MEMORY = (Stage.SERVO, Stage.PLAY)
 LEAST = 1e-9
@@ -168,10 +169,11 @@ class _Looker:
         memory = effect.stage in MEMORY
         views = [maker.joint_view if memory else maker.view for maker in self.features]
         trials = [effect.starts(view, zoom) for view in views]
-        told = next((own for own in trials if own is not None), None)
+        # What moves the joint most says which instances; the others say what they do there.
+        most = trials[moved_most(self.features, effect.site)]
+        told = most or next((own for own in trials if own is not None), None)
         if told is None:
             return None
-        # The first recording that can says which instances; the others say what they do there.
         found = told[0]
         pull, mass, shared = (np.zeros(()) for _ in range(3))
         for k, (maker, view) in enumerate(zip(self.features, views, strict=True)):

@@ -1,8 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Joints that hardly move: what depends on their motion cannot be told from a constant."""
+"""How far joints move: what depends on the motion of one at rest cannot be told from a constant."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -25,3 +27,26 @@ def hardly_moves(features: list[Features], effect: Effect) -> bool:
     positions = [maker.view.joint(i) for maker in features]
     travel = max(float(np.max(q)) for q in positions) - min(float(np.min(q)) for q in positions)
     return travel < (STILL_SLIDE if robot.prismatic[i] else STILL)
+
+
+def moved_most(features: Sequence[Features], joint: str | None) -> int:
+    """
+    Return which recording moves a joint farthest on its whole way, or all joints together.
+
+    Where an effect of many shapes may be is looked for there: a recording in which the joint stands
+    still shows none of them.
+
+    Parameters
+    ----------
+    features : sequence of Features
+        One for each recording.
+    joint : str or None
+        None for all joints.
+
+    """
+    if len(features) == 1:
+        return 0
+    joints = features[0].twin.robot.joint_names
+    chosen = slice(None) if joint is None else [joints.index(joint)]
+    ways = [np.abs(np.diff(maker.recording.joints.q[:, chosen], axis=0)).sum() for maker in features]
+    return int(np.argmax(ways))

@@ -32,7 +32,7 @@ from ..result import Site
 from .rivals import Rival, nats_in_place, weighed
 from .search import Search
 from .selection import fitted_with, implausible
-from .still_joints import hardly_moves
+from .still_joints import hardly_moves, moved_most
 
 POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
@@ -97,7 +97,8 @@ def _fitted_kin(found: Search, k: int, kin: Sequence[type[Effect]]) -> list[Riva
         return []
     effect, work = found.small.model.found[k], found.work
     rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
-    count, maker = found.effective(found.small), work.problem.features(rest.model)[0]
+    count, features = found.effective(found.small), work.problem.features(rest.model)
+    maker = features[moved_most(features, effect.site)]
     out = []
     for kind in kin:
         if kind.applicable(maker.view, effect.site) is not None:
@@ -177,7 +178,7 @@ def _at_rest(features: list[Features], kind: type[Effect], joint: str) -> list[E
     """Return instances that are no more than a constant, as the joint they need hardly moves."""
     if not kind.by_motion or kind.stage in (Stage.SERVO, Stage.PLAY):
         return []
-    seeds = list(kind.seeds(features[0].view, joint))[:FEW]
+    seeds = list(kind.seeds(features[moved_most(features, joint)].view, joint))[:FEW]
     return [seed for seed in seeds if hardly_moves(features, seed)]
 
 

@@ -25,7 +25,7 @@ from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.library import candidate_kinds
-from ..hypotheses.still_joints import hardly_moves
+from ..hypotheses.still_joints import hardly_moves, moved_most
 from .shrinkage import shrunk_fit, shrunk_step
 from .wave_lines import with_lines
 
@@ -190,7 +190,7 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
         residual = problem.whitened(problem.residuals(model), scale)
         frames = problem.whitened(problem.frame_columns(features)[0], scale)
         best: tuple[float, Effect] | None = None
-        for seed in features[0].seeds(kind, None)[0]:
+        for seed in features[moved_most(features, None)].seeds(kind, None)[0]:
             own = problem.whitened(problem.effect_columns(features, seed), scale)
             gram = Gram.of(np.concatenate([frames, own]), residual)
             index = np.arange(frames.shape[0], frames.shape[0] + own.shape[0])

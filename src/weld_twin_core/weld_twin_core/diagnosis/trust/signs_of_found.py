@@ -30,6 +30,8 @@ from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
 from .numbers import FAR, Numbers, log, log1, plain, rms
 
+FEWEST_STATES = 4
+"""Joint states from which a recording tells how fast and how often a joint turns."""
 LARGE = 300_000
 """Rows above which free columns at joints are left out: they would cost seconds, and what is
 learned from are recordings of less than a minute."""
@@ -183,15 +185,19 @@ def _of_slot(slot: Sequence[Rival], chosen: set[Site]) -> Numbers:
 
 def _of_joint(effect: Effect, problem: Problem, robot: Robot) -> Numbers:
     """Return how a joint was moved: what a formula that depends on motion is told from."""
-    joints = problem.recordings[0].joints
-    if effect.site is None or joints.t.size < 4:
+    streams = [r.joints for r in problem.recordings if r.joints.t.size >= FEWEST_STATES]
+    if effect.site is None or not streams:
         return {}
-    q = joints.q[:, robot.joint_names.index(effect.site)]
-    speed = np.abs(np.gradient(q, joints.t))
-    way = np.sign(np.diff(q))[speed[1:] > MOVING]
+    i = robot.joint_names.index(effect.site)
+    speeds = [np.abs(np.gradient(own.q[:, i], own.t)) for own in streams]
+    turns = 0.0
+    for own, speed in zip(streams, speeds, strict=True):
+        way = np.sign(np.diff(own.q[:, i]))[speed[1:] > MOVING]
+        turns += float((way[1:] * way[:-1] < 0.0).sum())
+    speed = np.concatenate(speeds)
     return {
-        'own_travel': log(float(np.ptp(q))),
-        'own_turns': log1(float((way[1:] * way[:-1] < 0.0).sum())),
+        'own_travel': log(float(np.ptp(np.concatenate([own.q[:, i] for own in streams])))),
+        'own_turns': log1(turns),
         'own_speed': log(float(speed.max())),
         'own_still': float((speed <= MOVING).mean()),
     }

@@ -4,10 +4,14 @@
 
 import numpy as np
 import pytest
-from diagnosis_cells import effect, known_scale, tiny
+from diagnosis_cells import HOME, effect, known_scale, tiny
 
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.hypotheses.starts import started
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.twin import Twin
 
 
 @pytest.mark.parametrize('frequency', [3.0, 9.0])
@@ -39,3 +43,23 @@ def test_an_effect_whose_fit_has_one_optimum_starts_where_it_is():
     offset = effect('joint_offset', joint='elbow_joint', offset=1e-3)
     problem, model = tiny((offset,))
     assert started(problem, model, known_scale(problem), offset) is offset
+
+
+def test_a_joint_at_rest_in_the_first_recording_hides_no_stairs_of_the_second():
+    robot, noise = load('ur5'), np.random.default_rng(5)
+    stairs = effect('quantization', joint='elbow_joint', step=1.3e-3)
+    t = np.arange(0.0, 20.0, 0.02)
+    both = np.array(HOME[:6]) + 0.4 * np.sin(np.outer(t, 0.5 + 0.13 * np.arange(6)))
+    still = both.copy()
+    still[:, 2] = HOME[2]
+    recordings = []
+    for name, q in (('still', still), ('moving', both)):
+        run = Recording(name, JointMotion(t, q))
+        seen = Twin(robot, [stairs]).poses(run).position
+        seen = seen + noise.normal(scale=2e-5, size=seen.shape)
+        recordings.append(run.with_measured(Measurements(t, seen)))
+    found = diagnose(recordings, robot, experiment=False)
+    assert [(e.effect.name, e.effect.joint) for e in found.effects] == [
+        ('quantization', 'elbow_joint')
+    ]
+    assert found.effects[0].effect.step == pytest.approx(1.3e-3, rel=1e-3)

@@ -48,5 +48,7 @@ def moved_most(features: Sequence[Features], joint: str | None) -> int:
         return 0
     joints = features[0].twin.robot.joint_names
     chosen = slice(None) if joint is None else [joints.index(joint)]
-    ways = [np.abs(np.diff(maker.recording.joints.q[:, chosen], axis=0)).sum() for maker in features]
+    ways = [
+        np.abs(np.diff(maker.recording.joints.q[:, chosen], axis=0)).sum() for maker in features
+    ]
     return int(np.argmax(ways))

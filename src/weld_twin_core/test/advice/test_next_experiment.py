@@ -280,3 +280,20 @@ def test_of_causes_that_fit_alike_the_next_measurement_parts_two(ur5):
     assert told.status == 'ambiguous' and ('joint_compliance', SPRING['joint']) in alike
     sides = told.next_experiment['between']
     assert all({(e['effect'], e['joint']) for e in side} & alike for side in sides)
+
+
+def test_what_is_sure_with_a_joint_at_rest_is_confirmed_in_motion_where_that_is_asked():
+    robot, noise = wt.load('ur5'), np.random.default_rng(3)
+    t = np.arange(0.0, 16.0, 0.02)
+    q = np.array([0.1, -1.2, 1.5, -1.0, -1.4, 0.3]) + 0.4 * np.sin(
+        np.outer(t, [0.6, 0.5, 0.7, 0.4, 0.9, 0])
+    )
+    run = wt.Recording('still wrist', wt.JointMotion(t, q))
+    seen = wt.Twin(robot, [wt.effects.JointCompliance('elbow_joint', compliance=2e-5)]).poses(run)
+    position = seen.position + noise.normal(scale=2e-5, size=seen.position.shape)
+    recording = run.with_measured(wt.Measurements(t, position))
+    sure = wt.diagnose(recording, robot, limits=Limits(confirm=True))
+    assert sure.status == 'identified' and sure.learned == sure.confidence > 0.9
+    asked = sure.next_experiment
+    assert asked['confirms'] == ['wrist_3_joint'] and 'wrist_3_joint' in asked['reason']
+    assert np.ptp(np.array(asked['motion']['q'])[:, 5]) > 0.5

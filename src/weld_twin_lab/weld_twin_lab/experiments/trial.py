@@ -12,7 +12,7 @@ from typing import Any
 from weld_twin_core.diagnosis.advice import Limits
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
-from weld_twin_nodes.offline.closing import repeat_wanted, third_wanted, weighed
+from weld_twin_nodes.offline.closing import STATED, signs, weighed
 from weld_twin_nodes.offline.investigation import decided, question, short
 
 from ..blind.recorded_motion import Motion
@@ -25,6 +25,8 @@ MINUTES = 5.0
 """Of robot motion at most, all experiments together."""
 VISIT = 60.0
 """Minutes at most, all experiments together, with what has to be set up for them."""
+Found = Mapping[str, Any]
+Heard = dict[str, Found]
 LEAST = 0.25
 """Minutes that an experiment is planned with where hardly any are left."""
 ASKED = (
@@ -49,14 +51,10 @@ def said(cell: SealedCell, found: Mapping[str, Any], why: str) -> dict[str, Any]
 
 
 def answered(
-    cell: SealedCell,
-    first: Recording,
-    later: Sequence[Recording],
-    limits: Limits,
-    before: Mapping[str, Any] | None = None,
-) -> tuple[Mapping[str, Any], str]:
+    cell: SealedCell, first: Recording, later: Sequence[Recording], limits: Limits
+) -> tuple[Found, str, Heard]:
     """
-    Return the answer from the first recording and later ones, and why it closes the question.
+    Return the answer from the first recording and later ones, why it closes the question, and all.
 
     Parameters
     ----------
@@ -65,37 +63,56 @@ def answered(
     later : sequence of Recording
     limits : Limits
         What the next experiment may take.
-    before : mapping, optional
-        What was believed before the last of them was made.
+
+    Returns
+    -------
+    found : mapping
+    why : str
+    heard : dict
+        Every diagnosis that was made for it: 'together', and 'alone' where it could be.
 
     """
-    together = cell.diagnosed([first, *later], limits=limits)
-    if not later or cell.seen_anew(later):
-        return weighed(together)
-    try:
-        alone = cell.diagnosed(list(later), holdout=[first], limits=limits)
-    except TwinError:
-        # Too few stations to be diagnosed by themselves.
-        return weighed(together)
-    free = cell.diagnosed(list(later), limits=limits) if third_wanted(together, alone) else None
-    newest = None
-    if repeat_wanted(together, alone, free, before):
+    heard: Heard = {'together': cell.diagnosed([first, *later], limits=limits)}
+    if later and not cell.seen_anew(later):
+        # Too few stations cannot be diagnosed by themselves.
         with suppress(TwinError):
-            newest = cell.diagnosed([later[-1]], limits=limits)
-    return weighed(together, alone, free, before, newest)
+            heard['alone'] = cell.diagnosed(list(later), limits=limits)
+    found, why = weighed(*heard.values())
+    return found, why, heard
+
+
+def _kept(cell: SealedCell, heard: Heard) -> dict[str, Any]:
+    """Return of every diagnosis what an answer is weighed by, and what it is worth."""
+    if len(heard) < 2:
+        return {}
+    together, alone = heard.values()
+    return {
+        'together': _weight(cell, together, alone),
+        'alone': _weight(cell, alone, together),
+    }
+
+
+def _weight(cell: SealedCell, found: Found, other: Found) -> dict[str, Any]:
+    return {
+        'signs': signs(found, other),
+        'stated': found['verdict']['status'] in STATED,
+        'right': cell.judged(found).right,
+    }
 
 
 def _left(minutes: float, visit: float = VISIT) -> Limits:
-    return Limits(minutes=max(visit, LEAST), moving=max(minutes, LEAST))
+    return Limits(minutes=max(visit, LEAST), moving=max(minutes, LEAST), confirm=True)
 
 
 def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Return the first diagnosis and what it is worth; None where it is right or finds a mistake."""
-    found, why = answered(cell, cell.first, [], _left(MINUTES))
+    found, why, _ = answered(cell, cell.first, [], _left(MINUTES))
     first = said(cell, found, why)
     wrong = first['status'] in ('ambiguous', 'unknown') or not first['right']
-    # What cannot be told apart by any motion is no question for an experiment.
-    closed = first['right'] and first['sure']
+    # What cannot be told apart by any motion is no question for an experiment; nor is one that only
+    # confirms what is right already.
+    confirms = bool((found['next_experiment'] or {}).get('confirms'))
+    closed = first['right'] and (first['sure'] or confirms)
     return (dict(found), first) if wrong and not closed else None
 
 
@@ -175,7 +192,7 @@ def investigated(
         left, visit = left - asked['robot_minutes'], visit - asked['minutes']
         begun = time.perf_counter()
         try:
-            found, why = answered(cell, start, later, _left(left, visit), found)
+            found, why, heard = answered(cell, start, later, _left(left, visit))
         except TwinError as error:
             return rounds, f'refused: {error}', answer
         answer = said(cell, found, why)
@@ -185,6 +202,7 @@ def investigated(
                 'decided': decided(asked, found),
                 'seconds': time.perf_counter() - begun,
                 'found': answer,
+                'heard': _kept(cell, heard),
             }
         )
 
@@ -193,7 +211,7 @@ def _with(cell: SealedCell, start: Recording, name: str, motion: Motion) -> dict
     """Return what a further recording of a motion leads to."""
     made = cell.made(name, motion, 200)
     try:
-        return said(cell, *answered(cell, start, [made], _left(MINUTES)))
+        return said(cell, *answered(cell, start, [made], _left(MINUTES))[:2])
     except TwinError as error:
         return {'status': 'refused', 'said': str(error), 'right': False, 'sure': False}
 

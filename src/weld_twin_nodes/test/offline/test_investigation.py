@@ -5,7 +5,7 @@
 import pytest
 
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.offline.closing import repeat_wanted, third_wanted, weighed
+from weld_twin_nodes.offline.closing import belief, weighed
 from weld_twin_nodes.offline.investigation import (
     begin,
     changed,
@@ -169,34 +169,26 @@ def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path):
         recordings(state)
 
 
+def named(cause, confidence, status='identified', wanted=None):
+    groups = ((cause,),) if cause else ()
+    return found(status, wanted, groups, confidence)
+
+
 @pytest.mark.parametrize(
     ('together', 'alone', 'believed', 'closed'),
     [
         # Sure and not contradicted.
-        (found('identified', groups=((SPRING,),)), found('unknown', groups=()), 0, True),
+        (named(SPRING, 0.995), named(None, 0.9, 'unknown'), 0, True),
         # What the poor recording hides, the experiments show.
-        (found('unknown', groups=()), found('identified', groups=((SPRING,),)), 1, True),
+        (named(None, 0.99, 'unknown'), named(SPRING, 0.995), 1, True),
         # Two that are sure of different causes are not sure.
-        (
-            found('identified', groups=((SPRING,),)),
-            found('identified', groups=((ELSE,),)),
-            0,
-            False,
-        ),
-        # Neither is sure, and both say the same.
-        (
-            found('identified', groups=((SPRING,),), confidence=0.8),
-            found('identified', groups=((SPRING,),), confidence=0.75),
-            0,
-            True,
-        ),
-        (
-            found('identified', groups=((SPRING,),), confidence=0.8),
-            found('identified', groups=((SPRING,),), confidence=0.5),
-            0,
-            False,
-        ),
-        (found('ambiguous'), found('ambiguous'), 0, False),
+        (named(SPRING, 0.995), named(ELSE, 0.99), 0, False),
+        (named(SPRING, 0.99), named(ELSE, 0.995), 1, False),
+        # Neither is sure by itself, and both say the same; or one hardly says it.
+        (named(SPRING, 0.9), named(SPRING, 0.92), 1, True),
+        (named(SPRING, 0.8), named(SPRING, 0.4), 0, False),
+        # Sure of as many causes, but of another one.
+        (found(groups=((SPRING, ZERO), (ELSE,))), named(SPRING, 0.6), 0, False),
         # Some motion parts what is named beside each other; or none does, and only others are asked.
         (found(wanted=stations()), found(wanted=stations()), 0, False),
         (
@@ -206,60 +198,36 @@ def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path):
             True,
         ),
         (found(wanted=stations(sigma=0.5)), found(wanted=stations(sigma=0.5)), 0, True),
+        (found(), found(), 0, False),
         # What was knocked between two recordings is sound in each.
-        (found('unsound', confidence=None), found('unknown', groups=()), 1, False),
+        (named(None, None, 'unsound'), named(None, 0.9, 'unknown'), 1, False),
+        (named(None, None, 'unsound'), named(SPRING, 0.995), 1, True),
+        (named(None, 0.99, 'none'), named(None, 0.99, 'none'), 0, True),
     ],
 )
 def test_experiments_alone_are_heard_beside_all_recordings(together, alone, believed, closed):
     told, why = weighed(together, alone)
-    assert told is (together, alone)[believed] and bool(why) is closed
+    expected = (together, alone)[believed]['verdict']
+    assert told['verdict']['status'] == expected['status']
+    assert told['verdict']['indistinguishable'] == expected['indistinguishable']
+    assert bool(why) is closed
 
 
-def named(cause, confidence, status='identified'):
-    return found(status, groups=((cause,),) if cause else (), confidence=confidence)
+def test_belief_is_that_of_both_and_the_other_raises_it_or_lowers_it():
+    alone = belief(named(SPRING, 0.9), named(None, 0.9, 'unknown'))
+    assert belief(named(SPRING, 0.9), named(SPRING, 0.9)) > alone
+    assert belief(named(SPRING, 0.9), named(ELSE, 0.9)) < alone
+    # What was learned counts, where a diagnosis tells less of it.
+    learned = named(SPRING, 0.8)
+    learned['verdict']['learned'] = 0.98
+    assert belief(learned, named(None, 0.9, 'unknown')) > alone
+    told, _ = weighed(learned, named(SPRING, 0.9))
+    assert told['verdict']['confidence'] == belief(learned, named(SPRING, 0.9))
 
 
-@pytest.mark.parametrize(
-    ('free', 'closed'),
-    [
-        # The experiments alone are sure of the same.
-        (named(SPRING, 0.95), True),
-        (named(SPRING, 0.8), False),
-        (named(ELSE, 0.95), False),
-    ],
-)
-def test_what_is_held_out_may_be_too_poor_to_be_foretold(free, closed):
-    together, alone = named(SPRING, 0.8), named(None, 0.9, 'unknown')
-    assert third_wanted(together, alone)
-    assert bool(weighed(together, alone, free)[1]) is closed
-
-
-@pytest.mark.parametrize(
-    ('together', 'before', 'newest', 'closed'),
-    [
-        # What poor recordings hide from all of them, two without a measurement in common show.
-        (named(None, 0.98, 'unknown'), named(SPRING, 0.8), named(SPRING, 0.8), True),
-        (named(None, 0.98, 'unknown'), named(SPRING, 0.8), named(SPRING, 0.75), False),
-        (named(None, 0.98, 'unknown'), named(SPRING, 0.75), named(SPRING, 0.95), False),
-        (named(None, 0.98, 'unknown'), named(SPRING, 0.8), named(ELSE, 0.95), False),
-        (named(ELSE, 0.6), named(SPRING, 0.8), named(SPRING, 0.8), False),
-    ],
-)
-def test_the_same_answer_from_recordings_without_a_common_measurement_closes(
-    together, before, newest, closed
-):
-    alone = named(SPRING, 0.8)
-    found, why = weighed(together, alone, None, before, newest)
-    assert bool(why) is closed and (not closed or found is alone)
-    # Where it could not close, the newest need not be diagnosed by itself.
-    assert closed <= bool(repeat_wanted(together, alone, None, before))
-    assert repeat_wanted(together, named(None, 0.9, 'unknown'), None, before) is None
-
-
-def test_one_cause_more_than_was_as_likely_before_is_not_sure_by_agreeing_with_itself():
-    more = found('identified', groups=((SPRING,), (ELSE,)), confidence=0.75)
-    assert weighed(more, more)[1] and not weighed(more, more, None, named(SPRING, 0.8))[1]
-    # Fewer candidates for the same cause overturn nothing, nor does what was hardly believed.
-    fewer = named(SPRING, 0.75)
-    assert weighed(fewer, fewer, None, found('ambiguous', confidence=0.8))[1]
-    assert weighed(more, more, None, named(SPRING, 0.6))[1]
+def test_nothing_is_sure_before_every_joint_has_moved():
+    wider = {**stations(), 'expected_separation_sigma': None, 'between': None, 'confirms': ['a']}
+    still = named(SPRING, 0.99, wanted=wider)
+    assert question(still, 30.0, [])['kind'] == 'stations'
+    assert weighed(still, still)[1] == ''
+    assert question(named(SPRING, 0.99), 30.0, [])[0] == 'sure'

@@ -99,6 +99,31 @@ def next_experiment(
     return told | {'skipped': skipped} if skipped else told
 
 
+def confirming(
+    problem: Problem, model: Model, joints: Sequence[str], limits: Limits
+) -> dict[str, Any]:
+    """
+    Return the measurement that shows whether an answer holds once joints move that stood still.
+
+    Parameters
+    ----------
+    problem, model
+        The data at hand, and the model with its frames.
+    joints : sequence of str
+        Those that stood still.
+    limits : Limits
+
+    Returns
+    -------
+    dict
+        As `next_experiment` returns it, and 'confirms': the joints.
+
+    """
+    options = list(candidates(problem, model, limits, joints))
+    reason = _RESTED.format(joints=', '.join(joints))
+    return _entry(widening(problem, options, limits), reason, model) | {'confirms': list(joints)}
+
+
 def _plans(
     problem: Problem,
     model: Model,
@@ -134,6 +159,10 @@ _DECIDED = (
 _ALIKE = (
     'The explanations at hand move the tool alike, and none of them is sure: data from elsewhere '
     'show whether they hold.'
+)
+_RESTED = (
+    'Nothing was seen of {joints}, which stood still all the time: what depends on their motion looks '
+    'like a constant. Data in which they move show whether the answer holds.'
 )
 
 

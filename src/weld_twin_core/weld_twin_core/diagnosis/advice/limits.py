@@ -30,6 +30,9 @@ class Limits:
         Whether something in the cell may be changed for it: another tool, a moved instrument.
     box : array, shape (2, 3), optional [m]
         Corners in the measuring frame that the arm stays between.
+    confirm : bool
+        Whether one is asked for where the question is closed, but a joint stood still all the time:
+        what depends on its motion looks like a constant, of that joint or of another.
 
     Raises
     ------
@@ -42,6 +45,7 @@ class Limits:
     moving: float = np.inf
     set_up: bool = True
     box: Array | None = None
+    confirm: bool = False
 
     def __post_init__(self) -> None:
         least = min(self.minutes, self.moving)

@@ -17,10 +17,11 @@ from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale
 from ..hypotheses.choices import ranking
 from ..hypotheses.search import Search
+from ..hypotheses.still_joints import at_rest
 from ..levels.curved import Curved
 from ..verdict.decision import Verdict
 from .chosen_pieces import DECIDES
-from .experiment import next_experiment
+from .experiment import confirming, next_experiment
 from .limits import Limits
 from .next_touches import next_touches
 from .postures import Room
@@ -69,19 +70,37 @@ def next_step(
         What explains the gap without a formula.
 
     """
+    limits = limits or Limits()
+    if found.problem.untracked:
+        return _touches(found, verdict)
+    wanted = _parting(found, verdict, limits, rival)
+    if not limits.confirm or (wanted is not None and wanted['motion'] is not None):
+        return wanted
+    problem, model = found.work.problem, found.small.model
+    rested = at_rest(problem.recordings, model.robot)
+    if not rested:
+        return wanted
+    return {**confirming(problem, model, rested, limits), 'promise': None}
+
+
+def _touches(found: Search, verdict: Verdict) -> dict[str, Any] | None:
+    """Return the contacts to make next: a motion in the air would show nothing."""
+    if verdict.status in ('identified', 'none'):
+        return None
+    listed = [found.small.model.found, *_in_place(found, verdict, named=True)]
+    return next_touches(found.problem, found.final.model, listed[:TOUCHED], found.scale)
+
+
+def _parting(
+    found: Search, verdict: Verdict, limits: Limits, rival: Curved | None
+) -> dict[str, Any] | None:
+    """Return the experiment that parts what is believed from what else it could be."""
     if verdict.status in ('identified', 'none') and verdict.confidence >= SURE:
         return None
     listed = [found.small.model.found, *_in_place(found, verdict, named=True)]
     named = len(listed)
-    if found.problem.untracked:
-        if verdict.status in ('identified', 'none'):
-            return None
-        # A motion in the air would show nothing.
-        final = found.final.model
-        return next_touches(found.problem, final, listed[:TOUCHED], found.scale)
     closed = verdict.status == 'ambiguous' and verdict.confidence >= SURE and len(listed) > 1
     if not closed:
-        limits = limits or Limits()
         room = Room(found.work.problem, found.small.model.robot, limits)
         shapes = without_names(found, rival, room.low, room.high)
         if verdict.status == 'unknown' and verdict.confidence >= NAMELESS:

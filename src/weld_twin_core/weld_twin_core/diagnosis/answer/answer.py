@@ -85,6 +85,7 @@ def answer(
         status=verdict.status,
         effects=effects,
         confidence=verdict.confidence,
+        learned=verdict.learned,
         indistinguishable=verdict.sets,
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),

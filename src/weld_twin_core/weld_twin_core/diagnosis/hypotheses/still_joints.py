@@ -8,7 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...arm.robot import Robot
 from ...effects.effect import Effect
+from ...recording import Recording
 from ...twin.features import Features
 
 STILL = 0.04
@@ -27,6 +29,22 @@ def hardly_moves(features: list[Features], effect: Effect) -> bool:
     positions = [maker.view.joint(i) for maker in features]
     travel = max(float(np.max(q)) for q in positions) - min(float(np.min(q)) for q in positions)
     return travel < (STILL_SLIDE if robot.prismatic[i] else STILL)
+
+
+def at_rest(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
+    """
+    Return the joints that hardly move in any of the recordings.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    robot : Robot
+
+    """
+    ends = [(r.joints.q.min(axis=0), r.joints.q.max(axis=0)) for r in recordings]
+    travel = np.max([high for _, high in ends], axis=0) - np.min([low for low, _ in ends], axis=0)
+    still = travel < np.where(robot.prismatic, STILL_SLIDE, STILL)
+    return tuple(np.array(robot.joint_names)[still].tolist())
 
 
 def moved_most(features: Sequence[Features], joint: str | None) -> int:

@@ -226,12 +226,12 @@ class Trust:
     levels: Mapping[str, Learned]
     card: Mapping[str, Any]
 
-    def told(self, level: str, group: str, signs: Mapping[str, float]) -> float | None:
+    def learned(self, level: str, group: str, signs: Mapping[str, float]) -> float | None:
         """
-        Return how far to believe a level: not above ``told_unsure`` where it is not sure.
+        Return how often such a level of such answers was right.
 
         Beyond the sizes that were learned from, nothing speaks against what the evidence alone says;
-        so it is told at least that, as far as it is not sure.
+        so it is at least that, as far as it is not sure.
 
         Parameters
         ----------
@@ -253,6 +253,26 @@ class Trust:
         before = signs.get(BEFORE[level], 0.0)
         if learned.larger(signs):
             probability = max(probability, min(before, self.told_unsure))
+        return probability
+
+    def told(self, level: str, group: str, signs: Mapping[str, float]) -> float | None:
+        """
+        Return how far to believe a level: not above ``told_unsure`` where it is not sure.
+
+        Parameters
+        ----------
+        level, group, signs
+            As `learned` takes them.
+
+        Returns
+        -------
+        float or None
+            None where nothing was learned of such answers.
+
+        """
+        probability = self.learned(level, group, signs)
+        if probability is None:
+            return None
         sure = probability >= self.sure_from.get(f'{level} {group}', 1.0)
         sure = sure and (level not in LEVELS_BACK or comes_back(signs))
         return probability if sure else min(probability, self.told_unsure)

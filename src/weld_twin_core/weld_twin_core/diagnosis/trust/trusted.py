@@ -83,8 +83,11 @@ def trusted_verdict(verdict: Verdict, signs: Mapping[str, float], trust: Trust) 
     trust : Trust
 
     """
-    told = trust.told('answer', group_of(verdict.status, signs), signs)
-    return verdict if told is None else replace(verdict, confidence=told)
+    of = 'answer', group_of(verdict.status, signs), signs
+    told = trust.told(*of)
+    return (
+        verdict if told is None else replace(verdict, confidence=told, learned=trust.learned(*of))
+    )
 
 
 def trusted_cause(cause: Cause, status: str, signs: Mapping[str, float], trust: Trust) -> Cause:

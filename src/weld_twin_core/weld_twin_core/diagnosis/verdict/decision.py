@@ -30,13 +30,19 @@ _NO_KIND = (
 
 @dataclass(frozen=True)
 class Verdict:
-    """Status, confidence, one set of sites per named effect, families of many small ones."""
+    """
+    Status, confidence, one set of sites per named effect, families of many small ones.
+
+    ``learned`` is how often such answers were right, where that was learned; ``confidence`` tells less
+    where it is not sure.
+    """
 
     status: str
     confidence: float
     sets: tuple[tuple[Site, ...], ...]
     reasons: tuple[str, ...]
     families: tuple[Family, ...] = ()
+    learned: float | None = None
 
 
 def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:

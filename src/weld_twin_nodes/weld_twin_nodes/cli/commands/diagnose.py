@@ -95,6 +95,12 @@ def _add_next(parser: argparse.ArgumentParser) -> None:
         help='that the next experiment may take, with what has to be set up (default: 60)',
     )
     parser.add_argument(
+        '--confirm',
+        action='store_true',
+        help='where the question is closed, but a joint stood still all the time, plan an '
+        'experiment in which it moves',
+    )
+    parser.add_argument(
         '--cell-box',
         default='',
         metavar='NUMBERS',
@@ -262,21 +268,25 @@ def _changes(args: argparse.Namespace) -> dict[int, SetUpChange]:
 
 def _limits(args: argparse.Namespace) -> Limits:
     """Return what the next experiment may cost, and where it has to stay."""
+    from dataclasses import replace
+
     import numpy as np
 
     from weld_twin_core.diagnosis.advice import Limits
+    from weld_twin_core.diagnosis.advice.limits import USUAL_MINUTES
     from weld_twin_core.errors import DataError
 
-    given = {} if args.experiment_minutes is None else {'minutes': args.experiment_minutes}
+    minutes = USUAL_MINUTES if args.experiment_minutes is None else args.experiment_minutes
+    limits = Limits(minutes, confirm=args.confirm)
     if not args.cell_box:
-        return Limits(**given)
+        return limits
     try:
         numbers = [float(part) for part in args.cell_box.split(',')]
     except ValueError:
         numbers = []
     if len(numbers) != 6:
         raise DataError(f"--cell-box takes six numbers with commas, got '{args.cell_box}'")
-    return Limits(**given, box=np.array(numbers).reshape(2, 3))
+    return replace(limits, box=np.array(numbers).reshape(2, 3))
 
 
 def _described(recording: Recording, artefact: str | None) -> Recording:

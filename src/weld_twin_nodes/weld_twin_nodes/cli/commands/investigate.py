@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -198,34 +197,25 @@ def _heard(
     """Diagnose all recordings, and the experiments by themselves; return what to believe."""
     from weld_twin_core.errors import DataError
 
-    from ...offline.closing import repeat_wanted, third_wanted, weighed
+    from ...offline.closing import weighed
     from ...offline.investigation import changed, recordings
     from ...offline.set_up_changes import FRAMES
 
     first, later = recordings(state)
     told = {**changed(state), **(dict.fromkeys(bags, changes) if changes else {})}
-    found = _diagnosed([*first, *later, *bags], [], state, place, told)
+    found = _diagnosed([*first, *later, *bags], state, place, told)
     if not first or any(what in FRAMES for what in told.values()):
         # Seen with another tool, or from elsewhere, they cannot be held against the first.
         return weighed(found)
-    alone = free = newest = None
-    with suppress(DataError):  # too few to be diagnosed by themselves
-        beside = place.with_name(f'{place.name}-experiments')
-        alone = _diagnosed([*later, *bags], first, state, beside, told)
-    if third_wanted(found, alone):
-        beside = place.with_name(f'{place.name}-experiments-only')
-        free = _diagnosed([*later, *bags], [], state, beside, told)
-    before = {'verdict': state['rounds'][-1]['believed']}
-    if repeat_wanted(found, alone, free, before):
-        with suppress(DataError):
-            beside = place.with_name(f'{place.name}-newest-only')
-            newest = _diagnosed(bags, [], state, beside, told)
-    return weighed(found, alone, free, before, newest)
+    beside = place.with_name(f'{place.name}-experiments')
+    try:
+        return weighed(found, _diagnosed([*later, *bags], state, beside, told))
+    except DataError:  # too few to be diagnosed by themselves
+        return weighed(found)
 
 
 def _diagnosed(
     bags: list[str],
-    held_out: list[str],
     state: dict[str, Any],
     place: Path,
     changes: Mapping[str, str],
@@ -238,8 +228,7 @@ def _diagnosed(
     diagnose.add_arguments(parser)
     left = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
     words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
-    words += ['--experiment-minutes', f'{left:g}']
-    words += [word for bag in held_out for word in ('--holdout', bag)]
+    words += ['--experiment-minutes', f'{left:g}', '--confirm']
     words += [word for bag in bags if bag in changes for word in ('--changed', bag, changes[bag])]
     diagnose.run(parser.parse_args(words))
     found: dict[str, Any] = json.loads((place / RESULT).read_text(encoding='utf-8'))

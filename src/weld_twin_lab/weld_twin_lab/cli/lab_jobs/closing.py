@@ -1,0 +1,39 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Learn from investigated cells how far to believe what two diagnoses name beside each other.
+
+Reads tables that `weld-twin lab investigate` wrote, and prints the weights of the rule that closes
+a question, with what they are worth on cells that they were not learned from.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        'tables', nargs='+', metavar='TABLE', help='investigate.json of cells to learn from'
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Learn, and print the page."""
+    from weld_twin_core.errors import DataError
+
+    from ...experiments.closing_weights import heard, page
+
+    cases = []
+    for table in map(Path, args.tables):
+        try:
+            cases += json.loads(table.read_text(encoding='utf-8'))['cases']
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise DataError(f"'{table}' is no table of investigated cells: {error}") from None
+    all_ = heard(cases)
+    if not len(all_.right):
+        raise DataError('none of the cells has two diagnoses of the same round; give other tables')
+    print(page(all_), end='')
+    return 0

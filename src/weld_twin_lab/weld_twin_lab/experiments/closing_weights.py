@@ -1,0 +1,148 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far to believe what two diagnoses of an investigation name: learned on cells that are open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weld_twin_core.arrays import Array
+
+from ..belief.logistic import Weights, fitted
+
+SIGNS = ('own', 'same', 'other')
+"""Log odds of the answer, and those of the other diagnosis that speak for it, or against it."""
+WAYS = np.array([1.0, 1.0, -1.0])
+"""Which way each may change belief."""
+RIDGE = 1.0
+"""Towards the log odds of the answer alone, in log loss: as much as one answer."""
+FOLDS = 10
+"""Parts of the cells of which each is judged by weights learned from the others."""
+TRIED = (0.9, 0.95, 0.97, 0.98)
+"""Probabilities from which a question could be closed."""
+
+
+class Heard(NamedTuple):
+    """
+    Every answer that was heard in the rounds of many cells.
+
+    Attributes
+    ----------
+    signs : array, shape (N, 3)
+    right : array of bool, shape (N,)
+    cell, turn : array of int, shape (N,)
+        Which cell, and which of its rounds.
+
+    """
+
+    signs: NDArray[Any]
+    right: NDArray[Any]
+    cell: NDArray[Any]
+    turn: NDArray[Any]
+
+    def only(self, rows: NDArray[Any]) -> Heard:
+        """Return some of them."""
+        return Heard(*(column[rows] for column in self))
+
+
+def heard(cases: Sequence[Mapping[str, Any]]) -> Heard:
+    """
+    Return the answers that say what the causes are, of cells as a study keeps them.
+
+    Parameters
+    ----------
+    cases : sequence of mapping
+        As in investigate.json.
+
+    """
+    rows = [
+        (answer['signs'], answer['right'], k, turn)
+        for k, case in enumerate(cases)
+        for turn, step in enumerate(case['rounds'])
+        for answer in (step.get('heard') or {}).values()
+        if answer['stated']
+    ]
+    columns = zip(*rows, strict=True) if rows else ([], [], [], [])
+    signs, right, cell, turn = (np.array(column) for column in columns)
+    return Heard(signs.reshape(-1, len(SIGNS)), right.astype(bool), cell, turn)
+
+
+def weights(taught: Heard) -> Weights:
+    """
+    Return what each sign counts, and what is added.
+
+    Parameters
+    ----------
+    taught : Heard
+
+    """
+    ones = np.ones(len(taught.right))
+    return fitted(taught.signs, taught.right, WAYS, np.array([1.0, 0.0, 0.0]), RIDGE, ones)
+
+
+def unseen(all_: Heard) -> Array:
+    """
+    Return the belief in each answer by weights learned from other cells, shape (N,).
+
+    Parameters
+    ----------
+    all_ : Heard
+
+    """
+    out = np.zeros(len(all_.right))
+    for fold in range(FOLDS):
+        here = all_.cell % FOLDS == fold
+        bias, slopes = weights(all_.only(~here))
+        out[here] = 1.0 / (1.0 + np.exp(-(bias + all_.signs[here] @ slopes)))
+    return out
+
+
+def closed(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
+    """
+    Return how many cells would be closed rightly, and how many wrongly.
+
+    Parameters
+    ----------
+    all_ : Heard
+    probability : array, shape (N,)
+    least : float
+        From which the first round that has it closes a cell.
+
+    """
+    counts = [0, 0]
+    for cell in np.unique(all_.cell):
+        own = np.flatnonzero((all_.cell == cell) & (probability >= least))
+        if own.size:
+            first = own[all_.turn[own] == all_.turn[own].min()]
+            counts[0 if all_.right[first[np.argmax(probability[first])]] else 1] += 1
+    return counts[0], counts[1]
+
+
+def page(all_: Heard) -> str:
+    """
+    Return what was learned, and what it is worth on cells it was not learned from, in Markdown.
+
+    Parameters
+    ----------
+    all_ : Heard
+
+    """
+    from weld_twin_msgs_py.files import markdown
+
+    found, probability = weights(all_), unseen(all_)
+    learned = zip((*SIGNS, 'added'), (*found.slopes, found.bias), strict=True)
+    rows = [(f'{least:.2f}', *map(str, closed(all_, probability, least))) for least in TRIED]
+    return '\n'.join(
+        [
+            f'{len(all_.right)} answers of {len(np.unique(all_.cell))} cells',
+            '',
+            markdown.table(('sign', 'counts'), *((name, f'{v:.2f}') for name, v in learned)),
+            '',
+            markdown.table(('closed from', 'right', 'wrong'), *rows),
+            '',
+        ]
+    )

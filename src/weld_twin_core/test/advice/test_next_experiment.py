@@ -282,7 +282,7 @@ def test_of_causes_that_fit_alike_the_next_measurement_parts_two(ur5):
     assert all({(e['effect'], e['joint']) for e in side} & alike for side in sides)
 
 
-def test_what_is_sure_with_a_joint_at_rest_is_confirmed_in_motion_where_that_is_asked():
+def test_what_is_sure_while_a_joint_hardly_moved_is_confirmed_where_that_is_asked():
     robot, noise = wt.load('ur5'), np.random.default_rng(3)
     t = np.arange(0.0, 16.0, 0.02)
     q = np.array([0.1, -1.2, 1.5, -1.0, -1.4, 0.3]) + 0.4 * np.sin(

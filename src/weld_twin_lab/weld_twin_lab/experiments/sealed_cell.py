@@ -43,6 +43,8 @@ FOLLOWING, STATES = 30.0, 62.5
 Twice as many say hardly more, for neighbours err alike, and a diagnosis then takes longer."""
 SECONDS = (12.0, 25.0)
 """Shortest and longest first recording [s], where the arm moves: what is poor stays poor."""
+NO_LOAD = 1e-6
+"""Load [N m, N] below which it is that of rounding."""
 STAY = 15.0
 """A station with the way to it [s], as experiments are planned."""
 
@@ -168,7 +170,8 @@ def _one_arm(case: Case) -> Case:
     """
     Return the case with what friction holds in a gear the same in every recording.
 
-    The plant has it as a share of a recording's largest load where it is not given.
+    The plant has it as a share of a recording's largest load where it is not given. Where there is no
+    load at all, rounding would decide on which flank the gear lies.
     """
     robot, command = case.cell.robot, case.train.command
     moved = Recording('first', JointMotion(command.t, command.q, static=command.static))
@@ -177,6 +180,8 @@ def _one_arm(case: Case) -> Case:
     for cause in case.causes:
         if cause['effect'] == 'loaded_play':
             most = float(np.abs(shift['tau', robot.index(str(cause['joint']))]).max())
+            if most < NO_LOAD:
+                raise DataError(f'{cause["joint"]} carries nothing, so no load moves its play')
             cause = {**cause, 'torque': FLANK_TORQUE * most}
         causes.append(cause)
     return replace(case, causes=causes)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from weld_twin_core.diagnosis.advice import Limits
@@ -101,12 +102,12 @@ def _weight(cell: SealedCell, found: Found, other: Found) -> dict[str, Any]:
 
 
 def _left(minutes: float, visit: float = VISIT) -> Limits:
-    return Limits(minutes=max(visit, LEAST), moving=max(minutes, LEAST), confirm=True)
+    return Limits(minutes=max(visit, LEAST), moving=max(minutes, LEAST))
 
 
 def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Return the first diagnosis and what it is worth; None where it is right or finds a mistake."""
-    found, why, _ = answered(cell, cell.first, [], _left(MINUTES))
+    found, why, _ = answered(cell, cell.first, [], replace(_left(MINUTES), confirm=True))
     first = said(cell, found, why)
     wrong = first['status'] in ('ambiguous', 'unknown') or not first['right']
     # What cannot be told apart by any motion is no question for an experiment; nor is one that only

@@ -166,15 +166,12 @@ def _words(found: Mapping[str, Any]) -> str:
 
 def _open_ends(found: Mapping[str, Any]) -> bool:
     """
-    Return whether something is to be asked still: joints that never moved, or causes named beside
-    each other that some motion would part.
+    Return whether causes are named beside each other that some motion would part.
 
     What can be parted among those named is asked first. So an experiment that asks something else
     found no motion for it; nor did one that would part nothing.
     """
     wanted = found.get('next_experiment')
-    if _to_confirm(found):
-        return True
     if found['verdict']['status'] != 'ambiguous' or wanted is None:
         return bool(found['verdict']['status'] == 'ambiguous')
     sigma = wanted['expected_separation_sigma']
@@ -188,7 +185,7 @@ def _open_ends(found: Mapping[str, Any]) -> bool:
 
 
 def _to_confirm(found: Mapping[str, Any]) -> bool:
-    """Return whether joints that stood still all the time have to move before anything is sure."""
+    """Return whether joints that hardly moved have to move before anything is sure."""
     return bool((found.get('next_experiment') or {}).get('confirms'))
 
 

@@ -103,14 +103,14 @@ def confirming(
     problem: Problem, model: Model, joints: Sequence[str], limits: Limits
 ) -> dict[str, Any]:
     """
-    Return the measurement that shows whether an answer holds once joints move that stood still.
+    Return the measurement that shows whether an answer holds once all joints move widely.
 
     Parameters
     ----------
     problem, model
         The data at hand, and the model with its frames.
     joints : sequence of str
-        Those that stood still.
+        Those that did not.
     limits : Limits
 
     Returns
@@ -120,7 +120,7 @@ def confirming(
 
     """
     options = list(candidates(problem, model, limits, joints))
-    reason = _RESTED.format(joints=', '.join(joints))
+    reason = _NARROW.format(joints=', '.join(joints))
     return _entry(widening(problem, options, limits), reason, model) | {'confirms': list(joints)}
 
 
@@ -160,9 +160,9 @@ _ALIKE = (
     'The explanations at hand move the tool alike, and none of them is sure: data from elsewhere '
     'show whether they hold.'
 )
-_RESTED = (
-    'Nothing was seen of {joints}, which stood still all the time: what depends on their motion looks '
-    'like a constant. Data in which they move show whether the answer holds.'
+_NARROW = (
+    'Little was seen of {joints}: what depends on the angle of a joint that hardly moves looks like '
+    'something else. Data in which all move widely show whether the answer holds.'
 )
 
 

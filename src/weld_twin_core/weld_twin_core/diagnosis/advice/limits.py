@@ -31,8 +31,8 @@ class Limits:
     box : array, shape (2, 3), optional [m]
         Corners in the measuring frame that the arm stays between.
     confirm : bool
-        Whether one is asked for where the question is closed, but a joint stood still all the time:
-        what depends on its motion looks like a constant, of that joint or of another.
+        Whether one is asked for where the question is closed, but some joints did not move widely:
+        what depends on their angle looks like something else.
 
     Raises
     ------

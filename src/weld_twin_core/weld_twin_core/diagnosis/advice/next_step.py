@@ -17,7 +17,7 @@ from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale
 from ..hypotheses.choices import ranking
 from ..hypotheses.search import Search
-from ..hypotheses.still_joints import at_rest
+from ..hypotheses.still_joints import narrow
 from ..levels.curved import Curved
 from ..verdict.decision import Verdict
 from .chosen_pieces import DECIDES
@@ -77,10 +77,10 @@ def next_step(
     if not limits.confirm or (wanted is not None and wanted['motion'] is not None):
         return wanted
     problem, model = found.work.problem, found.small.model
-    rested = at_rest(problem.recordings, model.robot)
-    if not rested:
+    joints = narrow(problem.recordings, model.robot)
+    if not joints:
         return wanted
-    return {**confirming(problem, model, rested, limits), 'promise': None}
+    return {**confirming(problem, model, joints, limits), 'promise': None}
 
 
 def _touches(found: Search, verdict: Verdict) -> dict[str, Any] | None:

@@ -85,7 +85,6 @@ def answer(
         status=verdict.status,
         effects=effects,
         confidence=verdict.confidence,
-        learned=verdict.learned,
         indistinguishable=verdict.sets,
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),
@@ -111,10 +110,15 @@ def _parted(
     verdict: Verdict,
     rival: Curved | None,
 ) -> dict[str, Any]:
-    """Return causes, shares, and what each cause adds, where the model carried stands for them."""
+    """Return what the levels of an answer say; what each cause adds, where the model stands for it."""
     other = verdict.status == 'unknown' and rival is not None and rival.unseen is not unseen
     added = None if other else contributions(unseen, told)
-    return {'causes': told, 'shares': shares, 'contributions': added}
+    return {
+        'causes': told,
+        'shares': shares,
+        'contributions': added,
+        'learned': verdict.learned,
+    }
 
 
 def _trusted(

@@ -17,6 +17,8 @@ STILL = 0.04
 """Travel [rad] below which a joint stands still: a scale of 0.1 % moves by 0.04 mrad over it."""
 STILL_SLIDE = 2e-3
 """The same for a joint that slides, [m]."""
+WIDE = 0.5
+"""Travel [rad, m] from which on a joint shows well how something depends on its angle."""
 REASON = 'the joint hardly moves'
 
 
@@ -31,9 +33,9 @@ def hardly_moves(features: list[Features], effect: Effect) -> bool:
     return travel < (STILL_SLIDE if robot.prismatic[i] else STILL)
 
 
-def at_rest(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
+def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
     """
-    Return the joints that hardly move in any of the recordings.
+    Return the joints that do not move widely, all recordings together.
 
     Parameters
     ----------
@@ -43,8 +45,7 @@ def at_rest(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
     """
     ends = [(r.joints.q.min(axis=0), r.joints.q.max(axis=0)) for r in recordings]
     travel = np.max([high for _, high in ends], axis=0) - np.min([low for low, _ in ends], axis=0)
-    still = travel < np.where(robot.prismatic, STILL_SLIDE, STILL)
-    return tuple(np.array(robot.joint_names)[still].tolist())
+    return tuple(np.array(robot.joint_names)[travel < WIDE].tolist())
 
 
 def moved_most(features: Sequence[Features], joint: str | None) -> int:

@@ -19,6 +19,7 @@ from ...arrays import Array
 from ..algebra.problem import Problem
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
+from ..hypotheses.still_joints import WIDE
 from ..levels.curved import Curved
 from ..levels.held_against import gain_of
 from ..result import Cause, Check, Site
@@ -29,9 +30,8 @@ from ..verdict.weighing import Weighed
 from .numbers import FAR, Numbers, log, log1, plain, rms
 from .signs_of_found import left_at_joints, residual_signs, worst_of
 
-MOVES, WIDE = 0.02, 0.5
-"""Travel [rad, m] from which on a joint shows something at all, and from which on it shows its
-angle well."""
+MOVES = 0.02
+"""Travel [rad, m] from which on a joint shows something at all."""
 CURVES = (
     'curves',
     'curve_gain',

@@ -97,8 +97,8 @@ def _add_next(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--confirm',
         action='store_true',
-        help='where the question is closed, but a joint stood still all the time, plan an '
-        'experiment in which it moves',
+        help='where the question is closed, but some joints did not move widely, plan an '
+        'experiment in which they do',
     )
     parser.add_argument(
         '--cell-box',

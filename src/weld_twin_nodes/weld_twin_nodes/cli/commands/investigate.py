@@ -228,7 +228,8 @@ def _diagnosed(
     diagnose.add_arguments(parser)
     left = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
     words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
-    words += ['--experiment-minutes', f'{left:g}', '--confirm']
+    words += ['--experiment-minutes', f'{left:g}']
+    words += [] if state['rounds'] else ['--confirm']
     words += [word for bag in bags if bag in changes for word in ('--changed', bag, changes[bag])]
     diagnose.run(parser.parse_args(words))
     found: dict[str, Any] = json.loads((place / RESULT).read_text(encoding='utf-8'))

@@ -14,9 +14,10 @@ from weld_twin_core.arrays import Array
 
 from ..belief.logistic import Weights, fitted
 
-SIGNS = ('own', 'same', 'other')
-"""Log odds of the answer, and those of the other diagnosis that speak for it, or against it."""
-WAYS = np.array([1.0, 1.0, -1.0])
+SIGNS = ('own', 'same', 'other', 'again')
+"""Log odds of the answer, those of the other diagnosis that speak for it, or against it, and how many
+further experiments name the same by themselves."""
+WAYS = np.array([1.0, 1.0, -1.0, 1.0])
 """Which way each may change belief."""
 RIDGE = 1.0
 """Towards the log odds of the answer alone, in log loss: as much as one answer."""
@@ -32,7 +33,7 @@ class Heard(NamedTuple):
 
     Attributes
     ----------
-    signs : array, shape (N, 3)
+    signs : array, shape (N, 4)
     right : array of bool, shape (N,)
     cell, turn : array of int, shape (N,)
         Which cell, and which of its rounds.
@@ -81,7 +82,7 @@ def weights(taught: Heard) -> Weights:
 
     """
     ones = np.ones(len(taught.right))
-    return fitted(taught.signs, taught.right, WAYS, np.array([1.0, 0.0, 0.0]), RIDGE, ones)
+    return fitted(taught.signs, taught.right, WAYS, np.array([1.0, 0.0, 0.0, 0.0]), RIDGE, ones)
 
 
 def unseen(all_: Heard) -> Array:

@@ -27,7 +27,6 @@ MINUTES = 5.0
 VISIT = 60.0
 """Minutes at most, all experiments together, with what has to be set up for them."""
 Found = Mapping[str, Any]
-Heard = dict[str, Found]
 LEAST = 0.25
 """Minutes that an experiment is planned with where hardly any are left."""
 ASKED = (
@@ -52,10 +51,14 @@ def said(cell: SealedCell, found: Mapping[str, Any], why: str) -> dict[str, Any]
 
 
 def answered(
-    cell: SealedCell, first: Recording, later: Sequence[Recording], limits: Limits
-) -> tuple[Found, str, Heard]:
+    cell: SealedCell,
+    first: Recording,
+    later: Sequence[Recording],
+    limits: Limits,
+    each: list[Found],
+) -> tuple[Found, str, dict[str, Any]]:
     """
-    Return the answer from the first recording and later ones, why it closes the question, and all.
+    Return the answer from the first recording and later ones, why it closes the question, and how.
 
     Parameters
     ----------
@@ -64,38 +67,37 @@ def answered(
     later : sequence of Recording
     limits : Limits
         What the next experiment may take.
+    each : list of mapping
+        What every experiment showed by itself; that of the newest is added.
 
     Returns
     -------
     found : mapping
     why : str
     heard : dict
-        Every diagnosis that was made for it: 'together', and 'alone' where it could be.
+        What the two diagnoses were weighed by, and what they are worth; empty where there was one.
 
     """
-    heard: Heard = {'together': cell.diagnosed([first, *later], limits=limits)}
-    if later and not cell.seen_anew(later):
-        # Too few stations cannot be diagnosed by themselves.
-        with suppress(TwinError):
-            heard['alone'] = cell.diagnosed(list(later), limits=limits)
-    found, why = weighed(*heard.values())
-    return found, why, heard
+    together = cell.diagnosed([first, *later], limits=limits)
+    if not later or cell.seen_anew(later):
+        return *weighed(together), {}
+    # Too few stations cannot be diagnosed by themselves.
+    with suppress(TwinError):
+        alone = cell.diagnosed(list(later), limits=limits)
+        if len(later) == 1:
+            each.append(alone)
+        else:
+            with suppress(TwinError):
+                each.append(cell.diagnosed([later[-1]], experiment=False))
+        pairs = {'together': (together, alone), 'alone': (alone, together)}
+        heard = {name: _weight(cell, *pair, each) for name, pair in pairs.items()}
+        return *weighed(together, alone, each), heard
+    return *weighed(together), {}
 
 
-def _kept(cell: SealedCell, heard: Heard) -> dict[str, Any]:
-    """Return of every diagnosis what an answer is weighed by, and what it is worth."""
-    if len(heard) < 2:
-        return {}
-    together, alone = heard.values()
+def _weight(cell: SealedCell, found: Found, other: Found, each: Sequence[Found]) -> dict[str, Any]:
     return {
-        'together': _weight(cell, together, alone),
-        'alone': _weight(cell, alone, together),
-    }
-
-
-def _weight(cell: SealedCell, found: Found, other: Found) -> dict[str, Any]:
-    return {
-        'signs': signs(found, other),
+        'signs': signs(found, other, each),
         'stated': found['verdict']['status'] in STATED,
         'right': cell.judged(found).right,
     }
@@ -107,7 +109,7 @@ def _left(minutes: float, visit: float = VISIT) -> Limits:
 
 def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Return the first diagnosis and what it is worth; None where it is right or finds a mistake."""
-    found, why, _ = answered(cell, cell.first, [], replace(_left(MINUTES), confirm=True))
+    found, why, _ = answered(cell, cell.first, [], replace(_left(MINUTES), confirm=True), [])
     first = said(cell, found, why)
     wrong = first['status'] in ('ambiguous', 'unknown') or not first['right']
     # What cannot be told apart by any motion is no question for an experiment; nor is one that only
@@ -177,6 +179,7 @@ def investigated(
 ) -> tuple[list[dict[str, Any]], str, dict[str, Any]]:
     """Return the rounds of the loop, the word that it ended with, and its last answer."""
     later: list[Recording] = []
+    each: list[Found] = []
     rounds: list[dict[str, Any]] = []
     left, visit, why = MINUTES, VISIT, None
     while True:
@@ -193,7 +196,7 @@ def investigated(
         left, visit = left - asked['robot_minutes'], visit - asked['minutes']
         begun = time.perf_counter()
         try:
-            found, why, heard = answered(cell, start, later, _left(left, visit))
+            found, why, heard = answered(cell, start, later, _left(left, visit), each)
         except TwinError as error:
             return rounds, f'refused: {error}', answer
         answer = said(cell, found, why)
@@ -203,7 +206,7 @@ def investigated(
                 'decided': decided(asked, found),
                 'seconds': time.perf_counter() - begun,
                 'found': answer,
-                'heard': _kept(cell, heard),
+                'heard': heard,
             }
         )
 
@@ -212,7 +215,7 @@ def _with(cell: SealedCell, start: Recording, name: str, motion: Motion) -> dict
     """Return what a further recording of a motion leads to."""
     made = cell.made(name, motion, 200)
     try:
-        return said(cell, *answered(cell, start, [made], _left(MINUTES))[:2])
+        return said(cell, *answered(cell, start, [made], _left(MINUTES), [])[:2])
     except TwinError as error:
         return {'status': 'refused', 'said': str(error), 'right': False, 'sure': False}
 

@@ -5,7 +5,8 @@ Whether diagnoses close the question of an investigation, and how far what they 
 
 What poor recordings show is easily misread, and then stands in the way of what better ones show. So
 all recordings are diagnosed together, and the experiments without the first ones. Each knows how often
-answers like it were right; the other speaks for it or against it.
+answers like it were right; the other speaks for it or against it. Experiments have no measurement in
+common: what several of them name by themselves is the likelier for it.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
 from weld_twin_core.diagnosis.advice.next_step import SURE
 from weld_twin_core.diagnosis.result import NAMING
 
-OWN, FOR, AGAINST, BEGIN = 1.1, 0.9, -0.75, 0.1
+OWN, FOR, AGAINST, AGAIN, BEGIN = 0.35, 1.3, -0.5, 1.0, -0.2
 """What the log odds of an answer count, those of the other where it names the same, those where it
-names something else, and what is added. `weld-twin lab closing` learned them; docs/investigate.md says
-from which cells."""
+names something else, every further experiment that names the same by itself, and what is added.
+`weld-twin lab closing` learned them; docs/investigate.md says from which cells."""
 CLOSED = 0.95
 """Probability from which an answer that two diagnoses were asked for closes the question. A judgement:
 in the cells that the weights were learned from, each judged by weights learned from the others, none of
-those closed so was wrong, and none from 0.9."""
+those closed so was wrong."""
 EXTREME = 1e-3
 """A probability is taken as no nearer to 0 and 1 than this: odds of a thousand."""
 ALIKE = 'the causes are known as far as any motion can tell'
@@ -34,7 +35,9 @@ STATED = (*NAMING, 'none')
 
 
 def weighed(
-    together: Mapping[str, Any], alone: Mapping[str, Any] | None = None
+    together: Mapping[str, Any],
+    alone: Mapping[str, Any] | None = None,
+    each: Sequence[Mapping[str, Any]] = (),
 ) -> tuple[Mapping[str, Any], str]:
     """
     Return which diagnosis to believe, and whether and why it closes the question.
@@ -45,21 +48,26 @@ def weighed(
         The diagnosis of all recordings.
     alone : mapping, optional
         That of the experiments without the recordings before them.
+    each : sequence of mapping
+        Those of every experiment by itself.
 
     Returns
     -------
     found : mapping
-        The one that is believed; where there were two, its confidence is that of both.
+        The one that is believed, that of all recordings where both name the same; where there were
+        two, its confidence is that of both.
     why : str
         In words why it closes the question; empty where it does not.
 
     """
     if alone is None:
         return together, closes(together)
-    heard = [_with_belief(together, alone), _with_belief(alone, together)]
+    pairs = ((together, alone), (alone, together))
+    heard = [_with_belief(found, other, each) for found, other in pairs]
     # What does not fit together, as after a knock between two recordings, may be sound by itself.
     heard = [one for one in heard if not _unsound(one)] or heard
-    heard.sort(key=lambda one: one['verdict']['confidence'] or 0.0, reverse=True)
+    if not _same(together, alone):
+        heard.sort(key=lambda one: one['verdict']['confidence'] or 0.0, reverse=True)
     stated = [one for one in heard if one['verdict']['status'] in STATED]
     for one in stated:
         if (one['verdict']['confidence'] or 0.0) >= CLOSED and not _open_ends(one):
@@ -84,36 +92,45 @@ def closes(found: Mapping[str, Any]) -> str:
     return '' if open_ or _to_confirm(found) else _words(found)
 
 
-def belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> float:
+def belief(
+    found: Mapping[str, Any], other: Mapping[str, Any], each: Sequence[Mapping[str, Any]] = ()
+) -> float:
     """
     Return how probable it is that an answer is right, with another of most of the same measurements.
 
     Parameters
     ----------
-    found, other : mapping
-        The contents of two diagnosis.json.
+    found, other, each
+        As `signs` takes them.
 
     """
-    own, same, against = signs(found, other)
-    return 1.0 / (1.0 + exp(-(OWN * own + FOR * same + AGAINST * against + BEGIN)))
+    own, same, against, again = signs(found, other, each)
+    total = OWN * own + FOR * same + AGAINST * against + AGAIN * again + BEGIN
+    return 1.0 / (1.0 + exp(-total))
 
 
-def signs(found: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, float, float]:
+def signs(
+    found: Mapping[str, Any], other: Mapping[str, Any], each: Sequence[Mapping[str, Any]] = ()
+) -> tuple[float, float, float, float]:
     """
     Return the log odds of an answer, and of another as far as it speaks for it, and against it.
 
-    What the other leaves unknown speaks for nothing: it may be what poor recordings hide.
+    The fourth is how many experiments name the same by themselves, after the first that does. What
+    the other leaves unknown speaks for nothing: it may be what poor recordings hide.
 
     Parameters
     ----------
     found, other : mapping
         The contents of two diagnosis.json.
+    each : sequence of mapping
+        Those of every experiment by itself.
 
     """
     stated = other['verdict']['status'] in STATED
     heard = max(_log_odds(other), 0.0) if stated else 0.0
     same = _same(found, other)
-    return _log_odds(found), heard * same, heard * (not same)
+    again = max(sum(_same(found, one) for one in each) - 1, 0)
+    return _log_odds(found), heard * same, heard * (not same), float(again)
 
 
 def _log_odds(found: Mapping[str, Any]) -> float:
@@ -124,12 +141,14 @@ def _log_odds(found: Mapping[str, Any]) -> float:
     return log(held / (1.0 - held))
 
 
-def _with_belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> Mapping[str, Any]:
+def _with_belief(
+    found: Mapping[str, Any], other: Mapping[str, Any], each: Sequence[Mapping[str, Any]]
+) -> Mapping[str, Any]:
     """Return a diagnosis with the confidence that it has beside another."""
     verdict = found['verdict']
     if verdict['status'] not in STATED:
         return found
-    return {**found, 'verdict': {**verdict, 'confidence': belief(found, other)}}
+    return {**found, 'verdict': {**verdict, 'confidence': belief(found, other, each)}}
 
 
 def _same(found: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

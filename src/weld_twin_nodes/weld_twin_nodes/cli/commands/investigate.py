@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -176,8 +177,8 @@ def _round(
     from ...report.investigation_page import headline, investigation_page
 
     place = directory / f'round-{len(state["rounds"])}'
-    heard = _heard(state, bags, changes, place)
-    state = take_in(state, bags, *heard, changes=changes)
+    found, why, newest = _heard(state, bags, changes, place)
+    state = take_in(state, bags, found, why, changes, newest)
     asked = state['rounds'][-1]['asked']
     if asked is not None:
         _write_experiment(args, place, state, asked)
@@ -193,12 +194,16 @@ def _round(
 
 def _heard(
     state: dict[str, Any], bags: list[str], changes: str, place: Path
-) -> tuple[Mapping[str, Any], str]:
-    """Diagnose all recordings, and the experiments by themselves; return what to believe."""
+) -> tuple[Mapping[str, Any], str, Mapping[str, Any] | None]:
+    """
+    Diagnose all recordings, and the experiments by themselves.
+
+    Returns what to believe, why that closes the question, and what the newest experiment shows.
+    """
     from weld_twin_core.errors import DataError
 
     from ...offline.closing import weighed
-    from ...offline.investigation import changed, recordings
+    from ...offline.investigation import changed, recordings, shown_alone
     from ...offline.set_up_changes import FRAMES
 
     first, later = recordings(state)
@@ -206,12 +211,16 @@ def _heard(
     found = _diagnosed([*first, *later, *bags], state, place, told)
     if not first or any(what in FRAMES for what in told.values()):
         # Seen with another tool, or from elsewhere, they cannot be held against the first.
-        return weighed(found)
-    beside = place.with_name(f'{place.name}-experiments')
-    try:
-        return weighed(found, _diagnosed([*later, *bags], state, beside, told))
-    except DataError:  # too few to be diagnosed by themselves
-        return weighed(found)
+        return *weighed(found), None
+    alone = newest = None
+    with suppress(DataError):  # too few to be diagnosed by themselves
+        beside = place.with_name(f'{place.name}-experiments')
+        newest = alone = _diagnosed([*later, *bags], state, beside, told)
+        if later:
+            newest = None
+            newest = _diagnosed(bags, state, place.with_name(f'{place.name}-newest'), told)
+    each = [*shown_alone(state), *([newest] if newest else [])]
+    return *weighed(found, alone, each), newest
 
 
 def _diagnosed(

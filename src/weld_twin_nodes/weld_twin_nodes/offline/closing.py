@@ -19,7 +19,7 @@ from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
 from weld_twin_core.diagnosis.advice.next_step import SURE
 from weld_twin_core.diagnosis.result import NAMING
 
-OWN, FOR, AGAINST, AGAIN, BEGIN = 0.35, 1.3, -0.5, 1.0, -0.2
+OWN, FOR, AGAINST, AGAIN, BEGIN = 0.37, 1.29, -0.52, 0.98, -0.1
 """What the log odds of an answer count, those of the other where it names the same, those where it
 names something else, every further experiment that names the same by itself, and what is added.
 `weld-twin lab closing` learned them; docs/investigate.md says from which cells."""

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from measured_cells import anywhere, moving, recorded, rejointed, remeasured, stations
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.fingerprint import fingerprint
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.soundness import Given, examine
-from weld_twin_core.effects import JointOffset, effects_from_list
+from weld_twin_core.effects import JointCoupling, JointOffset, effects_from_list
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.recording import JointMotion
 
@@ -76,6 +78,22 @@ def test_a_base_turned_by_half_a_turn_where_it_is_not_fitted(ur5, run):
 def test_joint_1_off_by_a_quarter_turn_is_not_a_base_that_stands_elsewhere(ur5, run):
     bad = rejointed(run, run.joints.q + [np.pi / 2, 0, 0, 0, 0, 0])
     assert only(ur5, bad, align=()) == ('constant_angle', ('shoulder_pan_joint',))
+
+
+@pytest.mark.parametrize('seed', [3, 4])
+def test_few_stations_of_a_coupled_wrist_in_frames_that_are_right_are_sound(seed):
+    tool = transform(np.eye(3), np.array([0.02, 0.01, 0.15]))
+    robot, rng = load('franka_panda').with_frames(tool=tool), np.random.default_rng(seed)
+    cause = [JointCoupling('panda_joint5', source='panda_joint4', ratio=-0.01)]
+    home = np.clip(rng.uniform(-1.5, 1.5, robot.n), robot.lower + 1, robot.upper - 1)
+    one = np.tile(home, (20, 1))
+    one[:, -1] += np.linspace(-1.0, 1.0, 20)
+    few = home + rng.uniform(-1.0, 1.0, (8, robot.n))
+    made = []
+    for name, q in (('one joint', one), ('few', few)):
+        motion = JointMotion(15.0 * np.arange(len(q)), q, static=True)
+        made.append(recorded(robot, motion, rng, cause, sigma=3e-5, points=True, name=name))
+    assert not examine(Given(tuple(made), robot)).unsound
 
 
 def test_a_sibling_that_is_not_bundled_is_another_robot(ur5, cell):

@@ -39,6 +39,25 @@ def test_stations_and_a_path_are_diagnosed_together(ur5):
     ]
 
 
+def test_ripple_is_found_in_a_path_beside_stations_that_came_first(ur5):
+    path = recorded(ur5, 'path', False).joints
+    rng = np.random.default_rng(4)
+    at_rest = wt.JointMotion(
+        15.0 * np.arange(15), path.q[0] + rng.uniform(-1.0, 1.0, (15, 6)), static=True
+    )
+    ripple = wt.effects.TransmissionRipple('wrist_2_joint', amplitude=8e-4, order=50.0)
+    made = []
+    for name, motion in (('stations', at_rest), ('path', path)):
+        real = wt.Twin(ur5, [ripple]).poses(wt.Recording(name, motion))
+        seen = real.position + rng.normal(0.0, 3e-5, real.position.shape)
+        made.append(wt.Recording(name, motion, wt.Measurements(motion.t, seen)))
+    found = wt.diagnose(made, ur5, experiment=False)
+    assert [(e.effect.name, e.effect.site) for e in found.effects] == [
+        ('transmission_ripple', 'wrist_2_joint')
+    ]
+    assert found.effects[0].effect.order == 50.0
+
+
 def test_a_staircase_is_found_in_recordings_of_different_travel(ur5):
     made = []
     for name, share in (('little', 0.3), ('wide', 1.0)):

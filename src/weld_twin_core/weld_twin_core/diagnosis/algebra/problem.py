@@ -114,6 +114,11 @@ class Problem:
             for r, own in zip(self.recordings, seen, strict=True)
         )
 
+    @property
+    def at_rest(self) -> bool:
+        """Return whether all was measured at rest: stations, and no motion among them."""
+        return all(recording.joints.static for recording in self.recordings)
+
     def contact(self, k: int) -> Unknowns | None:
         """Return what the contacts of recording k see; None where an instrument measured."""
         return self.touched[k] if self.touched else None

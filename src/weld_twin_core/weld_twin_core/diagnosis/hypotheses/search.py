@@ -236,7 +236,7 @@ def _chosen(
 
         refused = []
         steps = forward(work, now, hopeful, beliefs.many, progress, refused.append)
-        crowded = small.recordings[0].joints.static and len(steps) >= beliefs.many
+        crowded = small.at_rest and len(steps) >= beliefs.many
         if steps:
             now = steps[-1].fit
         if steps and not crowded:

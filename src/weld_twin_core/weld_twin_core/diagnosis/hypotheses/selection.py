@@ -315,7 +315,7 @@ def without_misfit(work: Workspace, now: Fit) -> Fit:
 
     """
     beliefs = work.beliefs
-    while len(now.model.found) > 1 and not work.problem.recordings[0].joints.static:
+    while len(now.model.found) > 1 and not work.problem.at_rest:
         largest = max(_size(work, now, now.model.without(k)) for k in range(len(now.model.found)))
         most = min(beliefs.misfit_noise, beliefs.misfit_share * largest)
         less = [

@@ -157,8 +157,9 @@ def _with_constants(
         seed
         for joint in _with_next(found.baseline.model.robot, joints)
         for kind in REGISTRY.values()
-        if kind.cause and kind.of == 'joint' and kind.applicable(features[0].view, joint) is None
-        for seed in (*kind.constants(features[0].view, joint), *_at_rest(features, kind, joint))
+        for view in (features[moved_most(features, joint)].view,)
+        if kind.cause and kind.of == 'joint' and kind.applicable(view, joint) is None
+        for seed in (*kind.constants(view, joint), *_at_rest(features, kind, joint))
         if Site(kind.name, joint) not in listed
     ]
     if not seeds:

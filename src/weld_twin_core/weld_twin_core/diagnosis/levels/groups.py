@@ -119,7 +119,7 @@ def wandering_groups(problem: Problem, model: Model, scale: Scale) -> list[Group
 
     """
     features = problem.features(model)
-    if features[0].run.view.static:
+    if problem.at_rest:
         return []
     out = []
     for index, joint in enumerate(model.robot.joint_names):
@@ -169,7 +169,7 @@ def spanned(
 
 
 def _curved(features: list[Features], model: Model) -> Iterator[tuple[str, str, list[Effect]]]:
-    static = features[0].run.view.static
+    static = all(maker.run.view.static for maker in features)
     for index, joint in enumerate(model.robot.joint_names):
         fixed = [
             JointCurve(joint, (0.0,), (0.0,), 'constant', channel) for channel in ('q', *OFF_AXIS)
@@ -218,7 +218,7 @@ def _plain(
     problem: Problem, features: list[Features], model: Model
 ) -> Iterator[tuple[str, str, list[Array]]]:
     """Yield groups that no curve stands for: columns (E, c, M) per recording."""
-    moving = not features[0].run.view.static
+    moving = not problem.at_rest
     for index, joint in enumerate(model.robot.joint_names):
         if moving and min(m.at.size for m in features) > 8:
             parts = []

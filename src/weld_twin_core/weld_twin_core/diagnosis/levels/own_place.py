@@ -101,7 +101,7 @@ def _forms(
     # Where noise hides the squares of the place, its linear part may still show.
     linear = [np.concatenate([part[k : k + 3] for k in range(0, len(part), 9)]) for part in field]
     named = [('instrument', 'place', field), ('instrument', 'place', linear)]
-    moving = not features[0].run.view.static
+    moving = not problem.at_rest
     for i, joint in enumerate(features[0].twin.robot.joint_names if moving else ()):
         if joint in places and _moves(features, i):
             ways = [_lost(problem, k, maker, features, i) for k, maker in enumerate(features)]

@@ -83,7 +83,8 @@ def scatter(found: Search, unseen: Unseen) -> list[Scatter]:
     problem, model = unseen.problem, found.final.model
     features = problem.features(model)
     parts = problem.by_sample(unseen.targets[0])
-    if problem.touched or features[0].run.view.static or min(problem.samples) < LEAST:
+    static = any(recording.joints.static for recording in problem.recordings)
+    if problem.touched or static or min(problem.samples) < LEAST:
         return []
     if any(len(measured_axes(part[:, :3].T)) < 3 for part in parts):
         return []

@@ -80,7 +80,7 @@ def _yielded(features: list[Features]) -> Iterator[tuple[str, str, list[Array]]]
             pairs = zip(features, warmth, strict=True)
             middle = 0.5 * (knots[0] + knots[-1])
             yield 'base', 'temperature', [_grown(m)[None] * (w - middle) for m, w in pairs]
-    if not features[0].run.view.static:
+    if not all(maker.run.view.static for maker in features):
         for index, joint in enumerate(features[0].twin.robot.joint_names):
             yield joint, 'direction', [_looped(maker, index) for maker in features]
 

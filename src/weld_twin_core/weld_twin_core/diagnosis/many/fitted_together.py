@@ -65,7 +65,7 @@ def fitted_together(
 
     """
     stations = sum(found.problem.samples)
-    if not found.problem.recordings[0].joints.static or stations < BEAR[0]:
+    if not found.problem.at_rest or stations < BEAR[0]:
         return found
     progress('many small errors at once: fitting them together')
     steps = _steps(found.problem, stations)

@@ -90,7 +90,6 @@ def _everything(
 ) -> tuple[Effect, ...]:
     """Return every effect that fits linearly, at zero unless the search has found its value."""
     features = problem.features(model)
-    view = features[0].view
     have = {effect.key: effect for effect in model.found}
     # All joints' pairs of coordinates together stay below half the rows.
     most = problem.size // (4 * model.robot.n)
@@ -100,6 +99,7 @@ def _everything(
             out += [e for e in model.found if e.name == kind.name]
             continue
         for joint in joints_of(kind, model.robot.joint_names):
+            view = features[moved_most(features, joint)].view
             if kind.applicable(view, joint) is not None:
                 continue
             if kind.waves is not None and orders is not None:

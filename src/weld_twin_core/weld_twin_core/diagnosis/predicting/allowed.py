@@ -172,7 +172,7 @@ def _expected(problem: Problem, scale: Scale) -> float:
     A fit of few stations leaves less than the noise; one of a stream has a hundred rows for every
     coordinate and leaves what there is.
     """
-    if not problem.recordings[0].joints.static:
+    if not problem.at_rest:
         return 1.0
     return float((USUAL_NOISE / scale.position) ** 2)
 

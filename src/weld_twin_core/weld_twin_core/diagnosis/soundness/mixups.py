@@ -84,10 +84,20 @@ def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list
         told = arm.off < start.off / factor or _as_given(shot, trial, start, align)
         # What is shrunk leaves less of everything; it must leave less for its size as well.
         size = trial.shrunk(shot)
-        told = told and arm.gap < UNDONE
+        told = told and arm.gap < UNDONE and not _moves_frames(shot, trial, align)
         if found and told and (size == 1.0 or arm.gap * size < start.gap / factor):
             return found, arm
     return [], start
+
+
+def _moves_frames(shot: Snapshot, trial: Snapshot, align: frozenset[str]) -> bool:
+    """
+    Return whether a trial throws out frames that were as given.
+
+    What is right within centimetres in the frames given leaves no room for a mix-up that has them
+    elsewhere. Few stations bear one: frames and a bent arm take up whatever it does.
+    """
+    return shot.gap_with(align) < FAR <= trial.gap_with(align)
 
 
 def _as_given(shot: Snapshot, trial: Snapshot, start: Arm, align: frozenset[str]) -> bool:

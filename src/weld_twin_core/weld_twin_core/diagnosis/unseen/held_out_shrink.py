@@ -60,7 +60,7 @@ def held_out_shrink(
         source = ', '.join(r.name for r in holdout)
     ratio, interval = ratio_interval(before, after, labels, elsewhere, beliefs.farthest)
     rms = float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))
-    if not holdout and found.problem.recordings[0].joints.static:
+    if not holdout and found.problem.at_rest:
         other = by_posture(unseen)
         ends = [_of_others(ratio, interval), _of_others(other.ratio, other.interval)]
         interval = (min(low for low, _ in ends), max(high for _, high in ends))

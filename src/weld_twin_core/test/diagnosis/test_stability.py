@@ -117,12 +117,13 @@ class Found:
     slots: tuple
 
 
-def again(times, of, instead=True):
+def again(times, of, instead=True, blind=0):
     """Return a search on halves that names play so often, and drift where it does not."""
     there = np.arange(of) < times
+    unable = (np.arange(of) >= of - blind)[:, None, None] & np.array([False, True])
     candidates = tuple(SimpleNamespace(site=site, effect=None) for site in (PLAY, DRIFT))
     taken = np.stack([there, ~there & instead], axis=1)
-    return Repeated(candidates, taken, np.ones((of, 1), bool), np.array([True, False]))
+    return Repeated(candidates, taken, np.ones((of, 1), bool), np.array([True, False]), unable)
 
 
 def told(times, of, instead=True):
@@ -169,6 +170,13 @@ def test_few_halves_that_would_show_a_cause_say_nothing_of_it():
     assert (verdict.confidence, cause.came_back) == (0.95, None)
 
 
+@pytest.mark.parametrize(('blind', 'share'), [(0, (12, 20)), (8, (12, 12)), (13, (12, 20))])
+def test_halves_that_cannot_tell_a_cause_from_what_came_instead_are_not_asked(blind, share):
+    # Of thirteen only seven are left that can: too few, and all are asked.
+    told = again(12, 20, blind=blind).came_back(PLAY, ())
+    assert (told.times, told.of) == share
+
+
 # The whole diagnosis -----------------------------------------------------------------------------
 
 
@@ -190,3 +198,22 @@ def test_a_cause_that_is_always_there_comes_back_on_every_half(monkeypatch):
     assert entry == {'times': entry['of'], 'of': entry['of'], 'instead': []}
     assert entry['of'] > 20
     assert (both[0].taken == both[1].taken).all()
+
+
+def test_halves_in_which_a_joint_hardly_moves_say_nothing_against_its_wave():
+    robot, t = wt.load('ur5'), np.arange(0.0, 12.0, 0.08)
+    wobble = wt.effects.BearingTilt('wrist_3_joint', lean=(2e-3, 0.0, 0.0, 0.0))
+    drawn, recordings = np.random.default_rng(5), []
+    for moved in (0.05, 1.2):
+        amplitude = np.array([0.4, 0.4, 0.4, 0.4, 0.4, moved])
+        way = amplitude * np.sin(np.outer(t, 0.9 + 0.31 * np.arange(6)))
+        q = np.array([0.0, -1.2, 1.4, -1.0, -1.5, 0.0]) + way
+        commanded = wt.Recording(f'{moved} rad', wt.JointMotion(t, q))
+        real = wt.Twin(robot, [wobble]).poses(commanded)
+        noise = drawn.normal(scale=3e-5, size=real.position.shape)
+        recordings.append(commanded.with_measured(wt.Measurements(t, real.position + noise)))
+    found = wt.diagnose(recordings, robot, experiment=False)
+    (cause,) = found.causes
+    assert cause.name[0][0] == Site('bearing_tilt', 'wrist_3_joint')
+    # Some of the 32 have the joint within 0.1 rad, where the wave is a twist of the link before.
+    assert cause.came_back.times == cause.came_back.of < 32

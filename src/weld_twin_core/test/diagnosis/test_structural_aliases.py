@@ -66,10 +66,10 @@ def test_an_excluded_error_that_is_no_twin_is_not_told():
     ]
 
 
-def swinging(effects, noise):
+def swinging(effects, noise, moved=1.0):
     robot = wt.load('ur5')
     t = np.arange(0.0, 12.0, 0.02)
-    q = np.array([0.0, -1.2, 1.4, -1.0, -1.5, 0.0]) + 0.4 * np.sin(
+    q = np.array([0.0, -1.2, 1.4, -1.0, -1.5, 0.0]) + 0.4 * moved * np.sin(
         np.outer(t, 0.9 + 0.31 * np.arange(6))
     )
     commanded = wt.Recording('swing', wt.JointMotion(t, q))
@@ -84,6 +84,16 @@ def test_play_that_was_taken_out_is_told_beside_friction_where_noise_hides_their
     assert found.status == 'ambiguous'
     (group,) = found.indistinguishable
     assert {('friction', 'elbow_joint'), ('backlash', 'elbow_joint')} <= {
+        (site.effect, site.joint) for site in group
+    }
+
+
+def test_a_wobble_of_a_bearing_at_rest_is_told_beside_the_twist_that_it_is_there():
+    moved = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
+    recording = swinging([wt.effects.LinkTwist('elbow_joint', dalpha=1e-3)], NOISE, moved)
+    found = wt.diagnose(recording, wt.load('ur5'), experiment=False)
+    (group,) = found.indistinguishable
+    assert {('link_twist', 'elbow_joint'), ('bearing_tilt', 'wrist_1_joint')} == {
         (site.effect, site.joint) for site in group
     }
 

@@ -81,7 +81,9 @@ def weighed(out: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
     return tuple(sorted(told, key=lambda r: -r.probability))
 
 
-def nats_in_place(rest: Fit, full: Fit, count: float, choice: Choice | None = None) -> float:
+def nats_in_place(
+    rest: Fit, full: Fit, count: float, choice: Choice | None = None, unused: int = 0
+) -> float:
     """
     Return the evidence of a fit in the place of an effect, by the rule that holds for all.
 
@@ -95,9 +97,11 @@ def nats_in_place(rest: Fit, full: Fit, count: float, choice: Choice | None = No
         Number of independent rows.
     choice : Choice or None
         The choice in its place, whose number of trials counts; none, and one is counted.
+    unused : int
+        Coordinates of what is in its place that buy nothing there, and cost nothing.
 
     """
-    freedom = float(full.coordinates.size - rest.coordinates.size)
+    freedom = float(full.coordinates.size - rest.coordinates.size - unused)
     trials = 1.0
     if choice is not None:
         # Unused components of a vector effect buy nothing and cost nothing.

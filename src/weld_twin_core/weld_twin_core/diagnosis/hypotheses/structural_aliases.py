@@ -32,7 +32,7 @@ from ..result import Site
 from .rivals import Rival, nats_in_place, weighed
 from .search import Search
 from .selection import fitted_with, implausible
-from .still_joints import hardly_moves, moved_most
+from .still_joints import STILL, hardly_moves, moved_most
 
 POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
@@ -167,12 +167,37 @@ def _with_constants(
     rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
     count, most = found.effective(found.small), max(rival.nats for rival in slot)
     tried = [(seed, fitted_with(work, rest.model, seed)) for seed in seeds]
-    more = [
-        Rival(Site(seed.name, seed.site), min(nats_in_place(rest, own, count), most), own)
-        for seed, own in tried
-        if not implausible(own.model)
-    ]
+    more = []
+    for seed, own in tried:
+        if not implausible(own.model):
+            unused = _unused(found, features, slot, seed) if hardly_moves(features, seed) else 0
+            nats = nats_in_place(rest, own, count, unused=unused)
+            more.append(Rival(Site(seed.name, seed.site), min(nats, most), own))
     return weighed([*slot, *_best_of_each(more)], beliefs.temperature)
+
+
+def _unused(found: Search, features: list[Features], slot: Sequence[Rival], seed: Effect) -> int:
+    """
+    Return how many coordinates of an effect of a joint at rest are none of what it is there.
+
+    Of the waves of a bearing that stands still each is a constant lean: four are no more than two,
+    and where the twist of a link is one of these, it takes no more than the twist.
+    """
+    own = _whitened(found, features, seed)
+    sizes = np.linalg.eigvalsh(own @ own.T)
+    used = [int((sizes >= STILL**2 * sizes[-1]).sum())]
+    for rival in slot:
+        if _constant(REGISTRY[rival.site.effect]):
+            other = _whitened(found, features, _of(rival.site))
+            used += [len(other)] if _inside(other, own, STILL) else []
+    return len(own) - min(used)
+
+
+def _whitened(found: Search, features: list[Features], effect: Effect) -> Array:
+    """Return the columns of an effect on the data, (P, rows)."""
+    problem = found.work.problem
+    columns = problem.effect_columns(features, effect)
+    return np.asarray(problem.whitened(columns, found.work.scale))
 
 
 def _at_rest(features: list[Features], kind: type[Effect], joint: str) -> list[Effect]:
@@ -238,10 +263,10 @@ def _columns(robot: Robot, effect: Effect) -> Array:
     return columns.reshape(columns.shape[0], -1)
 
 
-def _inside(rows: Array, span: Array) -> bool:
-    """Return whether every row lies in the span of others."""
+def _inside(rows: Array, span: Array, share: float = SAME) -> bool:
+    """Return whether every row lies in the span of others, but for a share of it."""
     size = np.linalg.norm(rows, axis=1)
     if not (size > 0.0).all():
         return False
     left = rows.T - span.T @ np.linalg.lstsq(span.T, rows.T, rcond=None)[0]
-    return bool((np.linalg.norm(left, axis=0) < SAME * size).all())
+    return bool((np.linalg.norm(left, axis=0) < share * size).all())

@@ -12,6 +12,7 @@ its price, the best enters first and each is held against all others in its plac
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,7 +26,7 @@ from ..unseen.unseen_stretches import rows_of
 from .candidates import Candidate, candidates_of
 from .halves import halves, parts_of
 from .reselected import Prices, reselected
-from .tableau import Mask, Tableau
+from .tableau import Mask, Tableau, quadratic
 
 SHOWS = 2.0
 """Standard errors by which a cause of the size found must stand above the price of a name on a
@@ -51,6 +52,8 @@ class Repeated:
         Which halves would show each effect found.
     whole : array of bool, shape (U,)
         What the same search takes on all data.
+    blind : array of bool, shape (H, K, U)
+        Which halves would not tell each effect found from another that all data rule out.
 
     """
 
@@ -58,6 +61,7 @@ class Repeated:
     taken: Mask
     shows: Mask
     whole: Mask
+    blind: Mask
 
     def came_back(self, site: Site, alike: Collection[Site]) -> CameBack | None:
         """
@@ -82,7 +86,10 @@ class Repeated:
         if site not in known or not self.whole[among].any():
             # Where the algebra would not name it even on all data, it says nothing of halves.
             return None
-        taken = self.taken[self.shows[:, known.index(site)]]
+        k = known.index(site)
+        taken = self.taken[self.shows[:, k] & ~self._undecided(k, among)]
+        if len(taken) < FEWEST:
+            taken = self.taken[self.shows[:, k]]
         if len(taken) < FEWEST:
             return None
         there = taken[:, among].any(axis=1)
@@ -93,6 +100,17 @@ class Repeated:
         }
         instead = sorted(((own, n) for own, n in came.items() if n), key=lambda item: -item[1])
         return CameBack(int(there.sum()), len(taken), tuple(instead))
+
+    def _undecided(self, k: int, among: Mask) -> Mask:
+        """
+        Return the halves that cannot tell a cause from what came in its place somewhere, (H,).
+
+        A joint that a half hardly moves has no wave there, and a constant comes for it: this says
+        nothing against a wave that all data show.
+        """
+        missed = ~self.taken[:, among].any(axis=1) & self.shows[:, k]
+        instead = self.taken[missed].any(axis=0) & ~among
+        return np.asarray((self.blind[:, k] & instead).any(axis=1))
 
 
 def repeated(found: Search) -> Repeated | None:
@@ -128,8 +146,9 @@ def repeated(found: Search) -> Repeated | None:
     for k in range(len(model.found)):
         full.sweep(np.arange(len(drawn)), k)
     shows = _shows(full, prices, size, len(model.found))
+    blind = _blind(full, prices, size, shows.shape[1], found.work.beliefs.rival_nats)
     taken = _better(full, empty, prices)
-    return Repeated(candidates, taken[:-1], shows[:-1], taken[-1])
+    return Repeated(candidates, taken[:-1], shows[:-1], taken[-1], blind[:-1])
 
 
 def _better(full: Tableau, empty: Tableau, prices: Prices) -> Mask:
@@ -148,13 +167,45 @@ def _shows(full: Tableau, prices: Prices, size: Array, found: int) -> Mask:
     out = []
     for k in range(found):
         part = full.parts[k]
-        scaled = size[:, part] * (full.table[-1, part, -1] / size[-1, part])
+        scaled = _as_on_all(full, size, k)
         # Swept in, a block is minus the inverse of what it was beside the others.
         mass = np.linalg.solve(full.table[:, part, part], scaled[..., None])[..., 0]
         fall = np.maximum(-(scaled * mass).sum(axis=1), 0.0)
         nats = 0.5 * prices.counts * np.log1p(fall / full.rss)
         out.append(nats - SHOWS * np.sqrt(2.0 * nats) > prices.each[:, k] + prices.enter)
     return np.stack(out, axis=1)
+
+
+def _as_on_all(full: Tableau, size: Array, k: int) -> Array:
+    """Return the coefficients that an effect has on all data, as every half scales them, (H, K)."""
+    part = full.parts[k]
+    return np.asarray(size[:, part] * (full.table[-1, part, -1] / size[-1, part]))
+
+
+def _blind(full: Tableau, prices: Prices, size: Array, found: int, far: float) -> Mask:
+    """
+    Return which halves would not tell each effect found from another, (H, found, U).
+
+    Only from such as all data put further behind than ``far`` nats: what comes near there is a
+    rival, and is to be heard.
+    """
+    halves, out = np.arange(len(size)), np.zeros((len(size), found, len(full.parts)), bool)
+    for k in range(found):
+        less = deepcopy(full)
+        less.sweep(halves, k)
+        part, scaled = full.parts[k], _as_on_all(full, size, k)
+        own = np.einsum('hi,hij,hj->h', scaled, less.table[:, part, part], scaled)
+        for u in range(found, len(full.parts)):
+            other, none = full.parts[u], less.taken[:, u]
+            square = less.table[:, other, other]
+            alike = (less.table[:, other, part] @ scaled[..., None])[..., 0]
+            missed = np.maximum(own - quadratic(square, alike, none), 0.0)
+            dearer = prices.each[:, k] - prices.each[:, u]
+            nats = 0.5 * prices.counts * np.log1p(missed / full.rss)
+            left = less.rss - quadratic(square, less.table[:, other, -1], none)
+            behind = 0.5 * prices.counts * np.log(np.maximum(left / full.rss, 1.0)) - dearer
+            out[:, k, u] = (nats - SHOWS * np.sqrt(2.0 * nats) <= dearer) & (behind[-1] > far)
+    return out
 
 
 def _products(rows: Array, labels: Sequence[Array]) -> Array:

@@ -70,7 +70,7 @@ class Tableau:
         One whose columns those taken repeat takes nothing off: what is left of them is rounding.
         """
         out = [
-            _quadratic(self.table[:, s, s], self.table[:, s, -1], self.taken[:, u])
+            quadratic(self.table[:, s, s], self.table[:, s, -1], self.taken[:, u])
             for u, s in enumerate(self.parts)
         ]
         return np.stack(out, axis=1)
@@ -101,8 +101,20 @@ class Tableau:
         self.taken[rows, which] = sign > 0.0
 
 
-def _quadratic(square: Array, pull: Array, taken: Mask) -> Array:
-    """Return the size of b' A^-1 b for many small systems, shape (H,); 0 where A is no more."""
+def quadratic(square: Array, pull: Array, taken: Mask) -> Array:
+    """
+    Return the size of b' A^-1 b for many small systems, shape (H,); 0 where A is no more.
+
+    Parameters
+    ----------
+    square : array, shape (H, K, K)
+        A.
+    pull : array, shape (H, K)
+        b.
+    taken : array of bool, shape (H,)
+        Where A was swept in, so that it stays what it is.
+
+    """
     if pull.shape[1] == 1:
         left = taken | (square[:, 0, 0] > REPEATED)
         size = np.abs(pull[:, 0] ** 2 / np.where(left, square[:, 0, 0], 1.0))

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -38,9 +39,7 @@ def seam_motion(robot: Robot, span: float, rate: float, rng: np.random.Generator
     """
     most = int(np.ceil(LONGEST * span * rate))
     for _ in range(TRIES):
-        q = working_posture(robot) + rng.uniform(-0.4, 0.4, robot.n)
-        seam = _seam(str(rng.choice(KINDS)), forward(robot, q), float(rng.uniform(*SIZE)), rng)
-        torch = Torch(work=rng.uniform(-0.2, 0.2), travel=rng.uniform(-0.2, 0.2))
+        q, seam, torch = drawn_seam(robot, rng)
         law: Profile = Smooth(speed=seam.length / span)
         if rng.random() < 0.5:
             law = Aggressive(speed=float(rng.uniform(0.05, 0.2)), reversals=6)
@@ -53,6 +52,15 @@ def seam_motion(robot: Robot, span: float, rate: float, rng: np.random.Generator
         if len(moved) < LONGEST * span * rate:
             return np.array(moved)
     raise PathError(f'none of {TRIES} seams drawn for {robot.name} is within its reach')
+
+
+def drawn_seam(
+    robot: Robot, rng: np.random.Generator, kinds: Sequence[str] = KINDS
+) -> tuple[Array, Path, Torch]:
+    """Return a posture near the working one, shape (n,), a seam through its tool, and the torch."""
+    q = working_posture(robot) + rng.uniform(-0.4, 0.4, robot.n)
+    seam = _seam(str(rng.choice(kinds)), forward(robot, q), float(rng.uniform(*SIZE)), rng)
+    return q, seam, Torch(work=rng.uniform(-0.2, 0.2), travel=rng.uniform(-0.2, 0.2))
 
 
 def working_posture(robot: Robot) -> Array:

@@ -22,9 +22,7 @@ from weld_twin_core.diagnosis.advice.candidates import LONGER
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.features import Features
-from weld_twin_core.twin.twin import Twin
+from weld_twin_core.recording import Measurements, Recording
 from weld_twin_nodes.offline.set_up_changes import FRAMES, SetUpChange, set_up_change, told
 from weld_twin_nodes.report.diagnosis_files import diagnosis_text
 
@@ -33,18 +31,16 @@ from ..blind.cause_sizes import site
 from ..blind.deck import Lot
 from ..blind.judging import Judged, judge
 from ..blind.making import Case, draw_case
+from ..blind.one_arm import one_arm
 from ..blind.poor_motion import WAYS
 from ..blind.recorded_motion import RATE, Motion
 from ..blind.seal import text_digest
-from ..plant.outside_causes import FLANK_TORQUE
 
 FOLLOWING, STATES = 30.0, 62.5
 """Rates [Hz] of an instrument that follows the tool in an experiment, and of the joint states beside it.
 Twice as many say hardly more, for neighbours err alike, and a diagnosis then takes longer."""
 SECONDS = (12.0, 25.0)
 """Shortest and longest first recording [s], where the arm moves: what is poor stays poor."""
-NO_LOAD = 1e-6
-"""Load [N m, N] below which it is that of rounding."""
 STAY = 15.0
 """A station with the way to it [s], as experiments are planned."""
 
@@ -79,7 +75,7 @@ class SealedCell:
         self.name = f'{seed}-{number:04d}'
         # Few stations are poor; of a path there is no few.
         self.poor = str(rng.choice([w for w in WAYS if w != 'few' or lot.motion == 'stations']))
-        self._case: Case = _one_arm(draw_case(lot, rng, SECONDS, poor=self.poor))
+        self._case: Case = one_arm(draw_case(lot, rng, SECONDS, poor=self.poor))
         self._changed: dict[str, SetUpChange] = {}
         self._salt = int(rng.integers(2**62))
         self.robot: Robot = self._case.cell.robot
@@ -164,27 +160,6 @@ class SealedCell:
     def judged(self, found: Mapping[str, Any]) -> Judged:
         """Return what a diagnosis is worth."""
         return judge(self.opened(), found)
-
-
-def _one_arm(case: Case) -> Case:
-    """
-    Return the case with what friction holds in a gear the same in every recording.
-
-    The plant has it as a share of a recording's largest load where it is not given. Where there is no
-    load at all, rounding would decide on which flank the gear lies.
-    """
-    robot, command = case.cell.robot, case.train.command
-    moved = Recording('first', JointMotion(command.t, command.q, static=command.static))
-    shift = Features(Twin(robot), moved, command.t).view.shift
-    causes = []
-    for cause in case.causes:
-        if cause['effect'] == 'loaded_play':
-            most = float(np.abs(shift['tau', robot.index(str(cause['joint']))]).max())
-            if most < NO_LOAD:
-                raise DataError(f'{cause["joint"]} carries nothing, so no load moves its play')
-            cause = {**cause, 'torque': FLANK_TORQUE * most}
-        causes.append(cause)
-    return replace(case, causes=causes)
 
 
 def _changed(robot: Robot, change: SetUpChange) -> Robot:

@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.catalog import load, names
 from weld_twin_core.arm.robot import Robot
 from weld_twin_msgs_py.programs import Context, controller_of
 
@@ -24,7 +25,7 @@ class Cell(NamedTuple):
 
     robot: str
     suffix: str
-    reader: Callable[[readers.Texts], readers.Moves]
+    reader: Callable[..., readers.Moves]
     rounding: float
 
 
@@ -38,6 +39,38 @@ CELLS: dict[str, Cell] = {
     'csv': Cell('ur5', '.csv', readers.table, 1e-8),
 }
 """By language."""
+
+
+MAKERS = {
+    'urscript': 'ur',
+    'krl': 'kuka_kr',
+    'rapid': 'abb',
+    'inform': 'yaskawa',
+    'fanuc-ls': 'fanuc',
+    'joint-trajectory': '',
+    'csv': '',
+}
+"""What the bundled robots that a language drives are called; KUKA's iiwa speaks Java."""
+
+
+def robots_of(language: str) -> list[str]:
+    """Return the bundled robots that a language drives."""
+    return [name for name in names() if name.startswith(MAKERS[language])]
+
+
+def reader_of(language: str, robot: Robot) -> Callable[[readers.Texts], readers.Moves]:
+    """Return the independent reader for a robot, whose joints have names of their own."""
+    if language in ('joint-trajectory', 'csv'):
+        return partial(CELLS[language].reader, joints=robot.joint_names)
+    return CELLS[language].reader
+
+
+def context_on(language: str, robot: Robot) -> Context:
+    """Return what a program is read with on a robot that has a torch; it is tool 0 and 1."""
+    flange = controller_of(robot, language).flange
+    tool = np.linalg.inv(flange) @ robot.T_flange_tool
+    controller = controller_of(robot, language, {'0': tool, '1': tool})
+    return Context(robot, controller, np.array(PULSES))
 
 
 def robot_of(language: str) -> Robot:

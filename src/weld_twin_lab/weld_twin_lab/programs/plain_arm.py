@@ -5,10 +5,16 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.robot import Robot
+
+CLOSED, REACHED = 1e-11, 1e-7
+"""Gap [m, rad] at which there is no further round, and up to which a pose counts as reached."""
+ROUNDS = 50
+"""Most rounds of Newton; from one place to the next it takes three."""
+LONGEST = 0.3
+"""Most that any joint turns in a round [rad]: farther away the tangent tells nothing."""
 
 
 def along(axis: int, length: float) -> np.ndarray:
@@ -21,7 +27,10 @@ def along(axis: int, length: float) -> np.ndarray:
 def about(axis: int, angle: float) -> np.ndarray:
     """Return a turn about an axis, shape (4, 4)."""
     out = np.eye(4)
-    out[:3, :3] = Rotation.from_euler('xyz'[axis], angle).as_matrix()
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    out[one, one] = out[two, two] = np.cos(angle)
+    out[two, one] = np.sin(angle)
+    out[one, two] = -out[two, one]
     return out
 
 
@@ -29,25 +38,38 @@ def tool_pose(
     robot: Robot, q: np.ndarray, tool: np.ndarray, offsets: np.ndarray | float = 0.0
 ) -> np.ndarray:
     """Return the pose of the tool; ``offsets``: how much further each joint really stands."""
-    out = np.eye(4)
-    rows = zip(robot.a, robot.alpha, robot.d, robot.theta + q + offsets, strict=True)
+    return np.asarray(_frames(robot, q + offsets)[-1] @ tool)
+
+
+def _frames(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
+    """Return the frame that each joint turns in, and the last frame, each of shape (4, 4)."""
+    at, out = np.eye(4), []
+    rows = zip(robot.a, robot.alpha, robot.d, robot.theta + q, strict=True)
     for a, alpha, d, theta in rows:
         if robot.convention == 'standard':
-            out = out @ about(2, theta) @ along(2, d) @ along(0, a) @ about(0, alpha)
+            out.append(at)
+            at = at @ about(2, theta) @ along(2, d) @ along(0, a) @ about(0, alpha)
         else:
-            out = out @ about(0, alpha) @ along(0, a) @ about(2, theta) @ along(2, d)
-    return np.asarray(out @ tool)
+            out.append(at @ about(0, alpha) @ along(0, a))
+            at = out[-1] @ about(2, theta) @ along(2, d)
+    return [*out, at]
 
 
 def joints_for(robot: Robot, pose: np.ndarray, tool: np.ndarray, near: np.ndarray) -> np.ndarray:
     """Return what a controller, which knows no error, makes of a pose."""
-
-    def off(q: np.ndarray) -> np.ndarray:
-        gap = np.linalg.inv(pose) @ tool_pose(robot, q, tool)
-        turn = Rotation.from_matrix(gap[:3, :3]).as_rotvec()
-        return np.concatenate([gap[:3, 3], turn])
-
-    found = least_squares(off, near, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    if np.abs(found.fun).max() > 1e-7:
+    q = np.array(near, dtype=float)
+    for _ in range(ROUNDS):
+        *axes, last = _frames(robot, q)
+        got = last @ tool
+        turn = Rotation.from_matrix(pose[:3, :3] @ got[:3, :3].T).as_rotvec()
+        gap = np.concatenate([pose[:3, 3] - got[:3, 3], turn])
+        if np.abs(gap).max() < CLOSED:
+            break
+        z = np.array([frame[:3, 2] for frame in axes])
+        arms = np.array([got[:3, 3] - frame[:3, 3] for frame in axes])
+        moves = np.concatenate([np.cross(z, arms), z], axis=1).T
+        step = np.linalg.lstsq(moves, gap, rcond=1e-9)[0]
+        q = q + step * min(1.0, LONGEST / max(float(np.abs(step).max()), 1e-12))
+    if np.abs(gap).max() > REACHED:
         raise ValueError(f'{robot.name} does not reach a pose from where it stands')
-    return np.asarray(found.x)
+    return q

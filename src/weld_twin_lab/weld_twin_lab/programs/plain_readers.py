@@ -177,13 +177,14 @@ def inform(files: Texts) -> Moves:
     return [(word, [known[name]]) for word, name in re.findall(r'^(MOV\w) (C\d+)', files[0], re.M)]
 
 
-def trajectory(files: Texts) -> Moves:
-    """Return the points of a trajectory of a UR arm."""
+def trajectory(files: Texts, joints: Sequence[str] = ()) -> Moves:
+    """Return the points of a trajectory; of a UR arm where no joints are named."""
     content = yaml.safe_load(files[0])
-    order = [UR_JOINTS.index(name) for name in content['joint_names']]
+    names = list(joints or UR_JOINTS)
+    order = [names.index(name) for name in content['joint_names']]
     out: Moves = []
     for point in content['points']:
-        q = np.zeros(6)
+        q = np.zeros(len(names))
         q[order] = point['positions']
         out.append(('point', [q]))
     return out
@@ -200,10 +201,10 @@ UR_JOINTS = [
 """In the order of the model."""
 
 
-def table(files: Texts) -> Moves:
-    """Return the lines of a table of a UR arm."""
+def table(files: Texts, joints: Sequence[str] = ()) -> Moves:
+    """Return the lines of a table; of a UR arm where no joints are named."""
     lines = [line for line in files[0].splitlines() if not line.startswith('#')]
     return [
-        (row['move'], [np.array([float(row[name]) for name in UR_JOINTS])])
+        (row['move'], [np.array([float(row[name]) for name in joints or UR_JOINTS])])
         for row in csv.DictReader(lines)
     ]

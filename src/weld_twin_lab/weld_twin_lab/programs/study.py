@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,29 +13,18 @@ from typing import Any
 from weld_twin_core import __version__
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.task_pool import Runner, Task
 
+from . import correction_table
 from .broken import fuzz
 from .cells import CELLS
 from .round_trips import round_trips
 
 RESULTS, TABLE, PARTS = 'programs.json', 'programs.md', 'parts'
+CORRECTIONS, CORRECTIONS_TABLE = 'corrections.json', 'corrections.md'
 SCHEMA = 'weld_twin/programs/1'
 MADE = Path('test/programs/made')
 """Programs as users have them, from the top of the source tree; left out where there are none."""
-SEAM_HEADS = (
-    'language',
-    'robot',
-    'causes',
-    'verdict',
-    'worst before, mm',
-    'after',
-    'true causes',
-    'RMS before, mm',
-    'after',
-    'true causes',
-    'worst, over true causes',
-)
-"""Heads of the table of corrected seams."""
 Tell = Callable[[str], None]
 
 
@@ -43,7 +32,6 @@ def study(
     out: Path,
     drawn: int,
     broken: int,
-    seams: int,
     made: Path = MADE,
     tell: Tell = lambda text: None,
 ) -> dict[str, Any]:
@@ -56,8 +44,6 @@ def study(
         Keeps a file for every part; a run that was interrupted goes on from there.
     drawn, broken : int
         Programs of each language.
-    seams : int
-        Seams of each language that are recorded, diagnosed, corrected and driven.
     made : Path
         Folder of programs as users have them.
     tell : callable
@@ -71,31 +57,76 @@ def study(
         trips.append(_kept(out, f'round_trips_{language}', trip, tell))
         trial = partial(fuzz, language, broken, _whole(language, made))
         fuzzed.append(_kept(out, f'fuzz_{language}', trial, tell))
-    driven = [
-        _kept(out, f'seam_{seed}_{language}', partial(_correction, language, seed), tell)
-        for seed in range(seams)
-        for language in CELLS
-    ]
     result = {
         'schema': SCHEMA,
         'version': __version__,
         'round_trips': trips,
         'fuzz': fuzzed,
-        'corrections': driven,
     }
     write_text(out / RESULTS, json.dumps(result, indent=1) + '\n', overwrite=True)
     write_text(out / TABLE, summary(result), overwrite=True)
     return result
 
 
-def _correction(language: str, seed: int) -> dict[str, Any]:
-    """Return what a correction does; the simulator is loaded where it is needed."""
+def corrections(
+    out: Path, seed: int, seams: int, runner: Runner, engine: str, languages: Sequence[str]
+) -> dict[str, Any]:
+    """
+    Correct sealed seams, let the plant run them, and write the results.
+
+    Parameters
+    ----------
+    out : Path
+    seed : int
+        Decides the seams.
+    seams : int
+        Of each language.
+    runner : Runner
+        Keeps what came of every seam; a run that was interrupted goes on from there.
+    engine : str
+        Tells the results of one version of the core from those of another.
+    languages : sequence of str
+
+    """
+    tasks = [
+        Task(corrected, (language, seed, k, engine), f'{language} {k}')
+        for k in range(seams)
+        for language in languages
+    ]
+    cases = sorted(runner.run(tasks), key=lambda case: list(CELLS).index(case['language']))
+    result = {
+        'schema': SCHEMA,
+        'version': __version__,
+        'engine': engine,
+        'seed': seed,
+        'totals': correction_table.totals(cases),
+        'cases': cases,
+    }
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / CORRECTIONS, json.dumps(result, indent=1) + '\n', overwrite=True)
+    write_text(out / CORRECTIONS_TABLE, correction_table.page(result), overwrite=True)
+    return result
+
+
+def corrected(language: str, seed: int, number: int, engine: str) -> dict[str, Any]:
+    """
+    Return what a correction does to one seam; the simulator is loaded where it is needed.
+
+    Parameters
+    ----------
+    language : str
+    seed, number : int
+        Decide everything random in it.
+    engine : str
+        Only tells the results of one version of the core from those of another.
+
+    """
     from ..blind.simulator import require_simulator
 
     require_simulator()
-    from .corrections import correction
+    from .corrections import corrected_seam
 
-    return correction(language, seed)
+    return corrected_seam(language, seed, number)
 
 
 def _whole(language: str, made: Path) -> list[list[str]]:
@@ -134,7 +165,6 @@ def summary(result: dict[str, Any]) -> str:
         )
         for e in result['fuzz']
     ]
-    driven = [_seam_row(entry) for entry in result['corrections']]
     heads = ('language', 'broken programs', 'refused', 'read', 'tracebacks', 'silently changed')
     return '\n'.join(
         [
@@ -146,22 +176,5 @@ def summary(result: dict[str, Any]) -> str:
             '',
             markdown.table(heads, *fuzzed),
             '',
-            '## Corrected seams, run by the plant',
-            '',
-            markdown.table(SEAM_HEADS, *driven),
-            '',
         ]
     )
-
-
-def _seam_row(entry: dict[str, Any]) -> tuple[str, ...]:
-    worst, rms = entry['path_error_m'], entry['rms_m']
-    causes = ', '.join(f'{cause["effect"]} of {cause["joint"]}' for cause in entry['causes'])
-    columns = [
-        f'{1e3 * size[key]:.3f}'
-        for size in (worst, rms)
-        for key in ('before', 'after', 'true_causes')
-    ]
-    ratio = worst['after'] / max(worst['true_causes'], 1e-9)
-    verdict = f'{entry["status"]}, left as it was' if entry['left'] else entry['status']
-    return (entry['language'], entry['robot'], causes, verdict, *columns, f'{ratio:.2f}')

@@ -17,6 +17,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse.along_path import PathSolution
 from weld_twin_core.motion.paths import KINDS
+from weld_twin_core.motion.planned_motion import Plan as SeamPlan
 from weld_twin_core.motion.programs import travel
 from weld_twin_msgs_py.files.joint_file import EASY, REST, read_joint_motion
 from weld_twin_msgs_py.programs import Context, read_sources, to_moves
@@ -58,7 +59,7 @@ class Speeds(NamedTuple):
 
 
 def export(
-    path: str,
+    path: str | SeamPlan,
     context: Context,
     language: str,
     name: str,
@@ -71,8 +72,9 @@ def export(
 
     Parameters
     ----------
-    path : str
-        A path file, a bundled seam, or an experiment as a diagnosis proposes it.
+    path : str or planned seam
+        A path file, a bundled seam, an experiment as a diagnosis proposes it, or a seam that is
+        planned already.
     context : Context
     language : str
     name : str
@@ -93,6 +95,7 @@ def export(
     plan = _planned(path, robot, seam_speed)
     robot.check_positions(plan.q)
     moves = _moves(plan, context, speeds)
+    source = Path(path).name if isinstance(path, str) else 'a seam'
     made = Exported(
         _name(name),
         moves,
@@ -100,19 +103,21 @@ def export(
         np.linalg.inv(context.controller.flange) @ robot.T_flange_tool,
         trigger,
         plan.stations,
-        (f'{robot.name}: {Path(path).name}', 'made by weld_twin', 'check for collisions first'),
+        (f'{robot.name}: {source}', 'made by weld_twin', 'check for collisions first'),
     )
     text = written(made, language)
     _read_again(made, text, language)
     return made, text, [*_singular(robot, plan.q), *context.controller.notes]
 
 
-def _planned(path: str, robot: Robot, speed: float) -> Plan:
-    given = None if path in KINDS else read_joint_motion(path, robot)
-    if given is not None:
-        t, q, stations = given
-        return Plan(q, t, stations, False, 0.0)
-    plan = plan_motion(robot, path, rate=RATE, speed=speed)
+def _planned(path: str | SeamPlan, robot: Robot, speed: float) -> Plan:
+    plan = path
+    if isinstance(plan, str):
+        given = None if plan in KINDS else read_joint_motion(plan, robot)
+        if given is not None:
+            t, q, stations = given
+            return Plan(q, t, stations, False, 0.0)
+        plan = plan_motion(robot, plan, rate=RATE, speed=speed)
     keep = _corners(plan.poses)
     travel_speed = plan.length / max(plan.report.duration, 1e-6)
     return Plan(plan.motion.q[keep], plan.motion.t[keep], False, True, speed or travel_speed)

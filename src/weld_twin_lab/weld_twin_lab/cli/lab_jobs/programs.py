@@ -2,16 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robot programs: are they read as they are meant, and does a corrected one help?
 
-In every language drawn programs are read again by the product and by an independent reader, programs
-are broken at random, and a seam is recorded, diagnosed, corrected and driven by the plant. Writes
-programs.json, programs.md and a file per part; a run that was interrupted goes on where it stopped.
-Exits with 1 when a program is read wrongly, or a broken one not met with words.
+In every language drawn programs are read again by the product and by an independent reader, and programs
+are broken at random (programs.json, programs.md). Seams of arms with sealed causes are recorded,
+diagnosed, corrected as programs and driven by the plant (corrections.json, corrections.md); with --seams
+0, or with --drawn 0 and --broken 0, one part is left out. A run that was interrupted goes on where it
+stopped. Exits with 1 when a program is read wrongly, or a broken one not met with words.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
+
+from ..blind_jobs.job_options import add_pool, runner_of
 
 MISSED = 1
 """Exit code where a program was read wrongly, or a broken one was not met with words."""
@@ -29,15 +33,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=1,
         metavar='N',
-        help='seams a language that the plant runs before and after (default: 1)',
+        help='sealed seams a language that the plant runs before and after (default: 1)',
     )
+    parser.add_argument('--seed', type=int, default=1, metavar='N', help='decides the seams')
     parser.add_argument(
         '--made', default='test/programs/made', metavar='DIR', help='programs as users have them'
     )
+    add_pool(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Try what is not tried yet, and print the tables."""
+    from ...blind.diagnosing import engine_digest
+    from ...programs.cells import CELLS
+    from ...programs.correction_table import page
+    from ...programs.study import PARTS, corrections
+
+    missed = _read(args) if args.drawn or args.broken else 0
+    if args.seams:
+        out = Path(args.out)
+        with runner_of(args, out / PARTS, 'correcting') as runner:
+            found = corrections(
+                out, args.seed, args.seams, runner, engine_digest(), list(CELLS)
+            )
+        print(page(found))
+    return missed
+
+
+def _read(args: argparse.Namespace) -> int:
+    """Read what is drawn and what is broken, and return whether all went well."""
     import sys
 
     from ...programs.study import study, summary
@@ -45,7 +69,9 @@ def run(args: argparse.Namespace) -> int:
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    result = study(Path(args.out), args.drawn, args.broken, args.seams, Path(args.made), tell)
+    result: dict[str, Any] = study(
+        Path(args.out), args.drawn, args.broken, Path(args.made), tell
+    )
     print(summary(result))
     wrong = [line for part in ('round_trips', 'fuzz') for e in result[part] for line in e['wrong']]
     for line in wrong:

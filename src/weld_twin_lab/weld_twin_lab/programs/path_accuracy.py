@@ -1,0 +1,51 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far a tool was from the path that it was to go."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.metrics.iso9283 import nearest_pass
+
+
+class PathAccuracy(NamedTuple):
+    """
+    How far a tool was from a path [m].
+
+    Attributes
+    ----------
+    at : float
+        AT_p of ISO 9283, clause 8.2: the largest distance, over the points of the command path, of
+        where the tool passes the plane square to it. The plant repeats itself exactly, so one cycle is
+        the barycentre of ten.
+    rms : float
+        Of the same distances.
+
+    """
+
+    at: float
+    rms: float
+
+
+def path_accuracy(attained: np.ndarray, wanted: np.ndarray) -> PathAccuracy:
+    """
+    Return how far a tool was from a path.
+
+    Parameters
+    ----------
+    attained : array, shape (K, 3) [m]
+    wanted : array, shape (m, 3) [m]
+        The command path. At its ends, where the tool may not pass the plane, the distance to the
+        nearest place of the tool counts.
+
+    """
+    tangents = np.gradient(wanted, axis=0)
+    off = []
+    for centre, tangent in zip(wanted, tangents, strict=True):
+        passed = nearest_pass(attained, centre, tangent)
+        nearest = float(np.linalg.norm(attained - centre, axis=1).min())
+        off.append(nearest if passed is None else float(np.linalg.norm(passed - centre)))
+    return PathAccuracy(max(off), float(np.sqrt(np.mean(np.square(off)))))

@@ -1,0 +1,114 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A controller that knows no error, as plain as can be: moves in, joint positions over time out."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm.robot import Robot
+
+from .plain_arm import joints_for, tool_pose
+from .plain_readers import Moves
+
+STEP = 0.005
+"""Way between two places that joints are worked out for [m]."""
+REST = 0.5
+"""Stay at either end [s]."""
+TURNING = 0.2
+"""A turn of the tool takes as long as its end takes to go so far [m/rad]."""
+BY_JOINTS = ('movej', 'PTP', 'MoveAbsJ', 'MOVJ', 'J', 'joint', 'point')
+"""Words of moves that are straight in the joints; a trajectory's points are reached so."""
+
+
+class Driven(NamedTuple):
+    """Times (N,) [s], joints (N, n) [rad], and where the controller believes the tool, (N, 3)."""
+
+    clock: np.ndarray
+    joints: np.ndarray
+    tool: np.ndarray
+
+
+def driven(robot: Robot, moves: Moves, start: np.ndarray, speed: float) -> Driven:
+    """
+    Return what a controller makes of moves; it stands at the end of the first when it begins.
+
+    Parameters
+    ----------
+    robot : Robot
+    moves : moves
+        As a reader returns them, their places in the robot's base.
+    start : array, shape (n,)
+        Joints near the end of the first move.
+    speed : float [m/s]
+        Of the tool.
+
+    """
+    tool = np.array(robot.T_flange_tool)
+    q, at = np.array(start), 0.0
+    clock, joints = [], []
+    for k, (word, places) in enumerate(moves):
+        place = places[-1]
+        if k == 0:
+            way = [place if place.ndim == 1 else joints_for(robot, place, tool, q)]
+        elif word in BY_JOINTS:
+            way = _by_joints(robot, q, place, tool)
+        else:
+            end = tool_pose(robot, place, tool) if place.ndim == 1 else place
+            way = _straight(robot, q, end, tool)
+        for step in way:
+            at += _length(robot, q, step, tool) / speed if k else 0.0
+            q = step
+            if not clock or at > clock[-1] + 1e-6:
+                clock.append(at)
+                joints.append(q)
+    rows = np.array(joints)
+    return Driven(
+        np.array(clock), rows, np.array([tool_pose(robot, row, tool)[:3, 3] for row in rows])
+    )
+
+
+def _by_joints(
+    robot: Robot, q: np.ndarray, place: np.ndarray, tool: np.ndarray
+) -> list[np.ndarray]:
+    end = place if place.ndim == 1 else joints_for(robot, place, tool, q)
+    count = max(int(np.ceil(_length(robot, q, end, tool) / STEP)), 1)
+    return [q + share * (end - q) for share in np.arange(1, count + 1) / count]
+
+
+def _straight(
+    robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray
+) -> list[np.ndarray]:
+    begin = tool_pose(robot, q, tool)
+    way = end[:3, 3] - begin[:3, 3]
+    turn = Rotation.from_matrix(end[:3, :3] @ begin[:3, :3].T).as_rotvec()
+    count = max(int(np.ceil(_size(way, turn) / STEP)), 1)
+    out = []
+    for share in np.arange(1, count + 1) / count:
+        pose = np.eye(4)
+        pose[:3, 3] = begin[:3, 3] + share * way
+        pose[:3, :3] = Rotation.from_rotvec(share * turn).as_matrix() @ begin[:3, :3]
+        q = joints_for(robot, pose, tool, q)
+        out.append(q)
+    return out
+
+
+def _length(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> float:
+    first, last = tool_pose(robot, q, tool), tool_pose(robot, end, tool)
+    turn = Rotation.from_matrix(last[:3, :3] @ first[:3, :3].T).as_rotvec()
+    return _size(last[:3, 3] - first[:3, 3], turn)
+
+
+def _size(way: np.ndarray, turn: np.ndarray) -> float:
+    return float(max(np.linalg.norm(way), TURNING * np.linalg.norm(turn)))
+
+
+def evenly(made: Driven, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return even stamps (N,) [s] and joints (N, n), with a stay at either end."""
+    end = float(made.clock[-1]) + 2.0 * REST
+    t = np.arange(int(end * rate) + 1) / rate
+    columns = [np.interp(t - REST, made.clock, column) for column in made.joints.T]
+    return t, np.stack(columns, axis=1)

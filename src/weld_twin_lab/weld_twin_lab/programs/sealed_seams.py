@@ -1,0 +1,184 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A seam on an arm with sealed causes: drawn, and run by the plant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError, PathError
+from weld_twin_core.motion.planned_motion import plan
+from weld_twin_core.motion.profiles import Smooth
+from weld_twin_core.recording import Recording
+from weld_twin_msgs_py.programs import Context
+from weld_twin_nodes.offline.exporting import Speeds, export
+
+from ..blind.blind_cell import Cell, as_recording, record
+from ..blind.deck import Lot, lots
+from ..blind.making import Case, draw_case
+from ..blind.one_arm import one_arm
+from ..blind.recorded_motion import RATE
+from ..blind.seams import drawn_seam
+from ..plant.plant import run
+from ..plant.plant_recording import Command, PlantRecording
+from ..plant.tracker import Tracker
+from .cells import CELLS, context_on, robots_of
+from .plain_controller import Driven, evenly
+
+KINDS = ('single', 'double', 'triple')
+"""Cases with their causes in the library: what is at work can be known."""
+SEAMS = ('line', 'arc', 'circle', 'polyline', 'spline')
+"""A weave is left out: as straight pieces it has some hundreds of points."""
+SPEED = (0.01, 0.04)
+"""Of the tool [m/s]: gas metal arc welding is between these."""
+RECORDED = 30.0
+"""Length of the free motion that is recorded [s]."""
+TRIES = 40
+"""Seams drawn for a robot before it is given up; many are out of its reach."""
+MEASURING = frozenset(
+    {'measurement_scale', 'refraction', 'drift', 'time_delay', 'clock_rate', 'measurement_noise'}
+)
+"""Causes of the instrument: they are recorded, and the tool that is judged has none of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class SealedSeam:
+    """
+    One arm with sealed causes, and a program for it.
+
+    Attributes
+    ----------
+    language : str
+    case : Case
+        Cell, causes, and the free motion.
+    context : Context
+        What programs are read with.
+    kind : str
+        Of the seam.
+    text : str
+        The program.
+    start : array, shape (n,)
+        Joints where the seam begins.
+    points : int
+        Moves of the program.
+    speed, length : float [m/s, m]
+    temperature : float or None [degC]
+        Of the arm along the seam; None where it is not recorded.
+
+    """
+
+    language: str
+    case: Case
+    context: Context
+    kind: str
+    text: str
+    start: Array
+    points: int
+    speed: float
+    length: float
+    temperature: float | None
+
+    @property
+    def cell(self) -> Cell:
+        """Return the cell; where its base stands is known, for seams are judged in the world."""
+        return replace(self.case.cell, align=())
+
+    @property
+    def robot(self) -> Robot:
+        """Return the robot as whoever diagnoses it knows it."""
+        return self.case.cell.robot
+
+    def command(self, t: Array, q: Array) -> Command:
+        """Return joints over time, as warm as the arm is and with nothing that pulls at the tool."""
+        wrench = np.zeros((t.size, 6)) if self.cell.loaded else None
+        warm = None if self.temperature is None else np.full(t.size, self.temperature)
+        return Command(t, q, False, wrench, warm)
+
+    def ran(self, t: Array, q: Array) -> PlantRecording:
+        """Return where the real tool is at stamps (N,) [s], seen by an instrument free of error."""
+        causes = [cause for cause in self.case.causes if cause['effect'] not in MEASURING]
+        return run(
+            self.robot.to_mapping(),
+            [*self.cell.known, *causes],
+            self.command(t, q),
+            Tracker(),
+            np.random.default_rng(0),
+            self.cell.richness,
+        )
+
+    def recordings(self, along: Driven, seed: int) -> list[Recording]:
+        """Return what the cell's instruments record of the free motion and once along the seam."""
+        cell, case = self.cell, self.case
+        free = record(cell, case.causes, case.train)
+        taken = case.train._replace(command=self.command(*evenly(along, RATE)), seed=seed)
+        seam = record(cell, case.causes, taken)
+        return [as_recording('free', free), as_recording('seam', seam)]
+
+
+def sealed_seam(language: str, seed: int, number: int) -> SealedSeam:
+    """
+    Return a seam of a language.
+
+    Parameters
+    ----------
+    language : str
+    seed, number : int
+        Decide everything random in it.
+
+    Raises
+    ------
+    DataError
+        The causes dealt cannot be seen, or no seam drawn can be welded.
+
+    """
+    rng = np.random.default_rng([seed, number, sorted(CELLS).index(language)])
+    case = one_arm(draw_case(_lot(language, seed, number), rng, (RECORDED, RECORDED)))
+    warm = case.train.command.temperature
+    context = context_on(language, case.cell.robot)
+    for _ in range(TRIES):
+        kind, speed = str(rng.choice(SEAMS)), float(rng.uniform(*SPEED))
+        q, seam, torch = drawn_seam(case.cell.robot, rng, (kind,))
+        try:
+            way = plan(
+                case.cell.robot, seam, Smooth(speed=speed), torch=torch, fit=True, seed=q
+            )
+            made, text, _ = export(way, context, language, 'seam', Speeds(), 1, speed)
+        except (PathError, DataError):
+            continue
+        at = None if warm is None else float(warm[-1])
+        start, count = made.moves[0].q, len(made.moves)
+        return SealedSeam(
+            language, case, context, kind, text, start, count, speed, way.length, at
+        )
+    raise DataError(f'none of {TRIES} seams drawn for {case.cell.robot.name} can be welded')
+
+
+def _lot(language: str, seed: int, number: int) -> Lot:
+    """Return what a case is to be: all languages draw from one deck, each its robots in turn."""
+    place = sorted(CELLS).index(language)
+    deal = len(CELLS) * number + place
+    robots = robots_of(language)
+    turn = np.random.default_rng([seed, place]).permutation(len(robots))
+    robot = robots[int(turn[number % len(robots)])]
+    return replace(lots(seed, deal + 1, KINDS)[deal], robot=robot, motion='free')
+
+
+def drawn_as(seam: SealedSeam) -> dict[str, Any]:
+    """Return what was drawn, in plain values."""
+    lot = seam.case.lot
+    return {
+        'language': seam.language,
+        'robot': seam.robot.name,
+        'kind': lot.kind,
+        'causes': seam.case.causes,
+        'ratios': seam.case.ratios,
+        'seam': seam.kind,
+        'points': seam.points,
+        'speed': seam.speed,
+        'length': seam.length,
+    }

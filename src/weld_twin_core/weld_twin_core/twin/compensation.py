@@ -36,9 +36,11 @@ BEYOND_COMMANDS = frozenset(
         'setup_step',
         'setup_settling',
         'instrument_knock',
+        'quantization',
     }
 )
-"""Effects of the measurement, or new in every run: no joint command mends them."""
+"""Effects of the measurement, new in every run, or a rounding of what is commanded, which is as near
+as it gets: no joint command mends them."""
 _CLOSED = 1e-12
 """Error [m, rad] that is rounding; nothing is left to correct."""
 _LEAST_SHARE = 1e-3

@@ -207,11 +207,16 @@ class _Work(NamedTuple):
         if move.end is not None and move.end.leads:
             off = gap[piece.ends[k]]
             if np.linalg.norm(off[:3]) > APART[0] or np.linalg.norm(off[3:]) > APART[1]:
-                return (
-                    f'{np.linalg.norm(off[:3]) * 1e3:.3f} mm would be left here, for the point is '
-                    'used by other moves that need another correction'
-                )
+                return f'{np.linalg.norm(off[:3]) * 1e3:.3f} mm would be left here, {self._left(move.end)}'
         return ''
+
+    def _left(self, use: Use) -> str:
+        """Return why the correction of a point leaves something."""
+        moves = [move for piece in self.program.pieces for move in piece]
+        shared = sum(u.leads and u.point == use.point for move in moves for u in move.uses) > 1
+        if shared:
+            return 'for the point is used by other moves that need another correction'
+        return 'for the correction itself would turn a joint around, and lost motion the other way'
 
     def moved_by(self, moved: MoveProgram, use: Use, tool: Array) -> tuple[float, float]:
         """

@@ -135,7 +135,7 @@ def _or_as_it_was(seam: SealedSeam, model: ProgramModel) -> tuple[str, str]:
     name = f'seam{CELLS[seam.language].suffix}'
     program = read_sources([Source(name, seam.text)], seam.context, seam.language)
     try:
-        text = corrected_program(program, seam.context, model, start=seam.start).texts[0]
+        text = corrected_program(program, seam.context, model).texts[0]
     except DataError as error:
         return seam.text, str(error)
     return text, '' if text != seam.text else UNCHANGED

@@ -79,9 +79,7 @@ def _by_joints(
     return [q + share * (end - q) for share in np.arange(1, count + 1) / count]
 
 
-def _straight(
-    robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray
-) -> list[np.ndarray]:
+def _straight(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
     begin = tool_pose(robot, q, tool)
     way = end[:3, 3] - begin[:3, 3]
     turn = Rotation.from_matrix(end[:3, :3] @ begin[:3, :3].T).as_rotvec()

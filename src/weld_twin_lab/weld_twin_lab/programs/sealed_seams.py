@@ -137,28 +137,24 @@ def sealed_seam(language: str, seed: int, number: int) -> SealedSeam:
 
     """
     rng = np.random.default_rng([seed, number, sorted(CELLS).index(language)])
-    case = one_arm(draw_case(_lot(language, seed, number), rng, (RECORDED, RECORDED)))
+    case = one_arm(draw_case(lot_of(language, seed, number), rng, (RECORDED, RECORDED)))
     warm = case.train.command.temperature
     context = context_on(language, case.cell.robot)
     for _ in range(TRIES):
         kind, speed = str(rng.choice(SEAMS)), float(rng.uniform(*SPEED))
         q, seam, torch = drawn_seam(case.cell.robot, rng, (kind,))
         try:
-            way = plan(
-                case.cell.robot, seam, Smooth(speed=speed), torch=torch, fit=True, seed=q
-            )
+            way = plan(case.cell.robot, seam, Smooth(speed=speed), torch=torch, fit=True, seed=q)
             made, text, _ = export(way, context, language, 'seam', Speeds(), 1, speed)
         except (PathError, DataError):
             continue
         at = None if warm is None else float(warm[-1])
         start, count = made.moves[0].q, len(made.moves)
-        return SealedSeam(
-            language, case, context, kind, text, start, count, speed, way.length, at
-        )
+        return SealedSeam(language, case, context, kind, text, start, count, speed, way.length, at)
     raise DataError(f'none of {TRIES} seams drawn for {case.cell.robot.name} can be welded')
 
 
-def _lot(language: str, seed: int, number: int) -> Lot:
+def lot_of(language: str, seed: int, number: int) -> Lot:
     """Return what a case is to be: all languages draw from one deck, each its robots in turn."""
     place = sorted(CELLS).index(language)
     deal = len(CELLS) * number + place

@@ -53,9 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if args.seams:
         out = Path(args.out)
         with runner_of(args, out / PARTS, 'correcting') as runner:
-            found = corrections(
-                out, args.seed, args.seams, runner, engine_digest(), list(CELLS)
-            )
+            found = corrections(out, args.seed, args.seams, runner, engine_digest(), list(CELLS))
         print(page(found))
     return missed
 
@@ -69,9 +67,7 @@ def _read(args: argparse.Namespace) -> int:
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    result: dict[str, Any] = study(
-        Path(args.out), args.drawn, args.broken, Path(args.made), tell
-    )
+    result: dict[str, Any] = study(Path(args.out), args.drawn, args.broken, Path(args.made), tell)
     print(summary(result))
     wrong = [line for part in ('round_trips', 'fuzz') for e in result[part] for line in e['wrong']]
     for line in wrong:

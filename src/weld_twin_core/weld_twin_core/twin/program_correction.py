@@ -207,7 +207,8 @@ class _Work(NamedTuple):
         if move.end is not None and move.end.leads:
             off = gap[piece.ends[k]]
             if np.linalg.norm(off[:3]) > APART[0] or np.linalg.norm(off[3:]) > APART[1]:
-                return f'{np.linalg.norm(off[:3]) * 1e3:.3f} mm would be left here, {self._left(move.end)}'
+                left = f'{np.linalg.norm(off[:3]) * 1e3:.3f} mm would be left here'
+                return f'{left}, {self._left(move.end)}'
         return ''
 
     def _left(self, use: Use) -> str:

@@ -219,3 +219,46 @@ def test_the_model_of_another_robot_and_of_unsound_data_is_refused(tmp_path):
             *('--model', tmp_path / 'diagnosis.json', '--out', tmp_path / 'out'),
         )
         assert said.code == 2 and words in said.err
+
+
+def a_line_on_which_a_joint_turns_around(tmp_path, found):
+    """Correct a line past the robot's front, shoulder and elbow there and back, by a model."""
+    robot, tool = wt.load('ur5'), np.array(wt.load('ur5').T_flange_tool)
+    q = np.array([0.0, -1.39, 1.65, -1.83, -1.57, 0.08])
+    front = tool_pose(robot, q, tool)
+    along = np.array([-front[1, 3], front[0, 3], 0.0]) / np.hypot(*front[:2, 3])
+    turn = readers.Rotation.from_matrix(front[:3, :3]).as_rotvec()
+    lines = [[*(front[:3, 3] + way * along), *turn] for way in (-0.01, 0.3)]
+    front[:3, 3] -= 0.045 * along
+    places = [', '.join(f'{v:.7f}' for v in [*joints_for(robot, front, tool, q)])]
+    places += [', '.join(f'{v:.7f}' for v in line) for line in lines]
+    text = f'def seam():\n  movej([{places[0]}])\n  movel(p[{places[1]}], v=0.02)\n'
+    text += f'  movel(p[{places[2]}], v=0.02)\nend\n'
+    (tmp_path / 'seam.script').write_text(text)
+    (tmp_path / 'found.yaml').write_text(yaml.safe_dump(found))
+    said = weld_twin(
+        *('correct-program', tmp_path / 'seam.script', '--robot', 'ur5'),
+        *('--out', tmp_path / 'out', '--model', tmp_path / 'found.yaml'),
+    )
+    reach = np.hypot(*front[:2, 3])
+    return said, [reach, *(np.hypot(line[0], line[1]) for line in lines)]
+
+
+PLAY = {'effect': 'backlash', 'joint': 'shoulder_lift_joint', 'width': 6e-4}
+ZERO = {'effect': 'joint_offset', 'joint': 'shoulder_pan_joint', 'offset': 3e-4}
+
+
+def test_a_seam_is_left_where_play_turns_around_between_its_points(tmp_path):
+    said, _ = a_line_on_which_a_joint_turns_around(tmp_path, [PLAY])
+    assert said.code == 2 and 'too little is gained' in said.err
+    assert not (tmp_path / 'out').exists()
+
+
+def test_what_play_spoils_is_corrected_without_it(tmp_path):
+    said, reaches = a_line_on_which_a_joint_turns_around(tmp_path, [ZERO, PLAY])
+    assert said.code == 0, said.err
+    told = json.loads((tmp_path / 'out' / 'correction.json').read_text())
+    assert any('without play' in note for note in told['notes'])
+    # The play of 6e-4 would have moved them by another 0.15 mm up and down.
+    moved = [move['moved_m'] for move in told['moves']]
+    assert moved == pytest.approx([3e-4 * reach for reach in reaches], rel=0.01)

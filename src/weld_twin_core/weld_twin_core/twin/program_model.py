@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..arm.chain import forward
 from ..arm.robot import Robot
 from ..arm.rotation import angle_between
 from ..arrays import Array
-from ..effects.effect import Effect
+from ..effects.effect import Effect, MemoryEffect
 from ..motion.programs import Move, Piece
 from ..recording import JointMotion, Recording, Signal
 from .compensation import commandable
@@ -56,6 +56,11 @@ class ProgramModel:
     def acting(self) -> tuple[Effect, ...]:
         """Return the effects that moves of the arm can mend."""
         return tuple(effect for effect in self.effects if commandable(effect))
+
+    def without_memory(self) -> ProgramModel | None:
+        """Return the model without play, friction and lag; None where it has none of them."""
+        still = tuple(e for e in self.effects if not isinstance(e, MemoryEffect))
+        return replace(self, effects=still, _twins={}) if len(still) < len(self.effects) else None
 
     def arm(self, tool: Array) -> Robot:
         """Return the nominal arm with a tool, in its own base."""

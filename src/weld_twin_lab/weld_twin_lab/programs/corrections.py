@@ -12,15 +12,16 @@ plant runs it. The path is judged against the seam as the program meant it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.rotation import angle_between, rotation_matrix
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.effects import effects_from_list
@@ -35,12 +36,23 @@ from weld_twin_nodes.offline.correcting import corrected_program, program_model
 from weld_twin_nodes.report.diagnosis_files import RESULT, diagnosis_text
 
 from ..blind.recorded_motion import RATE
-from ..plant.plant_recording import PlantRecording
 from .cells import CELLS, reader_of
 from .path_accuracy import path_accuracy
 from .plain_controller import Driven, driven, evenly
-from .sealed_seams import SealedSeam, drawn_as, sealed_seam
+from .sealed_seams import MEASURING, SealedSeam, drawn_as, sealed_seam
 
+MEMORY = frozenset(
+    {
+        'backlash',
+        'loaded_play',
+        'friction',
+        'hysteresis',
+        'gear_ratio_by_direction',
+        'servo_lag',
+        'vibration',
+    }
+)
+"""Causes whose effect hangs on where the arm came from."""
 UNCHANGED = 'nothing was found that a program mends'
 
 
@@ -48,20 +60,32 @@ UNCHANGED = 'nothing was found that a program mends'
 class AskedModel(ProgramModel):
     """A model that is no model: where the real tool goes, the plant is asked."""
 
-    ran: Callable[[Array, Array], PlantRecording] | None = None
+    seam: SealedSeam | None = None
+    without: frozenset[str] = MEASURING
+
+    def without_memory(self) -> AskedModel:
+        """Return the same plant without play, friction and lag."""
+        return replace(self, without=self.without | MEMORY)
 
     def real(self, piece: Piece, motion: JointMotion) -> Array:
-        """Return ``T_base_tool`` of the plant at every sample of a motion, (N, 4, 4)."""
-        assert self.ran is not None
+        """
+        Return ``T_base_tool`` of the plant at every sample of a motion, (N, 4, 4).
+
+        What is off is looked up between the plant's samples; it changes slowly, the tool does not.
+        """
+        assert self.seam is not None
         even = np.arange(motion.t[0], motion.t[-1] + 4.0 / RATE, 1.0 / RATE)
-        columns = [np.interp(even, motion.t, column) for column in motion.q.T]
-        made = self.ran(even, np.stack(columns, axis=1))
-        assert made.quaternion is not None
-        out = np.tile(np.eye(4), (motion.t.size, 1, 1))
-        for k in range(3):
-            out[:, k, 3] = np.interp(motion.t, even, made.position[:, k])
-        turns = Slerp(even, Rotation.from_quat(made.quaternion))
-        out[:, :3, :3] = turns(np.clip(motion.t, even[0], even[-1])).as_matrix()
+        q = np.stack([np.interp(even, motion.t, column) for column in motion.q.T], axis=1)
+        made = self.seam.ran(even, q, self.without)
+        meant = forward(self.robot, q)
+        turned = Rotation.from_quat(made.quaternion).as_matrix()
+        off = np.concatenate(
+            [made.position - meant[:, :3, 3], angle_between(turned, meant[:, :3, :3])], axis=1
+        )
+        there = np.stack([np.interp(motion.t, even, column) for column in off.T], axis=1)
+        out = forward(self.robot, motion.q)
+        out[:, :3, 3] += there[:, :3]
+        out[:, :3, :3] = rotation_matrix(there[:, 3:]) @ out[:, :3, :3]
         return np.asarray(np.linalg.inv(self.robot.T_world_base) @ out)
 
 
@@ -83,7 +107,7 @@ def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
     along = _along(seam, seam.text)
     found = _diagnosed(seam, along, seed)
     after, outcome, why = _by_diagnosis(seam, found)
-    asked = AskedModel(seam.robot, (), temperature=seam.temperature, ran=seam.ran)
+    asked = AskedModel(seam.robot, (), temperature=seam.temperature, seam=seam)
     best, limit = _or_as_it_was(seam, asked)
     texts = {'before': seam.text, 'after': after, 'true': best}
     accuracy = {name: _accuracy(seam, text, along) for name, text in texts.items()}

@@ -10,6 +10,9 @@ import numpy as np
 
 from weld_twin_core.metrics.iso9283 import nearest_pass
 
+APART = 1e-3
+"""Places of the command path are looked at so far apart [m]: what turns around takes a few of them."""
+
 
 class PathAccuracy(NamedTuple):
     """
@@ -42,10 +45,17 @@ def path_accuracy(attained: np.ndarray, wanted: np.ndarray) -> PathAccuracy:
         nearest place of the tool counts.
 
     """
-    tangents = np.gradient(wanted, axis=0)
+    fine = _finely(wanted)
     off = []
-    for centre, tangent in zip(wanted, tangents, strict=True):
+    for centre, tangent in zip(fine, np.gradient(fine, axis=0), strict=True):
         passed = nearest_pass(attained, centre, tangent)
         nearest = float(np.linalg.norm(attained - centre, axis=1).min())
         off.append(nearest if passed is None else float(np.linalg.norm(passed - centre)))
     return PathAccuracy(max(off), float(np.sqrt(np.mean(np.square(off)))))
+
+
+def _finely(path: np.ndarray) -> np.ndarray:
+    """Return places along straight pieces, shape (m, 3)."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / APART)), 1) + 1)
+    return np.stack([np.interp(at, way, column) for column in path.T], axis=1)

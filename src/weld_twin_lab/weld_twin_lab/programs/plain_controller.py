@@ -16,6 +16,8 @@ from .plain_readers import Moves
 
 STEP = 0.005
 """Way between two places that joints are worked out for [m]."""
+FINE = 0.001
+"""The same where they are straight in the joints, and the tool goes in a bow [m]."""
 REST = 0.5
 """Stay at either end [s]."""
 TURNING = 0.2
@@ -49,7 +51,8 @@ def driven(robot: Robot, moves: Moves, start: np.ndarray, speed: float) -> Drive
     """
     tool = np.array(robot.T_flange_tool)
     q, at = np.array(start), 0.0
-    clock, joints = [], []
+    clock: list[float] = []
+    joints: list[np.ndarray] = []
     for k, (word, places) in enumerate(moves):
         place = places[-1]
         if k == 0:
@@ -75,7 +78,7 @@ def _by_joints(
     robot: Robot, q: np.ndarray, place: np.ndarray, tool: np.ndarray
 ) -> list[np.ndarray]:
     end = place if place.ndim == 1 else joints_for(robot, place, tool, q)
-    count = max(int(np.ceil(_length(robot, q, end, tool) / STEP)), 1)
+    count = max(int(np.ceil(_length(robot, q, end, tool) / FINE)), 1)
     return [q + share * (end - q) for share in np.arange(1, count + 1) / count]
 
 

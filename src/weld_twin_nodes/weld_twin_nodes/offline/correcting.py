@@ -147,6 +147,7 @@ def corrected_program(
         f'{where} names no posture; the only one that was recorded was taken'
         for where in found.travel.assumed
     ]
+    notes += [f'corrected without play, friction and lag: {why}' for why in found.calm.values()]
     return CorrectedProgram(program, tuple(texts), found, tuple(notes))
 
 

@@ -52,6 +52,17 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
     return JointMotion(piece.motion.t, q)
 
 
+def unrelenting(piece: Piece, motion: JointMotion) -> JointMotion:
+    """Return a motion of a piece at full speed from the first to the last place of every move."""
+    steps = np.diff(motion.t)
+    for k in range(len(piece.moves)):
+        first = 0 if k == 0 else int(piece.ends[k - 1])
+        way = slice(first, first + _way_length(piece, k) - 1)
+        if steps[way].size:
+            steps[way] = steps[way].min()
+    return JointMotion(motion.t[0] + np.concatenate([[0.0], np.cumsum(steps)]), motion.q)
+
+
 def _way_length(piece: Piece, k: int) -> int:
     """Return the number of samples of a move from where it begins to where it arrives."""
     first = 0 if k == 0 else int(piece.ends[k - 1])

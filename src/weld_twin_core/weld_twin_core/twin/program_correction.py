@@ -354,8 +354,8 @@ class _Work(NamedTuple):
 
 def _worse(before: float, after: float) -> str:
     return (
-        f'its worst place would be {after * 1e3:.3f} mm off instead of {before * 1e3:.3f} mm; too little is '
-        'gained there, as where play turns around or lag sets in between two points'
+        f'its worst place would be {after * 1e3:.3f} mm off instead of {before * 1e3:.3f} mm; too '
+        'little is gained there, as where play turns around or lag sets in between two points'
     )
 
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -140,7 +139,7 @@ def sealed_seam(language: str, seed: int, number: int) -> SealedSeam:
 
     """
     rng = np.random.default_rng([seed, number, sorted(CELLS).index(language)])
-    case = one_arm(_dealt(language, seed, number, rng))
+    case = _dealt(language, seed, number, rng)
     warm = case.train.command.temperature
     context = context_on(language, case.cell.robot)
     for _ in range(TRIES):
@@ -159,10 +158,14 @@ def sealed_seam(language: str, seed: int, number: int) -> SealedSeam:
 
 def _dealt(language: str, seed: int, number: int, rng: np.random.Generator) -> Case:
     """Return a case; causes that do not show on a robot give way to those of another deck."""
-    for deck in range(DECKS - 1):
-        with suppress(DataError):
-            return draw_case(lot_of(language, seed, number, deck), rng, (RECORDED, RECORDED))
-    return draw_case(lot_of(language, seed, number, DECKS - 1), rng, (RECORDED, RECORDED))
+    why = DataError(language)
+    for deck in range(DECKS):
+        try:
+            lot = lot_of(language, seed, number, deck)
+            return one_arm(draw_case(lot, rng, (RECORDED, RECORDED)))
+        except DataError as error:
+            why = error
+    raise why
 
 
 def lot_of(language: str, seed: int, number: int, deck: int = 0) -> Lot:

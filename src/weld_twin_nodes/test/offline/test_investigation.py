@@ -193,6 +193,8 @@ def named(cause, confidence, status='identified', wanted=None):
         # Neither is sure by itself, and both say the same; or one hardly says it.
         (named(SPRING, 0.9), named(SPRING, 0.92), 0, True),
         (named(SPRING, 0.8), named(SPRING, 0.4), 0, False),
+        # What all recordings rule out, the experiments leave open: what both hold is told.
+        (named(SPRING, 0.95), found(wanted=stations(sigma=0.5)), 1, True),
         # Sure of as many causes, but of another one.
         (found(groups=((SPRING, ZERO), (ELSE,))), named(SPRING, 0.6), 0, False),
         # Some motion parts what is named beside each other; or none does, and only others are asked.
@@ -216,6 +218,16 @@ def test_experiments_alone_are_heard_beside_all_recordings(together, alone, beli
     assert told['verdict']['status'] == expected['status']
     assert told['verdict']['indistinguishable'] == expected['indistinguishable']
     assert bool(why) is closed
+
+
+def test_what_is_sure_of_all_recordings_and_unknown_without_the_first_is_asked_about():
+    unknown = named(None, 0.9, 'unknown', stations(sigma=None))
+    for wanted in (None, {**stations(), 'motion': None}):
+        told, why = weighed(named(SPRING, 0.99, wanted=wanted), unknown)
+        assert not why and told['verdict']['status'] == 'identified'
+        assert question(told, 30.0, [], why)['kind'] == 'stations'
+    own = stations(count=4)
+    assert weighed(named(SPRING, 0.99, wanted=own), unknown)[0]['next_experiment'] is own
 
 
 def test_belief_is_that_of_both_and_the_other_raises_it_or_lowers_it():

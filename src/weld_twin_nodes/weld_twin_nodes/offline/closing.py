@@ -19,7 +19,7 @@ from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
 from weld_twin_core.diagnosis.advice.next_step import SURE
 from weld_twin_core.diagnosis.result import NAMING
 
-OWN, FOR, AGAINST, AGAIN, BEGIN = 0.37, 1.29, -0.52, 0.98, -0.1
+OWN, FOR, AGAINST, AGAIN, BEGIN = 0.4, 1.2, -0.57, 0.97, 0.03
 """What the log odds of an answer count, those of the other where it names the same, those where it
 names something else, every further experiment that names the same by itself, and what is added.
 `weld-twin lab closing` learned them; docs/investigate.md says from which cells."""
@@ -72,7 +72,14 @@ def weighed(
     for one in stated:
         if (one['verdict']['confidence'] or 0.0) >= CLOSED and not _open_ends(one):
             return one, _words(one)
-    return (stated or heard)[0], ''
+    return _asking((stated or heard)[0], (together, alone)), ''
+
+
+def _asking(found: Mapping[str, Any], heard: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Return a diagnosis that leaves the question open, with the other's experiment if it has none."""
+    plans = [one.get('next_experiment') for one in (found, *heard)]
+    wanted = next((plan for plan in plans if plan and plan['motion'] is not None), plans[0])
+    return {**found, 'next_experiment': wanted}
 
 
 def closes(found: Mapping[str, Any]) -> str:
@@ -128,9 +135,9 @@ def signs(
     """
     stated = other['verdict']['status'] in STATED
     heard = max(_log_odds(other), 0.0) if stated else 0.0
-    same = _same(found, other)
+    backed = _same(found, other, no_wider=True)
     again = max(sum(_same(found, one) for one in each) - 1, 0)
-    return _log_odds(found), heard * same, heard * (not same), float(again)
+    return _log_odds(found), heard * backed, heard * (not _same(found, other)), float(again)
 
 
 def _log_odds(found: Mapping[str, Any]) -> float:
@@ -151,13 +158,18 @@ def _with_belief(
     return {**found, 'verdict': {**verdict, 'confidence': belief(found, other, each)}}
 
 
-def _same(found: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Return whether two answers name as many causes, each of one among those of the other."""
+def _same(found: Mapping[str, Any], other: Mapping[str, Any], *, no_wider: bool = False) -> bool:
+    """
+    Return whether two answers name as many causes, each of one among those of the other.
+
+    With ``no_wider``, whether all that the other names beside each other is named by the first as
+    well: an answer that leaves more open says nothing of what the first rules out.
+    """
     if any(one['verdict']['status'] not in STATED for one in (found, other)):
         return False
     left = _sites(other)
     for group in _sites(found):
-        match = next((own for own in left if group & own), None)
+        match = next((own for own in left if (own <= group if no_wider else own & group)), None)
         if match is None:
             return False
         left.remove(match)

@@ -158,7 +158,7 @@ def test_a_gear_ratio_has_degrees_and_no_two_minds_about_the_controller():
     page = plain(report_page(diagnoses.diagnosis('identified', robot, [gear], [gear], seam)))
     assert 'off by 0.108° in every 90°' in page and 'has no field for it' not in page
     assert 'Where the controller has a field for ratios of gears' in page
-    assert 'turns of the motor per turn of the joint, divide' in page
+    assert 'divided by it where it is turns of the motor per turn of the joint' in page
 
 
 def test_the_circle_has_a_key():

@@ -122,13 +122,10 @@ def correction(effect: Effect, brand: str | None) -> str:
 
 
 def gearing(effect: Effect) -> str:
-    """Return which way round a ratio of a gear is meant; nothing for another effect."""
+    """Return what shows that a ratio of a gear was entered the right way; nothing for another effect."""
     if effect.name != 'gear_ratio':
         return ''
-    return (
-        'Times is for turns of the joint per turn of the motor; where the field has turns of the '
-        'motor per turn of the joint, divide. Measure again: the wrong way round doubles the error.'
-    )
+    return 'Measure again: the wrong way round doubles the error.'
 
 
 def _off(effect: Effect) -> dict[str, str]:

@@ -94,8 +94,9 @@ def _tool_pose(effect: Effect, robot: Robot) -> str:
 def _gear_ratio(effect: Effect, robot: Robot) -> str:
     scale = _value(effect, 'scale')
     return (
-        f'Enter the gear ratio of {effect.site} times {1.0 + scale:.6f}: it turns '
-        f'{number(scale * 100.0)} % of its angle further than it reads.'
+        f'Enter the gear ratio of {effect.site} times {1.0 + scale:.6f} where it is turns of the joint '
+        f'per turn of the motor, divided by it where it is turns of the motor per turn of the joint: '
+        f'it turns {number(scale * 100.0)} % of its angle further than it reads.'
     )
 
 

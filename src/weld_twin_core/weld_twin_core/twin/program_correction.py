@@ -42,6 +42,8 @@ APART = (2e-4, 2e-3)
 BETTER = 0.8
 """Share of its worst error that a seam may keep: five arms with sealed causes that were to keep more
 came out up to twice as far off as before, and none better."""
+NOTHING = 1e-9
+"""Error [m] that is rounding."""
 WORTH = 0.5
 """Share of a correction that must be trusted: below it the doubt is larger than the correction."""
 
@@ -186,7 +188,10 @@ class _Work(NamedTuple):
         for _ in range(ROUNDS):
             steps: dict[int, list[Array]] = {}
             for piece in self.travel.pieces:
-                motion = repeated(self.model.robot, moved, piece)
+                try:
+                    motion = repeated(self.model.robot, moved, piece)
+                except PathError:
+                    continue  # its seams are refused for it
                 gap = self.gap(piece, motion, calm)
                 _collect(self.model, moved, piece, motion, gap, steps)
             points = list(moved.points)
@@ -240,10 +245,6 @@ class _Work(NamedTuple):
             motion = repeated(self.model.robot, moved, piece)
             meant = self.gap(piece, motion, calm)
             sizes = [self._sizes(piece, one) for one in (piece.motion, motion)]
-            sure = self.model.covariances(piece, motion)
-            if sure is not None:
-                doubt = np.trace(sure[:, :3, :3], axis1=1, axis2=2)
-                sizes[1] = np.sqrt(sizes[1] ** 2 + doubt)
             for k, move in enumerate(piece.moves):
                 off = meant[piece.ends[k]]
                 apart = np.linalg.norm(off[:3]) > APART[0] or np.linalg.norm(off[3:]) > APART[1]
@@ -256,7 +257,7 @@ class _Work(NamedTuple):
                 old = worst.get(move.seam, (0.0, 0.0))
                 worst[move.seam] = max(before, old[0]), max(after, old[1])
         for seam, (before, after) in worst.items():
-            if after > BETTER * before:
+            if after > BETTER * before + NOTHING:
                 out.setdefault(seam, _worse(before, after))
         return {seam: why for seam, why in out.items() if seam not in left}
 

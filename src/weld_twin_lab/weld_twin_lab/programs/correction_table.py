@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any
@@ -144,7 +145,7 @@ def _row(name: str, total: dict[str, Any]) -> tuple[str, ...]:
 
 def _plain(why: str) -> str:
     """Return a reason without its place and numbers."""
-    return why.rpartition(': ')[2]
+    return re.sub(r'\d+\.\d+', '...', why.rpartition(': ')[2])
 
 
 def _seam_row(case: dict[str, Any]) -> tuple[str, ...]:

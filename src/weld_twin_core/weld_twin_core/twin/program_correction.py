@@ -15,7 +15,7 @@ without what has a memory, and left where that gains too little as well.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -46,6 +46,10 @@ NOTHING = 1e-9
 """Error [m] that is rounding."""
 WORTH = 0.5
 """Share of a correction that must be trusted: below it the doubt is larger than the correction."""
+
+
+Written = Callable[[Sequence[Array]], Sequence[Array]]
+"""From points to what they read like once they are written."""
 
 
 class Caps(NamedTuple):
@@ -125,6 +129,7 @@ def correct_program(
     held: dict[int, str] | None = None,
     caps: Caps | None = None,
     start: Array | None = None,
+    written: Written | None = None,
 ) -> ProgramCorrection:
     """
     Return a program whose points are moved so that the real tool goes where it was to go.
@@ -138,10 +143,12 @@ def correct_program(
     caps : Caps, optional
     start : array, shape (n,), optional
         Joint positions before the first move.
+    written : callable, optional
+        Returns points as they read once they are written; a language has only so many digits.
 
     """
     way = travel(model.robot, program, start, model.recorded if model.posterior else None)
-    work = _Work(model, program, way, caps or Caps(), model.without_memory())
+    work = _Work(model, program, way, caps or Caps(), model.without_memory(), written)
     left = dict(work.travel.lost)
     for seam, why in _held_seams(program, held or {}).items():
         left.setdefault(seam, why)
@@ -149,12 +156,11 @@ def correct_program(
     moved = work.solved(_spread(program, left), calm)
     for _ in range(2 * len(work.seams) + 1):
         found = work.refused(moved, left, calm)
-        unsettled = {} if found else work.unsettled(moved, left, calm)
-        if not found and not unsettled:
+        found = found or work.unsettled(moved, left, calm)
+        if not found:
             break
-        for seam, why in unsettled.items():
-            (found if work.still is None or seam in calm else calm).setdefault(seam, why)
-        left |= found
+        for seam, why in found.items():
+            (left if work.still is None or seam in calm else calm).setdefault(seam, why)
         moved = work.solved(_spread(program, left), calm)
     calm = {seam: why for seam, why in calm.items() if seam not in left}
     return work.result(moved, left, calm)
@@ -168,6 +174,7 @@ class _Work(NamedTuple):
     travel: Travel
     caps: Caps
     still: ProgramModel | None
+    written: Written | None
 
     @property
     def seams(self) -> list[int]:
@@ -199,7 +206,7 @@ class _Work(NamedTuple):
                 if point not in still:
                     points[point] = _stepped(points[point], np.mean(found, axis=0))
             moved = moved.with_points(points)
-        return moved
+        return moved if self.written is None else moved.with_points(self.written(moved.points))
 
     def refused(
         self, moved: MoveProgram, left: dict[int, str], calm: Collection[int]

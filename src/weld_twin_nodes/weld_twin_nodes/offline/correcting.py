@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -133,16 +134,18 @@ def corrected_program(
     if not program.steps:
         raise DataError(f"no move was found in '{name}'; is its language {program.language}?")
     moves = to_moves(program, context.robot, context.controller)
-    found = correct_program(model, moves, held=program.held, caps=caps, start=start)
+    found = correct_program(
+        model,
+        moves,
+        held=program.held,
+        caps=caps,
+        start=start,
+        written=lambda points: _read_back(program, context, points)[1],
+    )
     seams = {move.seam for piece in moves.pieces for move in piece}
     if seams <= set(found.left):
         raise DataError(f"nothing in '{name}' can be corrected: {next(iter(found.left.values()))}")
-    moved = [k for k in _led(found) if k not in found.held]
-    texts = rewritten(program, found.program.points, moved)
-    again = [
-        Source(source.name, text) for source, text in zip(program.sources, texts, strict=True)
-    ]
-    check_written(program, read_sources(again, context, program.language), found.program.points)
+    texts, _ = _read_back(program, context, found.program.points)
     notes = _notes(program, context, model) + [
         f'{where} names no posture; the only one that was recorded was taken'
         for where in found.travel.assumed
@@ -151,10 +154,17 @@ def corrected_program(
     return CorrectedProgram(program, tuple(texts), found, tuple(notes))
 
 
-def _led(found: ProgramCorrection) -> list[int]:
-    """Return the points that a move goes to."""
-    uses = [use for piece in found.program.pieces for move in piece for use in move.uses]
-    return sorted({use.point for use in uses if use.leads})
+def _read_back(
+    program: Program, context: Context, points: Sequence[Array]
+) -> tuple[list[str], list[Array]]:
+    """Return the texts of a program with other points, and the points as they read there."""
+    texts = rewritten(program, points, range(len(points)))
+    sources = [
+        Source(source.name, text) for source, text in zip(program.sources, texts, strict=True)
+    ]
+    read = read_sources(sources, context, program.language)
+    check_written(program, read, points)
+    return texts, [point.value for point in read.points]
 
 
 def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]:

@@ -18,8 +18,8 @@ STEP = 0.005
 """Way between two places that joints are worked out for [m]."""
 FINE = 0.001
 """The same where they are straight in the joints, and the tool goes in a bow [m]."""
-REST = 0.5
-"""Stay at either end [s]."""
+REST = 2.0
+"""Stay at either end [s], as exported programs say; what grows with time has grown by then."""
 TURNING = 0.2
 """A turn of the tool takes as long as its end takes to go so far [m/rad]."""
 BY_JOINTS = ('movej', 'PTP', 'MoveAbsJ', 'MOVJ', 'J', 'joint', 'point')

@@ -262,3 +262,13 @@ def test_what_play_spoils_is_corrected_without_it(tmp_path):
     # The play of 6e-4 would have moved them by another 0.15 mm up and down.
     moved = [move['moved_m'] for move in told['moves']]
     assert moved == pytest.approx([3e-4 * reach for reach in reaches], rel=0.01)
+
+
+def test_a_correction_finer_than_the_language_writes_is_none(tmp_path):
+    found = [{'effect': 'joint_offset', 'joint': 'joint_2_l', 'offset': 4e-6}]
+    (tmp_path / 'found.yaml').write_text(yaml.safe_dump(found))
+    said = weld_twin(
+        *('correct-program', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
+        *('--out', tmp_path / 'out', '--model', tmp_path / 'found.yaml', *OPTIONS['inform']),
+    )
+    assert said.code == 2 and 'too little is gained' in said.err

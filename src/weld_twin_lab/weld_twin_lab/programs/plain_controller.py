@@ -107,9 +107,9 @@ def _size(way: np.ndarray, turn: np.ndarray) -> float:
     return float(max(np.linalg.norm(way), TURNING * np.linalg.norm(turn)))
 
 
-def evenly(made: Driven, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return even stamps (N,) [s] and joints (N, n), with a stay at either end."""
-    end = float(made.clock[-1]) + 2.0 * REST
+def evenly(made: Driven, rate: float, rest: float = REST) -> tuple[np.ndarray, np.ndarray]:
+    """Return even stamps (N,) [s] and joints (N, n), with a stay [s] at either end."""
+    end = float(made.clock[-1]) + 2.0 * rest
     t = np.arange(int(end * rate) + 1) / rate
-    columns = [np.interp(t - REST, made.clock, column) for column in made.joints.T]
+    columns = [np.interp(t - rest, made.clock, column) for column in made.joints.T]
     return t, np.stack(columns, axis=1)

@@ -39,8 +39,8 @@ SPEED = (0.01, 0.04)
 RECORDED = 30.0
 """Length of the free motion that is recorded [s]."""
 BARE = 0.5
-"""What is recorded of the stay at either end of a seam [s]: over longer stays an outlier of the instrument
-is taken for a tool that moves while the joints' positions are stuck."""
+"""What is recorded of the stay at either end of a seam [s]: over longer stays an outlier of the
+instrument is taken for a tool that moves while the joints are stuck."""
 DECKS, APART = 4, 10**6
 """Decks that are tried for a case, and how far apart their seeds are."""
 TRIES = 40

@@ -40,8 +40,8 @@ SINGULAR = 1e-9
 APART = (2e-4, 2e-3)
 """Two uses of one point may want corrections this far apart [m, rad]; the mean serves both."""
 BETTER = 0.8
-"""Share of its worst error that a seam may keep: five arms with sealed causes that were to keep more
-came out up to twice as far off as before, and none better."""
+"""Share of its worst error that a seam may keep: of arms with sealed causes that were to keep more, five
+came out farther off than before, up to twice as far."""
 NOTHING = 1e-9
 """Error [m] that is rounding."""
 WORTH = 0.5

@@ -530,8 +530,8 @@ class Diagnosis:
     contacts: ContactResult | None = None
     """How well contacts agree, where contacts took the place of an instrument."""
     learned: float | None = None
-    """How often such answers were right; ``confidence`` tells less where it is not sure. None where
-    nothing was learned of such answers."""
+    """How often such answers were right; ``confidence`` tells less where it is not sure, or does not
+    always come back. None where nothing was learned of such answers."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
@@ -559,7 +559,7 @@ class Diagnosis:
             'status': self.status,
             'effects': [found.as_dict() for found in self.effects],
             'confidence': None if self.status == 'unsound' else self.confidence,
-            'learned': self.learned,
+            'learned': self.learned if self.status != 'unsound' else None,
             'indistinguishable': [
                 [{'effect': s.effect, 'joint': s.joint} for s in group]
                 for group in self.indistinguishable

@@ -14,17 +14,16 @@ from weld_twin_core.arrays import Array
 
 from ..belief.logistic import Weights, fitted
 
-SIGNS = ('own', 'same', 'other', 'again')
-"""Log odds of the answer, those of the other diagnosis that speak for it, or against it, and how many
-further experiments name the same by themselves."""
-WAYS = np.array([1.0, 1.0, -1.0, 1.0])
+SIGNS = ('own', 'same', 'against')
+"""Log odds of the answer, and those of the other diagnosis that speak for it, or against it."""
+WAYS = np.array([1.0, 1.0, -1.0])
 """Which way each may change belief."""
 RIDGE = 1.0
 """Towards the log odds of the answer alone, in log loss: as much as one answer."""
 FOLDS = 10
 """Parts of the cells of which each is judged by weights learned from the others."""
 TRIED = (0.9, 0.95, 0.97, 0.98)
-"""Probabilities from which a question could be closed."""
+"""Beliefs from which a question could be closed."""
 
 
 class Heard(NamedTuple):
@@ -33,7 +32,7 @@ class Heard(NamedTuple):
 
     Attributes
     ----------
-    signs : array, shape (N, 4)
+    signs : array, shape (N, 3)
     right : array of bool, shape (N,)
     cell, turn : array of int, shape (N,)
         Which cell, and which of its rounds.
@@ -82,7 +81,7 @@ def weights(taught: Heard) -> Weights:
 
     """
     ones = np.ones(len(taught.right))
-    return fitted(taught.signs, taught.right, WAYS, np.array([1.0, 0.0, 0.0, 0.0]), RIDGE, ones)
+    return fitted(taught.signs, taught.right, WAYS, np.array([1.0, 0.0, 0.0]), RIDGE, ones)
 
 
 def unseen(all_: Heard) -> Array:
@@ -102,16 +101,16 @@ def unseen(all_: Heard) -> Array:
     return out
 
 
-def closed(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
+def reached(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
     """
-    Return how many cells would be closed rightly, and how many wrongly.
+    Return in how many cells the first answer that is believed so far is right, and in how many wrong.
 
     Parameters
     ----------
     all_ : Heard
     probability : array, shape (N,)
     least : float
-        From which the first round that has it closes a cell.
+        Belief that it has to have.
 
     """
     counts = [0, 0]
@@ -136,14 +135,14 @@ def page(all_: Heard) -> str:
 
     found, probability = weights(all_), unseen(all_)
     learned = zip((*SIGNS, 'added'), (*found.slopes, found.bias), strict=True)
-    rows = [(f'{least:.2f}', *map(str, closed(all_, probability, least))) for least in TRIED]
+    rows = [(f'{least:.2f}', *map(str, reached(all_, probability, least))) for least in TRIED]
     return '\n'.join(
         [
             f'{len(all_.right)} answers of {len(np.unique(all_.cell))} cells',
             '',
             markdown.table(('sign', 'counts'), *((name, f'{v:.2f}') for name, v in learned)),
             '',
-            markdown.table(('closed from', 'right', 'wrong'), *rows),
+            markdown.table(('believed from', 'right', 'wrong'), *rows),
             '',
         ]
     )

@@ -51,11 +51,7 @@ def said(cell: SealedCell, found: Mapping[str, Any], why: str) -> dict[str, Any]
 
 
 def answered(
-    cell: SealedCell,
-    first: Recording,
-    later: Sequence[Recording],
-    limits: Limits,
-    each: list[Found],
+    cell: SealedCell, first: Recording, later: Sequence[Recording], limits: Limits
 ) -> tuple[Found, str, dict[str, Any]]:
     """
     Return the answer from the first recording and later ones, why it closes the question, and how.
@@ -67,8 +63,6 @@ def answered(
     later : sequence of Recording
     limits : Limits
         What the next experiment may take.
-    each : list of mapping
-        What every experiment showed by itself; that of the newest is added.
 
     Returns
     -------
@@ -78,26 +72,23 @@ def answered(
         What the two diagnoses were weighed by, and what they are worth; empty where there was one.
 
     """
-    together = cell.diagnosed([first, *later], limits=limits)
-    if not later or cell.seen_anew(later):
+    by_itself = not later or cell.seen_anew(later)
+    asked = replace(limits, confirm=by_itself)
+    together = cell.diagnosed([first, *later], limits=asked)
+    if by_itself:
         return *weighed(together), {}
     # Too few stations cannot be diagnosed by themselves.
     with suppress(TwinError):
         alone = cell.diagnosed(list(later), limits=limits)
-        if len(later) == 1:
-            each.append(alone)
-        else:
-            with suppress(TwinError):
-                each.append(cell.diagnosed([later[-1]], experiment=False))
         pairs = {'together': (together, alone), 'alone': (alone, together)}
-        heard = {name: _weight(cell, *pair, each) for name, pair in pairs.items()}
-        return *weighed(together, alone, each), heard
+        heard = {name: _weight(cell, *pair) for name, pair in pairs.items()}
+        return *weighed(together, alone), heard
     return *weighed(together), {}
 
 
-def _weight(cell: SealedCell, found: Found, other: Found, each: Sequence[Found]) -> dict[str, Any]:
+def _weight(cell: SealedCell, found: Found, other: Found) -> dict[str, Any]:
     return {
-        'signs': signs(found, other, each),
+        'signs': signs(found, other),
         'stated': found['verdict']['status'] in STATED,
         'right': cell.judged(found).right,
     }
@@ -109,7 +100,7 @@ def _left(minutes: float, visit: float = VISIT) -> Limits:
 
 def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Return the first diagnosis and what it is worth; None where it is right or finds a mistake."""
-    found, why, _ = answered(cell, cell.first, [], replace(_left(MINUTES), confirm=True), [])
+    found, why, _ = answered(cell, cell.first, [], _left(MINUTES))
     first = said(cell, found, why)
     wrong = first['status'] in ('ambiguous', 'unknown') or not first['right']
     # What cannot be told apart by any motion is no question for an experiment; nor is one that only
@@ -179,7 +170,6 @@ def investigated(
 ) -> tuple[list[dict[str, Any]], str, dict[str, Any]]:
     """Return the rounds of the loop, the word that it ended with, and its last answer."""
     later: list[Recording] = []
-    each: list[Found] = []
     rounds: list[dict[str, Any]] = []
     left, visit, why = MINUTES, VISIT, None
     while True:
@@ -196,7 +186,7 @@ def investigated(
         left, visit = left - asked['robot_minutes'], visit - asked['minutes']
         begun = time.perf_counter()
         try:
-            found, why, heard = answered(cell, start, later, _left(left, visit), each)
+            found, why, heard = answered(cell, start, later, _left(left, visit))
         except TwinError as error:
             return rounds, f'refused: {error}', answer
         answer = said(cell, found, why)
@@ -215,7 +205,7 @@ def _with(cell: SealedCell, start: Recording, name: str, motion: Motion) -> dict
     """Return what a further recording of a motion leads to."""
     made = cell.made(name, motion, 200)
     try:
-        return said(cell, *answered(cell, start, [made], _left(MINUTES), [])[:2])
+        return said(cell, *answered(cell, start, [made], _left(MINUTES))[:2])
     except TwinError as error:
         return {'status': 'refused', 'said': str(error), 'right': False, 'sure': False}
 

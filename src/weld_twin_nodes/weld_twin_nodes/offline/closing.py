@@ -5,8 +5,7 @@ Whether diagnoses close the question of an investigation, and how far what they 
 
 What poor recordings show is easily misread, and then stands in the way of what better ones show. So
 all recordings are diagnosed together, and the experiments without the first ones. Each knows how often
-answers like it were right; the other speaks for it or against it. Experiments have no measurement in
-common: what several of them name by themselves is the likelier for it.
+answers like it were right; the other speaks for it or against it.
 """
 
 from __future__ import annotations
@@ -19,10 +18,10 @@ from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
 from weld_twin_core.diagnosis.advice.next_step import SURE
 from weld_twin_core.diagnosis.result import NAMING
 
-OWN, FOR, AGAINST, AGAIN, BEGIN = 0.4, 1.2, -0.57, 0.97, 0.03
+OWN, FOR, AGAINST, BEGIN = 0.4, 1.2, -0.57, 0.03
 """What the log odds of an answer count, those of the other where it names the same, those where it
-names something else, every further experiment that names the same by itself, and what is added.
-`weld-twin lab closing` learned them; docs/investigate.md says from which cells."""
+names something else, and what is added. `weld-twin lab closing` learned them; docs/investigate.md says
+from which cells."""
 CLOSED = 0.95
 """Probability from which an answer that two diagnoses were asked for closes the question. A judgement:
 in the cells that the weights were learned from, each judged by weights learned from the others, none of
@@ -35,9 +34,7 @@ STATED = (*NAMING, 'none')
 
 
 def weighed(
-    together: Mapping[str, Any],
-    alone: Mapping[str, Any] | None = None,
-    each: Sequence[Mapping[str, Any]] = (),
+    together: Mapping[str, Any], alone: Mapping[str, Any] | None = None
 ) -> tuple[Mapping[str, Any], str]:
     """
     Return which diagnosis to believe, and whether and why it closes the question.
@@ -48,14 +45,12 @@ def weighed(
         The diagnosis of all recordings.
     alone : mapping, optional
         That of the experiments without the recordings before them.
-    each : sequence of mapping
-        Those of every experiment by itself.
 
     Returns
     -------
     found : mapping
-        The one that is believed, that of all recordings where both name the same; where there were
-        two, its confidence is that of both.
+        The one that is believed; where there were two, its confidence is that of both. If both name
+        the same, it is that of all recordings, unless only the other closes the question.
     why : str
         In words why it closes the question; empty where it does not.
 
@@ -63,7 +58,7 @@ def weighed(
     if alone is None:
         return together, closes(together)
     pairs = ((together, alone), (alone, together))
-    heard = [_with_belief(found, other, each) for found, other in pairs]
+    heard = [_with_belief(found, other) for found, other in pairs]
     # What does not fit together, as after a knock between two recordings, may be sound by itself.
     heard = [one for one in heard if not _unsound(one)] or heard
     if not _same(together, alone):
@@ -99,45 +94,37 @@ def closes(found: Mapping[str, Any]) -> str:
     return '' if open_ or _to_confirm(found) else _words(found)
 
 
-def belief(
-    found: Mapping[str, Any], other: Mapping[str, Any], each: Sequence[Mapping[str, Any]] = ()
-) -> float:
+def belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> float:
     """
     Return how probable it is that an answer is right, with another of most of the same measurements.
 
     Parameters
     ----------
-    found, other, each
+    found, other
         As `signs` takes them.
 
     """
-    own, same, against, again = signs(found, other, each)
-    total = OWN * own + FOR * same + AGAINST * against + AGAIN * again + BEGIN
-    return 1.0 / (1.0 + exp(-total))
+    own, same, against = signs(found, other)
+    return 1.0 / (1.0 + exp(-(OWN * own + FOR * same + AGAINST * against + BEGIN)))
 
 
-def signs(
-    found: Mapping[str, Any], other: Mapping[str, Any], each: Sequence[Mapping[str, Any]] = ()
-) -> tuple[float, float, float, float]:
+def signs(found: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, float, float]:
     """
     Return the log odds of an answer, and of another as far as it speaks for it, and against it.
 
-    The fourth is how many experiments name the same by themselves, after the first that does. What
-    the other leaves unknown speaks for nothing: it may be what poor recordings hide.
+    The other counts where it is likelier right than wrong. What it leaves unknown speaks for nothing:
+    it may be what poor recordings hide.
 
     Parameters
     ----------
     found, other : mapping
         The contents of two diagnosis.json.
-    each : sequence of mapping
-        Those of every experiment by itself.
 
     """
     stated = other['verdict']['status'] in STATED
     heard = max(_log_odds(other), 0.0) if stated else 0.0
     backed = _same(found, other, no_wider=True)
-    again = max(sum(_same(found, one) for one in each) - 1, 0)
-    return _log_odds(found), heard * backed, heard * (not _same(found, other)), float(again)
+    return _log_odds(found), heard * backed, heard * (not _same(found, other))
 
 
 def _log_odds(found: Mapping[str, Any]) -> float:
@@ -148,14 +135,12 @@ def _log_odds(found: Mapping[str, Any]) -> float:
     return log(held / (1.0 - held))
 
 
-def _with_belief(
-    found: Mapping[str, Any], other: Mapping[str, Any], each: Sequence[Mapping[str, Any]]
-) -> Mapping[str, Any]:
+def _with_belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return a diagnosis with the confidence that it has beside another."""
     verdict = found['verdict']
     if verdict['status'] not in STATED:
         return found
-    return {**found, 'verdict': {**verdict, 'confidence': belief(found, other, each)}}
+    return {**found, 'verdict': {**verdict, 'confidence': belief(found, other)}}
 
 
 def _same(found: Mapping[str, Any], other: Mapping[str, Any], *, no_wider: bool = False) -> bool:

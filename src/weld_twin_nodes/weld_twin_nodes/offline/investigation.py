@@ -123,7 +123,6 @@ def take_in(
     found: Mapping[str, Any],
     why: str | None = None,
     changes: str = '',
-    newest: Mapping[str, Any] | None = None,
 ) -> State:
     """
     Return the state after a diagnosis of all recordings so far.
@@ -139,8 +138,6 @@ def take_in(
         Why it closes the question, as `weighed` tells it; left out, this diagnosis alone counts.
     changes : str
         What was changed in the cell for the new recordings; every later diagnosis is told.
-    newest : mapping, optional
-        What the new recordings show by themselves.
 
     """
     rounds = list(state['rounds'])
@@ -153,8 +150,6 @@ def take_in(
         {**hashed('recording', Path(bag).resolve())._asdict(), 'changed': changes} for bag in bags
     ]
     step: dict[str, Any] = {'recordings': new, 'believed': believed(found), 'asked': None}
-    if newest is not None:
-        step['newest'] = believed(newest)
     out = {**state, 'rounds': [*rounds, step], 'spent_min': spent}
     kinds = [r['asked']['kind'] for r in rounds if r.get('asked')]
     answer = question(found, float(state['budget_min']) - spent, kinds, why)
@@ -163,11 +158,6 @@ def take_in(
         return out
     status, reason = answer
     return {**out, 'state': status, 'why': reason}
-
-
-def shown_alone(state: State) -> list[dict[str, Any]]:
-    """Return what every experiment so far showed by itself, as `weighed` takes it."""
-    return [{'verdict': step['newest']} for step in state['rounds'] if 'newest' in step]
 
 
 def believed(found: Mapping[str, Any]) -> dict[str, Any]:

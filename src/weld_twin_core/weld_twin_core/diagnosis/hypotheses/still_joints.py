@@ -19,6 +19,8 @@ STILL_SLIDE = 2e-3
 """The same for a joint that slides, [m]."""
 WIDE = 0.5
 """Travel [rad, m] from which on a joint shows well how something depends on its angle."""
+MOST_OF_IT = 0.5
+"""Share of what a joint can travel at all that is wide where that is less."""
 REASON = 'the joint hardly moves'
 
 
@@ -45,7 +47,8 @@ def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
     """
     ends = [(r.joints.q.min(axis=0), r.joints.q.max(axis=0)) for r in recordings]
     travel = np.max([high for _, high in ends], axis=0) - np.min([low for low, _ in ends], axis=0)
-    return tuple(np.array(robot.joint_names)[travel < WIDE].tolist())
+    wide = np.minimum(WIDE, MOST_OF_IT * (robot.upper - robot.lower))
+    return tuple(np.array(robot.joint_names)[travel < wide].tolist())
 
 
 def moved_most(features: Sequence[Features], joint: str | None) -> int:

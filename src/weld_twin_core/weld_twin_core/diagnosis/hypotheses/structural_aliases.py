@@ -32,7 +32,7 @@ from ..result import Site
 from .rivals import Rival, nats_in_place, weighed
 from .search import Search
 from .selection import fitted_with, implausible
-from .still_joints import STILL, hardly_moves, moved_most
+from .still_joints import hardly_moves, moved_most
 
 POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
@@ -40,6 +40,9 @@ LEVER = 0.5
 """Metres of tool motion that a radian of turn counts as; it only scales a comparison."""
 SAME = 1e-6
 """Share of an error that may lie outside what another one spans; far above rounding."""
+SAME_AT_REST = 0.04
+"""The same of what is done by a joint at rest: as far as that may travel [rad], a wave that comes once
+per turn departs from a constant."""
 MOST_SEEDS = 3
 """Instances of an excluded kind that are fitted at most; between them lie sizes ten times apart."""
 FEW = 2
@@ -185,11 +188,11 @@ def _unused(found: Search, features: list[Features], slot: Sequence[Rival], seed
     """
     own = _whitened(found, features, seed)
     sizes = np.linalg.eigvalsh(own @ own.T)
-    used = [int((sizes >= STILL**2 * sizes[-1]).sum())]
+    used = [int((sizes >= SAME_AT_REST**2 * sizes[-1]).sum())]
     for rival in slot:
         if _constant(REGISTRY[rival.site.effect]):
             other = _whitened(found, features, _of(rival.site))
-            used += [len(other)] if _inside(other, own, STILL) else []
+            used += [len(other)] if _inside(other, own, SAME_AT_REST) else []
     return len(own) - min(used)
 
 

@@ -189,10 +189,10 @@ def _blind(full: Tableau, prices: Prices, size: Array, found: int, far: float) -
     Only from such as all data put further behind than ``far`` nats: what comes near there is a
     rival, and is to be heard.
     """
-    halves, out = np.arange(len(size)), np.zeros((len(size), found, len(full.parts)), bool)
+    every, out = np.arange(len(size)), np.zeros((len(size), found, len(full.parts)), bool)
     for k in range(found):
         less = deepcopy(full)
-        less.sweep(halves, k)
+        less.sweep(every, k)
         part, scaled = full.parts[k], _as_on_all(full, size, k)
         own = np.einsum('hi,hij,hj->h', scaled, less.table[:, part, part], scaled)
         for u in range(found, len(full.parts)):

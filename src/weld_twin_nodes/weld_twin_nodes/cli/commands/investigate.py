@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -112,8 +111,12 @@ def _changes(args: argparse.Namespace, state: dict[str, Any]) -> str:
 
 def _recorded(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> dict[str, Any]:
     """Run and record what is asked for in the cell that is up, and take it in."""
+    from weld_twin_core.errors import DataError
+
     from ...harness.recorded_experiment import recorded_experiment
 
+    if 'robot_minutes' not in _asked(state):
+        raise DataError(f"nothing is asked for in '{directory}'; go on with a recording")
     place = directory / f'round-{len(state["rounds"]) - 1}'
     seconds = 60.0 * SLOWER * float(_asked(state)['robot_minutes']) / max(args.playback, LEAST)
     bag = recorded_experiment(
@@ -177,8 +180,7 @@ def _round(
     from ...report.investigation_page import headline, investigation_page
 
     place = directory / f'round-{len(state["rounds"])}'
-    found, why, newest = _heard(state, bags, changes, place)
-    state = take_in(state, bags, found, why, changes, newest)
+    state = take_in(state, bags, *_heard(state, bags, changes, place), changes)
     asked = state['rounds'][-1]['asked']
     if asked is not None:
         _write_experiment(args, place, state, asked)
@@ -194,33 +196,26 @@ def _round(
 
 def _heard(
     state: dict[str, Any], bags: list[str], changes: str, place: Path
-) -> tuple[Mapping[str, Any], str, Mapping[str, Any] | None]:
-    """
-    Diagnose all recordings, and the experiments by themselves.
-
-    Returns what to believe, why that closes the question, and what the newest experiment shows.
-    """
-    from weld_twin_core.errors import DataError
+) -> tuple[Mapping[str, Any], str]:
+    """Diagnose all recordings, and the experiments by themselves; return what to believe."""
+    from weld_twin_core.errors import TwinError
 
     from ...offline.closing import weighed
-    from ...offline.investigation import changed, recordings, shown_alone
+    from ...offline.investigation import changed, recordings
     from ...offline.set_up_changes import FRAMES
 
     first, later = recordings(state)
     told = {**changed(state), **(dict.fromkeys(bags, changes) if changes else {})}
-    found = _diagnosed([*first, *later, *bags], state, place, told)
-    if not first or any(what in FRAMES for what in told.values()):
-        # Seen with another tool, or from elsewhere, they cannot be held against the first.
-        return *weighed(found), None
-    alone = newest = None
-    with suppress(DataError):  # too few to be diagnosed by themselves
-        beside = place.with_name(f'{place.name}-experiments')
-        newest = alone = _diagnosed([*later, *bags], state, beside, told)
-        if later:
-            newest = None
-            newest = _diagnosed(bags, state, place.with_name(f'{place.name}-newest'), told)
-    each = [*shown_alone(state), *([newest] if newest else [])]
-    return *weighed(found, alone, each), newest
+    # Seen with another tool, or from elsewhere, they cannot be held against the first.
+    by_itself = not first or any(what in FRAMES for what in told.values())
+    found = _diagnosed([*first, *later, *bags], state, place, told, confirm=by_itself)
+    if by_itself:
+        return weighed(found)
+    beside = place.with_name(f'{place.name}-experiments')
+    try:
+        return weighed(found, _diagnosed([*later, *bags], state, beside, told))
+    except TwinError:  # too few to be diagnosed by themselves
+        return weighed(found)
 
 
 def _diagnosed(
@@ -228,6 +223,8 @@ def _diagnosed(
     state: dict[str, Any],
     place: Path,
     changes: Mapping[str, str],
+    *,
+    confirm: bool = False,
 ) -> dict[str, Any]:
     """Run the diagnosis as its own command does; return the content of diagnosis.json."""
     from ...report.diagnosis_files import RESULT
@@ -238,7 +235,7 @@ def _diagnosed(
     left = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
     words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
     words += ['--experiment-minutes', f'{left:g}']
-    words += [] if state['rounds'] else ['--confirm']
+    words += ['--confirm'] if confirm else []
     words += [word for bag in bags if bag in changes for word in ('--changed', bag, changes[bag])]
     diagnose.run(parser.parse_args(words))
     found: dict[str, Any] = json.loads((place / RESULT).read_text(encoding='utf-8'))

@@ -151,6 +151,16 @@ def test_a_joint_that_rests_is_not_stuck(ur5, rng):
     assert not seen(ur5, held).unsound
 
 
+def test_a_stray_reading_while_the_arm_stands_is_no_stuck_stream(ur5, rng):
+    motion = moving(ur5, rng)
+    q = np.insert(motion.q, 900, np.tile(motion.q[900], (250, 1)), axis=0)
+    held = recorded(ur5, JointMotion(np.arange(len(q)) / 125.0, q), rng)
+    position = np.array(held.measured.position)
+    standing = np.flatnonzero((held.measured.t > 1000 / 125.0) & (held.measured.t < 1100 / 125.0))
+    position[standing[3]] += [0.0, 5e-3, 0.0]
+    assert not seen(ur5, held.with_measured(replace(held.measured, position=position))).unsound
+
+
 SLIPS = {
     'joint_slipped': ({'effect': 'joint_slip', 'joint': 'elbow_joint', 'offset': 1.5e-3}, 4e-4),
     'reflector_jumped': ({'effect': 'tool_slip', 'xyz': [1e-3, -5e-4, 0.0]}, 4e-4),

@@ -124,6 +124,9 @@ STUCK_AFTER = 0.3
 """Seconds that an arm may go on after its command stands still: lag and settling."""
 STUCK_FAR = 2e-3
 """Motion or gap [m] at the tool that no standing arm has; play and springs are smaller."""
+STUCK_STRAYS = 0.1
+"""Share of the measurements of a standing stretch, one at least, that may lie anywhere: instruments have
+strays, and a tool that moves on is elsewhere in all the others too."""
 STUCK_EXPLAINED = 4.0
 """Factor by which the gap there is larger than elsewhere, and than with the joint set free."""
 LIKE_LENGTH = 0.8

@@ -15,7 +15,14 @@ from ...recording import JointMotion, Recording
 from ..algebra.problem import Model
 from ..frames.alignment import refined
 from .evidence import Case, Finding, Mistake, distance, length
-from .limits import STUCK_AFTER, STUCK_EXPLAINED, STUCK_FAR, STUCK_LEAST, STUCK_STATIONS
+from .limits import (
+    STUCK_AFTER,
+    STUCK_EXPLAINED,
+    STUCK_FAR,
+    STUCK_LEAST,
+    STUCK_STATIONS,
+    STUCK_STRAYS,
+)
 from .snapshot import measured
 
 ROUNDS = 12
@@ -52,7 +59,7 @@ def _whole(recording: Recording) -> Mistake | None:
         inside = _inside(recording, start, end)
         if inside.sum() < 2:
             continue
-        way = float(np.ptp(seen.position[inside], axis=0).max())
+        way = _way(seen.position[inside])
         if way > STUCK_FAR:
             sentence = (
                 f'The joint positions of {recording.name} stand still {_when(recording, start, end)}'
@@ -60,6 +67,14 @@ def _whole(recording: Recording) -> Mistake | None:
             )
             return Mistake('joints_stuck', (), sentence, REMEDY, None)
     return None
+
+
+def _way(position: Array) -> float:
+    """Return how far places (M, 3) lie apart [m], without those that lie farthest out."""
+    off = np.linalg.norm(position - np.median(position, axis=0), axis=1)
+    left_out = max(1, round(STUCK_STRAYS * len(off)))
+    kept = position[np.argsort(off)[:-left_out]]
+    return float(np.ptp(kept, axis=0).max())
 
 
 REMEDY = 'See to the driver that publishes the joint states, and measure again'

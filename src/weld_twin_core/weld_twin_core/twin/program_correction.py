@@ -247,7 +247,7 @@ class _Work(NamedTuple):
     ) -> dict[int, str]:
         """Return the seams that points cannot be moved for, with the reason."""
         out: dict[int, str] = {}
-        worst: dict[int, tuple[float, float]] = {}
+        worst: dict[int, tuple[float, float, str]] = {}
         for piece in self.travel.pieces:
             motion = repeated(self.model.robot, moved, piece)
             meant = self.gap(piece, motion, calm)
@@ -261,11 +261,12 @@ class _Work(NamedTuple):
                 # How the arm comes to where a seam begins does not matter, only that it gets there.
                 chosen = piece.move == k if move.seam in worst else piece.ends[k]
                 before, after = (float(size[chosen].max()) for size in sizes)
-                old = worst.get(move.seam, (0.0, 0.0))
-                worst[move.seam] = max(before, old[0]), max(after, old[1])
-        for seam, (before, after) in worst.items():
+                old = worst.get(move.seam, (0.0, -1.0, ''))
+                where = move.where if after > old[1] else old[2]
+                worst[move.seam] = max(before, old[0]), max(after, old[1]), where
+        for seam, (before, after, where) in worst.items():
             if after > BETTER * before + NOTHING:
-                out.setdefault(seam, _worse(before, after))
+                out.setdefault(seam, f'{where}: {_worse(before, after)}')
         return {seam: why for seam, why in out.items() if seam not in left}
 
     def _sizes(self, piece: Piece, motion: JointMotion) -> Array:

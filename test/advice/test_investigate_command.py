@@ -52,6 +52,24 @@ def test_what_is_asked_for_is_taken_in_and_judged(ur5, tmp_path):
     assert ('joint_compliance', 'shoulder_lift_joint') in named
 
 
+def test_a_larger_budget_goes_on_where_the_first_was_spent(ur5, tmp_path):
+    rng = np.random.default_rng(1)
+    near = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + 0.03 * rng.uniform(-1, 1, (25, 6))
+    first, place = measured(ur5, tmp_path / 'monday', near, 1), str(tmp_path / 'cell')
+    said = weld_twin('investigate', place, first, '--robot', 'ur5', '--budget', '0.3')
+    assert said.code == 0 and 'budget spent' in said.out
+    said = weld_twin('investigate', place, '--live')
+    assert said.code == 2 and 'a larger --budget opens it again' in said.err
+    said = weld_twin('investigate', place, '--budget', '30')
+    assert said.code == 0 and 'experiment.yaml' in said.out, said.err
+    state = json.loads((tmp_path / 'cell' / 'investigation.json').read_text())
+    assert (state['state'], state['spent_min'], len(state['rounds'])) == ('open', 0.0, 1)
+    assert state['rounds'][0]['asked']['minutes'] <= 30.0
+    said = weld_twin('investigate', place, '--budget', '40')
+    assert said.code == 0
+    assert json.loads((tmp_path / 'cell' / 'investigation.json').read_text())['budget_min'] == 40.0
+
+
 def test_a_weight_that_was_hung_for_one_recording_is_told(ur5, tmp_path):
     rng = np.random.default_rng(1)
     near = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + 0.4 * rng.uniform(-1, 1, (40, 6))

@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
     directory = Path(args.directory)
     begun = (directory / STATE).exists()
-    if not args.bags and not args.live:
+    if not args.bags and not args.live and (args.budget is None or not begun):
         if not begun:
             raise DataError(f"'{directory}' is no investigation; begin one with recordings")
         print(headline(read_state(directory)))
@@ -86,12 +86,34 @@ def run(args: argparse.Namespace) -> int:
     if args.bags:
         state = _round(args, directory, state, args.bags, _changes(args, state))
         args.changed = None
+    elif args.budget is not None:
+        state = _with_budget(args, directory, state)
     # What has to be changed by hand is done when the person calls again.
     done = not args.bags
     while args.live and state['state'] == 'open' and (done or not _asked(state)['changes']):
         state = _recorded(args, directory, state)
         done = False
     return 0
+
+
+def _with_budget(
+    args: argparse.Namespace, directory: Path, state: dict[str, Any]
+) -> dict[str, Any]:
+    """Keep another budget; where nothing is asked for, plan anew from what was recorded last."""
+    from ...offline.investigation import write_state
+    from ...report.investigation_page import headline
+
+    *before, last = state['rounds']
+    if last['asked'] is not None:
+        write_state(directory, state)
+        print(headline(state))
+        return state
+    bags = [str(entry['path']) for entry in last['recordings']]
+    changes = str(last['recordings'][0].get('changed') or '')
+    # The minutes of the experiment that it came from are counted when it is taken in again.
+    counted = float(before[-1]['asked']['minutes']) if before and before[-1].get('asked') else 0.0
+    spent = float(state['spent_min']) - counted
+    return _round(args, directory, {**state, 'rounds': before, 'spent_min': spent}, bags, changes)
 
 
 def _asked(state: dict[str, Any]) -> dict[str, Any]:

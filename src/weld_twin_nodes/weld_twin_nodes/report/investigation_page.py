@@ -12,6 +12,7 @@ from weld_twin_core.diagnosis.result import Site
 
 from ..offline.investigation import foreseen
 from .html import Child, Html, bars, document, section, tag
+from .quantities import odds
 from .words import cause, in_words, listed, place_name
 
 SHOWN = 5
@@ -79,7 +80,7 @@ def _figures(state: Mapping[str, Any]) -> Html:
     if foreseen:
         told += f'; {sum(foreseen):.1f} were foreseen'
     cells = [
-        ('Belief', str(last['status']), '' if sure is None else f'{sure:.0%} sure'),
+        ('Belief', str(last['status']), '' if sure is None else f'{odds(sure)} sure'),
         (
             'Minutes',
             f'{state["spent_min"]:.1f}',
@@ -115,7 +116,7 @@ def _believed(number: int, step: Round) -> Html:
     """Return a node of the tree: what came back, and what is believed with it."""
     belief, names = step['believed'], [_file(item) for item in step['recordings']]
     came = 'Recorded' if number == 0 else 'Came back'
-    sure = '' if belief['confidence'] is None else f', {belief["confidence"]:.0%} sure'
+    sure = '' if belief['confidence'] is None else f', {odds(belief["confidence"])} sure'
     named = listed([_name(effect) for effect in belief['effects']]) or _without_name(belief)
     alike = [
         tag('p', f'Not told apart: {listed([_name(item) for item in group])}.', class_='note')
@@ -123,7 +124,7 @@ def _believed(number: int, step: Round) -> Html:
         if len(group) > 1
     ]
     rows = [
-        (_name(item), float(item['probability']), f'{item["probability"]:.0%}')
+        (_name(item), float(item['probability']), odds(float(item['probability'])))
         for item in belief['candidates']
         if (item['probability'] or 0.0) >= LEAST
     ]

@@ -27,8 +27,8 @@ CLOSED = 0.93
 of the 202 cells that the weights were learned from, each judged by weights learned from the others, from
 0.92 to 0.98 one was believed wrongly, and from 0.9 two to four."""
 MOST = 0.99
-"""Probability that two diagnoses earn at the most: of the 202 cells one was believed wrongly, and the next
-might be another."""
+"""Probability that two diagnoses earn at the most: one of the 202 cells was believed wrongly, and the
+next might be another."""
 EXTREME = 1e-3
 """A probability is taken as no nearer to 0 and 1 than this: odds of a thousand."""
 ALIKE = 'the causes are known as far as any motion can tell'

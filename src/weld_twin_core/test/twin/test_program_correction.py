@@ -58,16 +58,25 @@ def test_a_posture_that_nobody_names_is_taken_only_where_one_is_known(ur5):
 
 
 def test_a_point_approached_from_two_sides_gets_the_mean_and_says_what_is_left(ur5):
-    # Play of 0.2 mrad about the base: coming from -y and from +y the tool misses point 2 to
-    # opposite sides.
+    # Play of 0.2 mrad about the base, beside a zero error: coming from -y and from +y the tool
+    # misses point 2 to opposite sides.
     play = wt.effects.Backlash('shoulder_pan_joint', width=2e-4)
+    off = wt.effects.JointOffset('shoulder_pan_joint', offset=1e-3)
     there = seam(ur5, *(Move('linear', use(k), EYE) for k in (1, 2, 4, 2)))
-    found = correct_program(ProgramModel(ur5, (play,)), there, caps=Caps(1e-3, 0.01))
+    found = correct_program(ProgramModel(ur5, (off, play)), there, caps=Caps(1e-3, 0.01))
     ends = [found.results[k].after for k in (2, 4)]
     reach = np.linalg.norm(there.points[2][:2, 3])
     np.testing.assert_allclose(ends, 1e-4 * reach, rtol=0.05)
     alone = [found.results[k].after for k in (1, 3)]
     assert max(alone) < 1e-8
+
+
+def test_a_seam_whose_worst_place_would_gain_nothing_is_left_with_a_word_of_where(ur5):
+    play = wt.effects.Backlash('shoulder_pan_joint', width=2e-4)
+    there = seam(ur5, *(Move('linear', use(k), EYE) for k in (1, 2, 4, 2)))
+    found = correct_program(ProgramModel(ur5, (play,)), there, caps=Caps(1e-3, 0.01))
+    (why,) = found.left.values()
+    assert 'its worst place would be' in why and not why.startswith('its')
 
 
 @pytest.mark.parametrize(('cap', 'left'), [(1e-3, set()), (1e-4, {0})])

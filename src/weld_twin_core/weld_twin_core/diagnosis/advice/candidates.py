@@ -129,7 +129,7 @@ def candidates(
     # Elsewhere than the experiments before.
     skip = STATIONS * (len(problem.recordings) - 1)
     spread = room.spread(STATIONS, skip)
-    still = all(r.joints.static for r in problem.recordings)
+    still = problem.at_rest
     if limits.set_up or not still:
         yield _path(problem, now, room, spread, joints, ANOTHER if still else 0.0)
     yield from _at_rest(problem, now, room, spread)

@@ -247,7 +247,7 @@ def widening(problem: Problem, options: Sequence[Candidate], limits: Limits) -> 
     limits : Limits
 
     """
-    still = all(r.joints.static for r in problem.recordings)
+    still = problem.at_rest
     wanted = ('bidirectional', 'stations') if still else ('path',)
     room = 60.0 * min(limits.minutes, limits.moving)
     for kind in wanted:

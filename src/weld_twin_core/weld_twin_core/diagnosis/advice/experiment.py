@@ -89,7 +89,7 @@ def next_experiment(
             told = _entry(widening(problem, options, limits), _ALIKE, model)
     else:
         good = [plan for plan in plans if plan.score >= WORTH * best]
-        if not all(r.joints.static for r in problem.recordings):
+        if not problem.at_rest:
             # An instrument that follows the tool learns more in a minute than at four stations.
             good = [plan for plan in good if not plan.candidate.static] or good
         least = min(plan.minutes for plan in good)

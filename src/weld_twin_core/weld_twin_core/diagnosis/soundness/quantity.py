@@ -50,6 +50,6 @@ def quantity(case: Case) -> Sequence[Finding]:
     if seen < STILL:
         raise DataError('the joints move, but the measured tool never does; is the topic right?')
     total = sum(problem.samples)
-    if all(r.joints.static for r in case.recordings) and total < FEW_STATIONS:
+    if problem.at_rest and total < FEW_STATIONS:
         return (Finding('note', f'With {total} stations few causes can be told apart.'),)
     return ()

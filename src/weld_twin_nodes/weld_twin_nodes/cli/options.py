@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -129,6 +130,31 @@ def add_pool(parser: argparse.ArgumentParser) -> None:
         metavar='ADDRESS',
         help='Dask cluster to run on instead; it must see the same directories',
     )
+
+
+def add_output(parser: argparse.ArgumentParser, text: str, default: str | None = None) -> None:
+    """Add the options of a command that writes a folder of files."""
+    parser.add_argument(
+        '--out', required=default is None, default=default, metavar='DIR', help=text
+    )
+    add_force(parser)
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """Add the option that settles what is in the way."""
+    parser.add_argument(
+        '--force',
+        action='store_true',
+        help='write also where files are in the way that weld-twin has not written, or that were '
+        'changed since; they are kept as NAME.kept-1',
+    )
+
+
+def output(args: argparse.Namespace, mark: str) -> AbstractContextManager[Path]:
+    """Return the folder that the options name, as `output_directory.new_directory` does."""
+    from ..offline.output_directory import new_directory
+
+    return new_directory(args.out, mark=mark, force=args.force)
 
 
 def add_bag_output(parser: argparse.ArgumentParser) -> None:

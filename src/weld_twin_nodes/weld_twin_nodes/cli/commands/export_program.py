@@ -52,13 +52,42 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write program and sheet."""
+    from weld_twin_core.errors import DataError
+
+    out = Path(args.out)
+    for path in (out, _guide(out)):
+        if path.exists():
+            raise DataError(f"'{path}' exists already and is not overwritten")
+    for line in write_program(args, out, out):
+        print(line)
+    return 0
+
+
+def _guide(program: Path) -> Path:
+    """Return where the sheet of a program goes: beside it."""
+    return program.with_name(f'{program.name}.md')
+
+
+def write_program(args: argparse.Namespace, out: Path, told_as: Path) -> list[str]:
+    """
+    Write program and sheet, and return what to tell.
+
+    Parameters
+    ----------
+    args : Namespace
+        Of this command.
+    out : Path
+        Program to write.
+    told_as : Path
+        Where it will be found.
+
+    """
     from weld_twin_msgs_py.files.whole_files import write_text
     from weld_twin_msgs_py.programs.writing import sheet
 
     from ...offline.exporting import FAST, SLOW, Speeds, export
 
     _check(args)
-    out = Path(args.out)
     context = context_of(args, robot_of(args), args.controller)
     share, tool = FAST if args.full_speed else SLOW
     speed = quantity(args.speed.removesuffix('/s'), ('mm', 'm'), '--speed') if args.speed else 0.0
@@ -76,13 +105,12 @@ def run(args: argparse.Namespace) -> int:
     if not args.full_speed:
         told += ' That is for the first run; --full-speed writes it faster.'
     write_text(out, text)
-    guide = out.with_name(f'{out.name}.md')
-    write_text(guide, sheet(made, args.controller, out.name, told, notes), overwrite=True)
-    print(f'{out}: {len(made.moves)} moves in {args.controller}, {fast}')
-    for note in notes:
-        print(f'note: {note}')
-    print(f'how to load it and to record: {guide}')
-    return 0
+    write_text(_guide(out), sheet(made, args.controller, out.name, told, notes))
+    return [
+        f'{told_as}: {len(made.moves)} moves in {args.controller}, {fast}',
+        *(f'note: {note}' for note in notes),
+        f'how to load it and to record: {_guide(told_as)}',
+    ]
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -97,5 +125,3 @@ def _check(args: argparse.Namespace) -> None:
         )
     if not (0.0 <= args.dwell <= 600.0 and 0 <= args.trigger <= 9999):
         raise DataError('--dwell must be 0 to 600 s, and --trigger the number of an output')
-    if Path(args.out).exists():
-        raise DataError(f"'{args.out}' exists already and is not overwritten")

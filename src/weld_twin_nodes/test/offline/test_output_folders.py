@@ -160,7 +160,9 @@ def test_a_bag_and_a_file_go_where_a_link_leads(weld_twin, tmp_path):
     assert json.loads((tmp_path / 'disk/schema.json').read_text())
     before = content(tmp_path / 'disk')
     assert weld_twin(*words, '--out', tmp_path / 'bag').code == 2
-    assert weld_twin('schema', 'seam', '--out', tmp_path / 'schema.json').code == 2
+    (tmp_path / 'disk/schema.json').write_text('changed')
+    before['schema.json'] = b'changed'
+    assert weld_twin('schema', 'robot', '--out', tmp_path / 'schema.json').code == 2
     assert content(tmp_path / 'disk') == before
 
 

@@ -157,6 +157,19 @@ def output(args: argparse.Namespace, mark: str) -> AbstractContextManager[Path]:
     return new_directory(args.out, mark=mark, force=args.force)
 
 
+def add_file_output(parser: argparse.ArgumentParser, text: str, *, required: bool = False) -> None:
+    """Add the options of a command that writes one file."""
+    parser.add_argument('--out', required=required, metavar='FILE', help=text)
+    add_force(parser)
+
+
+def output_file(args: argparse.Namespace) -> AbstractContextManager[Path]:
+    """Return the file that the options name, as `output_directory.new_file` does."""
+    from ..offline.output_directory import new_file
+
+    return new_file(args.out, force=args.force)
+
+
 def add_bag_output(parser: argparse.ArgumentParser) -> None:
     """Add the options of a command that writes a bag."""
     parser.add_argument(

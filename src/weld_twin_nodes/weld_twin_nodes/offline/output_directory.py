@@ -102,9 +102,33 @@ def write_owned(path: Path | str, text: str) -> None:
     text : str
 
     """
-    file = Path(path)
-    with new_directory(file.parent, mark=file.name, force=True, shared=True) as place:
-        write_text(place / file.name, text)
+    with new_file(path, force=True) as file:
+        write_text(file, text)
+
+
+@contextmanager
+def new_file(path: Path | str, *, force: bool = False) -> Iterator[Path]:
+    """
+    Yield where to write what comes to ``path`` when the block succeeds, and more files beside it.
+
+    Parameters
+    ----------
+    path : Path or str
+        A file, in a folder that may be anybody's. A link is followed.
+    force : bool
+        As `new_directory` takes it.
+
+    Raises
+    ------
+    DataError
+        What is there is not ours, or the place cannot be written.
+
+    """
+    target = followed(path)
+    if target.is_dir():
+        raise DataError(f"'{path}' is a folder; give a file")
+    with new_directory(target.parent, mark=target.name, force=force, shared=True) as place:
+        yield place / target.name
 
 
 def _refusal(target: Path, error: OSError) -> DataError:

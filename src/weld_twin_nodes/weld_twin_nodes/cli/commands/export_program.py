@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..options import add_robot, robot_of
+from ..options import add_file_output, add_robot, output_file, robot_of
 from ..program_options import add_program_options, context_of, quantity
 
 
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME',
         help='urscript, krl, rapid, inform, fanuc-ls, joint-trajectory or csv',
     )
-    parser.add_argument('--out', required=True, metavar='FILE', help='program; must not exist')
+    add_file_output(parser, 'program to write', required=True)
     parser.add_argument(
         '--full-speed',
         action='store_true',
@@ -52,14 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write program and sheet."""
-    from weld_twin_core.errors import DataError
-
-    out = Path(args.out)
-    for path in (out, _guide(out)):
-        if path.exists():
-            raise DataError(f"'{path}' exists already and is not overwritten")
-    for line in write_program(args, out, out):
-        print(line)
+    with output_file(args) as made:
+        lines = write_program(args, made, Path(args.out))
+    print('\n'.join(lines))
     return 0
 
 

@@ -9,6 +9,7 @@ from .evidence import Checker
 from .mixups import mixups
 from .orientation import orientation
 from .outliers import outliers
+from .parted import parted
 from .quantity import quantity
 from .repeats import repeats
 from .richness import motion
@@ -20,6 +21,7 @@ from .stuck import stuck
 CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
     'readings': (stuck, 'No reading stands still while the tool moves.'),
+    'tools': (parted, 'No recording has another tool than the first.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
     'orientation': (orientation, 'Orientations turn as the joints say.'),
     'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),

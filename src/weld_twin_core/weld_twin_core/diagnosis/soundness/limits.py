@@ -168,3 +168,12 @@ ENDS = 0.05
 """Share of a recording at its ends in which a step cannot be told from the end's own troubles."""
 MOST_SLIPS = 4
 """So many changes in time are taken out in turn."""
+
+PARTED = 2.0
+"""
+Factor by which a tool of its own in each recording must bring down the gap that an arm leaves.
+
+As for links: what else is at work stays. Of sound pairs of recordings it took off a tenth.
+"""
+PARTED_LEAST = 5e-5
+"""Gap [m] that an arm leaves below which no tool is looked at: the noise of a good tracker."""

@@ -90,6 +90,11 @@ def robot_as(given: Given, robot: Robot) -> Given:
     return replace(given, robot=placed)
 
 
+def differing(given: Given, families: tuple[str, ...]) -> Given:
+    """Return what was given with errors of more families that may differ between recordings."""
+    return replace(given, may_change=tuple(dict.fromkeys([*given.may_change, *families])))
+
+
 def frames_fitted(given: Given, frames: frozenset[str]) -> Given:
     """Return what was given with more frames to be fitted."""
     return replace(given, align=given.align | frames)

@@ -295,6 +295,8 @@ class Recording:
         that begin late or end early against the others.
     contacts : Contacts, optional
         What the tool point touched in every posture, in place of measured positions.
+    simulated : bool
+        Whether it says of itself that a simulator made it, with or without noise of an instrument.
 
     Raises
     ------
@@ -323,6 +325,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     incomplete: tuple[str, ...] = ()
     contacts: Contacts | None = None
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         if self.contacts is not None and self.contacts.size != self.joints.t.size:

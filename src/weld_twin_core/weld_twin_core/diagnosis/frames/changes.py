@@ -118,7 +118,7 @@ def with_changes(
     found = model.found
     if not found:
         # What all recordings have in common must not pass for what differs between them.
-        model, precision = model.with_found(_geometry(model.robot)), None
+        model, precision = model.with_found(constant_errors(model.robot)), None
     prior = effect_precision(model) if precision is None else precision
     every = replace(problem.thinned(ROWS), changes=candidates)
     free = _fitted(every, replace(model, changes=candidates), prior)
@@ -134,7 +134,7 @@ def with_changes(
     return problem, model if found else model.with_found(())
 
 
-def _geometry(robot: Robot) -> tuple[Effect, ...]:
+def constant_errors(robot: Robot) -> tuple[Effect, ...]:
     """Return every constant error of every joint, at zero."""
     kinds = [
         k for k in REGISTRY.values() if k.cause and _constant(k) and k.of in ('joint', 'link')

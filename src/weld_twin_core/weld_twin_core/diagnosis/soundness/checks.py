@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from .clocks import clocks
+from .computed import computed
 from .evidence import Checker
 from .mixups import mixups
 from .orientation import orientation
@@ -24,6 +25,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'tools': (parted, 'No recording has another tool than the first.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
     'orientation': (orientation, 'Orientations turn as the joints say.'),
+    'instrument': (computed, 'The poses have the noise of an instrument.'),
     'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),
     'stamps': (stamps, 'Stamps come regularly and without gaps.'),
     'repeats': (repeats, 'Nothing was recorded twice.'),

@@ -132,6 +132,15 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     return replace(given, recordings=tuple(recordings))
 
 
+def stamped_evenly(given: Given, k: int, first: float, step: float) -> Given:
+    """Return what was given with measurements of recording k at first + step * 0, 1, 2, … [s]."""
+    recordings = list(given.recordings)
+    seen = measured(recordings[k])
+    even = first + step * np.arange(seen.t.size)
+    recordings[k] = recordings[k].with_measured(replace(seen, t=even))
+    return replace(given, recordings=tuple(recordings))
+
+
 def velocities_left_out(given: Given, k: int) -> Given:
     """Return what was given without the joint velocities of recording k."""
     recordings = list(given.recordings)

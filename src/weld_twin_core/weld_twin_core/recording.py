@@ -195,6 +195,25 @@ class Measurements:
                 )
             object.__setattr__(self, 'sigma', sigma)
 
+    def inverted(self) -> Measurements:
+        """
+        Return the pose of the measuring frame in what was measured, in place of the reverse.
+
+        A camera on the arm that looks at a fixed board measures the board; inverted it is a camera
+        on the arm that the board measures.
+
+        Raises
+        ------
+        DataError
+            Points were measured: a point has no frame.
+
+        """
+        if self.rotation is None:
+            raise DataError('only measured poses can be inverted; these are points')
+        turn = np.swapaxes(self.rotation, -1, -2)
+        position = -(turn @ self.position[..., None])[..., 0]
+        return Measurements(self.t, position, turn, self.sigma)
+
     def take(self, index: np.ndarray) -> Measurements:
         """
         Return some of the measurements.

@@ -110,6 +110,8 @@ def read_recording(
     )
     if touched:
         return touching(whole, touched, made)
+    if names.measured_inverse and whole.measured is not None:
+        whole = whole.with_measured(whole.measured.inverted())
     return _with_what_is_missing(whole, made, _ends(names, samples))
 
 

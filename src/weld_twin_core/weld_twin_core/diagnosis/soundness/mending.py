@@ -84,6 +84,15 @@ def turns_as(given: Given, undo: Callable[[Array], Array]) -> Given:
     return replace(given, recordings=tuple(out))
 
 
+def poses_inverted(given: Given) -> Given:
+    """Return what was given with measured poses inverted; points stay as they are."""
+    out = []
+    for r in given.recordings:
+        seen = measured(r)
+        out.append(r if seen.rotation is None else r.with_measured(seen.inverted()))
+    return replace(given, recordings=tuple(out))
+
+
 def robot_as(given: Given, robot: Robot) -> Given:
     """Return what was given with another robot that stands where the first did, same tool."""
     placed = robot.with_frames(base=given.robot.T_world_base, tool=given.robot.T_flange_tool)

@@ -196,3 +196,6 @@ bursts they make all of it wrong.
 """
 EVEN_LEAST = 5e-5
 """Gap [m] below which stamps are as good as they need to be: the noise of a good tracker."""
+PARTED_TURN = 0.01
+"""Turn [rad] that an arm leaves of orientations below which no tool is looked at: zeros and twists of
+an arm as delivered turn the tool by some milliradians."""

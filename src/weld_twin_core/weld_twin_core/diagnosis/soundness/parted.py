@@ -15,8 +15,9 @@ from ...arrays import Array
 from ...effects.tool_pose import ToolPose
 from ..algebra.problem import Change, Model
 from .evidence import Case, Finding, Mistake, length, listed
-from .limits import LARGE, PARTED, PARTED_LEAST
+from .limits import PARTED, PARTED_LEAST, PARTED_TURN
 from .mending import differing
+from .orientation import WRONG, disagreement
 from .snapshot import Arm, Snapshot
 
 MUCH = 0.2
@@ -30,22 +31,28 @@ TURN_TOLD = 1e-3
 def parted(case: Case) -> Sequence[Finding]:
     """Return which recordings have a tool of their own, where that explains what is left."""
     told = any(change.effect.fitted_with == 'tool' for change in case.model.changes)
-    if len(case.recordings) < 2 or told or case.gap < PARTED_LEAST:
+    if len(case.recordings) < 2 or told:
         return ()
     shot = case.snapshot
     before = shot.arm()
-    if before.gap < PARTED_LEAST:
+    turn = disagreement(shot, before.model)
+    if before.gap < PARTED_LEAST and turn < TURN_TOLD:
         return ()
-    own = _with_tools(shot).arm()
-    if PARTED * own.gap > before.gap:
+    apart = _with_tools(shot)
+    own = apart.arm()
+    after = disagreement(apart, own.model)
+    shifted = PARTED * own.gap < before.gap and before.gap > PARTED_LEAST
+    turned = PARTED * after < turn and turn > PARTED_TURN
+    if not (shifted or turned):
         return ()
-    words = _words(case, own) + f'; so told, the gap falls from {length(before.gap)} to '
-    sentence = f'{words}{length(own.gap)}.'
+    falls = [f'the gap falls from {length(before.gap)} to {length(own.gap)}'] * shifted
+    falls += [f'that of the turns from {_angle(turn)} to {_angle(after)}'] * turned
+    sentence = f'{_words(case, own)}; so told, {listed(falls)}.'
     remedy = (
         'Tell it (--may-change tool_pose, or --changed BAG tool), or diagnose the recordings one '
         'by one'
     )
-    if before.off < 1.0:
+    if before.off < 1.0 and turn < WRONG:
         return (Finding('warning', f'{sentence} {remedy}.'),)
     mend = partial(differing, families=('tool_pose',))
     return (Finding.of(Mistake('reflector_jumped', ('tool',), sentence, remedy, mend)),)
@@ -83,9 +90,13 @@ def _words(case: Case, own: Arm) -> str:
     worst = max(sizes, key=lambda k: sizes[k])
     names = [case.recordings[k].name for k, size in sizes.items() if size > MUCH * sizes[worst]]
     way, turn = far[worst]
-    angle = f' and turned by {np.degrees(turn):.3g} degrees' if turn > TURN_TOLD else ''
+    angle = f' and turned by {_angle(turn)}' if turn > TURN_TOLD else ''
     most = f', {case.recordings[worst].name} most' if len(names) > 1 else ''
     return (
         f'The tool or its reflector of {listed(names)} sits elsewhere than that of '
         f'{case.recordings[0].name}{most}: {length(way)} away{angle}'
     )
+
+
+def _angle(turn: float) -> str:
+    return f'{np.degrees(turn):.3g} degrees'

@@ -97,6 +97,12 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
         metavar='JOINT=NAME',
         help='joints of the robot and what the joint states call them, such as joint_1=A1',
     )
+    group.add_argument(
+        '--measured-inverse',
+        action='store_true',
+        help='the measured poses are those of something fixed seen from the arm, such as of a board '
+        'by a camera on the arm; they are inverted',
+    )
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
@@ -116,7 +122,12 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
             raise DataError(f"--joint-map takes JOINT=NAME, got '{text}'")
         pairs.append((joint, name))
     names = replace(TopicNames.within(args.namespace), **named)
-    return replace(names, joint_prefix=args.joint_prefix, joint_map=tuple(pairs))
+    return replace(
+        names,
+        joint_prefix=args.joint_prefix,
+        joint_map=tuple(pairs),
+        measured_inverse=args.measured_inverse,
+    )
 
 
 def add_pool(parser: argparse.ArgumentParser) -> None:

@@ -19,11 +19,12 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 
 from ..files.whole_files import write_text
-from .build import Table, joint_angles, own_epoch
+from .build import Table, own_epoch
 from .cells import Cells, read_cells
-from .header import CONTACTS, joint_columns
+from .header import CONTACTS, joint_columns, unit_of
+from .joint_readings import joint_angles
 from .table_options import TableOptions
-from .unit_guess import METRES
+from .unit_guess import METRES, factor
 
 WORDS = {
     'contact': CONTACTS,
@@ -171,12 +172,11 @@ def _lengths(
     values = cells.numbers(name)
     if np.isnan(values).all():
         return None
-    last = re.split(r'[^0-9a-z]+', name.lower().rstrip('])'))[-1]
-    unit = options.length_unit or (last if last in METRES else None)
+    unit = options.length_unit or unit_of(name)
     if unit is None:
         unit = 'mm' if np.nanmax(np.abs(values)) > ARM else 'm'
         said.append(f'{name} is in {unit}; --length-unit decides')
-    return values * METRES[unit]
+    return values * factor(METRES, unit, name, 'a length')
 
 
 def _kinds(

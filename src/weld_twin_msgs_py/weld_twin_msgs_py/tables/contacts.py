@@ -25,6 +25,7 @@ from .header import CONTACTS, joint_columns, unit_of
 from .joint_readings import joint_angles
 from .table_options import TableOptions
 from .unit_guess import METRES, factor
+from .words import shortened
 
 WORDS = {
     'contact': CONTACTS,
@@ -153,7 +154,7 @@ def _columns(cells: Cells) -> dict[str, str]:
     if 'contact' not in out:
         raise DataError(
             f"table '{cells.path}' has no column 'contact' that says what each posture touched; "
-            'its columns are ' + ', '.join(cells.header)
+            'its columns are ' + shortened(cells.header)
         )
     return out
 

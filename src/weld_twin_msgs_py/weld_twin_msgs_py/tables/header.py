@@ -31,6 +31,7 @@ from .words import (
     TEMPERATURE,
     TURNS,
     parted,
+    shortened,
     tokens,
 )
 
@@ -180,7 +181,9 @@ def _by_own_names(parts: Sequence[Named], robot: Robot) -> dict[str, str]:
     # The x that was measured is no joint because a slide of a gantry is called so, too.
     others = [part for part in parts if part.name not in found.values()]
     axes = {part.axis for part in others if part.kind == 'length'}
-    return {joint: name for joint, name in found.items() if tokens(joint)[-1] not in {*'xyz'} - axes}
+    return {
+        joint: name for joint, name in found.items() if tokens(joint)[-1] not in {*'xyz'} - axes
+    }
 
 
 def _beside_the_arm(parts: Sequence[Named]) -> list[str]:
@@ -241,7 +244,7 @@ def _found(parts: Sequence[Named], numbered: Mapping[tuple[str, ...], Mapping[in
     joints = [name for group in numbered.values() for _, name in sorted(group.items())]
     others = [part.name for part in parts if part.name not in joints]
     told = [('joints', joints), ('besides', others)] if joints else [('columns', others)]
-    said = ', '.join(f'{word} {", ".join(names)}' for word, names in told if names)
+    said = ', '.join(f'{word} {shortened(names)}' for word, names in told if names)
     return f'; found {said}' if said else ''
 
 
@@ -278,7 +281,7 @@ def _lacking(parts: Sequence[Named]) -> str:
     others = [part.name for part in parts if part.name not in there.values()]
     said = [f'found {", ".join(there.values())}'] if there else []
     said += [f'missing {", ".join(missing)}'] if missing else []
-    said += [f'besides the joints there are {", ".join(others)}'] if others else []
+    said += [f'besides the joints there are {shortened(others)}'] if others else []
     return f' ({"; ".join(said)})' if said else ''
 
 
@@ -319,7 +322,7 @@ def _one_group(
     for stem in named:
         if stem in twice:
             raise DataError(
-                f'{" and ".join(twice[stem])} are called alike; {flag_of(option)} decides'
+                f'{" and ".join(twice[stem][:2])} mean the same; {flag_of(option)} decides'
             )
     return tuple(whole[named[0]][axis] for axis in axes) if named else ()
 

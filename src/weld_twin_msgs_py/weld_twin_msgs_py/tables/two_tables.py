@@ -67,7 +67,8 @@ def read_two_tables(
                 'for each station'
             )
         said.append('rows of both files are paired in their order')
-        return table_of(_joined(log, seen, names, q, own), robot, options, said)
+        joined = _joined(log, seen, names, q, own)
+        return table_of(joined, robot, replace(options, time_column=None), said)
     dated = bool(min(times[0], own[0]) > SINCE_1970)
     if dated and max(times[-1], own[-1]) >= LAST_STAMP:
         times, own, dated = times - times[0], own - times[0], False
@@ -102,6 +103,7 @@ def _moving(
         seen, rows=[seen.rows[k] for k in inside], lines=[seen.lines[k] for k in inside]
     )
     both = _joined(log, kept, names, at, own[inside])
+    options = replace(options, time_column=None)  # both share one now
     (still, said_all), units = stations(both, robot, options, said)
     begin = still.epoch_ns * 1e-9
     whole = joint_angles(log, robot, names, options, [], units)

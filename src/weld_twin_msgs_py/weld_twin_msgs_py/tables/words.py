@@ -6,15 +6,17 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Sequence
 
 MEASURED = {
-    'measurement', 'measured', 'measure', 'meas', 'messen', 'actual', 'act', 'tracker', 'laser', 'real', 'observed',
-    'ist', 'istwert', 'gemessen', 'messung', 'mess', 'messwert', 'current', 'feedback',
+    'measurement', 'measured', 'measure', 'meas', 'messen', 'actual', 'act', 'tracker', 'laser',
+    'real', 'observed', 'ist', 'istwert', 'gemessen', 'messung', 'mess', 'messwert', 'current',
+    'feedback',
 }  # fmt: skip
 """Before or after an axis: what an instrument saw, or an encoder."""
 TARGET = {
-    't', 'target', 'goal', 'nominal', 'nom', 'design', 'cmd', 'command', 'commanded', 'desired', 'set', 'ref',
-    'soll', 'sollwert', 'vorgabe', 'nenn', 'programmed', 'planned',
+    't', 'target', 'goal', 'nominal', 'nom', 'design', 'cmd', 'command', 'commanded', 'desired', 'set',
+    'ref', 'soll', 'sollwert', 'vorgabe', 'nenn', 'programmed', 'planned',
 }  # fmt: skip
 DIFFERENCE = {
     'd', 'dif', 'diff', 'difference', 'delta', 'err', 'error', 'dev', 'deviation',
@@ -79,6 +81,8 @@ TEMPERATURE = re.compile(r'temp')
 DATE = re.compile(r'^(date|datum)\b')
 CLOCK = re.compile(r'time|stamp|zeit|^t$')
 """With a column of dates beside it: the time of day."""
+_LISTED = 40
+"""Names that fit into a message."""
 _BRACKETS = re.compile(r'[\[(<{]([^\[\](){}<>]*)[\])>}]\s*$')
 
 
@@ -90,15 +94,32 @@ def tokens(name: str) -> list[str]:
 
 def parted(name: str) -> tuple[list[str], str | None]:
     """Return the words of a header cell without its unit, and the unit as this project has it."""
-    found = _BRACKETS.search(name)
+    found = bracketed(name)
     if found is not None:
-        unit = IN_BRACKETS.get(_plain(found[1]).strip().lower())
-        if unit is not None:
-            return tokens(name[: found.start()]), unit
+        return tokens(found[0]), IN_BRACKETS[unit_word(found[1])]
     words = tokens(name)
     if len(words) > 1 and words[-1] in UNITS:
         return words[:-1], UNITS[words[-1]]
     return words, None
+
+
+def bracketed(name: str) -> tuple[str, str] | None:
+    """Return a header cell before its unit in brackets, and that unit; None where it has none."""
+    found = _BRACKETS.search(name)
+    if found is None or unit_word(found[1]) not in IN_BRACKETS:
+        return None
+    return name[: found.start()].strip(), found[1].strip()
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Return names in a row, of very many the first."""
+    more = len(names) - _LISTED
+    return ', '.join(names[:_LISTED]) + (f' and {more:,} more' if more > 0 else '')
+
+
+def unit_word(text: str) -> str:
+    """Return a unit as the tables of units have it, without brackets."""
+    return _plain(text).strip('[]() ').lower()
 
 
 def _plain(text: str) -> str:

@@ -18,6 +18,7 @@ from weld_twin_core.contacts import Artefact, Contact, Contacts
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 
+from ..files.csv_text import csv_text
 from ..files.whole_files import write_text
 from .build import Table, own_epoch
 from .cells import Cells, read_cells
@@ -62,15 +63,12 @@ def write_touches(path: Path, motion: Mapping[str, Any]) -> None:
         'joint_names', 'q' [rad, m] and 'contact', one label per posture.
 
     """
-    lines = [','.join((*motion['joint_names'], 'contact'))]
-    for q, label in zip(motion['q'], motion['contact'], strict=True):
-        lines.append(','.join((*(f'{value:.7f}' for value in q), quoted(label))))
-    write_text(path, '\n'.join(lines) + '\n', overwrite=True)
-
-
-def quoted(label: str) -> str:
-    """Return a label as a cell of a table has it."""
-    return '"' + label.replace('"', '""') + '"' if set(label) & set(',"') else label
+    rows = [
+        (*(f'{value:.7f}' for value in q), label)
+        for q, label in zip(motion['q'], motion['contact'], strict=True)
+    ]
+    header = (*motion['joint_names'], 'contact')
+    write_text(path, csv_text(header, rows), overwrite=True)
 
 
 def read_contacts(

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from weld_twin_core.errors import DataError
 
+from ..files.csv_text import unguarded
 from .number_text import NUMBER
 from .words import UNITS, bracketed, parted, unit_word
 
@@ -95,7 +96,7 @@ def _read(path: Path, lines: Sequence[str], delimiter: str) -> Iterator[_Row]:
             last = reader.line_num
             if last > first and ''.join(lines[first - 1 : last]).count('"') % 2:
                 raise DataError(endless.format(path, first))
-            cells = [' '.join(cell.split()) for cell in row]
+            cells = [unguarded(' '.join(cell.split())) for cell in row]
             if any(cells):
                 yield _Row(cells, first, last)
             first = last + 1

@@ -13,6 +13,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.predicting.planned import plan_stations
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.programs import Context
@@ -155,11 +156,14 @@ def write_plan(folder: Path, context: Context, language: str | None, plan: Plann
     labels = [
         f'{name} [{unit}]' for name, unit in zip(_labels(robot, language), units, strict=True)
     ]
-    rows = [','.join(['station', *labels, 'x [mm]', 'y [mm]', 'z [mm]'])]
-    for k, q in enumerate(plan.q, start=1):
-        cells = [f'{value:.4f}' for value in shown.numbers(q, [])]
-        rows.append(','.join([str(k), *cells, '', '', '']))
-    write_text(folder / TABLE, '\n'.join(rows) + '\n')
+    point = [f'{axis} [mm]' for axis in 'xyz']
+    if set(point) & set(labels):  # slides of a gantry may be called x, y, z, too
+        point = [f'measured {name}' for name in point]
+    rows = [
+        [k, *(f'{value:.4f}' for value in shown.numbers(q, [])), *[''] * len(point)]
+        for k, q in enumerate(plan.q, start=1)
+    ]
+    write_text(folder / TABLE, csv_text(['station', *labels, *point], rows))
 
 
 def _labels(robot: Robot, language: str | None) -> list[str]:

@@ -218,7 +218,7 @@ def _deviation(twin: Twin, recording: Recording) -> Array | None:
     if measured is None or not measured.t.size:
         return None
     gap = measured.position - twin.poses(recording, measured.t).position
-    return np.asarray(gap @ twin.robot.T_world_base[:3, :3])
+    return np.asarray(gap @ twin.robot.T_world_origin[:3, :3])
 
 
 def write_outside(bag: Path, outside: Sequence[Stretch]) -> None:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arm.chain import frames
+from ...arm.mounting import rising
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...errors import DataError
@@ -40,8 +41,8 @@ link, and not so wide that a reflector turns away from the instrument or an arm 
 SLIDE = 0.3
 """The same of a joint that slides [m]."""
 CLEAR = 0.1
-"""Least height of wrist and tool above the base plane, and distance from the base's axis, in
-reaches: what keeps most postures out of the floor and the arm's own column."""
+"""Least height of wrist and tool above the plane that the base stands on or hangs from, and distance
+from the base's axis, in reaches: what keeps most postures out of the floor and the arm's column."""
 CANDIDATES = 160
 """Stations to choose from; twice as many make the choice better by per cents."""
 JUDGED = 48
@@ -139,7 +140,7 @@ def clear_postures(robot: Robot, spread: float) -> Array:
     wrist = [np.broadcast_to(row.z_point.T, (TRIED, 3)) for row in chain.rows[robot.n // 2 :]]
     points = np.stack([*wrist, chain.flange_point, chain.position], axis=1)
     least = CLEAR * float(abs(robot.a).sum() + abs(robot.d).sum())
-    above = points[..., 2].min(axis=1) > least
+    above = (rising(robot) * points[..., 2]).min(axis=1) > least
     off = np.linalg.norm(points[..., :2], axis=-1).min(axis=1) > least
     return np.asarray(q[above & off])
 

@@ -216,7 +216,7 @@ def _deviation(twin: Twin, recording: Recording) -> Array | None:
     if measured is None or not measured.t.size:
         return None
     gap = measured.position - twin.poses(recording, measured.t).position
-    return np.asarray(gap @ twin.robot.T_world_base[:3, :3])
+    return np.asarray(gap @ twin.robot.T_world_origin[:3, :3])
 
 
 def beside_bag(model: Predictor, outside: Sequence[Stretch]) -> dict[str, str]:

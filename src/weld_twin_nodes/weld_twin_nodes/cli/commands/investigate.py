@@ -163,6 +163,7 @@ def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
     words = [('--align', args.align), ('--effects-known', args.effects_known)]
     words += [('--cell-box', args.cell_box)]
     words += [('--base-link', args.base_link), ('--tip-link', args.tip_link)]
+    words += [('--flange-link', args.flange_link)]
     # A box may begin with a minus, and is then taken for an option unless it is joined.
     options = [f'{word}={value}' for word, value in words if value]
     return begin(args.robot, options, budget)

@@ -27,6 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='recording of the diagnosis whose set-up is meant, if the set-up moved between them',
     )
     parser.add_argument(
+        '--temperature',
+        type=float,
+        metavar='DEGC',
+        help='of the arm, where the bag has none or another is meant',
+    )
+    parser.add_argument(
         '--table',
         metavar='FILE.csv',
         help='also write the poses as a table, with standard deviations',
@@ -47,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(f"'{args.table}' exists already and is not overwritten")
     robot = robot_of(args)
     recording = read_recording(args.bag, robot, topics_of(args))
+    if args.temperature is not None:
+        recording = recording.at_temperature(args.temperature)
     model = predictor(robot, args.model, args.bag, recording, args.setup)
     say_doubts(model.twin, args.model)
     made = {'model': str(args.model)}

@@ -7,14 +7,11 @@ from __future__ import annotations
 import csv
 import json
 import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
-from weld_twin_lab.fleet.postgres import NoServer, postgres
 from weld_twin_nodes.cli.in_process import weld_twin
 
 ROBOT = 'kuka_kr6_r900'
@@ -87,11 +84,10 @@ def week(place, number, error, rng):
     bag = place / f'week_{number}'
     done('import', place / 'plan/measurements.csv', '--robot', ROBOT, '--out', bag)
     done('diagnose', bag, '--robot', ROBOT, '--align', 'base,tool', '--out', place / 'found')
-    verdict = json.loads((place / 'found/diagnosis.json').read_text())['verdict']
-    (effect,) = verdict['effects']
-    assert (effect['effect'], effect['joint']) == (
-        'joint_offset', MODEL['joints'][JOINT]['name']
-    )  # fmt: skip
+    found = json.loads((place / 'found/diagnosis.json').read_text())
+    effect = found['verdict']['effects'][0]  # the strongest
+    assert effect['effect'] == 'joint_offset'
+    assert effect['joint'] == MODEL['joints'][JOINT]['name']
     return effect['parameters']['offset']
 
 
@@ -141,30 +137,3 @@ def test_what_was_filled_in_and_put_beside_outlives_the_second_week(weeks):
         'found',
         'laptop',
     }
-
-
-def test_two_machines_keep_their_diagnoses_in_one_new_database_at_once(weeks):
-    pytest.importorskip('sqlalchemy', reason='the history is an extra')
-    pytest.importorskip('psycopg', reason='PostgreSQL needs its driver')
-    place, _ = weeks
-    try:
-        with postgres() as url:
-            machines = [
-                subprocess.Popen(
-                    [sys.executable, '-m', 'weld_twin_nodes', 'history', 'add', str(place / folder),
-                     '--cell', 'line 3', '--at', at, '--db', url],
-                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                )
-                for folder, at in (('laptop', '2026-03-02'), ('found', '2026-03-09'))
-            ]  # fmt: skip
-            for machine in machines:
-                out, err = machine.communicate(timeout=120.0)
-                assert machine.returncode == 0, err
-                assert out.endswith('added\n')
-            told = json.loads(
-                done('history', 'show', '--cell', 'line 3', '--db', url, '--json').out
-            )
-    except NoServer as error:
-        pytest.skip(str(error))
-    dates = [each['at'][:10] for each in told['diagnoses']]
-    assert dates == ['2026-03-02', '2026-03-09']

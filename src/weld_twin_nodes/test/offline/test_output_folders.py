@@ -83,13 +83,13 @@ def test_a_folder_of_an_earlier_version_has_no_list_so_nothing_in_it_is_replaced
     out = tmp_path / 'better'
     assert correct(weld_twin, program, out).code == 0
     (out / LIST).unlink()
-    assert correct(weld_twin, program, out).code == 0  # it would write the same
-    (out / LIST).unlink()
     (out / 'bracket.src').write_text('; my own\n')
     refused = correct(weld_twin, program, out)
-    assert refused.code == 2 and 'bracket.kept-1.src' in refused.err
+    assert refused.code == 2 and 'no list says that weld-twin wrote it' in refused.err
+    assert "--force, which keeps it as 'correction.kept-1.json'" in refused.err
     assert correct(weld_twin, program, out, '--force').code == 0
     assert (out / 'bracket.kept-1.src').read_text() == '; my own\n'
+    assert not (out / 'correction.kept-1.json').exists()  # it is the same as before
     assert (out / 'bracket.src').read_bytes() == program.read_bytes()
 
 

@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,22 @@ def test_the_lock_has_every_dependency_in_a_version_that_is_asked_for(python):
             assert asked.specifier.contains(version, prereleases=True), text
 
 
+def test_what_the_packages_of_the_lock_need_themselves_is_in_the_lock():
+    pins = {canonicalize_name(pin.name): pin for _, pin in locked()}
+    lacking = []
+    for package in metadata.distributions():
+        name = canonicalize_name(package.metadata['Name'])
+        if name in pins and pins[name].specifier.contains(package.version):
+            needs = [Requirement(text) for text in package.requires or []]
+            lacking += [
+                f'{name}: {need}'
+                for need in needs
+                if (need.marker is None or need.marker.evaluate({'extra': ''}))
+                and canonicalize_name(need.name) not in pins
+            ]
+    assert lacking == []
+
+
 def test_versions_with_known_holes_are_not_asked_for():
     for extra in ('serve', 'test'):
         asked = {
@@ -95,11 +112,9 @@ def test_the_bill_of_materials_names_what_is_installed_with_its_licence():
 def test_two_builds_of_the_wheel_are_the_same(tmp_path):
     pytest.importorskip('hatchling', reason='the builder is not installed')
     copy = tmp_path / 'copy'
-    shutil.copytree(
-        ROOT,
-        copy,
-        ignore=shutil.ignore_patterns('.*', '__pycache__', 'build', 'out', 'docs', 'bags'),
-    )
+    shutil.copytree(ROOT / 'src', copy / 'src', ignore=shutil.ignore_patterns('__pycache__'))
+    for name in ('pyproject.toml', 'README.md', 'LICENSE', '.gitignore'):
+        shutil.copy(ROOT / name, copy)
     for path in copy.rglob('*'):
         os.utime(path, (1_000_000_000, 1_000_000_000))
         path.chmod(0o700 if path.is_dir() else 0o600)

@@ -155,7 +155,7 @@ def test_a_tracker_that_repeats_itself_at_rest_is_a_measurement(rng):
 def test_a_simulation_without_noise_says_what_it_is(tmp_path):
     (tmp_path / 'e.yaml').write_text('- {effect: joint_offset, joint: elbow_joint, offset: 1e-3}')
     bag, out = str(tmp_path / 'bag'), tmp_path / 'out'
-    words = ['--robot', 'ur5', '--effects', str(tmp_path / 'e.yaml'), '--rate', '50']
+    words = ['--robot', 'ur5', '--effects', str(tmp_path / 'e.yaml'), '--rate', '20']
     assert main(['simulate', *words, '--path', 'line', '--out', bag]) == 0
     assert main(['diagnose', bag, '--robot', 'ur5', '--out', str(out)]) == 0
     found = json.loads((out / 'diagnosis.json').read_text())
@@ -207,7 +207,7 @@ def test_points_that_were_measured_in_bursts_keep_their_stamps(rng):
 
 def on_the_arm(rng, noise=5e-5):
     """Return a board on the table as a camera on the flange sees it."""
-    t, q = motion(rate=50.0)
+    t, q = motion(rate=20.0, seconds=12.0)
     camera = np.linalg.inv(REAL.reaches(q)) @ frame([0.4, 0.1, 0.0], [np.pi, 0.1, 0.0])
     turn = Rotation.from_rotvec(3e-4 * rng.standard_normal((len(q), 3))).as_matrix()
     position = camera[:, :3, 3] + noise * rng.standard_normal((len(q), 3))

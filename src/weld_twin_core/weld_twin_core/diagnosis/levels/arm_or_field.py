@@ -55,21 +55,19 @@ def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> Fre
     small = found.problem.thinned(rows)
     start = found.baseline.model
     bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
-    joints = _joints(small, bare, scale)
-    if not joints:
-        return form
-    bases = _bases(small, bare, scale)
-    arm = _gain(bases, [group for each in joints.values() for group in each])
+    joints, bases = _joints(small, bare, scale), _bases(small, bare, scale)
     touched = small.untracked
-    if not touched and arm < AS_GOOD * _gain(bases, [_field(small, bare, scale)]):
+    every = [group for each in joints.values() for group in each]
+    arm = _gain(bases, every) if every else 0.0
+    if not touched and (arm <= 0.0 or arm < AS_GOOD * _gain(bases, [_field(small, bare, scale)])):
         return form
     gains = {name: max(_gain(bases, groups), 0.0) for name, groups in joints.items()}
+    rest = tuple(part for part in form.parts if part not in fields)
     whole = sum(gains.values())
     if whole <= 0.0:
-        return form
+        return replace(form, parts=rest) if touched else form
     left = 0.0 if touched else FIELD
     sizes = {name: (1.0 - left) * gain / whole for name, gain in gains.items()}
-    rest = tuple(part for part in form.parts if part not in fields)
     part = _shared(fields, joints, sizes, left)
     return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
 

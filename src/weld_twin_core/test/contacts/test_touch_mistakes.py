@@ -3,7 +3,6 @@
 """Postures that are not what they are called: told of, and not fitted."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +10,9 @@ import pytest
 import weld_twin_core as wt
 from weld_twin_core.arm.chain import forward, jacobian
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.levels.arm_or_field import arm_first
-from weld_twin_core.diagnosis.levels.free_form import FreeForm, Part
-from weld_twin_core.diagnosis.levels.groups import Group
+from weld_twin_core.diagnosis.levels.groups import all_groups
+from weld_twin_core.diagnosis.levels.whole_arm import whole_arm_groups
 from weld_twin_core.diagnosis.soundness.touches import touches
 
 SOCKETS = {'a': [0.45, 0.1, 0.3], 'b': [0.45, 0.15, 0.3], 'c': [-0.1, 0.5, 0.4]}
@@ -107,17 +104,12 @@ def test_swapped_files_are_not_mended(sound, robot):
     assert wrong[0].startswith("'a' and 'b' are 50 mm apart by the artefact and ")
 
 
-@pytest.mark.parametrize('size', [0.0, 2e-3])
-def test_what_looks_like_a_field_is_never_put_down_to_an_instrument_that_is_not_there(
-    sound, robot, size
-):
-    q = sound.joints.q + size * np.eye(robot.n)[3]
-    off = replace(sound, joints=replace(sound.joints, q=q))
-    problem, model = aligned(off, robot, 'tool', ())
-    found = SimpleNamespace(problem=problem, baseline=SimpleNamespace(model=model))
-    field = Group('instrument', 'place', (), np.zeros((0, 0)), np.zeros(0))
-    form = FreeForm((Part(field, 10.0, ((field, 1.0),), 0.7),), 0.7, 5.0)
-    places = [part.weight_of('at') for part in arm_first(found, form, 6000, Beliefs()).parts]
-    assert all('instrument' not in each for each in places)
-    if size:
-        assert set(places[0]) <= set(robot.joint_names)
+def test_contacts_have_no_instrument_that_could_be_at_fault(sound, robot):
+    problem, model = aligned(sound, robot, 'tool', ())
+    scale = problem.unit_scale()
+    groups = [
+        *all_groups(problem, model, scale),
+        *whole_arm_groups(problem, model, scale),
+    ]
+    assert {group.at for group in groups} >= set(robot.joint_names[1:-1])
+    assert 'instrument' not in {group.at for group in groups}

@@ -414,6 +414,22 @@ class Recording:
         """
         return replace(self, measured=measured)
 
+    def at_temperature(self, celsius: float) -> Recording:
+        """
+        Return the recording with one temperature all along.
+
+        Parameters
+        ----------
+        celsius : float [degC]
+
+        Raises
+        ------
+        DataError
+            It is no number.
+
+        """
+        return replace(self, temperature=Signal(self.joints.t[:1], np.array([celsius])))
+
     def looking_back(self) -> Recording:
         """
         Return the recording with its side signals straight between samples.

@@ -116,11 +116,12 @@ def _loaded(recording: Recording, numbers: Sequence[float], robot: Robot) -> Rec
     if recording.wrench is not None:
         return recording
     t, poses = recording.joints.t, forward(robot, recording.joints.q)
-    force = np.tile(numbers[0] * robot.gravity, (t.size, 1))
-    tools = robot.T_world_base[:3, :3].T @ poses[:, :3, :3]
+    pull = numbers[0] * (robot.T_base_origin[:3, :3].T @ robot.gravity)
+    force = np.tile(pull, (t.size, 1))
+    tools = robot.T_world_origin[:3, :3].T @ poses[:, :3, :3]
     torque = np.cross(tools @ np.array(numbers[1:] or (0.0, 0.0, 0.0)), force)
-    pull = Signal(t, np.concatenate([force, torque], axis=1))
-    return replace(recording, wrench=pull, wrench_frame='base')
+    wrench = Signal(t, np.concatenate([force, torque], axis=1))
+    return replace(recording, wrench=wrench, wrench_frame='base')
 
 
 def _seen_from_before(recording: Recording, robot: Robot) -> Recording:

@@ -49,9 +49,7 @@ def test_a_load_that_was_taken_off_leaves_what_is_still_there(ur5, stations):
     whole = replace(ur5, payload_mass=3.0)
     (lighter,), _ = told([stations], {0: set_up_change('load=-1.25')}, whole)
     left = wt.Twin(replace(ur5, payload_mass=1.75), [SPRING]).poses(stations)
-    assert np.allclose(
-        left.position, wt.Twin(whole, [SPRING]).poses(lighter).position, atol=1e-9
-    )
+    assert np.allclose(left.position, wt.Twin(whole, [SPRING]).poses(lighter).position, atol=1e-9)
 
 
 def test_forces_that_were_measured_hold_the_load_already(ur5, stations):

@@ -23,7 +23,7 @@ from .claims_table import cases_csv, claims_csv, claims_markdown
 from .figures import Drawing
 
 RESULT, CLAIMS, PAGE = 'sensitivity.json', 'claims.json', 'sensitivity.html'
-TASKS = 'tasks'
+TASKS, FIGURES = 'tasks', 'figures'
 
 
 def study_directory(path: Path | str) -> Path:

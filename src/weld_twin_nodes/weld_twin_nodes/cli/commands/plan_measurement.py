@@ -12,7 +12,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..options import add_robot, robot_of
+from ..options import add_force, add_robot, output, robot_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -67,7 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add('--controller', metavar='NAME', help=f'also write a program: {", ".join(SUFFIXES)}')
     add('--trigger', type=int, default=1, metavar='N', help='output that tells the instrument')
-    add('--out', metavar='DIR', help='directory for the files; it must not exist')
+    add('--out', metavar='DIR', help='directory for the files')
+    add_force(parser)
     add_program_options(parser)
 
 
@@ -135,12 +136,11 @@ def _write(args: argparse.Namespace, robot: Robot, plan: Planned) -> None:
     import numpy as np
 
     from ...offline.measurement_plan import STATIONS, TABLE, write_plan
-    from ...offline.output_directory import new_directory
     from ..program_options import context_of
 
     # Without a controller the table counts as the model does, which this one's language does too.
     context = context_of(args, robot, args.controller or 'csv')
-    with new_directory(args.out, mark=TABLE) as folder:
+    with output(args, TABLE) as folder:
         write_plan(folder, context, args.controller, plan)
         if args.controller:
             _write_program(args, context, folder)

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from .charts import Axis, Line, chart
 from .html import Child, Html, joined, section, tag
 from .mending import left_with
-from .quantities import millimetres, percent
+from .quantities import counted, millimetres, percent
 from .switches import along, as_it_is, drawn, parted, static, switches, trusted
 from .words import listed
 

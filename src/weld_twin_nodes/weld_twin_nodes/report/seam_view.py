@@ -189,7 +189,7 @@ def _left_out(diagnosis: Diagnosis, k: int) -> str:
     out = np.flatnonzero(~trusted(diagnosis, k))
     if not out.size:
         return ''
-    size = np.linalg.norm(as_it_is(diagnosis, k), axis=1)
+    size = np.linalg.norm(diagnosis.traces.before[k], axis=1)
     worst = sorted(out[np.argsort(-size[out])][:_LISTED].tolist())
     told = [seen_at(diagnosis, k, sample, float(size[sample])) for sample in worst]
     if out.size > _LISTED:

@@ -154,7 +154,10 @@ def test_what_is_left_counts_in_no_curve_that_is_advised_against():
     assert f'shrinks to {1e3 * left.rms_after:.3f} mm' in second
     page = plain(report_page(case))
     assert f'Left with only cause {good + 1} mended {1e3 * left.rms_after:.3f} mm' in page
-    assert 'without the entries of joint_a3 under found' in page and 'all 2 causes (not advised)' in page
+    assert (
+        'without the entries of joint_a3 under found' in page
+        and 'all 2 causes (not advised)' in page
+    )
 
 
 def test_the_controller_is_not_to_be_given_a_curve_that_takes_hardly_anything_off():

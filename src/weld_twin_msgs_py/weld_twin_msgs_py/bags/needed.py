@@ -39,7 +39,7 @@ def no_measurements(names: TopicNames, present: Present) -> str:
 
 
 def other_names(robot: Robot, there: Sequence[str]) -> str:
-    """Return which joints are there in place of the robot's, and the option that brings them together."""
+    """Return which joints are there in place of the robot's, and the option that joins them."""
     if not there:
         return ''
     told = f'; it holds {", ".join(there[:_LISTED])}' + (' and more' * (len(there) > _LISTED))

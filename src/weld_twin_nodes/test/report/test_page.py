@@ -151,7 +151,7 @@ def test_outliers_are_counted_and_not_drawn():
     assert page_data(replace(case, traces=spoilt))['top'] < 2.0 * page_data(case)['top']
     page = report_page(replace(case, traces=spoilt)).replace('\N{NO-BREAK SPACE}', ' ')
     told = re.findall(r'\(1 sample left out: [^)]*\)', page)
-    assert set(told) == {'(1 sample left out: 50.000 mm at 0.1 s)'}
+    assert set(told) == {'(1 sample left out: 50.00 mm at 0.1 s)'}
     assert 'not drawn' not in report_page(case)
 
 

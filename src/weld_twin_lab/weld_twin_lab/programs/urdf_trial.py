@@ -13,9 +13,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,6 +27,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_msgs_py.programs import Context, controller_of
 from weld_twin_msgs_py.programs.writing import Exported, ExportMove, written
 from weld_twin_msgs_py.robots import load_robot
+from weld_twin_nodes.cli.in_process import weld_twin
 
 from ..plant.plant import run
 from ..plant.plant_recording import Command
@@ -131,15 +130,11 @@ def command(*words: str) -> str:
         Its exit code is not 0; the message is its last line.
 
     """
-    from weld_twin_nodes.cli.main import main
-
-    said, wrong = StringIO(), StringIO()
-    with redirect_stdout(said), redirect_stderr(wrong):
-        code = main(list(words))
-    if code != 0:
-        lines = (wrong.getvalue() or said.getvalue()).strip().splitlines() or ['']
+    said = weld_twin(*words)
+    if said.code != 0:
+        lines = (said.err or said.out).strip().splitlines() or ['']
         raise CommandFailed(f'{words[0]}: {lines[-1]}')
-    return said.getvalue()
+    return said.out
 
 
 def _through(seed: int, number: int, arm: DrawnArm, place: Path) -> dict[str, Any]:

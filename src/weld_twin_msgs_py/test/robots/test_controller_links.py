@@ -134,14 +134,26 @@ def test_the_base_is_the_link_asked_for_or_found_by_its_name(case, tmp_path):
     robot = load_robot(tmp_path / 'r.urdf', asked, 'link_6')
     assert robot.controller.base_link == base
     own = load_robot(tmp_path / 'r.urdf', base, 'link_6')  # poses of this one are in that link
-    seen = np.linalg.inv(robot.T_world_origin) @ forward(robot, Q)
+    T_world_base = robot.T_world_base @ robot.controller.base
+    seen = np.linalg.inv(T_world_base) @ forward(robot, Q)
     np.testing.assert_allclose(seen, forward(own, Q), atol=1e-12)
+
+
+def test_the_base_of_a_ur_is_told_by_base_link_and_its_programs_count_from_base(tmp_path):
+    (tmp_path / 'r.urdf').write_text(urdf(('base_link', 'base', '0 0 0', '0 0 3.1415927')))
+    robot = load_robot(tmp_path / 'r.urdf', tip_link='link_6')
+    np.testing.assert_allclose(robot.T_world_origin, np.eye(4), atol=1e-12)
+    turned = robot.T_world_base @ robot.controller.base
+    np.testing.assert_allclose(turned, np.diag([-1.0, -1.0, 1.0, 1.0]), atol=1e-7)
+    moved = np.eye(4)
+    moved[:3, 3] = 1.0, 2.0, 3.0
+    np.testing.assert_allclose(robot.with_origin(moved).T_world_origin, moved, atol=1e-12)
 
 
 def hand_in_base(robot):
     """Return the controller's flange in its base."""
     bare = robot.with_frames(tool=robot.controller.flange)
-    return np.linalg.inv(robot.T_world_origin) @ forward(bare, Q)
+    return np.linalg.inv(robot.T_world_base @ robot.controller.base) @ forward(bare, Q)
 
 
 @pytest.mark.parametrize('tip', ['tcp', 'tool0', 'link_6'])
@@ -165,6 +177,7 @@ def test_corrected_files_keep_flange_and_base_where_the_tool_was_fitted(tip, tmp
     for read in again:
         np.testing.assert_allclose(forward(read, Q), forward(robot, Q), atol=1e-12)
         np.testing.assert_allclose(hand_in_base(read), hand_in_base(robot), atol=1e-12)
+        np.testing.assert_allclose(read.T_world_origin, robot.T_world_origin, atol=1e-12)
 
 
 def arms(tmp_path):

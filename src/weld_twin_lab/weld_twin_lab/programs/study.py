@@ -13,6 +13,7 @@ from typing import Any
 from weld_twin_core import __version__
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from . import correction_table, urdf_table
@@ -64,8 +65,8 @@ def study(
         'round_trips': trips,
         'fuzz': fuzzed,
     }
-    write_text(out / RESULTS, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / TABLE, summary(result), overwrite=True)
+    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
+    write_owned(out / TABLE, summary(result))
     return result
 
 
@@ -104,8 +105,8 @@ def corrections(
         'cases': cases,
     }
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / CORRECTIONS, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / CORRECTIONS_TABLE, correction_table.page(result), overwrite=True)
+    write_owned(out / CORRECTIONS, json.dumps(result, indent=1) + '\n')
+    write_owned(out / CORRECTIONS_TABLE, correction_table.page(result))
     return result
 
 

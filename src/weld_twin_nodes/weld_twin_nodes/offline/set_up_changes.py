@@ -38,7 +38,8 @@ class SetUpChange:
     kind : str
         'load', 'tool' or 'instrument'.
     numbers : tuple of float
-        Of a load its mass [kg] and, where given, its centre of mass in the tool frame [m].
+        Of a load its mass [kg], below 0 where it was taken off, and, where given, its centre of mass
+        in the tool frame [m].
 
     """
 
@@ -69,8 +70,11 @@ def set_up_change(text: str) -> SetUpChange:
         raise DataError(
             f"what was changed is 'load=KG', 'load=KG,X,Y,Z', 'tool' or 'instrument', got '{text}'"
         )
-    if kind == 'load' and not 0.0 < numbers[0] < HEAVIEST:
-        raise DataError(f'a load is given in kg, above 0 and below {HEAVIEST:g}, got {text!r}')
+    if kind == 'load' and not 0.0 < abs(numbers[0]) < HEAVIEST:
+        raise DataError(
+            f'a load is given in kg, not 0 and below {HEAVIEST:g}, or below 0 where one was taken '
+            f'off; got {text!r}'
+        )
     return SetUpChange(kind, numbers)
 
 

@@ -84,10 +84,24 @@ def turns_as(given: Given, undo: Callable[[Array], Array]) -> Given:
     return replace(given, recordings=tuple(out))
 
 
+def poses_inverted(given: Given) -> Given:
+    """Return what was given with measured poses inverted; points stay as they are."""
+    out = []
+    for r in given.recordings:
+        seen = measured(r)
+        out.append(r if seen.rotation is None else r.with_measured(seen.inverted()))
+    return replace(given, recordings=tuple(out))
+
+
 def robot_as(given: Given, robot: Robot) -> Given:
     """Return what was given with another robot that stands where the first did, same tool."""
     placed = robot.with_frames(base=given.robot.T_world_base, tool=given.robot.T_flange_tool)
     return replace(given, robot=placed)
+
+
+def differing(given: Given, families: tuple[str, ...]) -> Given:
+    """Return what was given with errors of more families that may differ between recordings."""
+    return replace(given, may_change=tuple(dict.fromkeys([*given.may_change, *families])))
 
 
 def frames_fitted(given: Given, frames: frozenset[str]) -> Given:
@@ -124,6 +138,15 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     seen = measured(recordings[k])
     earlier = seen.t - (late + rate * (seen.t - middle))
     recordings[k] = recordings[k].with_measured(replace(seen, t=earlier))
+    return replace(given, recordings=tuple(recordings))
+
+
+def stamped_evenly(given: Given, k: int, first: float, step: float) -> Given:
+    """Return what was given with measurements of recording k at first + step * 0, 1, 2, … [s]."""
+    recordings = list(given.recordings)
+    seen = measured(recordings[k])
+    even = first + step * np.arange(seen.t.size)
+    recordings[k] = recordings[k].with_measured(replace(seen, t=even))
     return replace(given, recordings=tuple(recordings))
 
 

@@ -109,10 +109,11 @@ def _whole(diagnosis: Diagnosis) -> str:
         return 'All of it is at the level of the noise, so it lies nowhere in particular.'
     if not diagnosis.causes:
         return 'Nothing was named, so these are what each joint could explain by itself.'
-    told = sum(cause.share for cause in diagnosis.causes)
-    rest = [
-        f'{percent(share, places(diagnosis))} is {name}' for name, share in remainder(diagnosis)
-    ]
+    shares = [cause.share for cause in diagnosis.causes if not cause.rest]
+    left = [cause.share for cause in diagnosis.causes if cause.rest]
+    told, left = sum(shares or left), left if shares else []
+    rows = [*(('without a name', share) for share in left), *remainder(diagnosis)]
+    rest = [f'{percent(share, places(diagnosis))} is {name}' for name, share in rows]
     held = 'The causes explain' if diagnosis.effects else 'The places found hold'
     return (
         f'{held} {percent(told, places(diagnosis))} of the squared gap; '

@@ -29,7 +29,7 @@ class Bursts(NamedTuple):
 
     Attributes
     ----------
-    count : int
+    number : int
     every : float [s]
         Median time from burst to burst.
     first, step : float [s]
@@ -37,7 +37,7 @@ class Bursts(NamedTuple):
 
     """
 
-    count: int
+    number: int
     every: float
     first: float
     step: float
@@ -51,7 +51,7 @@ class Bursts(NamedTuple):
     def words(self) -> str:
         """Return what is to be said of it, to follow the name of the stream."""
         return (
-            f'stamped in {self.count} bursts, one every {self.every * 1e3:.3g} ms; '
+            f'stamped in {self.number} bursts, one every {self.every * 1e3:.3g} ms; '
             f'{self.rate:#.4g} Hz underneath'
         )
 
@@ -72,7 +72,7 @@ def bursts(t: Array) -> Bursts | None:
     >>> import numpy as np
     >>> from weld_twin_core.bursts import bursts
     >>> sent = np.repeat(np.arange(10) * 0.4 + 0.3, 4) + np.tile(np.arange(4) * 1e-4, 10)
-    >>> print(bursts(sent).count, round(bursts(sent).rate, 2))
+    >>> print(bursts(sent).number, round(bursts(sent).rate, 2))
     10 10.0
 
     """

@@ -68,7 +68,9 @@ def _left(case: Case, k: int) -> float | None:
     """Return what a rigid arm leaves of a recording [m] where that is no more than rounding."""
     if case.gap > UNEXPLAINED:
         return None
-    bare = Model(case.model.robot, (case.model.bases[k],), case.model.known + case.model.changed(k))
+    bare = Model(
+        case.model.robot, (case.model.bases[k],), case.model.known + case.model.changed(k)
+    )
     model = bare.with_found(constant_errors(bare.robot))
     tried = [_stations(recording, k, model) for recording in _paired(case, k)]
     near = [(one, started) for one in tried if one is not None and (started := _near(one, model))]
@@ -135,7 +137,7 @@ def _rounding(problem: Problem, model: Model) -> float:
     (recording,), (maker,) = problem.recordings, problem.features(model)
     turning = ~model.robot.prismatic
     step, angle = _grid(measured(recording).position, GRIDS), _grid(recording.joints.q, ANGLES)
-    reach = [maker.column(('q', i))[:3] for i in np.flatnonzero(turning)]
+    reach = [maker.column(('q', i))[:3] for i in np.flatnonzero(turning).tolist()]
     squares = np.sum([(column**2).sum(axis=0).mean() for column in reach])
     out = OVER * float(np.sqrt((3.0 * step**2 + squares * angle**2) / 12.0))
     return out if out < ROUNDED else 0.0

@@ -88,8 +88,8 @@ def poses_inverted(given: Given) -> Given:
     """Return what was given with measured poses inverted; points stay as they are."""
     out = []
     for r in given.recordings:
-        seen = measured(r)
-        out.append(r if seen.rotation is None else r.with_measured(seen.inverted()))
+        posed = r.measured is not None and r.measured.rotation is not None
+        out.append(r.with_measured(measured(r).inverted()) if posed else r)
     return replace(given, recordings=tuple(out))
 
 
@@ -141,11 +141,28 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     return replace(given, recordings=tuple(recordings))
 
 
-def stamped_evenly(given: Given, k: int, first: float, step: float) -> Given:
-    """Return what was given with measurements of recording k at first + step * 0, 1, 2, … [s]."""
+def stamped_evenly(given: Given, k: int, first: float, step: float, count: int) -> Given:
+    """
+    Return what was given with measurements of recording k stamped by an even clock.
+
+    Parameters
+    ----------
+    given : Given
+        Recordings, robot and frames as they were given.
+    k : int
+        Which recording, counted from 0.
+    first, step : float [s]
+        The first stamp, and the time from one to the next.
+    count : int
+        How many measurements had these stamps; of as many in the same time as there are now, each
+        takes its share.
+
+    """
     recordings = list(given.recordings)
-    seen = measured(recordings[k])
-    even = first + step * np.arange(seen.t.size)
+    seen = recordings[k].measured
+    if seen is None:
+        return given
+    even = np.asarray(first + step * count / seen.t.size * np.arange(seen.t.size), dtype=float)
     recordings[k] = recordings[k].with_measured(replace(seen, t=even))
     return replace(given, recordings=tuple(recordings))
 

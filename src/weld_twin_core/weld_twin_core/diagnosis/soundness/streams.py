@@ -109,7 +109,7 @@ def _in_bursts(given: Given, k: int) -> Iterator[Mistake]:
         f'from {length(before)} to {length(after)}.',
         "Record the instrument's own time of each measurement, or send each at once; --apply "
         'stamps them anew',
-        partial(stamped_evenly, k=k, first=even.first, step=even.step),
+        partial(stamped_evenly, k=k, first=even.first, step=even.step, count=t.size),
         of_all=False,
     )
 
@@ -117,15 +117,17 @@ def _in_bursts(given: Given, k: int) -> Iterator[Mistake]:
 def _evenly(given: Given, k: int, found: Bursts) -> tuple[float, Bursts, float]:
     """Return the median gap [m] as stamped, the even stamps that explain most, and their gap."""
     alone = replace(given, recordings=(given.recordings[k],))
+    count = measured(given.recordings[k]).t.size
     even = found
     for _ in range(ROUNDS):
-        (late,) = _posed(stamped_evenly(alone, 0, even.first, even.step)).lags
+        (late,) = _posed(stamped_evenly(alone, 0, even.first, even.step, count)).lags
         if late is None:
             break
         # A delay that grows evenly is another first stamp and another step.
         first = even.first - (late.late + late.rate * (even.first - late.middle))
         even = even._replace(first=first, step=even.step * (1.0 - late.rate))
-    return _posed(alone).gap, even, _posed(stamped_evenly(alone, 0, even.first, even.step)).gap
+    after = _posed(stamped_evenly(alone, 0, even.first, even.step, count))
+    return _posed(alone).gap, even, after.gap
 
 
 def _posed(given: Given) -> Case:

@@ -172,6 +172,31 @@ def test_what_a_person_saves_while_the_command_runs_is_not_lost(tmp_path):
     assert said == ["'a.txt' was not overwritten and is kept as 'a.kept-1.txt'"]
 
 
+def test_a_folder_of_a_persons_is_not_taken_for_ours_because_one_file_in_it_is(
+    weld_twin, program, tmp_path
+):
+    (tmp_path / 'thesis.tex').write_text('years of work')
+    assert weld_twin('schema', 'robot', '--out', tmp_path / 'robot.json').code == 0
+    refused = correct(weld_twin, program, tmp_path)
+    assert refused.code == 2 and 'holds something else already' in refused.err
+    assert correct(weld_twin, program, tmp_path, '--force').code == 0
+    assert correct(weld_twin, program, tmp_path).code == 0
+    assert (tmp_path / 'thesis.tex').read_text() == 'years of work'
+
+
+def test_two_runs_at_once_into_one_folder_leave_the_whole_result_of_the_last(tmp_path):
+    for out in (tmp_path / 'new', tmp_path / 'there'):
+        if out.name == 'there':
+            make(out, **{'a.txt': '0', 'b.txt': '0'})
+        with new_directory(out, mark='result.json') as first:
+            make(out, **{'a.txt': '1'})
+            for name in ('a.txt', 'c.txt', 'result.json'):
+                write_text(first / name, '2')
+        assert content(out) == {'a.txt': b'2', 'c.txt': b'2', 'result.json': b'2'}
+        make(out)
+    assert {path.name for path in tmp_path.iterdir()} == {'new', 'there'}
+
+
 def test_two_results_in_one_folder_do_not_take_each_others_files(weld_twin, program, tmp_path):
     out = tmp_path / 'monday'
     assert correct(weld_twin, program, out).code == 0

@@ -72,7 +72,7 @@ class DrawnArm:
 
     def of_plant(self, q: np.ndarray) -> np.ndarray:
         """Return joints of the plant, shape (N, 6), from those of the URDF."""
-        return q * self.sign + self.zero
+        return np.asarray(q * self.sign + self.zero)
 
 
 def drawn_arm(seed: int, number: int) -> DrawnArm:

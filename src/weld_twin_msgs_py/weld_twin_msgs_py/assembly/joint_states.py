@@ -110,6 +110,8 @@ class JointStates:
     ----------
     others : int
         Messages that hold no joint of the robot.
+    strangers : dict of str
+        Names of the joints in those messages, in their order.
     parts : int
         Messages that hold some joints and wait for the rest.
     remark, velocity_remark : str
@@ -143,6 +145,7 @@ class JointStates:
         self._stamp = 0
         self._parts: dict[str, tuple[float, float]] = {}
         self.others = self.parts = 0
+        self.strangers: dict[str, None] = {}
         self.remark = ''
         self.velocity_remark = ''
 
@@ -205,6 +208,7 @@ class JointStates:
                 raise Missing('the joint state names no joint')
             if not (self._take_own_names(message) or self._take_prefix(message.name)):
                 self.others += 1
+                self.strangers.update(dict.fromkeys(message.name))
                 return None
             present = self._names
         if 0 < len(present) < len(self._names):

@@ -74,9 +74,8 @@ def new_directory(
     try:
         _finish(target, tell)
         _refuse_foreign(target, mark, force or shared)
-        if not force and not adds:
-            own = owned_files.listed(target).get(mark, {})
-            owned_files.refuse(target, mark, owned_files.changed(target, own))
+        if not (force or shared):
+            _refuse_before(target, mark)
         scratch = _scratch(target)
     except OSError as error:
         raise _refusal(target, error) from None
@@ -195,6 +194,13 @@ def _install(
         except BaseException:
             scratch.leave()  # the next one ends what is begun
             raise
+
+
+def _refuse_before(target: Path, mark: str) -> None:
+    """Refuse what would be refused when all is computed, as far as it is known."""
+    own = owned_files.listed(target).get(mark, {})
+    unlisted = [mark] if mark not in own and os.path.lexists(target / mark) else []
+    owned_files.refuse(target, mark, owned_files.changed(target, own) + unlisted)
 
 
 def _refuse_foreign(target: Path, mark: str, any_folder: bool) -> None:

@@ -127,7 +127,7 @@ def told(neighbours, node, inputs=(), heard=(), **reached):
     hears = json.dumps({topic: [count, 0] for topic, count in heard})
     own = Status(node, 0, '', {**health(node), 'reached': json.dumps(reached), 'heard': hears})
     others = [Status(f'{node}: {topic}', 0, '', {}) for topic in inputs]
-    neighbours.take(make.statuses(1, [own, *others]))
+    neighbours.take(from_messages.diagnostics(make.statuses(1, [own, *others])))
 
 
 def test_nodes_have_met_when_each_reaches_all_who_listen():

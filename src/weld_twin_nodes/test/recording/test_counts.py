@@ -17,6 +17,7 @@ from rosbags.highlevel import AnyReader
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
 from weld_twin_msgs_py.bags.segment import Channel
+from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import Status, bag_messages
 from weld_twin_msgs_py.messages.typestore import TYPES
 from weld_twin_nodes.live.completeness import NEW, SentBook, shortfall

@@ -35,7 +35,7 @@ from .all_nodes import refuse_unknown
 from .health import Health, Input
 from .losses import Losses
 from .outputs import NODE, REACHED, RUN, Output, read_told
-from .partners import senders, unreached_subscribers
+from .partners import readers, senders, unreached_subscribers
 from .qos_overrides import QosOverrides
 from .settings import SHARED, Setting
 from .typed_input import Turn, TypedInput, measured_turn, reader
@@ -46,12 +46,19 @@ READY_EVERY = 0.02
 """Seconds between two looks at whether the listeners are there."""
 HEALTH_EVERY = 1.0
 """Seconds between two health messages."""
-LAST_WORDS = 2.0
+LAST_WORDS = 8.0
 """
 Seconds an ending node waits in all until its subscribers have everything. Acknowledgements take
-milliseconds; who asks for what it lacks is answered as fast. A subscriber that stands still would
-keep the node for ever, and `ros2 launch` ends by force what has not ended within 5 s.
+milliseconds; what was lost on the way is sent again with Fast DDS's heartbeat, every 3 s, and on a
+busy machine the first of them may be lost too.
 """
+STANDS_STILL = 2.0
+"""
+Seconds it waits where a subscriber does not tell of itself, as the nodes of the project do once a
+second: one that stands still would keep it, and `ros2 launch` ends by force what takes 5 s.
+"""
+ACKNOWLEDGED = 0.2
+"""Seconds between two looks at who still tells of itself."""
 FORWARDS = 10.0
 """Seconds of a jump of the clock forwards that is told: a bag that is played jumps by its pauses."""
 KNOWN = 2.0
@@ -103,7 +110,8 @@ class CellNode(Node):
         self.take_robot(None)
         self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
         self._read_health = reader(DIAGNOSTICS.type)
-        self.create_subscription(
+        self._told_at: dict[str, float] = {}
+        self._diagnosed: Any = self.create_subscription(
             DIAGNOSTICS.message_class(),
             DIAGNOSTICS.name,
             self._hear,
@@ -143,15 +151,35 @@ class CellNode(Node):
         if self.context.ok():
             self._tell_health()
             self._tell_last_losses()
-            latest = time.monotonic() + LAST_WORDS
+            begun = time.monotonic()
             for output in self._outputs:
-                left = max(latest - time.monotonic(), 0.0)
-                if not output.wait_for_all_acked(Duration(seconds=left)):
-                    self.get_logger().warning(
-                        f'{output.topic}: a subscriber does not take in what was sent to it; '
-                        'this node ends without waiting for it any longer'
-                    )
+                self._wait_for_readers(output, begun)
         super().destroy_node()  # type: ignore[no-untyped-call]
+
+    def _wait_for_readers(self, output: Output, begun: float) -> None:
+        """Wait until all who take an output have all of it, or stand still; and say so."""
+        while True:
+            live = readers(self, output.topic) <= self._live()
+            left = begun + (LAST_WORDS if live else STANDS_STILL) - time.monotonic()
+            slice_s = min(max(left, READY_EVERY), ACKNOWLEDGED)
+            if output.wait_for_all_acked(Duration(seconds=slice_s)):
+                return
+            if left <= 0.0:
+                break
+        self.get_logger().warning(
+            f'{output.topic}: a subscriber has not taken in all that was sent to it; this node ends '
+            'without waiting for it any longer'
+        )
+
+    def _live(self) -> set[str]:
+        """Return the nodes that have told of themselves just now; none is served at the end."""
+        with self._diagnosed.handle:
+            while (
+                taken := self._diagnosed.handle.take_message(self._diagnosed.msg_type, True)
+            ) is not None:
+                self._hear(taken[0])
+        now = time.monotonic()
+        return {node for node, told in self._told_at.items() if now - told < STANDS_STILL}
 
     def take_robot(self, robot: Robot | None, joint_names: tuple[str, ...] | None = None) -> None:
         """
@@ -467,6 +495,8 @@ class CellNode(Node):
     def _hear_counts(self, statuses: Statuses) -> None:
         """Hold what a node tells it has sent against what has come of it."""
         for values in statuses.values():
+            if NODE in values:
+                self._told_at[values[NODE]] = time.monotonic()
             for topic, sent in read_told(values).items():
                 if topic in self._losses:
                     teller = values.get(NODE, ''), values.get(RUN, '')

@@ -21,8 +21,13 @@ TELLS = 4
 Counts in a row that must all be short before messages are missing. They come once a second, and
 what was lost on the way to a reliable reader is sent again within 3 s (Fast DDS).
 """
-OVER = 5.0
+OVER = 4.0
 """Seconds without another missing message after which a loss is over."""
+
+
+SETTLES = 3.0
+"""Seconds within which a loss that still grows is told: a burst is over by then, and the number is
+that of all of it."""
 
 
 class Counted:
@@ -64,7 +69,7 @@ class Counted:
             self._short.append(self._lack(state))
         self._told = False
         if len(self._short) == TELLS:
-            self._now = max(self._now, min(self._short))
+            self._now = max(min(self._short), 0)  # what is sent again comes after all
         return self._before + self._now
 
     def _total(self) -> int:
@@ -89,7 +94,8 @@ class Losses:
         self._state = state
         self.counted = Counted()
         self._by_stamps = 0
-        self._grew = 0.0
+        self._grew = self._since = 0.0
+        self._said = False
         self.telling = ''
 
     def look(self, senders: Collection[str], now: float) -> list[str]:
@@ -115,15 +121,19 @@ class Losses:
             self._by_stamps += seen.missing
             lost = self._by_stamps
             said = (
-                f'{topic}: {lost:,} messages are missing by the gaps between its stamps (one is '
+                f'{topic}: {lost:,} missing messages, by the gaps between its stamps (one is '
                 f'due every {seen.step * 1e3:.3g} ms): they were lost on the way, or never sent'
             )
-        if lost > self._state.lost:
-            self._state.lost, self._grew = lost, now
-            out += [] if self.telling else [said]
-            self.telling = said
-        elif self.telling and now - self._grew > OVER:
-            self.telling = ''
+        grown = lost > self._state.lost
+        if grown:
+            self._since = self._since if self.telling else now
+            self._grew, self.telling = now, said
+        self._state.lost = lost
+        if self.telling and not self._said and (not grown or now - self._since > SETTLES):
+            self._said = True
+            out.append(self.telling)
+        if self.telling and now - self._grew > OVER:
+            self.telling, self._said = '', False
             out.append(f'{topic}: no more messages go missing; {lost:,} are missing in all')
         return out
 

@@ -53,6 +53,11 @@ def senders(node: Node, topic: str) -> set[str]:
     return {_name(info) for info in node.get_publishers_info_by_topic(topic)}
 
 
+def readers(node: Node, topic: str) -> set[str]:
+    """Return the full names of the nodes that subscribe to a topic."""
+    return {_name(info) for info in node.get_subscriptions_info_by_topic(topic)}
+
+
 def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
     """
     Return where the input may be that nobody publishes, in a sentence; empty where nowhere.

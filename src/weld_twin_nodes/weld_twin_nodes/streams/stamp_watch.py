@@ -16,17 +16,18 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_msgs_py.assembly.stamp_order import RESTART_AFTER
 
-from .clock_watch import NANOSECOND, PACE
+from .clock_watch import NANOSECOND
 
 KEPT = 200
-"""Steps of the stamps over which their beat is judged: a second at 200 Hz."""
+"""Steps of the stamps that are kept to judge their beat by: a second at 200 Hz."""
 FEWEST = 20
 """Steps without which a stream has no beat that is known."""
 ON_BEAT = 0.25
 """Part of a step by which another may differ and be on the beat: a driver that stamps what it
 receives is off by an eighth of 8 ms."""
-REGULAR = 0.9
-"""Share of the steps that must be on the beat, for a gap to tell of anything."""
+REGULAR = 0.8
+"""Share of the steps that must be on the beat, or a whole number of them, for a gap to tell of
+anything: steps that come as they like are so by half."""
 GAP = 1.5
 """Steps from which on a message is missing in between."""
 SILENT = 1.0
@@ -35,7 +36,10 @@ JUMPED = 1.0
 """Seconds by which stamps run ahead of the time that passed, in a stream in real time, where a
 clock was set: messages take milliseconds."""
 JUMPED_ANYHOW = 100.0
-"""The same where stamps do not pass as time does: more than a queue of 5,000 loses at 50 Hz."""
+"""The same where messages come faster than their stamps pass, as from a queue that overran or from
+a recording: more than a queue of 5,000 loses at 50 Hz."""
+RUSH = 0.5
+"""Time that steps beside a gap take, against that between their stamps, below which they rush."""
 
 
 class Seen(NamedTuple):
@@ -67,9 +71,9 @@ class StampWatch:
     def __init__(self) -> None:
         self._stamps: list[int] = []
         self._arrivals: list[float] = []
-        self._top: tuple[int, float] | None = None
+        self._kept = np.empty(0, dtype=np.int64), np.empty(0)
+        self._judged = 0
         self._behind = 0
-        self._steps = np.empty(0)
 
     def add(self, stamp: int, now: float) -> None:
         """Take a stamp [ns] that comes at a time [s]."""
@@ -77,71 +81,100 @@ class StampWatch:
         self._arrivals.append(now)
 
     def look(self) -> Seen:
-        """Return what has come since the last look."""
-        if not self._stamps:
-            return Seen()
-        stamps, arrivals = np.array(self._stamps), np.array(self._arrivals)
+        """
+        Return what was seen since the last look.
+
+        The newest steps are judged by what comes after them, unless nothing does.
+        """
+        new = len(self._stamps)
+        stamps = np.concatenate([self._kept[0], np.array(self._stamps, dtype=np.int64)])
+        arrivals = np.concatenate([self._kept[1], np.array(self._arrivals)])
         self._stamps.clear()
         self._arrivals.clear()
-        if self._top is not None:
-            stamps = np.concatenate([[self._top[0]], stamps])
-            arrivals = np.concatenate([[self._top[1]], arrivals])
+        if stamps.size < 2:
+            self._kept = stamps, arrivals
+            return Seen()
         top = np.maximum.accumulate(stamps)
-        back = self._back(stamps < top, stamps, top)
+        back = self._back(stamps < top, new, int((top - stamps).max()))
         if back:
-            self._top = int(stamps[-1]), float(arrivals[-1])
+            self._kept, self._judged = (stamps[-1:], arrivals[-1:]), 0
             return Seen(back=back)
         ahead = np.concatenate([[True], np.diff(top) > 0])
-        self._top = int(top[-1]), float(arrivals[ahead][-1])
-        step = np.diff(stamps[ahead]) * NANOSECOND
-        return self._gaps(step, np.diff(arrivals[ahead]))
+        stamps, arrivals = stamps[ahead], arrivals[ahead]
+        steps = stamps.size - 1
+        until = max(self._judged, steps - FEWEST) if new else steps
+        step, passed = np.diff(stamps) * NANOSECOND, np.diff(arrivals)
+        seen = _seen(step, passed, self._judged, until)
+        cut = max(steps - KEPT, 0)
+        self._kept, self._judged = (stamps[cut:], arrivals[cut:]), max(until - cut, 0)
+        return seen
 
-    def _back(self, below: Array, stamps: Array, top: Array) -> float:
+    def _back(self, below: Array, new: int, by: int) -> float:
         """Return how far the stamps have gone back for good [s]; one late stamp is no new run."""
-        trailing = int(np.argmin(below[::-1])) if not below.all() else below.size
-        # The first of them is the highest one before, which is never below itself.
-        self._behind = trailing if trailing < below.size - 1 else self._behind + trailing
+        fresh = below[below.size - new :]
+        trailing = new if fresh.all() else int(np.argmin(fresh[::-1]))
+        self._behind = self._behind + new if trailing == new else trailing
         if self._behind < RESTART_AFTER:
             return 0.0
         self._behind = 0
-        return float(top[-1] - stamps[-1]) * NANOSECOND
-
-    def _gaps(self, step: Array, passed: Array) -> Seen:
-        """Return what the steps between stamps [s] show, held against the time between them [s]."""
-        recent = np.concatenate([self._steps, step])[-KEPT:]
-        self._steps = recent
-        beat = step if step.size >= FEWEST else recent
-        if step.size == 0 or beat.size < FEWEST:
-            return Seen()
-        usual = float(np.median(beat))
-        jumps = step - passed > self._most(step, passed, usual)
-        ahead = float((step - passed)[jumps].max(initial=0.0))
-        if np.mean(abs(recent - usual) <= ON_BEAT * usual) < REGULAR:
-            return Seen(ahead=ahead)
-        silence = passed > max(SILENT, 5.0 * usual)
-        gaps = (step > GAP * usual) & ~jumps & ~silence
-        return Seen(_missing(step, gaps, usual), usual, ahead)
-
-    @staticmethod
-    def _most(step: Array, passed: Array, usual: float) -> float:
-        """Return by how much stamps may run ahead of time [s]."""
-        small = step <= 4.0 * usual
-        time = float(passed[small].sum())
-        pace = float(step[small].sum()) / time if time > 0.0 else 0.0
-        return JUMPED if PACE[0] < pace < PACE[1] else JUMPED_ANYHOW
+        return float(by) * NANOSECOND
 
 
-def _missing(step: Array, gaps: Array, usual: float) -> int:
+def _seen(step: Array, passed: Array, begin: int, end: int) -> Seen:
+    """
+    Return what steps of stamps show.
+
+    Parameters
+    ----------
+    step, passed : array, shape (N,) [s]
+        Between stamps, and between their arrivals.
+    begin, end : int
+        Of the steps that are judged; the others are there to judge them by.
+
+    """
+    if begin >= end:
+        return Seen()
+    beat = step.size >= FEWEST
+    usual = float(np.median(step)) if beat else np.inf
+    excess = step - passed
+    rushed = np.array([_rushed(step, passed, k) for k in np.flatnonzero(excess > JUMPED)], bool)
+    jumps = excess > JUMPED_ANYHOW
+    if beat:
+        jumps[excess > JUMPED] |= ~rushed
+    judged = (np.arange(step.size) >= begin) & (np.arange(step.size) < end)
+    ahead = float(excess[jumps & judged].max(initial=0.0))
+    beats = step / usual
+    on_beat = abs(beats - np.maximum(np.round(beats), 1.0)) <= ON_BEAT
+    if not beat or np.mean(on_beat) < REGULAR:
+        return Seen(ahead=ahead)
+    silence = passed > max(SILENT, 5.0 * usual)
+    gaps = (step > GAP * usual) & ~jumps & (~silence | (excess > SILENT))
+    return Seen(_missing(step, gaps, usual, begin, end), usual, ahead)
+
+
+def _rushed(step: Array, passed: Array, k: int) -> bool:
+    """Return whether the messages before or after a step came faster than their stamps pass."""
+    for side in (slice(max(k - FEWEST, 0), k), slice(k + 1, k + 1 + FEWEST)):
+        time, stamps = float(passed[side].sum()), float(step[side].sum())
+        if step[side].size >= FEWEST // 2 and time < RUSH * stamps:
+            return True
+    return False
+
+
+def _missing(step: Array, gaps: Array, usual: float, begin: int, end: int) -> int:
     """
     Return how many messages are missing in gaps.
 
     A gap is taken together with the steps beside it: a stamp that is late makes one step long and
-    the next one short.
+    the next one short. Gaps side by side count when the last of them is judged.
     """
     beside = gaps.copy()
     beside[1:] |= gaps[:-1]
     beside[:-1] |= gaps[1:]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], beside, [False]])))
-    return sum(
-        max(round(float(step[a:b].sum()) / usual) - int(b - a), 0) for a, b in edges.reshape(-1, 2)
-    )
+    total = 0
+    for a, b in edges.reshape(-1, 2):
+        last = a + int(np.flatnonzero(gaps[a:b])[-1])
+        if begin <= last < end:
+            total += max(round(float(step[a:b].sum()) / usual) - int(b - a), 0)
+    return total

@@ -147,10 +147,10 @@ class Losses:
 def _of_clock(seen: Seen) -> list[str]:
     """Return what is to be told of stamps that jumped."""
     if seen.back:
-        return [f'the stamps begin anew, {seen.back:,.3f} s behind the last one']
+        return [f'the stamps begin anew, {seen.back:,.1f} s behind the last one']
     if seen.ahead:
         return [
-            f'the stamps jumped forwards by {seen.ahead:,.3f} s: a clock was set, or another '
+            f'the stamps jumped forwards by {seen.ahead:,.1f} s: a clock was set, or another '
             'recording is played'
         ]
     return []

@@ -172,9 +172,9 @@ class ManagedNode(CellNode):
             None,
         )
         if step is None:
-            self._tell_once(
-                f'the transition {asked.label or asked.id} is refused: the node is {self._state}'
-            )
+            known = {step.number: step.label for step in STEPS}
+            name = asked.label or known.get(asked.id, asked.id)
+            self._tell_once(f'the transition {name} is refused: the node is {self._state}')
             response.success = False
             return response
         later = Later()

@@ -20,7 +20,8 @@ class Beside:
     robot : str
         Its name.
     own : sequence of str
-        Its joints; one of the same name behind another prefix is another robot's, and left out.
+        Its joints. Where all of them come behind another prefix, too, these are another robot's;
+        one alone is not: controllers call the track of a robot `rail_joint_1`, or `group_2/joint_1`.
 
     """
 
@@ -37,12 +38,18 @@ class Beside:
             if first is None:
                 if name in self._others or not isfinite(at):
                     continue
-                if name.endswith(self._own):
-                    self._others.add(name)
-                else:
+                self._others |= self._of_another(names)
+                if name not in self._others:
                     self._first[name] = at
             elif abs(at - first) > MOVED and name not in self.moving:
                 self.moving.append(name)
+
+    def _of_another(self, names: Sequence[str]) -> set[str]:
+        """Return the names that are all of the robot's joints behind a prefix."""
+        last = self._own[-1]
+        prefixes = {name.removesuffix(last) for name in names if name.endswith(last)}
+        sets = ({prefix + own for own in self._own} for prefix in prefixes)
+        return {name for each in sets if each <= set(names) for name in each}
 
     @property
     def remark(self) -> str:

@@ -143,7 +143,9 @@ class JointStates:
         self._low, self._high = zip(*self._ranges, strict=True)
         self._pick = _picker(range(robot.n))
         self._apart: tuple[int, ...] = ()
-        self.beside = Beside(robot.name, robot.joint_names)
+        columns = enumerate(zip(*self._names, strict=False)) if self._given else ()
+        start = next((k for k, column in columns if len(set(column)) > 1), 0)
+        self.beside = Beside(robot.name, tuple(name[start:] for name in self._names))
         self._spread: set[str] = set()
         self._stamp = 0
         self._parts: dict[str, tuple[float, float]] = {}

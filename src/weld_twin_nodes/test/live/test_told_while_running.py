@@ -88,9 +88,10 @@ def bench(tmp_path_factory, robot):
 
 
 def test_joints_beside_the_robot_are_named_once_and_told_when_one_moves(bench):
-    bench.beside = {'gripper': 0.0, 'rail/track': 1.0, 'right_elbow_joint': 0.3}
+    right = {f'right_{name}': 0.3 for name in bench.robot.joint_names}
+    bench.beside = {'gripper': 0.0, 'rail/track': 1.0, **right}
     bench.run(0.3)
-    bench.beside = {'gripper': 0.5, 'rail/track': 1.0, 'right_elbow_joint': 0.9}
+    bench.beside |= {'gripper': 0.5, 'right_elbow_joint': 0.9}
     bench.cell.wait(lambda: 'are left out: gripper, rail/track' in bench.twin.log, 'their names')
     bench.run(0.3)
     assert 'moved and' not in bench.twin.log  # what grips, and another arm, carry nothing

@@ -132,7 +132,9 @@ def test_a_recorder_serves_all_else_while_it_waits_for_a_node_that_stands_still(
     recorder = Managed(cell, 'recorder')
     assert recorder.change('configure')
     assert recorder.change('activate')
-    cell.wait(lambda: cell.node.count_subscribers('/twin/tool_pose') == 1, 'the recorder')
+    health = HealthListener(cell.node)
+    met = lambda: health.values.get('/recorder: /twin/tool_pose', {}).get('publishers')  # noqa: E731
+    cell.wait(lambda: met() == '1', 'the recorder to see the twin')
     twin.signal(signal.SIGSTOP)
     try:
         answer = recorder.begin('deactivate')

@@ -147,7 +147,7 @@ class ManagedNode(CellNode):
             else:
                 send(response, header)
 
-        change.send_response = send_later
+        change.send_response = send_later  # type: ignore[method-assign]
         self.create_service(GetState, '~/get_state', self._tell_state)
         self.create_service(GetAvailableStates, '~/get_available_states', self._tell_states)
         for name, start in (('available_transitions', True), ('transition_graph', False)):

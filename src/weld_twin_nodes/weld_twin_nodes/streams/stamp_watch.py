@@ -12,12 +12,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
 from weld_twin_msgs_py.assembly.stamp_order import RESTART_AFTER
 
 from .clock_watch import NANOSECOND
 
+Flags = NDArray[np.bool_]
 KEPT = 200
 """Steps of the stamps that are kept to judge their beat by: a second at 200 Hz."""
 FEWEST = 20
@@ -109,7 +111,7 @@ class StampWatch:
         self._kept, self._judged = (stamps[cut:], arrivals[cut:]), max(until - cut, 0)
         return seen
 
-    def _back(self, below: Array, new: int, by: int) -> float:
+    def _back(self, below: Flags, new: int, by: int) -> float:
         """Return how far the stamps have gone back for good [s]; one late stamp is no new run."""
         fresh = below[below.size - new :]
         trailing = new if fresh.all() else int(np.argmin(fresh[::-1]))
@@ -137,10 +139,9 @@ def _seen(step: Array, passed: Array, begin: int, end: int) -> Seen:
     beat = step.size >= FEWEST
     usual = float(np.median(step)) if beat else np.inf
     excess = step - passed
-    rushed = np.array([_rushed(step, passed, k) for k in np.flatnonzero(excess > JUMPED)], bool)
-    jumps = excess > JUMPED_ANYHOW
-    if beat:
-        jumps[excess > JUMPED] |= ~rushed
+    jumps: Flags = excess > JUMPED_ANYHOW
+    for k in np.flatnonzero(excess > JUMPED).tolist() if beat else ():
+        jumps[k] |= not _rushed(step, passed, k)
     judged = (np.arange(step.size) >= begin) & (np.arange(step.size) < end)
     ahead = float(excess[jumps & judged].max(initial=0.0))
     beats = step / usual
@@ -161,7 +162,7 @@ def _rushed(step: Array, passed: Array, k: int) -> bool:
     return False
 
 
-def _missing(step: Array, gaps: Array, usual: float, begin: int, end: int) -> int:
+def _missing(step: Array, gaps: Flags, usual: float, begin: int, end: int) -> int:
     """
     Return how many messages are missing in gaps.
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from weld_twin_core.errors import DataError, TwinError
 
 from .growing import GrowingBag
+from .recover_command import recover_command
 from .segment import Channel
 
 CLOSED_WITHIN = 15.0
@@ -124,7 +125,8 @@ class BackgroundBag:
         if self._thread.is_alive():
             raise DataError(
                 f"the bag '{self._bag.path}' is not complete: the disk has taken nothing for "
-                f"{CLOSED_WITHIN:g} s; what it took is kept: 'weld-twin recover {self._bag.path}'"
+                f'{CLOSED_WITHIN:g} s; what it took is kept: '
+                f"'{recover_command(self._bag.path, self._bag.folder)}'"
             )
         if self.failure is not None:
             raise self.failure

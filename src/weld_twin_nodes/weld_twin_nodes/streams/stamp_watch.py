@@ -144,10 +144,14 @@ def _seen(step: Array, passed: Array, begin: int, end: int) -> Seen:
         jumps[k] |= not _rushed(step, passed, k)
     judged = (np.arange(step.size) >= begin) & (np.arange(step.size) < end)
     ahead = float(excess[jumps & judged].max(initial=0.0))
-    beats = step / usual
-    on_beat = abs(beats - np.maximum(np.round(beats), 1.0)) <= ON_BEAT
+    whole = np.maximum(np.round(step / usual), 1.0)
+    on_beat = abs(step / usual - whole) <= ON_BEAT
     if not beat or np.mean(on_beat) < REGULAR:
         return Seen(ahead=ahead)
+    few = on_beat & (
+        whole <= FEWEST
+    )  # the middle of steps that vary is high where some are double
+    usual = float(step[few].sum() / whole[few].sum())
     silence = passed > max(SILENT, 5.0 * usual)
     gaps = (step > GAP * usual) & ~jumps & (~silence | (excess > SILENT))
     return Seen(_missing(step, gaps, usual, begin, end), usual, ahead)

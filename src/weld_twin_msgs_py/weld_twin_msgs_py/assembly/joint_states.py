@@ -111,6 +111,8 @@ class JointStates:
     ----------
     others : int
         Messages that hold no joint of the robot.
+    strangers : dict of str
+        Names of the joints in those messages, in their order.
     parts : int
         Messages that hold some joints and wait for the rest.
     beside : Beside
@@ -150,6 +152,7 @@ class JointStates:
         self._stamp = 0
         self._parts: dict[str, tuple[float, float]] = {}
         self.others = self.parts = 0
+        self.strangers: dict[str, None] = {}
         self.remark = ''
         self.velocity_remark = ''
 
@@ -213,6 +216,7 @@ class JointStates:
             if not (self._take_own_names(message) or self._take_prefix(message.name)):
                 self.others += 1
                 self.beside.take(message.name, message.position)
+                self.strangers.update(dict.fromkeys(message.name))
                 return None
             present = self._names
         if 0 < len(present) < len(self._names):

@@ -138,6 +138,7 @@ def find(job: Job) -> Finding:
     values: dict[str, Any] = {
         'status': diagnosis.status,
         'confidence': diagnosis.confidence,
+        'sure': diagnosis.sure,
         'gap_rms_m': gap.rms_m,
         'noise_floor_m': gap.noise_floor_m,
         'rms_after_m': shrink.rms_after_m,

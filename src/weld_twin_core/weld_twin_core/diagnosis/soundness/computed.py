@@ -68,7 +68,9 @@ def _left(case: Case, k: int) -> float | None:
     """Return what a rigid arm leaves of a recording [m] where that is no more than rounding."""
     if case.gap > UNEXPLAINED:
         return None
-    bare = Model(case.model.robot, (case.model.bases[k],), case.model.known + case.model.changed(k))
+    bare = Model(
+        case.model.robot, (case.model.bases[k],), case.model.known + case.model.changed(k)
+    )
     model = bare.with_found(constant_errors(bare.robot))
     tried = [_stations(recording, k, model) for recording in _paired(case, k)]
     near = [(one, started) for one in tried if one is not None and (started := _near(one, model))]

@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -139,6 +140,14 @@ def test_a_bag_and_a_file_go_where_a_link_leads(weld_twin, tmp_path):
     before['schema.json'] = b'changed'
     assert weld_twin('schema', 'robot', '--out', tmp_path / 'schema.json').code == 2
     assert content(tmp_path / 'disk') == before
+
+
+def test_a_prediction_whose_table_is_in_the_way_leaves_no_bag(weld_twin, tmp_path):
+    bag, table = Path(__file__).parents[4] / 'bags/elbow_play', tmp_path / 'poses.csv'
+    table.write_text('mine')
+    words = ('predict', bag, '--robot', 'ur5', '--model', f'{bag}.yaml', '--table', table)
+    assert weld_twin(*words, '--out', tmp_path / 'predicted').code == 2
+    assert content(tmp_path) == {'poses.csv': b'mine'}
 
 
 def test_where_folders_of_ours_should_be_a_persons_file_is_kept(tmp_path):

@@ -30,7 +30,8 @@ BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 
 def sentences(out: Path) -> tuple[list[str], list[str]]:
     """Return what the demo says of the clear case and of the open one."""
-    lines = (out / 'summary.txt').read_text(encoding='utf-8').splitlines()
+    text = (out / 'summary.txt').read_text(encoding='utf-8')
+    lines = text.replace('\N{NO-BREAK SPACE}', ' ').splitlines()
     at = [k for k, line in enumerate(lines) if line.startswith('The gap of ')]
     clear, unclear = (lines[k : k + 2] for k in at)
     return clear, unclear

@@ -127,6 +127,15 @@ def test_what_a_controller_computes_is_no_measurement(rng, arm, how):
     assert kinds(run_of(arm, rng, **how), align=()) == [('computed', ('instrument',))]
 
 
+def test_few_postures_tell_that_the_nominal_arm_computed_them_and_nothing_of_another(rng):
+    few = [
+        measured(arm, 5.0 * np.arange(14), stations(rng, 14), rng, noise=0.0, turns=False)
+        for arm in (Arm(), CALIBRATED)
+    ]
+    assert kinds(few[0]) == [('computed', ('instrument',))]
+    assert not kinds(few[1])
+
+
 def test_computed_poses_with_stamps_of_their_own_belong_to_the_last_joint_state(rng):
     made = run_of(Arm(), rng)
     late = replace(made.measured, t=made.measured.t + 3e-3)
@@ -165,10 +174,10 @@ def test_a_simulation_without_noise_says_what_it_is(tmp_path):
 # Stamps in bursts ------------------------------------------------------------------------------
 
 
-def buffered(rng, size=6, waited=0.07):
-    """Return 20 Hz points that were sent by sixes, and the stamps they should have."""
+def buffered(rng, size=6, waited=0.07, without=()):
+    """Return 20 Hz points that were sent by sixes, some lost, and the stamps they should have."""
     t, q = motion()
-    taken = np.arange(0.5, 15.0, 0.05)
+    taken = np.delete(np.arange(0.5, 15.0, 0.05), without)
     whole = np.array([np.interp(taken, t, column) for column in q.T]).T
     seen = measured(REAL, taken, whole, rng, turns=False, at_rest=False).measured
     last = np.minimum((np.arange(taken.size) // size + 1) * size - 1, taken.size - 1)
@@ -183,6 +192,15 @@ def test_points_that_waited_in_a_buffer_are_stamped_anew(rng):
     assert (item.kind, item.at, item.applied) == ('stamps_in_bursts', ('clock',), True)
     assert '20.00 Hz underneath' in item.sentence
     assert np.abs(found.given.recordings[0].measured.t - taken).max() < 2e-3
+
+
+def test_points_that_were_lost_before_they_waited_are_counted(rng):
+    made, taken = buffered(rng, without=[60, 61, 150, 220])
+    found = looked(made, apply=True)
+    (item,) = found.unsound
+    assert item.kind == 'stamps_in_bursts' and '4 were lost' in item.sentence
+    off = np.abs(found.given.recordings[0].measured.t - taken)
+    assert np.median(off) < 2e-3 and (off < 5e-3).mean() > 0.9
 
 
 def test_info_tells_the_rate_underneath(rng, tmp_path, capsys):

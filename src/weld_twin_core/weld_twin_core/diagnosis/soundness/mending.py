@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
+from ...bursts import evenly
 from ...errors import DataError
 from ...recording import Measurements, Recording
 
@@ -141,7 +142,9 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     return replace(given, recordings=tuple(recordings))
 
 
-def stamped_evenly(given: Given, k: int, first: float, step: float, count: int) -> Given:
+def stamped_evenly(
+    given: Given, k: int, first: float, step: float, lost: Sequence[int] | Array, count: int
+) -> Given:
     """
     Return what was given with measurements of recording k stamped by an even clock.
 
@@ -153,6 +156,8 @@ def stamped_evenly(given: Given, k: int, first: float, step: float, count: int) 
         Which recording, counted from 0.
     first, step : float [s]
         The first stamp, and the time from one to the next.
+    lost : array of int
+        Samples before which one is missing.
     count : int
         How many measurements had these stamps; of as many in the same time as there are now, each
         takes its share.
@@ -162,7 +167,7 @@ def stamped_evenly(given: Given, k: int, first: float, step: float, count: int) 
     seen = recordings[k].measured
     if seen is None:
         return given
-    even = np.asarray(first + step * count / seen.t.size * np.arange(seen.t.size), dtype=float)
+    even = evenly(first, step, np.asarray(lost, dtype=int), seen.t.size, count)
     recordings[k] = recordings[k].with_measured(replace(seen, t=even))
     return replace(given, recordings=tuple(recordings))
 

@@ -11,7 +11,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from weld_twin_core import __version__
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.files.input_files import hashed
 
 from ..offline.content_hash import digest
@@ -75,12 +75,17 @@ class Listed:
         A file that is not there is told by its name: once it is there, it is another request.
         """
         files = [self.recording, self.robot, self.effects_known, self.contacts]
-        told = [
-            hashed('recording', name).sha256 if name and Path(name).exists() else name
-            for name in files
-        ]
+        told = [_content(name) for name in files]
         rest = (self.cell, self.at, self.align, self.base_link, self.tip_link, str(self.apply))
         return digest(__version__, *told, *rest)
+
+
+def _content(name: str) -> str:
+    """Return what tells the content of a file; its name where there is none that can be read."""
+    try:
+        return hashed('recording', name).sha256 if name and Path(name).exists() else name
+    except (OSError, TwinError):
+        return name
 
 
 def read_list(path: Path | str) -> list[Listed]:

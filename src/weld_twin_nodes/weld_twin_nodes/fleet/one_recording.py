@@ -8,6 +8,7 @@ import shutil
 import tempfile
 import threading
 from dataclasses import asdict
+from errno import ENOSPC
 from pathlib import Path
 from typing import Any
 
@@ -38,16 +39,32 @@ def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, 
         Directory for what the command wrote; empty to keep nothing.
 
     """
-    with tempfile.TemporaryDirectory(prefix='fleet-') as place:
-        out = Path(place) / 'found'
-        done = _warm(limits).run(listed.words(out))
-        state, sentence, entry = _read(listed, done, out)
-        if keep and out.is_dir():
-            target = Path(keep) / key
-            shutil.rmtree(target, ignore_errors=True)
-            shutil.copytree(out, target)
+    done, entry = Outcome(-1, '', 0.0), None
+    try:
+        with tempfile.TemporaryDirectory(prefix='fleet-') as place:
+            out = Path(place) / 'found'
+            done = _warm(limits).run(listed.words(out))
+            state, sentence, entry = _read(listed, done, out)
+            if keep and out.is_dir():
+                _kept(out, Path(keep) / key)
+    except OSError as error:  # the disk is full: this one can run again, the others go on
+        where = f" '{error.filename}'" if error.filename else ''
+        state, sentence, entry = FAILED, f'{error.strerror or error}{where}', None
     run = Run(key, listed.cell, listed.recording, state, sentence, done.seconds, done.memory)
     return {'run': asdict(run), 'entry': entry}
+
+
+def _kept(out: Path, target: Path) -> None:
+    """Copy what the command wrote, whole or not at all."""
+    shutil.rmtree(target, ignore_errors=True)
+    try:
+        shutil.copytree(out, target)
+    except OSError as error:
+        shutil.rmtree(target, ignore_errors=True)
+        told = (
+            error if error.errno else OSError(ENOSPC, 'cannot be kept whole', str(target.parent))
+        )
+        raise told from None
 
 
 def _read(listed: Listed, done: Outcome, out: Path) -> tuple[str, str, dict[str, Any] | None]:

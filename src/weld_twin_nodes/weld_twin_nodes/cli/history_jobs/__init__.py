@@ -28,11 +28,11 @@ def add_database(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def opened(args: argparse.Namespace) -> Iterator[Database]:
-    """Yield the database of the options."""
+def opened(args: argparse.Namespace, *, make: bool = False) -> Iterator[Database]:
+    """Yield the database of the options; ``make`` it where there is none yet."""
     from weld_twin_nodes.history import Database
 
-    database = Database(args.db)
+    database = Database(args.db, make=make)
     try:
         yield database
     finally:

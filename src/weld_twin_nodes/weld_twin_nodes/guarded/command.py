@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 from weakref import WeakSet
 
@@ -100,7 +101,10 @@ class Guarded:
         self.close()
 
     def run(
-        self, words: Sequence[object], tell: Callable[[str], None] = lambda text: None
+        self,
+        words: Sequence[object],
+        tell: Callable[[str], None] = lambda text: None,
+        folder: Path | None = None,
     ) -> Outcome:
         """
         Run ``weld-twin`` with the words given.
@@ -111,6 +115,8 @@ class Guarded:
             The command's words.
         tell : callable
             Told every line that the command tells of its progress.
+        folder : Path, optional
+            Where it runs: paths relative to it keep the places of this machine out of results.
 
         """
         began = time.monotonic()
@@ -120,6 +126,7 @@ class Guarded:
             'memory': limits.memory,
             'cpu_s': limits.cpu_s,
             'file': limits.file,
+            'folder': None if folder is None else str(folder.absolute()),
         }
         found: dict[str, Any] = {}
         try:
@@ -168,8 +175,14 @@ class Guarded:
             )
         ended = int(found.get('end', -1))
         said = str(found.get('said', ''))
-        if ended == -signal.SIGXCPU or (ended == -signal.SIGKILL and not said):
+        computed = float(found.get('cpu_s', 0.0)) >= self._limits.cpu_s
+        if ended == -signal.SIGXCPU or (ended == -signal.SIGKILL and computed):
             said = f'it took more than {self._limits.cpu_s} s of computing'
+        if ended == -signal.SIGKILL and not said:
+            said = (
+                'its process was killed from outside, as the system does where memory runs out; '
+                'try it again'
+            )
         if -ended in _CRASHES and not said:
             said = (
                 f'its process crashed ({signal.Signals(-ended).name}), as when it needs more memory '

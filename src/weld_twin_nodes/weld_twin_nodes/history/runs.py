@@ -211,9 +211,9 @@ class Runs:
         entries = self._database.entries(cell, NEWEST) if entries is None else entries
         seen = observations(entries)
         told = [as_dict(change) for change in changed(entries, seen)]
-        row = {'cell_id': number, 'newest': newest, 'diagnoses': count, 'changes': told}
-        new = self._database.insert(findings).values(row)
-        new = new.on_conflict_do_update(index_elements=[findings.c.cell_id], set_=row)
+        new_row = {'cell_id': number, 'newest': newest, 'diagnoses': count, 'changes': told}
+        new = self._database.insert(findings).values(new_row)
+        new = new.on_conflict_do_update(index_elements=[findings.c.cell_id], set_=new_row)
         # Who may only read works it out anew.
         with suppress(Unavailable):
             self._database.write(lambda connection: connection.execute(new), patience=0.0)

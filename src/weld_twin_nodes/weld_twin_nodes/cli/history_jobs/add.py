@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 
-from . import add_database, date_of, opened
+from . import add_database, opened
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,11 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Add them in the order given."""
     from weld_twin_core.errors import DataError
-    from weld_twin_nodes.history import entry_of
+    from weld_twin_nodes.history.entry import entry_of, instant
 
     if args.at and len(args.diagnoses) > 1:
         raise DataError('--at is the date of one diagnosis; add them one by one')
-    at = date_of(args.at) if args.at else None
+    at = instant(args.at) if args.at else None
     # All are read before the first is written, and all are written or none.
     entries = [entry_of(path, at) for path in args.diagnoses]
     with opened(args, make=True) as database:

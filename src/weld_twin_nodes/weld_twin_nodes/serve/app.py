@@ -221,7 +221,7 @@ class _Site:
         return HTMLResponse(pages.me_page(request.scope['user'], self._ways))
 
     async def enter(self, request: Request) -> Response:
-        async with request.form(max_files=0, max_fields=1, max_part_size=FIELD) as form:
+        async with request.form(max_files=0, max_fields=FIELDS, max_part_size=FIELD) as form:
             key = str(form.get('key', '')).strip().lower()
         if not self._people.knows(key):
             raise DataError('that is no key of this server; copy the whole of it')
@@ -233,7 +233,7 @@ class _Site:
         return self._message('logged out', 'This browser knows nothing of you any more.')
 
     async def delete_me(self, request: Request) -> Response:
-        async with request.form(max_files=0, max_fields=1, max_part_size=FIELD) as form:
+        async with request.form(max_files=0, max_fields=FIELDS, max_part_size=FIELD) as form:
             if form.get('sure') != 'yes':
                 raise DataError('say that you are sure: it cannot be undone')
         await run_in_threadpool(self._queue.remove_user, request.scope['user'])

@@ -18,7 +18,7 @@ RATE = 16_000.0
 """Bytes a second that somebody must send on average; a poor mobile line has ten times as much."""
 BEHIND = 30.0
 """Seconds that somebody may lag behind this pace: a line that breaks down for a moment recovers."""
-GIVES_WAY = 2.0
+GIVES_WAY = 0.5
 """Seconds behind after which somebody gives way to others who wait."""
 OF_ADDRESS, OF_ALL = 16, 64
 """Bodies read at the same time, of one address and of all; the parser holds a megabyte of each."""
@@ -66,7 +66,7 @@ class Body:
     ) -> None:
         self.address, self.gave_way = address, False
         self._bodies, self._receive, self._most, self._length = bodies, receive, most, length
-        self._got, self._waited, self._since = 0, 0.0, 0.0
+        self._got, self._lag, self._since = 0, 0.0, 0.0
         self.whole = False
 
     async def receive(self) -> dict[str, Any]:
@@ -95,9 +95,8 @@ class Body:
             await self._next()
 
     def behind(self) -> float:
-        """Return the seconds that it lags behind the slowest pace allowed."""
-        waits = time.monotonic() - self._since if self._since else 0.0
-        return self._waited + waits - self._got / RATE
+        """Return the seconds that it lags behind the slowest pace allowed; nothing is sent ahead."""
+        return self._lag + (time.monotonic() - self._since if self._since else 0.0)
 
     async def _next(self) -> dict[str, Any]:
         self._since = time.monotonic()
@@ -110,9 +109,10 @@ class Body:
                     if self.gave_way or self.behind() > BEHIND:
                         raise TooSlow from None
         finally:
-            self._waited += time.monotonic() - self._since
-            self._since = 0.0
-        self._got += len(message.get('body', b''))
+            self._lag, self._since = self.behind(), 0.0
+        count = len(message.get('body', b''))
+        self._got += count
+        self._lag = max(self._lag - count / RATE, 0.0)
         if message['type'] != 'http.request' or not message.get('more_body'):
             self.whole = True
             self._bodies.leave(self)

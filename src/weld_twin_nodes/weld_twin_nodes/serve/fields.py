@@ -274,13 +274,13 @@ def sentence(text: str, command: str = '') -> str:
     ----------
     text : str
     command : str
-        The one that says it, where two fields are called alike; empty for a recording's.
+        The one that says it, where two fields are called alike; empty for those of a recording.
 
     """
     titles = {
         (field.option or name).replace('_', '-'): field.title
         for name, field in FIELDS.items()
-        if not command or command in field.commands
+        if (CORRECT in field.commands if command == CORRECT else field.commands != (CORRECT,))
     }
     titles = {**titles, **ELSEWHERE}
 
@@ -290,10 +290,8 @@ def sentence(text: str, command: str = '') -> str:
             return COLUMNS
         return f'“{titles[name]}”' if name in titles else 'a setting of the command line'
 
-    text = re.sub(
-        r':? ?weld-twin ([a-z]+(?:-[a-z]+)*)(?: [^;,()]*)?',
-        r' by whoever runs this server (the command \1)',
-        text,
-    )
+    # What is quoted is a whole command line; it can only be typed where the server is.
+    text = re.sub(r"'weld-twin ([a-z-]+)[^']*'", r'the command “\1” where the server runs', text)
+    text = re.sub(r'\bweld-twin ([a-z-]+)', r'“\1”', text)
     text = re.sub(r'(?<![\w-])--([a-z]+(?:-[a-z]+)*)', title, text)
     return text[:1].upper() + text[1:]

@@ -150,8 +150,21 @@ class Job:
         return job
 
     def write(self, folder: Path) -> None:
-        """Write it into its folder, whole."""
-        write_text(folder / FILE, json.dumps(asdict(self)) + '\n', overwrite=True)
+        """
+        Write it into its folder, whole.
+
+        Raises
+        ------
+        OSError
+            The disk is full, or does not take it.
+
+        """
+        try:
+            write_text(folder / FILE, json.dumps(asdict(self)) + '\n', overwrite=True)
+        except DataError as error:
+            if isinstance(error.__context__, OSError):
+                raise error.__context__ from None
+            raise
 
     def ask(self, asked: Asked) -> Job:
         """Return the same files, asked for in another way: they wait, or a question does."""

@@ -419,7 +419,7 @@ def me_page(key: str, site: Site, said: str = '') -> str:
             'This browser keeps it for a year from your last visit. Whoever has it sees and deletes '
             'what is yours: keep it as a password.',
         ),
-        tag('p', tag('code', key, id='key')),
+        tag('p', tag('code', key, id='own')),
         id_='mine',
     )
     enter = tag(

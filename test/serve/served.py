@@ -8,9 +8,12 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
 from contextlib import contextmanager
+from http.cookiejar import CookieJar
+from urllib.request import HTTPCookieProcessor, Request, build_opener
 
 
 class Server:
@@ -68,6 +71,40 @@ def drop(server, **how):
 def until(page, selector, seconds=60):
     page.wait_for_selector(selector, timeout=1000 * seconds)
     return page.locator(selector)
+
+
+class Person:
+    """Somebody with a client that keeps cookies."""
+
+    def __init__(self, server):
+        self.root, self.jar = server.root, CookieJar()
+        self.open = build_opener(HTTPCookieProcessor(self.jar)).open
+
+    def get(self, path='/', data=None, kind=''):
+        """Return status, address and text of a page."""
+        request = Request(self.root + path, data, {'Content-Type': kind} if kind else {})
+        try:
+            with self.open(request, timeout=30) as answer:
+                return (
+                    answer.status,
+                    answer.url.removeprefix(self.root),
+                    answer.read().decode(
+                        'latin-1' if 'octet' in answer.headers['content-type'] else 'utf-8'
+                    ),
+                )
+        except OSError as error:
+            return error.code, path, error.read().decode()
+
+    def drop(self, path='/recordings', **how):
+        """Send a form; return status, address and text of what comes."""
+        body, kind = form(**how)
+        return self.get(path, body, kind)
+
+    def end_of(self, address):
+        """Return the page of a recording once it is finished."""
+        while 'http-equiv="refresh"' in (text := self.get(address)[2]):
+            time.sleep(0.1)
+        return text
 
 
 @contextmanager

@@ -8,19 +8,17 @@ import json
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
-from http.cookiejar import CookieJar
 from pathlib import Path
-from urllib.request import HTTPCookieProcessor, Request, build_opener
 
 import pytest
-from served import Server, drop, fill, form, small_disk
-
-for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
-    pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
+from served import Person, Server, drop, fill, small_disk
 
 from weld_twin_nodes.cli.main import _parser
 from weld_twin_nodes.serve.access import _without_token
 from weld_twin_nodes.serve.fields import CORRECT, sentence
+
+for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
+    pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
 
 TABLE = b'J1,J2,J3,J4,J5,J6,X,Y,Z\n' + b'0,-90,90,0,90,0,500,0,600\n' * 30
 """Thirty times the same station: read, and refused."""
@@ -33,32 +31,6 @@ def server(tmp_path_factory):
     made = Server(tmp_path_factory.mktemp('served'))
     yield made
     made.kill()
-
-
-class Person:
-    """Somebody with a client that keeps cookies."""
-
-    def __init__(self, server):
-        self.root, self.jar = server.root, CookieJar()
-        self.open = build_opener(HTTPCookieProcessor(self.jar)).open
-
-    def get(self, path='/', data=None, kind=''):
-        request = Request(self.root + path, data, {'Content-Type': kind} if kind else {})
-        try:
-            with self.open(request, timeout=30) as answer:
-                return answer.status, answer.url.removeprefix(self.root), answer.read().decode()
-        except OSError as error:
-            return error.code, path, error.read().decode()
-
-    def drop(self, path='/recordings', **how):
-        body, kind = form(**how)
-        return self.get(path, body, kind)
-
-    def end_of(self, address):
-        """Return the page of a recording once it is finished."""
-        while 'http-equiv="refresh"' in (text := self.get(address)[2]):
-            time.sleep(0.1)
-        return text
 
 
 def connections(server, count, said=b''):
@@ -129,7 +101,9 @@ def test_names_as_people_give_them_are_taken_and_no_place_of_the_server_is_told(
     assert '/tmp' not in text and 'jobs' not in text and '--' not in text.split('</style>')[1]
 
 
-@pytest.mark.parametrize('name', ['.csv', '-o.csv', 'a\u202egnp.csv', 'a\nb.csv', f'{"x" * 250}.csv'])
+@pytest.mark.parametrize(
+    'name', ['.csv', '-o.csv', 'a\u202egnp.csv', 'a\nb.csv', f'{"x" * 250}.csv']
+)
 def test_names_that_hide_something_are_not(server, name):
     assert drop(server, files=[(name, TABLE)])[0] in (400, 422)
 
@@ -227,7 +201,9 @@ def test_what_commands_say_names_fields_of_the_browser():
                 said = sentence(text, command)
                 if option.startswith('--'):
                     assert '--' not in said, said
-    assert sentence('name it with --controller', CORRECT) == 'Name it with “Language of the program”'
+    assert (
+        sentence('name it with --controller', CORRECT) == 'Name it with “Language of the program”'
+    )
     assert sentence('name it with --controller') == 'Name it with “Controller”'
     assert 'weld-twin' not in sentence("it becomes a bag with 'weld-twin recover x'")
 

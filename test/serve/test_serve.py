@@ -8,10 +8,18 @@ import os
 import shutil
 import time
 from contextlib import contextmanager
+from dataclasses import replace
+from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
-from served import Server, drop, fill, form, small_disk, until
+from served import Person, Server, drop, fill, form, small_disk, until
+
+from weld_twin_nodes.cli.in_process import weld_twin
+from weld_twin_nodes.history import Database
+from weld_twin_nodes.serve import Settings
+from weld_twin_nodes.serve.job import Asked, Job
+from weld_twin_nodes.serve.queue import Queue
 
 for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
     pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
@@ -167,6 +175,10 @@ def friday(page, week, key):
     page.goto(week.root + '/history')
     page.get_by_role('link', name='line <3>').first.click()
     assert '2026-03-02' in page.locator('#diagnoses').inner_text()
+    database = Database(str(next((week.disk / 'users').glob('*/history.db'))), make=False)
+    monday = database.entries('line <3>')[0].at
+    assert monday == datetime(2026, 3, 2, 6, tzinfo=timezone.utc)  # 08:00+02:00
+    database.close()
     page.goto(week.root + '/me')
     page.get_by_role('button', name='Log out').click()
     page.goto(week.root + '/recordings')
@@ -214,6 +226,81 @@ def test_what_the_gate_asks_is_answered_in_the_browser(server, chromium, tmp_pat
     page.get_by_role('button', name='Correct it and go on').click()
     until(page, 'iframe')
     page.context.close()
+
+
+def stretch_of_the_recording(file):
+    """Write a program: the motion that was recorded, from one turn of the elbow to the next."""
+    import numpy as np
+
+    from weld_twin_core.arm import catalog
+    from weld_twin_msgs_py.bags import read_recording
+
+    robot = catalog.load('ur5')
+    joints = read_recording(BAG, robot).joints
+    rows = np.searchsorted(joints.t, joints.t[0] + np.linspace(1.66, 2.14, 8))
+    lines = [f'joint_names: [{", ".join(robot.joint_names)}]', 'points:']
+    for row in rows:
+        place = ', '.join(f'{angle:.6f}' for angle in joints.q[row])
+        after = round(1e9 * (joints.t[row] - joints.t[rows[0]]))
+        lines += [f'- positions: [{place}]', f'  time_from_start: {{sec: 0, nanosec: {after}}}']
+    file.write_text('\n'.join(lines) + '\n')
+
+
+def test_a_program_is_corrected_in_the_browser_as_on_the_command_line(server, tmp_path):
+    person, program = Person(server), tmp_path / 'seam.yaml'
+    stretch_of_the_recording(program)
+    person.get()
+    files = [(Path(name).name, Path(name).read_bytes()) for name in bag_files()]
+    _, address, _ = person.drop(files=files)
+    key = address.rpartition('/')[2]
+    assert '<iframe' in person.end_of(address)
+    assert f'value="{key}" selected' in person.get(f'/program?of={key}')[2]
+    told = {'robot': '', 'files': [(program.name, program.read_bytes())], 'of': key}
+    _, made, _ = person.drop('/program', **told, max_length='1,5')
+    assert '<iframe' in person.end_of(made)
+    corrected = person.get(f'{made}/{program.name}')[2]
+    model = tmp_path / 'diagnosis.json'
+    model.write_text(person.get(f'{address}/diagnosis.json')[2])
+    words = ('--model', model, '--max-correction', '1.5mm', '1deg', '--out', tmp_path / 'out')
+    said = weld_twin('correct-program', program, '--robot', 'ur5', *words)
+    assert said.code == 0, said.err
+    assert corrected == (tmp_path / 'out' / program.name).read_text() != program.read_text()
+    # What is wrong is told at once, or asked again, in the words of the fields.
+    status, _, text = person.drop('/program', **told, start='up')
+    assert status == 422 and '“Joints before the first move” cannot be' in text
+    _, made, _ = person.drop('/program', **told, start='0,0')
+    text = person.end_of(made)
+    assert 'It could not be corrected' in text and '“Joints before the first move” needs 6' in text
+    assert person.get(f'{made}/job.json')[0] == person.get(f'{made}/diagnosis.json')[0] == 404
+
+
+def test_what_is_asked_while_a_recording_is_in_work_is_done_afterwards(tmp_path):
+    queue = Queue(Settings(tmp_path))
+    job = replace(Job.new('a' * 64), names=('elbow_play.mcap',))
+    place = job.uploads(queue.folder(job))
+    place.mkdir(parents=True)
+    shutil.copy(BAG / 'elbow_play.mcap', place)
+    try:
+        queue.add(job.ask(Asked('ur5')))
+        after(lambda: queue.get(job.key, job.user).state == 'running')
+        queue.again(job, Asked('no_robot'))
+        after(lambda: queue.get(job.key, job.user).state not in ('waiting', 'running'))
+        now = queue.get(job.key, job.user)
+        assert (now.state, now.asked.robot) == ('refused', 'no_robot')
+        # What is deleted in work leaves nothing, and the worker goes on.
+        queue.again(job, Asked('ur5'))
+        after(lambda: queue.get(job.key, job.user).state == 'running')
+        queue.remove(job)
+        assert queue.of(job.user) == [] and list((tmp_path / 'jobs').iterdir()) == []
+    finally:
+        queue.stop()
+
+
+def after(true, seconds=60.0):
+    until = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < until
+        time.sleep(0.02)
 
 
 def test_who_does_not_come_from_a_page_of_ours_changes_nothing(server):

@@ -31,6 +31,7 @@ from . import pages
 from .access import Access, be, be_nobody
 from .bodies import Busy, TooMuch, TooSlow
 from .connections import Doors
+from .fields import sentence
 from .job import DIAGNOSIS, DONE, FOUND, MODEL, OPEN, PROGRAM, RECORDING, UPLOADS, Job
 from .people import People
 from .queue import HISTORY, UNKNOWN, Queue
@@ -310,7 +311,7 @@ class _Site:
         elif path.startswith('/me'):
             page = pages.me_page(request.scope['user'], self._ways, why)
         elif path.startswith(('/history', '/plant')):
-            return self._message('refused', pages.sentence(why), 422)
+            return self._message('refused', sentence(why), 422)
         else:
             page = pages.start_page(self._ways, why)
         return HTMLResponse(page, 422)

@@ -296,6 +296,34 @@ def test_what_is_asked_while_a_recording_is_in_work_is_done_afterwards(tmp_path)
         queue.stop()
 
 
+def test_who_has_most_gives_way_and_nobody_for_another_one(tmp_path):
+    """A disk of a hundred kilobytes: one user fills it, another one still has his recording."""
+    queue = Queue(Settings(tmp_path, disk=100_000, kept=6, own=99))
+    few, many = '1' * 64, '2' * 64
+
+    def keep(user):
+        job = replace(Job.new(user), names=('a.csv',))
+        place = job.uploads(queue.folder(job))
+        place.mkdir(parents=True)
+        (place / 'a.csv').write_bytes(bytes(9_000))
+        queue.add(job.ask(Asked('no_robot')))
+        after(lambda: queue.get(job.key, user).state == 'refused')
+        return job
+
+    try:
+        mine = keep(few)
+        theirs = [keep(many) for _ in range(8)]
+        assert queue.get(mine.key, few) is not None
+        assert [queue.get(job.key, many) is not None for job in theirs] == [False] + [True] * 7
+        assert len(list((tmp_path / 'jobs').iterdir())) == 8
+        others = [keep(f'{k:064d}') for k in range(6)]  # nobody else has more than his share
+        assert queue.get(mine.key, few) is not None
+        assert all(queue.get(job.key, job.user) is not None for job in others)
+        assert sum(queue.get(job.key, many) is not None for job in theirs) == 3
+    finally:
+        queue.stop()
+
+
 def after(true, seconds=60.0):
     until = time.monotonic() + seconds
     while not true():

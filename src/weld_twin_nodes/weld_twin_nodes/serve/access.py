@@ -10,24 +10,23 @@ of ours.
 
 from __future__ import annotations
 
+import asyncio
 import hmac
-from collections import Counter
 from collections.abc import Awaitable, Callable
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
-from .bodies import Bodies, Body, Receive
+from .bodies import Bodies, Body, Receive, TooSlow
 from .connections import Doors
 from .people import People
+from .rates import Rates
 from .settings import LOOPBACK, Settings
 
 USER, TOKEN = 'weld_twin_user', 'weld_twin_token'
 """Cookies: who it is, and that the token was right."""
 YEAR = 366 * 86_400
 """Seconds for which a browser keeps them, counted anew with every visit."""
-AT_ONCE = 64
-"""Requests of one address answered at the same time; a browser asks for six."""
 HEADERS = (
     (b'content-security-policy', b"frame-ancestors 'self'; form-action 'self'; base-uri 'none'"),
     (b'x-content-type-options', b'nosniff'),
@@ -51,8 +50,7 @@ class Access:
 
     def __init__(self, app: Any, settings: Settings, people: People, doors: Doors) -> None:
         self._app, self._settings, self._people, self._doors = app, settings, people, doors
-        self._bodies = Bodies()
-        self._at_once: Counter[str] = Counter()
+        self._bodies, self._rates = Bodies(), Rates()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -64,33 +62,42 @@ class Access:
         headers = {
             name.decode('latin-1'): value.decode('latin-1') for name, value in scope['headers']
         }
-        address = scope['address'] = self._address(client[0], headers)
-        self._doors.began(client)
-        self._at_once[address] += 1
+        cookies = _cookies(headers.get('cookie', ''))
+        user = cookies.get(USER, '')
+        scope['address'] = self._address(client[0], headers)
+        scope['unknown'] = not self._people.knows(user)
+        scope['user'] = self._people.new() if scope['unknown'] else user
+        # Who has no key shares everything with the others of his address who have none.
+        party = scope['address'] if scope['unknown'] else user
         length = headers.get('content-length', '0')
-        most = self._settings.upload
-        body = Body(
-            self._bodies, address, receive, most, int(length) if length.isdecimal() else None
-        )
+        announced = int(length) if length.isdecimal() else None
+        body = Body(self._bodies, party, receive, self._settings.upload, announced)
+        self._doors.began(client)
         try:
-            await self._let_in(scope, headers, body, send)
+            wait = self._rates.wait(party)
+            if wait is None:
+                await _refuse(send, 503, 'Too many requests come from here; try again soon.')
+                return
+            if wait:
+                await asyncio.sleep(wait)
+            await self._let_in(scope, headers, cookies, body, send)
         finally:
             self._bodies.leave(body)
-            self._at_once[address] -= 1
-            if not self._at_once[address]:
-                del self._at_once[address]
             self._doors.ended(client)
 
-    async def _let_in(self, scope: Scope, headers: dict[str, str], body: Body, send: Send) -> None:
+    async def _let_in(
+        self,
+        scope: Scope,
+        headers: dict[str, str],
+        cookies: dict[str, str],
+        body: Body,
+        send: Send,
+    ) -> None:
         """Answer a request, or refuse it."""
-        if self._at_once[scope['address']] > AT_ONCE:
-            await _refuse(send, 503, 'Too many requests come from your address; try again soon.')
-            return
         why = self._foreign(scope, headers)
         if why:
             await _refuse(send, 403, why)
             return
-        cookies = _cookies(headers.get('cookie', ''))
         query = scope.get('query_string', b'').decode('latin-1')
         told = [value for name, value in parse_qsl(query) if name == 'token']
         right = [value for value in told if self._is_token(value)]
@@ -102,12 +109,7 @@ class Access:
             # The token must not stay where others read it: in the address, and in the history.
             await _send_on(send, _without_token(scope['path'], query), kept)
             return
-        user = cookies.get(USER, '')
-        scope['unknown'] = not self._people.knows(user)
-        if scope['unknown']:
-            user = self._people.new()
-        scope['user'] = user
-        kept += [_cookie(USER, user)]
+        kept += [_cookie(USER, scope['user'])]
         await self._app(scope, body.receive, _with_headers(send, kept, scope, body))
 
     def _address(self, host: str, headers: dict[str, str]) -> str:
@@ -195,8 +197,6 @@ def _with_headers(send: Send, cookies: list[bytes], scope: Scope, body: Body) ->
 
 
 async def _drained(body: Body) -> None:
-    from .bodies import TooSlow
-
     try:
         await body.drain()
     except TooSlow:

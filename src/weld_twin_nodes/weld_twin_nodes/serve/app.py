@@ -19,6 +19,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 from starlette.datastructures import FormData, UploadFile
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from weld_twin_core.errors import DataError, TwinError
 
@@ -92,7 +93,8 @@ def make_app(settings: Settings, queue: Queue, doors: Doors, live: Said = lambda
         ('/live', site.live, get),
     ):
         app.add_api_route(path, answer, methods=methods, response_model=None)
-    for kind in (TooMuch, TooSlow, Busy, OSError, TwinError, HTTPException, Exception):
+    known = (TooMuch, TooSlow, Busy, ClientDisconnect, OSError, TwinError, HTTPException)
+    for kind in (*known, Exception):  # the last one is told on the server's terminal as well
         app.add_exception_handler(kind, site.refused)
     return Access(app, settings, people, doors)
 
@@ -286,7 +288,7 @@ class _Site:
         if isinstance(error, TooMuch):
             most = self._settings.upload / 1e6
             return self._message('too large', f'An upload has at most {most:.0f} MB.', 413)
-        if isinstance(error, TooSlow):
+        if isinstance(error, TooSlow | ClientDisconnect):
             return self._message('too slow', 'The upload came too slowly; try it again.', 408)
         if isinstance(error, Busy):
             text = 'Many uploads come from your address; try again in a minute.'

@@ -20,8 +20,9 @@ BEHIND = 30.0
 """Seconds that somebody may lag behind this pace: a line that breaks down for a moment recovers."""
 GIVES_WAY = 0.5
 """Seconds behind after which somebody gives way to others who wait."""
-OF_ADDRESS, OF_ALL = 16, 64
-"""Bodies read at the same time, of one address and of all; the parser holds a megabyte of each."""
+OF_PARTY, OF_ALL = 16, 64
+"""Bodies read at the same time: of one user, or of all at one address who have no key; and of all. The
+parser holds a megabyte of each."""
 PATIENCE = 30.0
 """Seconds for which somebody waits until others have sent theirs."""
 TICK = 0.25
@@ -50,8 +51,8 @@ class Body:
     Parameters
     ----------
     bodies : Bodies
-    address : str
-        Where it comes from.
+    party : str
+        Who sends it.
     receive : callable
         What the server hands out.
     most : int
@@ -62,9 +63,9 @@ class Body:
     """
 
     def __init__(
-        self, bodies: Bodies, address: str, receive: Receive, most: int, length: int | None
+        self, bodies: Bodies, party: str, receive: Receive, most: int, length: int | None
     ) -> None:
-        self.address, self.gave_way = address, False
+        self.party, self.gave_way = party, False
         self._bodies, self._receive, self._most, self._length = bodies, receive, most, length
         self._got, self._lag, self._since = 0, 0.0, 0.0
         self.whole = False
@@ -125,20 +126,20 @@ class Bodies:
 
     Parameters
     ----------
-    of_address, of_all : int
-        How many are read at the same time, of one address and of all.
+    of_party, of_all : int
+        How many are read at the same time, of one party and of all.
 
     """
 
-    def __init__(self, of_address: int = OF_ADDRESS, of_all: int = OF_ALL) -> None:
-        self._of_address, self._of_all = of_address, of_all
+    def __init__(self, of_party: int = OF_PARTY, of_all: int = OF_ALL) -> None:
+        self._of_party, self._of_all = of_party, of_all
         self._read: dict[Body, None] = {}
 
     async def enter(self, body: Body) -> None:
         """Wait until there is room for a body; it is there until it is whole, or leaves."""
         until = time.monotonic() + PATIENCE
         while body not in self._read and not body.whole:
-            rivals = self._rivals(body.address)
+            rivals = self._rivals(body.party)
             if not rivals:
                 self._read[body] = None
                 return
@@ -155,9 +156,9 @@ class Bodies:
         """Forget a body."""
         self._read.pop(body, None)
 
-    def _rivals(self, address: str) -> list[Body]:
+    def _rivals(self, party: str) -> list[Body]:
         """Return the bodies one of which has to go first; none where there is room."""
-        mine = [each for each in self._read if each.address == address]
-        if len(mine) >= self._of_address:
+        mine = [each for each in self._read if each.party == party]
+        if len(mine) >= self._of_party:
             return mine
         return list(self._read) if len(self._read) >= self._of_all else []

@@ -14,10 +14,13 @@ from __future__ import annotations
 
 import asyncio
 import resource
+import time
 from typing import Any, NamedTuple
 
 HEAD = 10.0
 """Seconds that the head of a request may take; a browser sends it at once, in one piece."""
+GRACE = 1.0
+"""Seconds in which nobody gives way: many that come at once are read one after the other."""
 OF_ADDRESS = 64
 """Connections of one address that may wait for a head; a browser opens six."""
 OF_ALL = 4000
@@ -33,6 +36,7 @@ class Door(NamedTuple):
 
     transport: asyncio.Transport
     timer: asyncio.TimerHandle
+    since: float
 
 
 class Doors:
@@ -61,10 +65,15 @@ class Doors:
         self._open[client] = transport
         self._wait(client)
         mine = [each for each in self._waiting if each[0] == client[0]]
-        if len(mine) > self._of_address:
+        if len(mine) > self._of_address and self._idle(mine[0]):
             self._give_way(mine[0])
         elif len(self._open) > self._of_all:
-            self._give_way(next(iter(self._waiting)))
+            first = next(iter(self._waiting))
+            self._give_way(first if self._idle(first) else client)
+
+    def _idle(self, client: Client) -> bool:
+        """Return whether a connection had the time to say something."""
+        return time.monotonic() - self._waiting[client].since > GRACE
 
     def closed(self, transport: asyncio.Transport) -> None:
         """Forget a connection."""
@@ -86,7 +95,7 @@ class Doors:
     def _wait(self, client: Client) -> None:
         transport = self._open[client]
         timer = asyncio.get_running_loop().call_later(self._head, self._late, client)
-        self._waiting[client] = Door(transport, timer)
+        self._waiting[client] = Door(transport, timer, time.monotonic())
 
     def _late(self, client: Client) -> None:
         door = self._waiting.pop(client, None)

@@ -363,11 +363,7 @@ def program_page(jobs: Sequence[Job], of: str, site: Site, said: str = '') -> st
         Why it was refused before.
 
     """
-    done = [job for job in jobs if job.state == DONE and job.kind != PROGRAM]
-    models = [('', 'none of these: I drop a diagnosis below')]
-    models += [
-        (job.key, f'{", ".join(job.names[:2])}, {job.asked.robot}, {_when(job)}') for job in done
-    ]
+    models = _models(jobs)
     robots = [('', "the diagnosis', or the file dropped"), *((n, n) for n in catalog.names())]
     form = tag(
         'form',
@@ -404,6 +400,18 @@ def program_page(jobs: Sequence[Job], of: str, site: Site, said: str = '') -> st
     lead = 'Its points are moved so that the real tool goes where the program means it.'
     body = section('Correct a program', form, id_='drop', lead=lead)
     return page('correct a program', _said(said, CORRECT), body, site=site)
+
+
+def _models(jobs: Sequence[Job]) -> list[tuple[str, str]]:
+    """Return what a program may be corrected by."""
+    done = [job for job in jobs if job.state == DONE and job.kind != PROGRAM]
+    return [
+        ('', 'none of these: I drop a diagnosis below'),
+        *(
+            (job.key, f'{", ".join(job.names[:2])}, {job.asked.robot}, {_when(job)}')
+            for job in done
+        ),
+    ]
 
 
 def _when(job: Job) -> str:

@@ -18,13 +18,17 @@ from hashlib import sha256
 from pathlib import Path
 
 LENGTH = 64
-"""Hexadecimal digits of a key: eight of its date, forty of chance, sixteen of a signature."""
-DATE, SIGNATURE = 8, 16
+"""Hexadecimal digits of a key: those of its date, forty of chance, those of a signature."""
+DATE = 8
+"""Hexadecimal digits of the seconds since 1970; enough until 2106."""
+SIGNATURE = 16
+"""Hexadecimal digits; of 2^64 guesses one is right."""
 SETTLED = 600.0
 """Seconds after which a new key counts as a user of its own."""
 SECRET = 'secret'
 """File that signs keys."""
 SECRET_BYTES = 32
+"""Bytes of chance in it."""
 
 
 class People:

@@ -169,7 +169,7 @@ class Queue:
             job.write(self.folder(job))
             self._jobs[job.key], self._sizes[job.key] = job, size
             self._news.notify()
-        for each in {*going, *mine[self._settings.kept :]}:
+        for each in (*going, *mine[self._settings.kept :]):
             self.remove(each)
 
     def again(self, job: Job, asked: Asked) -> None:

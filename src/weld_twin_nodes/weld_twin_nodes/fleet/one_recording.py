@@ -8,16 +8,18 @@ import shutil
 import tempfile
 import threading
 from dataclasses import asdict
-from errno import ENOSPC
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core.errors import TwinError
+from weld_twin_core.errors import DataError, TwinError
+from weld_twin_msgs_py.files.scratch import Scratch
 
 from ..guarded import Guarded, Limits, Outcome
 from ..history import entry_of
 from ..history.plain_entry import plain
 from ..history.runs import DONE, FAILED, REFUSED, UNSOUND, Run
+from ..offline.output_directory import new_directory
+from ..report.diagnosis_files import RESULT
 from .listed import Listed
 
 STATES = {0: DONE, 2: REFUSED, 3: UNSOUND}
@@ -41,30 +43,21 @@ def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, 
     """
     done, entry = Outcome(-1, '', 0.0), None
     try:
-        with tempfile.TemporaryDirectory(prefix='fleet-') as place:
-            out = Path(place) / 'found'
+        with Scratch(Path(tempfile.gettempdir()), 'weld_twin-fleet-') as place:
+            out = place / 'found'
             done = _warm(limits).run(listed.words(out))
             state, sentence, entry = _read(listed, done, out)
             if keep and out.is_dir():
-                _kept(out, Path(keep) / key)
-    except OSError as error:  # the disk is full: this one can run again, the others go on
-        where = f" '{error.filename}'" if error.filename else ''
-        state, sentence, entry = FAILED, f'{error.strerror or error}{where}', None
+                with new_directory(Path(keep) / key, mark=RESULT, force=True) as kept:
+                    shutil.copytree(out, kept, dirs_exist_ok=True)
+    except (OSError, DataError) as error:  # the disk is full: this can run again, the others go on
+        said = str(error)
+        if isinstance(error, OSError):
+            where = f" '{error.filename}'" if error.filename else ''
+            said = f'{error.strerror or error}{where}'
+        state, sentence, entry = FAILED, said, None
     run = Run(key, listed.cell, listed.recording, state, sentence, done.seconds, done.memory)
     return {'run': asdict(run), 'entry': entry}
-
-
-def _kept(out: Path, target: Path) -> None:
-    """Copy what the command wrote, whole or not at all."""
-    shutil.rmtree(target, ignore_errors=True)
-    try:
-        shutil.copytree(out, target)
-    except OSError as error:
-        shutil.rmtree(target, ignore_errors=True)
-        told = (
-            error if error.errno else OSError(ENOSPC, 'cannot be kept whole', str(target.parent))
-        )
-        raise told from None
 
 
 def _read(listed: Listed, done: Outcome, out: Path) -> tuple[str, str, dict[str, Any] | None]:

@@ -33,6 +33,8 @@ LONGEST = 1 << 20
 
 _CRASHES = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT)
 """How compiled code ends that was refused memory and did not look whether it got it."""
+_NO_SPACE = ('No space left on device', 'Disk quota exceeded', 'disk is full')
+"""What commands say of a full disk."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,11 @@ class Outcome:
     said: str
     seconds: float
     memory: int = 0
+
+    @property
+    def disk_full(self) -> bool:
+        """Return whether it ended since nothing more could be written."""
+        return self.code != 0 and any(sign in self.said for sign in _NO_SPACE)
 
 
 class Guarded:

@@ -195,7 +195,8 @@ class Job:
             more = words(self.asked.told, IMPORT)
             first = [['import', str(recording), '--robot', robot, '--out', str(bag), *more]]
             recording = bag
-        last = ['diagnose', str(recording), '--robot', robot, '--out', FOUND]
+        # Nobody but the server writes there, and an earlier version kept no list.
+        last = ['diagnose', str(recording), '--robot', robot, '--out', FOUND, '--force']
         last += words(self.asked.told, DIAGNOSE)
         return [*first, last + ['--apply'] * self.asked.apply]
 

@@ -24,10 +24,10 @@ from ..history import entry_of
 from ..history.database import Database
 from ..history.entry import instant
 from ..history.runs import Runs
+from .directory import Directory
 from .job import (
     DONE,
     FAILED,
-    FILE,
     FOUND,
     IMPORTED,
     OPEN,
@@ -71,9 +71,7 @@ class Queue:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._place = settings.directory / 'jobs'
-        self._place.mkdir(parents=True, exist_ok=True)
-        settings.directory.chmod(0o700)
+        self._directory = Directory(settings.directory)
         self._news = threading.Condition()
         self._stopped = False
         self._jobs = {job.key: job for job in self._kept()}
@@ -88,10 +86,7 @@ class Queue:
     def _kept(self) -> list[Job]:
         """Return the jobs of the folders; what was running waits again."""
         out = []
-        for folder in self._place.iterdir():
-            if not (folder / FILE).is_file():
-                shutil.rmtree(folder, ignore_errors=True)  # an upload that was cut off
-                continue
+        for folder in self._directory.kept():
             try:
                 job = Job.read(folder)
             except DataError as error:
@@ -104,11 +99,11 @@ class Queue:
 
     def folder(self, job: Job) -> Path:
         """Return the folder of a job."""
-        return self._place / job.key
+        return self._directory.jobs / job.key
 
     def user_folder(self, user: str) -> Path:
         """Return the folder of a user; it is there once something was kept in it."""
-        return self._settings.directory / 'users' / user
+        return self._directory.users / user
 
     def has(self, user: str) -> bool:
         """Return whether something is kept of a user."""
@@ -238,6 +233,7 @@ class Queue:
         Guarded.end_all()
         for worker in self._workers:
             worker.join(timeout=5.0)
+        self._directory.close()
 
     def _put(self, job: Job) -> None:
         """Keep a job; where the disk is full it is kept here, and written as soon as that goes."""

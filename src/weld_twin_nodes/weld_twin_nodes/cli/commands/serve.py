@@ -14,7 +14,7 @@ import argparse
 GIGABYTE = 1_000_000_000
 """Bytes."""
 LAST_PORT = 65_535
-"""The highest port there is."""
+"""A port is a number of sixteen bits."""
 TOKEN = 24
 """Bytes of chance in a token."""
 
@@ -66,13 +66,15 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_nodes.serve import Settings
     from weld_twin_nodes.serve.running import serve
 
+    if not 0 <= args.port <= LAST_PORT:
+        raise DataError(
+            f'--port takes 0 to {LAST_PORT}, got {args.port}; 0 takes any that is free'
+        )
     more = (args.upload, args.disk, args.minutes)
     if args.workers < 1 or args.memory < 1.0 or not all(0.0 < each < 1e6 for each in more):
         raise DataError(
             '--workers takes 1 or more, --memory 1 GB or more, the others more than none'
         )
-    if not 0 <= args.port <= LAST_PORT:
-        raise DataError(f'--port {args.port}: a port is a number from 0 to {LAST_PORT}')
     wall = max(round(60.0 * args.minutes), 1)
     settings = Settings(
         Path(args.dir),

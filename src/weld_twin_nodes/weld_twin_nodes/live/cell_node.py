@@ -30,6 +30,7 @@ from weld_twin_msgs_py.messages.topics import (
     Topic,
 )
 
+from ..streams.stamp_watch import StampWatch
 from . import qos_events
 from .all_nodes import refuse_unknown
 from .health import Health, Input
@@ -270,7 +271,7 @@ class CellNode(Node):
         turn = self._plain_turn(topic)
 
         def use(message: Any) -> None:
-            if topic.stamped:
+            if topic.stamped and topic.steady:
                 at = message.header.stamp
                 state.stamped(at.sec * 1_000_000_000 + at.nanosec)
             callback(message)
@@ -457,6 +458,8 @@ class CellNode(Node):
 
     def _jumped(self, jump: TimeJump) -> None:
         by = jump.delta.nanoseconds * 1e-9
+        for state in self.health.inputs.values():
+            state.stamps = StampWatch()  # that they jump along is no news
         if by > 0.0:
             if self.get_clock().now().nanoseconds > jump.delta.nanoseconds:  # it had a time before
                 self._tell_once(f'the clock jumped forwards by {by:,.3f} s')

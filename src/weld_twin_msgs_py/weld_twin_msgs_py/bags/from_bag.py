@@ -29,7 +29,7 @@ from ..messages.topics import (
 from .columns import LEFT_OUT, Stream
 from .contacts import marks, touching
 from .ends import Ends, never_recorded, uneven_ends
-from .needed import POSE_TYPES, no_joints, no_measurements
+from .needed import POSE_TYPES, no_joints, no_measurements, other_names
 from .reader import BagReader
 from .regular import fill_regular
 
@@ -42,6 +42,8 @@ TYPES = {
     Role.TEMPERATURE: (TEMPERATURE.type,),
 }
 """Message types from which each role is read."""
+INJECTED = 'effects'
+"""Key of the provenance under which the simulator and the injector tell what they put in."""
 
 
 def read_recording(
@@ -95,6 +97,7 @@ def read_recording(
         raise DataError(
             f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
             f'{robot.name!r}: {", ".join(robot.joint_names)}'
+            f'{other_names(robot, tuple(intake.joints.strangers))}'
         )
     samples = {role: stream.samples() for role, stream in streams.items()}
     whole = assembled(
@@ -108,6 +111,8 @@ def read_recording(
     )
     if touched:
         return touching(whole, touched, made)
+    if names.measured_inverse and whole.measured is not None:
+        whole = whole.with_measured(whole.measured.inverted())
     return _with_what_is_missing(whole, made, _ends(names, samples))
 
 
@@ -116,7 +121,12 @@ def _with_what_is_missing(
 ) -> Recording:
     lacking = never_recorded(made)
     uneven = () if recording.joints.static else uneven_ends(ends)
-    return replace(recording, incomplete=(*lacking, *uneven), notes=(*recording.notes, *lacking))
+    return replace(
+        recording,
+        incomplete=(*lacking, *uneven),
+        notes=(*recording.notes, *lacking),
+        simulated=INJECTED in made,
+    )
 
 
 def _ends(names: TopicNames, samples: Mapping[Role, Samples]) -> dict[str, Ends]:

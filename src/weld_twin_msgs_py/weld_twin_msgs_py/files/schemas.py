@@ -78,6 +78,14 @@ def _robot() -> Schema:
             'joints': {'type': 'array', 'items': _joint(), 'minItems': 1},
             'links': {'type': 'array', 'items': _object(mass), 'description': 'one per joint'},
             'payload': _object(mass),
+            'controller': _said(
+                _object(
+                    dict.fromkeys(('base', 'flange', 'foot'), frame)
+                    | {'base_link': TEXT, 'flange_link': TEXT}
+                ),
+                "the controller's base, and the link the arm stands in (foot), in the base; the "
+                "controller's flange at the end of the last row",
+            ),
             'source': _said(TEXT, 'where the numbers come from'),
             'plausible': _object(
                 {

@@ -18,7 +18,7 @@ from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
-from .prediction import Predictor, Stretch, write_outside
+from .prediction import Predictor, Stretch, beside_bag
 from .told_twin import build_twin
 
 WHOLE = 0.999
@@ -96,9 +96,8 @@ def write_compensated(
         covariance=made.model.covariances(commands),
         storage=storage,
         provenance={'compensated_with': [effect.to_mapping() for effect in twin.effects]},
+        beside=beside_bag(made.model, made.outside),
     )
-    if made.model.posterior is not None:
-        write_outside(Path(path), made.outside)
 
 
 def told_trust(made: Compensated) -> list[str]:

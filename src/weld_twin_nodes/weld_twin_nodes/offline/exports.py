@@ -15,6 +15,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.twin.corrected import corrected, joint_offsets
+from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
@@ -43,12 +44,14 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     del notes
     robot = model.robot
     offsets = joint_offsets(robot, _causes(model))
-    rows = [*(f'# {line}' for line in _mended(model)), 'joint,offset,unit,shown,shown_unit']
+    rows = []
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
         units = ('m', 'mm') if slides else ('rad', 'deg')
-        rows.append(f'{name},{float(offset)!r},{units[0]},{shown:.6f},{units[1]}')
-    write_text(path, '\n'.join(rows) + '\n', overwrite=True)
+        rows.append((name, float(offset), units[0], f'{shown:.6f}', units[1]))
+    remarks = ''.join(f'# {line}\n' for line in _mended(model))
+    table = csv_text(('joint', 'offset', 'unit', 'shown', 'shown_unit'), rows)
+    write_text(path, remarks + table, overwrite=True)
 
 
 def write_effects(path: Path, model: Model, notes: Sequence[str]) -> None:

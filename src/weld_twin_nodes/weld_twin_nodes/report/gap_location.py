@@ -77,9 +77,16 @@ def _dependences(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
         return [(REGIMES.get(name, name), share, percent(share)) for name, share in regimes]
     words = {**DEPENDENCES, 'constant': 'constant'}
     return _summed(
-        [(c.dependence, c.share, lambda on: words.get(on, on)) for c in diagnosis.causes],
+        [(_on(diagnosis, c), c.share, lambda on: words.get(on, on)) for c in diagnosis.causes],
         diagnosis,
     )
+
+
+def _on(diagnosis: Diagnosis, cause: Cause) -> Sequence[tuple[str, float]]:
+    """Return what a cause depends on; where several causes fit alike, what each of them does."""
+    effects = [REGISTRY.get(site.effect) for site in alternatives(diagnosis, cause)]
+    on = list(dict.fromkeys(effect.depends_on for effect in effects if effect is not None))
+    return [(each, HALF / len(on)) for each in on] if len(on) > 1 else cause.dependence
 
 
 def _summed(
@@ -211,7 +218,9 @@ def _worst(diagnosis: Diagnosis) -> Html | None:
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
     if parts is None:
         return None
-    told = f'RMS. The largest, {seen_at(diagnosis, k, sample, size)}: {sides_words(parts[sample])}'
+    told = f'RMS. The largest, {seen_at(diagnosis, k, sample, size)}'
+    if sides := sides_words(parts[sample]):
+        told += f': {sides}'
     keys = 'Left is as seen from the tool, looking along it; out is away from the flange.'
     return tag('p', f'{told}. {keys}', class_='note')
 

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
+from ...bursts import evenly
 from ...errors import DataError
 from ...recording import Measurements, Recording
 
@@ -84,10 +85,24 @@ def turns_as(given: Given, undo: Callable[[Array], Array]) -> Given:
     return replace(given, recordings=tuple(out))
 
 
+def poses_inverted(given: Given) -> Given:
+    """Return what was given with measured poses inverted; points stay as they are."""
+    out = []
+    for r in given.recordings:
+        posed = r.measured is not None and r.measured.rotation is not None
+        out.append(r.with_measured(measured(r).inverted()) if posed else r)
+    return replace(given, recordings=tuple(out))
+
+
 def robot_as(given: Given, robot: Robot) -> Given:
     """Return what was given with another robot that stands where the first did, same tool."""
     placed = robot.with_frames(base=given.robot.T_world_base, tool=given.robot.T_flange_tool)
     return replace(given, robot=placed)
+
+
+def differing(given: Given, families: tuple[str, ...]) -> Given:
+    """Return what was given with errors of more families that may differ between recordings."""
+    return replace(given, may_change=tuple(dict.fromkeys([*given.may_change, *families])))
 
 
 def frames_fitted(given: Given, frames: frozenset[str]) -> Given:
@@ -124,6 +139,36 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     seen = measured(recordings[k])
     earlier = seen.t - (late + rate * (seen.t - middle))
     recordings[k] = recordings[k].with_measured(replace(seen, t=earlier))
+    return replace(given, recordings=tuple(recordings))
+
+
+def stamped_evenly(
+    given: Given, k: int, first: float, step: float, lost: Sequence[int] | Array, count: int
+) -> Given:
+    """
+    Return what was given with measurements of recording k stamped by an even clock.
+
+    Parameters
+    ----------
+    given : Given
+        Recordings, robot and frames as they were given.
+    k : int
+        Which recording, counted from 0.
+    first, step : float [s]
+        The first stamp, and the time from one to the next.
+    lost : array of int
+        Samples before which one is missing.
+    count : int
+        How many measurements had these stamps; of as many in the same time as there are now, each
+        takes its share.
+
+    """
+    recordings = list(given.recordings)
+    seen = recordings[k].measured
+    if seen is None:
+        return given
+    even = evenly(first, step, np.asarray(lost, dtype=int), seen.t.size, count)
+    recordings[k] = recordings[k].with_measured(replace(seen, t=even))
     return replace(given, recordings=tuple(recordings))
 
 

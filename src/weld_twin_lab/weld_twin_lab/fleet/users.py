@@ -13,6 +13,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from http.cookiejar import CookieJar
 from pathlib import Path
 from typing import Any, Protocol
@@ -25,10 +26,17 @@ PATIENCE = 1800.0
 """Seconds after which somebody gives up."""
 
 
-@contextmanager
-def server(place: Path, *words: str) -> Iterator[str]:
-    """Yield the address of a server that ends with the block."""
-    with subprocess.Popen(
+def started(place: Path, *words: str) -> tuple[subprocess.Popen[str], str]:
+    """
+    Start a server; return it and its address.
+
+    Raises
+    ------
+    DataError
+        It does not start.
+
+    """
+    process = subprocess.Popen(
         [
             sys.executable,
             '-m',
@@ -42,13 +50,22 @@ def server(place: Path, *words: str) -> Iterator[str]:
         ],
         stdout=subprocess.PIPE,
         text=True,
-    ) as process:
-        assert process.stdout is not None
-        said = process.stdout.readline()
-        if not said.startswith('open '):
-            raise DataError('the server does not start')
+    )
+    assert process.stdout is not None
+    said = process.stdout.readline()
+    if not said.startswith('open '):
+        process.kill()
+        raise DataError('the server does not start')
+    return process, said.removeprefix('open ').strip().rstrip('/')
+
+
+@contextmanager
+def server(place: Path, *words: str) -> Iterator[str]:
+    """Yield the address of a server that ends with the block."""
+    process, address = started(place, *words)
+    with process:
         try:
-            yield said.removeprefix('open ').strip().rstrip('/')
+            yield address
         finally:
             process.terminate()
 
@@ -69,7 +86,7 @@ class Visitor:
     """Somebody with a plain client: it keeps cookies and follows what the server says."""
 
     def __init__(self, root: str) -> None:
-        self._root = root
+        self.root = root
         self._open = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
         self.page()
 
@@ -77,12 +94,12 @@ class Visitor:
         self, path: str = '/', data: bytes | None = None, kind: str = ''
     ) -> tuple[int, str, str]:
         """Return status, address and text of a page."""
-        request = urllib.request.Request(self._root + path, data=data)
+        request = urllib.request.Request(self.root + path, data=data)
         if kind:
             request.add_header('Content-Type', kind)
         try:
             with self._open.open(request, timeout=60) as answer:
-                return answer.status, answer.url.removeprefix(self._root), answer.read().decode()
+                return answer.status, answer.url.removeprefix(self.root), answer.read().decode()
         except urllib.error.HTTPError as error:
             return error.code, path, error.read().decode()
 
@@ -109,12 +126,21 @@ class Visitor:
 
 def wait(visitor: Person, address: str) -> str:
     """Return the page of a recording that is finished."""
-    return wait_all([(visitor, address)])[0][1]
+    return wait_all([(visitor, address)])[0].text
 
 
-def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]]:
+@dataclass
+class Waited:
+    """Places in the queue that somebody was told, the page that came at last, and when [s]."""
+
+    places: set[int] = field(default_factory=set)
+    text: str = ''
+    until: float = 0.0
+
+
+def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[Waited]:
     """
-    Return, for each visitor, the places in the queue that were told, and the page that came at last.
+    Return what each visitor was told while he waited, and at last.
 
     Raises
     ------
@@ -122,7 +148,7 @@ def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]
         A visitor waited too long.
 
     """
-    found: list[tuple[set[int], str]] = [(set(), '') for _ in waiting]
+    found = [Waited() for _ in waiting]
     left = set(range(len(waiting)))
     until = time.perf_counter() + PATIENCE
     while left:
@@ -131,9 +157,9 @@ def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]
         for k in sorted(left):
             visitor, address = waiting[k]
             text = visitor.look(address)
-            found[k][0].update(_places(text))
+            found[k].places.update(_places(text))
             if text and 'http-equiv="refresh"' not in text:
-                found[k] = (found[k][0], text)
+                found[k].text, found[k].until = text, time.perf_counter()
                 left.remove(k)
         time.sleep(ASK_EVERY)
     return found
@@ -156,8 +182,9 @@ def at_once(visitors: Sequence[Person], files: Sequence[Path], **fields: str) ->
     return {
         'users': len(visitors),
         'seconds': time.perf_counter() - began,
-        'sheets': sum('<iframe' in text for _, text in found),
+        'waits_s': [waited.until - began for waited in found],
+        'sheets': sum('<iframe' in waited.text for waited in found),
         'saw_their_place': sum(
-            bool(told or places) for told, (places, _) in zip(first, found, strict=True)
+            bool(told or waited.places) for told, waited in zip(first, found, strict=True)
         ),
     }

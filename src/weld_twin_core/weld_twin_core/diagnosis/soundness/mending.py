@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm.robot import Robot
 from ...arrays import Array
@@ -143,7 +144,12 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
 
 
 def stamped_evenly(
-    given: Given, k: int, first: float, step: float, lost: Sequence[int] | Array, count: int
+    given: Given,
+    k: int,
+    first: float,
+    step: float,
+    lost: Sequence[int] | NDArray[np.int_],
+    count: int,
 ) -> Given:
     """
     Return what was given with measurements of recording k stamped by an even clock.

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.diagnosis.advice.zeros import stands, to_mend
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.setup_motion import of_the_robot
@@ -43,11 +44,13 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     del notes
     robot = model.robot
     offsets = joint_offsets(robot, _causes(model))
-    rows = [*(f'# {line}' for line in _mended(model)), 'joint,offset,unit,shown,shown_unit']
+    rows = [*(f'# {line}' for line in _mended(model)), 'joint,offset,unit,shown,shown_unit,meaning']
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
         units = ('m', 'mm') if slides else ('rad', 'deg')
-        rows.append(f'{name},{float(offset)!r},{units[0]},{shown:.6f},{units[1]}')
+        told = f'{stands(name, offset, sliding=slides)} {to_mend(offset, sliding=slides)}'
+        meaning = f'"{told}"' if offset else ''
+        rows.append(f'{name},{float(offset)!r},{units[0]},{shown:.6f},{units[1]},{meaning}')
     write_text(path, '\n'.join(rows) + '\n', overwrite=True)
 
 

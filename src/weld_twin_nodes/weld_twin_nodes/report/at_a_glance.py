@@ -290,7 +290,7 @@ def _enter(diagnosis: Diagnosis, k: int, brand: str | None) -> str:
         return 'nothing yet'
     if alternatives(diagnosis, cause):
         return 'nothing before it is known which it is'
-    told = UNNAMED if unnamed(cause) else correction(found[0], brand)
+    told = UNNAMED if unnamed(cause) else correction(found[0], brand, diagnosis.model.robot)
     return _SENTENCE.split(told.removesuffix(UNCHECKED).rstrip())[0]
 
 

@@ -273,7 +273,12 @@ def _at_the_controller(
     fault = curve_fault(diagnosis, k)
     if fault:
         return [(head, f'Nothing is to be entered: the curve {fault}.')]
-    told = f'{UNNAMED}{_taken_out(diagnosis)}' if unnamed(cause) else correction(effects[0], brand)
+    robot = diagnosis.model.robot
+    told = (
+        f'{UNNAMED}{_taken_out(diagnosis)}'
+        if unnamed(cause)
+        else correction(effects[0], brand, robot)
+    )
     if alternatives(diagnosis, cause):
         which = one_of(diagnosis, cause)
         told = f'Nothing before it is known which it is. Should it be {which}: {told}'

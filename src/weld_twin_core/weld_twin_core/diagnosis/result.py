@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -77,6 +78,9 @@ class Unsound:
         Whether the remedy was made and the diagnosis went on with mended data.
     alike : tuple of (str, tuple of str)
         Kinds and places of other mistakes that would explain the data as well.
+    mend : mapping, optional
+        The correction as plain values, to be made again on the same source; None where nothing
+        can undo it.
 
     """
 
@@ -86,6 +90,7 @@ class Unsound:
     remedy: str
     applied: bool = False
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    mend: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``unsound``."""

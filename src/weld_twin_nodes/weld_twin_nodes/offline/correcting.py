@@ -101,7 +101,7 @@ def program_model(
         effects = of_the_robot(twin.effects)
         posterior = read_posterior(robot, path)
         return ProgramModel(twin.robot, tuple(effects), posterior, temperature, setup)
-    twin = build_twin(robot, path)
+    twin = build_twin(robot, path, mended=True)
     return ProgramModel(twin.robot, tuple(twin.effects), None, temperature)
 
 
@@ -111,6 +111,7 @@ def corrected_program(
     model: ProgramModel,
     caps: Caps | None = None,
     start: Array | None = None,
+    readings: str = '',
 ) -> CorrectedProgram:
     """
     Return a program corrected so that the real tool goes where it means.
@@ -123,6 +124,9 @@ def corrected_program(
     caps : Caps, optional
     start : array, shape (n,), optional
         Joint positions before the first move.
+    readings : str
+        Why the model counts joints otherwise than they are read, see `other_readings`; whether a
+        program does, too, nobody knows.
 
     Raises
     ------
@@ -131,6 +135,13 @@ def corrected_program(
 
     """
     name = program.sources[0].name
+    if readings:
+        joints = next((point for point in program.points if point.value.ndim == 1), None)
+        if joints is not None:
+            raise DataError(
+                f'{joints.where}: {joints.name} holds joint values, and the model takes them mended: '
+                f'{readings}'
+            )
     if not program.steps:
         raise DataError(f"no move was found in '{name}'; is its language {program.language}?")
     moves = to_moves(program, context.robot, context.controller)

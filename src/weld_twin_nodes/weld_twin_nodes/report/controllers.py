@@ -56,7 +56,10 @@ _PLACES = {
     ('fanuc', 'base'): 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
     ('fanuc', 'tool'): 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
     ('fanuc', 'load'): 'MENU > SYSTEM > Motion: change the payload schedule.',
-    ('yaskawa', 'zero'): 'ROBOT > HOME POSITION: absolute data of the axis, in pulses: new value = '
+    (
+        'yaskawa',
+        'zero',
+    ): 'ROBOT > HOME POSITION: absolute data of the axis, in pulses: new value = '
     'old value {degrees_back} * P, where P is pulses per degree, with its sign: turn the axis by '
     '+10 deg, read by how many pulses its position grows, and divide.',
     ('yaskawa', 'base'): 'ROBOT > USER COORDINATE: teach or change the user frame.',
@@ -141,7 +144,9 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
     # The makers' fields of a zero are angles; what a slide's count is not known.
     if kind is not None and (brand is None or (sliding and kind == 'zero')):
         told = _ANYWHERE[kind].format(**off)
-        return told + ('.' if brand else '; --controller with the name of its maker tells the menu.')
+        return told + (
+            '.' if brand else '; --controller with the name of its maker tells the menu.'
+        )
     place = _PLACES.get((str(brand), str(kind)))
     if place is None:
         return _PROGRAM

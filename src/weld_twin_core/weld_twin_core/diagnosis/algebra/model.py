@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,6 +63,8 @@ class Model:
         What differs between the recordings.
     given : tuple of int
         Of which of the recordings given each is a part; see `Problem`.
+    mends : tuple of mapping
+        How it was undone, as plain values to be made again; see `soundness.mending`.
 
     """
 
@@ -72,6 +75,7 @@ class Model:
     mended: tuple[str, ...] = ()
     changes: tuple[Change, ...] = ()
     given: tuple[int, ...] = ()
+    mends: tuple[Mapping[str, Any], ...] = ()
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""

@@ -81,11 +81,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _corrected(args: argparse.Namespace, context: Context, program: Program) -> int:
     from weld_twin_core.twin.program_correction import Caps
+    from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
     from weld_twin_msgs_py.files.input_files import hashed
     from weld_twin_msgs_py.files.whole_files import write_text
 
     from ...offline.correcting import corrected_program, correction_entry, program_model
     from ...offline.output_directory import new_directory
+    from ...offline.told_twin import other_readings
     from ...report.correction_page import correction_page, headline
 
     length, angle = args.max_correction
@@ -95,7 +97,10 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
     )
     robot = context.robot
     model = program_model(robot, args.model, args.temperature, args.setup - 1)
-    made = corrected_program(program, context, model, caps, start_of(args, robot))
+    content = read_diagnosis(args.model) if Path(args.model).suffix.lower() == '.json' else {}
+    made = corrected_program(
+        program, context, model, caps, start_of(args, robot), other_readings(content)
+    )
     entry = correction_entry(made, robot, caps)
     inputs = [hashed('program', args.program), hashed('model', args.model)]
     entry['inputs'] = [item.as_dict() for item in inputs]

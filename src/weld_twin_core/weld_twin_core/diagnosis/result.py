@@ -534,6 +534,8 @@ class Diagnosis:
     """What was said to be able to differ."""
     contacts: ContactResult | None = None
     """How well contacts agree, where contacts took the place of an instrument."""
+    same: tuple[tuple[Site, ...], ...] = ()
+    """Those of ``indistinguishable`` that are the same error on any motion, the one to set first."""
     learned: float | None = None
     """How often such answers were right; ``confidence`` tells less where it is not sure, or does not
     always come back. None where nothing was learned of such answers."""
@@ -568,6 +570,9 @@ class Diagnosis:
             'indistinguishable': [
                 [{'effect': s.effect, 'joint': s.joint} for s in group]
                 for group in self.indistinguishable
+            ],
+            'same_on_any_motion': [
+                [{'effect': s.effect, 'joint': s.joint} for s in group] for group in self.same
             ],
             'reasons': list(self.reasons),
             'families': [family.as_dict() for family in self.families],

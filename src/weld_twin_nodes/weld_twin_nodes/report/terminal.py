@@ -25,7 +25,7 @@ from .quantities import change, millimetres, parameter_rows
 from .to_do import worth_doing
 from .untried import weighed
 from .verdict import verdict
-from .words import STATUS, found_name, listed, mended, open_sets, site_name
+from .words import found_name, listed, mended, open_sets, site_name, status_word
 
 _COLOURS = {
     'identified': 'green',
@@ -44,7 +44,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, demand: Demand | None 
     """Print the verdict in two sentences, then tables as far as there is something in them."""
     first, second = verdict(diagnosis)
     colour = _COLOURS[diagnosis.status]
-    console.print(f'[bold {colour}]{STATUS[diagnosis.status]}[/]  {escape(first)}')
+    console.print(f'[bold {colour}]{status_word(diagnosis)}[/]  {escape(first)}')
     console.print(Padding(escape(second), (0, 0, 1, 0)))
     for sentence in mended(diagnosis):
         console.print(f'[bold yellow]mended before the diagnosis:[/] {escape(sentence)}')

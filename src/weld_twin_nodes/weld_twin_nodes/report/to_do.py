@@ -23,6 +23,7 @@ from .words import (
     not_to_be_tried,
     open_sets,
     open_sites,
+    same_words,
     share_by_site,
     site_name,
     site_of,
@@ -130,7 +131,8 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
     for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
         if site_of(named) in unsure:
             action = f'Should it be {found_name(named)}: {action[:1].lower()}{action[1:]}'
-        action = f'{action} {gearing(named.effect)}'.rstrip()
+        twins = ' '.join(same_words(diagnosis, site_of(named)))
+        action = ' '.join(filter(None, [action, gearing(named.effect), twins]))
         worse = warning(diagnosis, held[site_of(named)]) if site_of(named) in held else ''
         out.append(f'{action} {worse}'.rstrip())
     return out

@@ -12,6 +12,7 @@ from ..advice import Limits, actions
 from ..advice.next_step import next_step
 from ..frames.places import NOT_TOLD, not_told
 from ..hypotheses.search import Search
+from ..hypotheses.structural_aliases import never_parted
 from ..levels.causes import causes
 from ..levels.contributions import contributions
 from ..levels.curved import Curved
@@ -86,6 +87,7 @@ def answer(
         effects=effects,
         confidence=verdict.confidence,
         indistinguishable=verdict.sets,
+        same=never_parted(found, verdict.sets),
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,

@@ -614,6 +614,7 @@ class Diagnosis:
             'spans_ns': [list(r.span_ns) for r in self.recordings],
             'known': [effect.to_mapping() for effect in self.model.known],
             'found': [effect.to_mapping() for effect in self.model.found],
+            'alone': None if self.model.alone is None else self.model.alone.as_dict(),
         }
 
     def _where(self) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import numpy as np
 from weld_twin_core.arm.fingerprint import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
+from weld_twin_core.diagnosis.algebra.model import Alone
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.soundness.mending import Given, replayed
 from weld_twin_core.effects import effects_from_list
@@ -79,6 +80,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         bases = tuple(_frame(base, 'model.bases') for base in model['bases'])
         known = effects_from_list(model.get('known', []), robot)
         found = effects_from_list(model.get('found', []), robot)
+        alone = _alone(model.get('alone'), robot)
     except (KeyError, TypeError) as error:
         raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
     except (ModelError, DataError) as error:
@@ -86,7 +88,15 @@ def read_model(robot: Robot, path: Path | str) -> Model:
     if not bases:
         raise ModelError(f"the model of diagnosis '{path}' has no base frame")
     placed = robot.with_frames(tool=tool)
-    return Model(placed, bases, known, found, _mended(content), mends=mends)
+    return Model(placed, bases, known, found, _mended(content), mends=mends, alone=alone)
+
+
+def _alone(entry: Any, robot: Robot) -> Alone | None:
+    """Return what the robot file of a model does by itself; older files say nothing of it."""
+    if not isinstance(entry, dict):
+        return None
+    sizes = {key: float(entry[key]) for key in Alone._fields if key != 'changes'}
+    return Alone(effects_from_list(entry['changes'], robot), **sizes)
 
 
 def _without_model(path: Path | str, content: dict[str, Any]) -> str:

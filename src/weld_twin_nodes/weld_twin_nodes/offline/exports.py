@@ -22,18 +22,21 @@ from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
 from weld_twin_msgs_py.robots.urdf_like import GivenUrdf, write_urdf_like
 
+from .where_it_holds import file_alone
+
 _EVERYTHING = 'Every effect of the twin; goes with the nominal robot.'
 _LEFT_OVER = 'What the corrected robot.yaml cannot hold; goes with that, not with the nominal.'
 
 
 def write_yaml(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the corrected robot as a robot file."""
-    write_robot_yaml(path, _corrected(model)[0], notes=[*_readings(model), *notes], overwrite=True)
+    said = _of_the_robot(model, notes)
+    write_robot_yaml(path, _corrected(model)[0], notes=said, overwrite=True)
 
 
 def write_model_urdf(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the corrected robot as a URDF."""
-    write_urdf(path, _corrected(model)[0], overwrite=True, notes=[*_readings(model), *notes])
+    write_urdf(path, _corrected(model)[0], overwrite=True, notes=_of_the_robot(model, notes))
 
 
 def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
@@ -102,13 +105,21 @@ def write_all(
 
 def write_given_urdf(path: Path, model: Model, notes: Sequence[str], given: GivenUrdf) -> None:
     """Write the corrected robot as the URDF that it was read from, its names kept."""
-    robot, said = _corrected(model)[0], [*_readings(model), *notes]
+    robot, said = _corrected(model)[0], _of_the_robot(model, notes)
     write_urdf_like(path, given, robot, overwrite=True, notes=said)
+
+
+def _of_the_robot(model: Model, notes: Sequence[str]) -> list[str]:
+    """Return the head of a robot file: what it leaves by itself, and where the model holds."""
+    own = [] if model.alone is None else file_alone(model.alone, left=bool(_corrected(model)[1]))
+    return [*own, *_readings(model), *notes]
 
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     based = model.robot.with_frames(base=model.bases[0])
-    robot, left = corrected(based, _causes(model))
+    robot, left = corrected(based, (*_causes(model), *_changes(model)))
+    # What the file has for use by itself, the effects that go with it take back.
+    left = (*left, *(effect.with_vector(-effect.vector()) for effect in _changes(model)))
     zeros = _zeros(model)
     if zeros.any():
         key = np.where(robot.prismatic, 0.0, zeros), np.where(robot.prismatic, zeros, 0.0)
@@ -123,6 +134,11 @@ def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     if model.mended:
         source += f' of mended data: {" ".join(model.mended)}'
     return replace(robot, source=source), left
+
+
+def _changes(model: Model) -> tuple[Effect, ...]:
+    """Return what the robot file has beside the constants found, to do well by itself."""
+    return () if model.alone is None else model.alone.changes
 
 
 def _zeros(model: Model) -> np.ndarray:

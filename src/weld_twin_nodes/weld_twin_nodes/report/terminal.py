@@ -13,7 +13,7 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from ..offline.where_it_holds import elsewhere, left_open
+from ..offline.where_it_holds import elsewhere, left_open, which_file
 from .acceptance import Demand, rule_of
 from .cause_levels import LEVEL_HEADS, level_row
 from .cause_list import rivalry, slots
@@ -95,6 +95,8 @@ def _print_holds(diagnosis: Diagnosis, console: Console) -> None:
     if diagnosis.posterior is None:
         return
     console.print(escape(elsewhere(diagnosis.posterior, correctable(diagnosis))))
+    if file := which_file(diagnosis.model.alone):
+        console.print(f'[yellow]files:[/] {escape(file)}')
     for sentence in left_open(diagnosis.posterior):
         console.print(f'[yellow]open:[/] {escape(sentence)}')
 

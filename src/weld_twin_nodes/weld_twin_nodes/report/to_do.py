@@ -34,8 +34,9 @@ from .words import (
 _LARGEST = 3
 """Actions told; the others are counted."""
 TOGETHER = (
-    'Take them in together, by the corrected robot.yaml or robot.urdf or by corrected programs '
-    '(weld-twin correct-program): one by one they are not certain, their sum is.'
+    'Take them in together, by corrected programs (weld-twin correct-program), or by the corrected '
+    'robot.yaml or robot.urdf, whose head says what it leaves by itself: one by one they are not '
+    'certain, their sum is.'
 )
 
 

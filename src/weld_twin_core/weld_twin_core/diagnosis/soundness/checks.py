@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from .clocks import clocks
 from .evidence import Checker
+from .gravity import gravity
 from .mixups import mixups
 from .orientation import orientation
 from .outliers import outliers
@@ -21,6 +22,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
     'readings': (stuck, 'No reading stands still while the tool moves.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
+    'gravity': (gravity, 'Gravity pulls down where the base stands.'),
     'orientation': (orientation, 'Orientations turn as the joints say.'),
     'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),
     'stamps': (stamps, 'Stamps come regularly and without gaps.'),

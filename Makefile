@@ -26,7 +26,7 @@ setup: .venv/ready
 setup-test: .venv/ready-test
 setup-docs: .venv/ready-docs
 
-.venv/ready: pyproject.toml tools/setup
+.venv/ready: pyproject.toml tools/setup tools/lock.txt
 	@tools/setup
 
 .venv/ready-test: .venv/ready

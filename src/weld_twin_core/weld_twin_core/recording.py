@@ -195,6 +195,25 @@ class Measurements:
                 )
             object.__setattr__(self, 'sigma', sigma)
 
+    def inverted(self) -> Measurements:
+        """
+        Return the pose of the measuring frame in what was measured, in place of the reverse.
+
+        A camera on the arm that looks at a fixed board measures the board; inverted it is a camera
+        on the arm that the board measures.
+
+        Raises
+        ------
+        DataError
+            Points were measured: a point has no frame.
+
+        """
+        if self.rotation is None:
+            raise DataError('only measured poses can be inverted; these are points')
+        turn = np.swapaxes(self.rotation, -1, -2)
+        position = -(turn @ self.position[..., None])[..., 0]
+        return Measurements(self.t, position, turn, self.sigma)
+
     def take(self, index: np.ndarray) -> Measurements:
         """
         Return some of the measurements.
@@ -295,6 +314,8 @@ class Recording:
         that begin late or end early against the others.
     contacts : Contacts, optional
         What the tool point touched in every posture, in place of measured positions.
+    simulated : bool
+        Whether it says of itself that a simulator made it, with or without noise of an instrument.
 
     Raises
     ------
@@ -323,6 +344,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     incomplete: tuple[str, ...] = ()
     contacts: Contacts | None = None
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         if self.contacts is not None and self.contacts.size != self.joints.t.size:
@@ -391,6 +413,22 @@ class Recording:
 
         """
         return replace(self, measured=measured)
+
+    def at_temperature(self, celsius: float) -> Recording:
+        """
+        Return the recording with one temperature all along.
+
+        Parameters
+        ----------
+        celsius : float [degC]
+
+        Raises
+        ------
+        DataError
+            It is no number.
+
+        """
+        return replace(self, temperature=Signal(self.joints.t[:1], np.array([celsius])))
 
     def looking_back(self) -> Recording:
         """

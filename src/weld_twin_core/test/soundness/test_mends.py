@@ -23,6 +23,9 @@ MADE = {
     'base': {'turn': TURN},
     'stamps': {'k': 0, 'late': 0.3, 'rate': 1e-4, 'middle': 5.0},
     'velocities': {'k': 0},
+    'poses_inverted': {},
+    'even_stamps': {'k': 0, 'first': 0.1, 'step': 0.02},
+    'may_change': {'families': ('tool_pose',)},
 }
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arrays import Array
 from .chain import Frames, frames
+from .mounting import rising, up
 from .robot import Robot
 
 THICK = 0.05
@@ -28,6 +29,8 @@ SHORT = 1e-3
 ALIKE = 1e-3
 """Distance [m] by which two postures may differ and be as near: links that cannot move against each
 other differ by rounding."""
+UPRIGHT = 0.99
+"""Cosine of the angle to the vertical [1] from which an arm stands upright, within 8 degrees."""
 PLACES = 5
 """Places along each of two lines between which their distance is looked at."""
 
@@ -150,8 +153,8 @@ class Space:
         self._robot, self._box = robot, box
         self._known = _whole(robot, seen)
         self._usual: dict[bytes, Array] = {}
-        gravity = robot.T_world_base[:3, :3] @ robot.gravity
-        self._up = -gravity / max(float(np.linalg.norm(robot.gravity)), 1e-9)
+        self._up = robot.T_world_base[:3, :3] @ up(robot)
+        self._upright = rising(robot) * up(robot)[2] > UPRIGHT
         known = self._known.of(self._known.long)
         standing = float(robot.T_world_base[:3, 3] @ self._up)
         self._foot = min(standing, _lowest(known.end @ self._up).min())
@@ -174,7 +177,7 @@ class Space:
         if self._box is not None:
             inside = (ends >= self._box[0]) & (ends <= self._box[1])
             return np.asarray(good & inside.all(axis=(1, 2)))
-        if self._up @ self._robot.T_world_base[:3, 2] < 0.99:
+        if not self._upright:
             return np.asarray(good)
         return np.asarray(good & (_lowest(ends @ self._up) >= self._foot))
 

@@ -61,6 +61,24 @@ def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array)
     return point_force_torque(robot, chain, components(centre), weight)
 
 
+def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
+    """
+    Return the axes of a wrench in the world, shape (..., 3, 3).
+
+    Parameters
+    ----------
+    robot : Robot
+    chain : Frames
+        The chain at the samples.
+    frame : str
+        Where the wrench is expressed: 'tool', or 'base' for the base that the controller has.
+
+    """
+    if frame == 'tool':
+        return chain.rotation
+    return np.asarray(chain.base_rotation @ robot.T_base_origin[:3, :3])
+
+
 def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool') -> Array:
     """
     Return load torques, shape (n, ...) [N m], of a wrench on the tool: J^T w.
@@ -76,7 +94,7 @@ def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool
         Where they are expressed: 'tool' or 'base'.
 
     """
-    rotation = chain.rotation if frame == 'tool' else chain.base_rotation
+    rotation = wrench_rotation(robot, chain, frame)
     force = components((rotation @ wrench[..., :3, None])[..., 0])
     moment = components((rotation @ wrench[..., 3:, None])[..., 0])
     torque = point_force_torque(robot, chain, components(chain.position), force)
@@ -203,7 +221,7 @@ def base_moment(
         lever = lever + robot.payload_mass * (components(centre) - origin)
     moment: Array = cross(lever, gravity_direction(robot, chain))
     if wrench is not None:
-        rotation = chain.rotation if frame == 'tool' else chain.base_rotation
+        rotation = wrench_rotation(robot, chain, frame)
         force = components((rotation @ wrench[..., :3, None])[..., 0])
         own = components((rotation @ wrench[..., 3:, None])[..., 0])
         moment = moment + own + cross(components(chain.position) - origin, force)

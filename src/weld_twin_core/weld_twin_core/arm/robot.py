@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, readonly
 from ..errors import DataError, ModelError
-from .rotation import matrix_from_quaternion, quaternion_from_matrix, transform
+from .controller_frames import ControllerFrames, frame_of, pose_mapping
 
 CONVENTIONS = ('standard', 'modified')
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
@@ -30,6 +30,7 @@ _TOP_KEYS = {
     'payload',
     'source',
     'plausible',
+    'controller',
 }
 _JOINT_KEYS = {
     'name',
@@ -72,6 +73,8 @@ class Robot:
     plausible : mapping
         What this robot's errors can be where it is known better than of robots at large: effect,
         parameter, and ``sd``, ``low``, ``high``; see `weld_twin_core.effects.plausible`.
+    controller : ControllerFrames, optional
+        Where the controller has its base and flange, of a robot that says so, as a URDF does.
 
     Raises
     ------
@@ -116,6 +119,7 @@ class Robot:
     gravity: Array = field(default_factory=lambda: np.array(STANDARD_GRAVITY))
     source: str = ''
     plausible: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
+    controller: ControllerFrames | None = None
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
@@ -160,6 +164,18 @@ class Robot:
         """Return the number of joints."""
         return len(self.joint_names)
 
+    @property
+    def T_base_origin(self) -> Array:
+        """Return the controller's base in the base frame of the rows, shape (4, 4) [m]."""
+        return np.eye(4) if self.controller is None else self.controller.base
+
+    @property
+    def T_world_origin(self) -> Array:
+        """Return the controller's base in the world, shape (4, 4) [m]: the base people speak of."""
+        if self.controller is None:
+            return self.T_world_base
+        return np.asarray(self.T_world_base @ self.controller.base)
+
     def index(self, joint: str) -> int:
         """
         Return the position of a joint in the chain, counted from 0.
@@ -202,6 +218,19 @@ class Robot:
         for key, frame in new.items():
             out._set(key, readonly(frame, (4, 4), f'{key} of robot {self.name!r}'))
         return out
+
+    def with_origin(self, T_world_origin: Array) -> Robot:
+        """
+        Return the same arm with the controller's base elsewhere.
+
+        Parameters
+        ----------
+        T_world_origin : array, shape (4, 4) [m]
+
+        """
+        if self.controller is None:
+            return self.with_frames(base=T_world_origin)
+        return self.with_frames(base=T_world_origin @ np.linalg.inv(self.controller.base))
 
     def check_positions(self, q: Array) -> None:
         """
@@ -271,7 +300,7 @@ class Robot:
 
     @classmethod
     def _from_rows(cls, name: str, rows: Sequence[Any], data: Mapping[str, Any]) -> Robot:
-        links = data.get('links')
+        links, frames = data.get('links'), data.get('controller')
         payload = data.get('payload') or {}
         if links is not None and len(links) != len(rows):
             raise ModelError(
@@ -291,8 +320,8 @@ class Robot:
             max_velocity=_column(rows, 'max_velocity', np.inf),
             max_acceleration=_column(rows, 'max_acceleration', np.inf),
             convention=str(data.get('convention', 'standard')),
-            T_world_base=_frame(data.get('base'), 'base'),
-            T_flange_tool=_frame(data.get('tool'), 'tool'),
+            T_world_base=frame_of(data.get('base'), 'base'),
+            T_flange_tool=frame_of(data.get('tool'), 'tool'),
             mass=None if links is None else _column(links, 'mass'),
             com=None if links is None else _column(links, 'com', (0.0, 0.0, 0.0)),
             payload_mass=float(payload.get('mass', 0.0)),
@@ -300,6 +329,7 @@ class Robot:
             gravity=data.get('gravity', STANDARD_GRAVITY),
             source=str(data.get('source', '')),
             plausible=_plausible(data.get('plausible')),
+            controller=None if frames is None else ControllerFrames.from_mapping(frames),
         )
 
     def to_mapping(self) -> dict[str, Any]:
@@ -322,8 +352,8 @@ class Robot:
             'name': self.name,
             'convention': self.convention,
             'gravity': self.gravity.tolist(),
-            'base': _pose_mapping(self.T_world_base),
-            'tool': _pose_mapping(self.T_flange_tool),
+            'base': pose_mapping(self.T_world_base),
+            'tool': pose_mapping(self.T_flange_tool),
             'joints': joints,
         }
         if self.mass is not None and self.com is not None:
@@ -336,6 +366,8 @@ class Robot:
             out['source'] = self.source
         if self.plausible:
             out['plausible'] = _plausible(self.plausible)
+        if self.controller is not None:
+            out['controller'] = self.controller.to_mapping()
         return out
 
 
@@ -365,18 +397,3 @@ def _plausible(value: Any) -> dict[str, dict[str, dict[str, float]]]:
 
 def _column(rows: Sequence[Any], key: str, default: Any = 0.0) -> Any:
     return [row.get(key, default) for row in rows]
-
-
-def _frame(value: Any, name: str) -> Array:
-    if value is None:
-        return np.eye(4)
-    position = readonly(value.get('xyz', (0.0, 0.0, 0.0)), (3,), f'{name} xyz')
-    quaternion = value.get('quat_xyzw', (0.0, 0.0, 0.0, 1.0))
-    return transform(matrix_from_quaternion(quaternion, f'{name} quat_xyzw'), position)
-
-
-def _pose_mapping(matrix: Array) -> dict[str, list[float]]:
-    return {
-        'xyz': matrix[:3, 3].tolist(),
-        'quat_xyzw': quaternion_from_matrix(matrix[:3, :3]).tolist(),
-    }

@@ -185,7 +185,7 @@ def _explained(
 def _by_itself(found: Search, shrink: Shrink) -> Search:
     """Return what was found with what a robot file of it does by itself."""
     model = found.final.model
-    own = replace(model, alone=alone(found.problem, model, shrink))
+    own = replace(model, alone=alone(found.problem, model, shrink, many=found.dense))
     return replace(found, final=replace(found.final, model=own))
 
 

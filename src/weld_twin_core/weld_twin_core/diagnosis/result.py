@@ -34,6 +34,9 @@ MISTAKES = (
     'joints_stuck',
     'zero_velocities',
     'clock',
+    'stamps_in_bursts',
+    'computed',
+    'camera_inverted',
     'other',
 )
 """Kinds of mistakes in data and set-up; docs/unsound.md describes each."""

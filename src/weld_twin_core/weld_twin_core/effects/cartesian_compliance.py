@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.dynamics import wrench_rotation
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
@@ -37,7 +38,7 @@ class CartesianCompliance(Effect):
         chain = view.frames
         force = view.wrench[..., :3]
         if view.wrench_frame == 'base':
-            world = (chain.base_rotation @ force[..., None])[..., 0]
+            world = (wrench_rotation(view.robot, chain, 'base') @ force[..., None])[..., 0]
             force = (np.swapaxes(chain.rotation, -1, -2) @ world[..., None])[..., 0]
         return [chain.rotation[..., :, k] * force[..., k, None] for k in range(3)]
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Channel, Shift
-from ..arm.dynamics import base_moment
+from ..arm.dynamics import base_moment, wrench_rotation
 from ..arm.vectors import components, dot, pad
 from ..arrays import Array
 from .effect import Effect
@@ -83,14 +83,14 @@ class PedestalTilt(Effect):
 def _moments(view: View) -> tuple[Array, Array]:
     """Return the moments about the base's x and y, each shape (..., N) [N m]."""
     moment = base_moment(view.robot, view.frames, view.wrench, view.wrench_frame)
-    axes = view.frames.base_rotation
+    axes = wrench_rotation(view.robot, view.frames, 'base')
     x, y = (dot(pad(components(axes[..., k]), moment.ndim - 1), moment) for k in range(2))
     return x, y
 
 
 def _leans(view: View) -> tuple[dict[Channel, Array], dict[Channel, Array]]:
     """Return the turn of the base in the world for a compliance of one about its x, and its y."""
-    axes = view.robot.T_world_base[:3, :2].T
+    axes = view.robot.T_world_origin[:3, :2].T
     x, y = (
         {('base', 3 + k): axis[k] * moment for k in range(3)}
         for axis, moment in zip(axes, _moments(view), strict=True)

@@ -82,7 +82,8 @@ class ThermalGrowth(Effect):
             return self.warmup[0] * -np.expm1(-view.elapsed / self.warmup[1])
         if view.temperature is None:
             raise DataError(
-                'thermal_growth needs a temperature: record /temperature, or give warmup'
+                'thermal_growth needs a temperature: record /temperature, say it with '
+                '--temperature, or give the effect a warmup'
             )
         return view.temperature - self.reference
 

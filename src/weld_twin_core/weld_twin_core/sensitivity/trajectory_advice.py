@@ -190,7 +190,7 @@ class Placement:
     def robot(self, robot: Robot) -> Robot:
         """Return the robot on its new place."""
         move = transform(rotation_matrix([0.0, 0.0, self.yaw]), np.array([self.x, self.y, 0.0]))
-        return robot.with_frames(base=robot.T_world_base @ move)
+        return robot.with_origin(robot.T_world_origin @ move)
 
     def torch(self, torch: Torch) -> Torch:
         """Return the turned torch."""

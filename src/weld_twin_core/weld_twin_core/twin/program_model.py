@@ -15,7 +15,7 @@ from ..arm.rotation import angle_between
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect
 from ..motion.programs import Move, Piece
-from ..recording import JointMotion, Recording, Signal
+from ..recording import JointMotion, Recording
 from .compensation import commandable
 from .domain import Domain, Outside
 from .posterior import Posterior, pose_covariances
@@ -128,10 +128,8 @@ class ProgramModel:
 
     def recording(self, motion: JointMotion) -> Recording:
         """Return a motion as the twin takes it."""
-        warm = None
-        if self.temperature is not None:
-            warm = Signal(motion.t[:1], np.array([self.temperature]))
-        return Recording('program', motion, temperature=warm)
+        plain = Recording('program', motion)
+        return plain if self.temperature is None else plain.at_temperature(self.temperature)
 
     @staticmethod
     def _by_tool(piece: Piece, of: Callable[[Array], Array]) -> Array:

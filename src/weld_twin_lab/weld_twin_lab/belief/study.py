@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core.diagnosis.trust.model import FILE, Trust, trust_from
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from . import learning
@@ -168,5 +168,5 @@ def write(out: Path, content: Mapping[str, Any], rows: Sequence[Mapping[str, Any
         (RELIABILITY, reliability_picture(whole)),
         (RISK, risk_picture(whole)),
     ):
-        write_text(out / name, body, overwrite=True)
+        write_owned(out / name, body)
     return text

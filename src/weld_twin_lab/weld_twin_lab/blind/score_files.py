@@ -7,8 +7,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import read_yaml
+from weld_twin_nodes.offline.output_directory import write_owned
 
 from . import layout
 from .score_page import score_page
@@ -17,8 +17,8 @@ from .scoring import Score
 
 def write_score(out: Path, score: Score) -> None:
     """Write the score as JSON and as a page."""
-    write_text(out / layout.PAGE, score_page(score), overwrite=True)
-    layout.write(out / layout.SCORE, score.as_dict(), overwrite=True)
+    write_owned(out / layout.PAGE, score_page(score))
+    write_owned(out / layout.SCORE, layout.text(layout.SCORE, score.as_dict()))
 
 
 def read_reasons(path: str) -> dict[str, str]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import os
 
+from weld_twin_nodes.cli.options import add_output, output
 from weld_twin_nodes.offline.environment import THREADS
 
 ONE_THREAD = {
@@ -24,17 +25,16 @@ ONE_THREAD = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+    add_output(parser, 'where results go')
     parser.add_argument('--quick', action='store_true', help='small sizes, to see that it runs')
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the benchmark; print results as they come."""
     os.environ.update(ONE_THREAD)
-    from weld_twin_nodes.offline.output_directory import new_directory
 
     from ..benchmark.all_races import FULL, QUICK, benchmark
 
-    with new_directory(args.out, mark='benchmark.json') as folder:
+    with output(args, 'benchmark.json') as folder:
         benchmark(folder, QUICK if args.quick else FULL, lambda line: print(line, flush=True))
     return 0

@@ -11,6 +11,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from weld_twin_nodes.cli.options import add_output, output
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
@@ -18,21 +20,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--ur10', required=True, metavar='DIR', help='holds series_c_random_poses.csv'
     )
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+    add_output(parser, 'where results go')
 
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, judge, write, and print one line for each split."""
     import sys
 
-    from weld_twin_nodes.offline.output_directory import new_directory
-
     from ..real_robots.arm_study import RESULTS, study
 
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    with new_directory(args.out, mark=RESULTS) as place:
+    with output(args, RESULTS) as place:
         results = study(Path(args.ur5), Path(args.ur10), place, tell)
     for robot in results['robots'].values():
         for name, split in robot['splits'].items():

@@ -21,6 +21,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.posterior import largest_sigma
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.output_directory import write_owned
 
 from ..blind.simulator import require_simulator
 from ..plant.plant import run
@@ -136,7 +137,7 @@ def planned(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any
             write_text(path, json.dumps(carried_out(seed), indent=1) + '\n')
         entries.append(json.loads(path.read_text()))
         tell(' '.join(f'{key} {value}' for key, value in entries[-1].items()))
-    write_text(out / RESULTS, json.dumps(entries, indent=1) + '\n', overwrite=True)
+    write_owned(out / RESULTS, json.dumps(entries, indent=1) + '\n')
     ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in entries]
     return {
         'plans': len(entries),

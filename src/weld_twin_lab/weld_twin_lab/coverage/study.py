@@ -21,6 +21,7 @@ from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
+from weld_twin_nodes.offline.output_directory import write_owned
 
 from ..blind import layout
 from ..blind.diagnosing import diagnosis_of
@@ -75,9 +76,9 @@ def study(
             pair = (cases / 'cases' / name, cases / 'truths' / name)
             entries.append(_kept(out, name, lambda p=pair: of_case(*p), tell))  # type: ignore[misc]
     result = {'schema': SCHEMA, 'version': __version__, 'entries': entries}
-    write_text(out / TABLE, page(entries), overwrite=True)
+    write_owned(out / TABLE, page(entries))
     text = json.dumps(result, indent=1, allow_nan=False) + '\n'
-    write_text(out / RESULTS, text, overwrite=True)
+    write_owned(out / RESULTS, text)
     return result
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_core.errors import TwinError
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..blind.deck import lots
@@ -81,8 +81,8 @@ def study(
         'cases': cases,
     }
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / RESULTS, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / TABLE, page(result), overwrite=True)
+    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
+    write_owned(out / TABLE, page(result))
     return result
 
 

@@ -30,7 +30,7 @@ ALIGN = ('base', 'tool')
 """The tracker stands anywhere, and the reflector was never measured in."""
 FEWEST = 60
 """Stations in which a mistake is made: fewer may not show it."""
-NOT_HERE = ('zero_velocities', 'clock', 'base_turned')
+NOT_HERE = ('zero_velocities', 'clock', 'base_turned', 'stamps_in_bursts')
 """Mistakes that stations with an aligned base cannot have."""
 ONE_PLACE = (('instrument_knocked', 'ur5'),)
 """A kind that an arm's stations cannot show: the UR5's tool turns by thirteen degrees, and a knock

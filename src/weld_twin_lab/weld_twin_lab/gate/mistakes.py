@@ -32,7 +32,17 @@ SEEN_AT_ALL = 1e-3
 ONE_PLACE = np.radians(20.0)
 """Mean turn [rad] of the tool below which a knock and a jump of the reflector move it alike: to a
 tenth of their squares."""
-MOVING_ONLY = frozenset({'zero_velocities', 'clock'})
+CALIBRATED = 1e-3
+"""What the constants of a controller's own model differ by from the nominal ones [rad, m]."""
+POSTURES = 60
+"""Measurements from which computed poses cannot be a chance: a rigid arm has some forty numbers."""
+BUFFER = (4, 12)
+"""Samples that an instrument keeps before it sends them: a driver's loop beside its own."""
+SENT = 1e-4
+"""Time from sample to sample [s] where a buffer is sent."""
+BRISK = 0.02
+"""Way [m] between bursts from which even stamps are better than those of bursts, whatever else is."""
+MOVING_ONLY = frozenset({'zero_velocities', 'clock', 'stamps_in_bursts'})
 """Kinds that stations in a table cannot have."""
 
 
@@ -339,6 +349,47 @@ def other(sound: Sound, rng: np.random.Generator) -> Made:
     return sound.robot, sound.recording.with_measured(made), said
 
 
+def computed(sound: Sound, rng: np.random.Generator) -> Made:
+    """Publish the controller's own forward kinematics, nominal or calibrated, as if measured."""
+    seen, robot = _seen(sound.recording), sound.robot
+    if seen.t.size < POSTURES:
+        raise Hidden('some rigid arm agrees with so few postures')
+    q = sound.recording.joints.at(seen.t)[0]
+    own, said = robot, 'nominal'
+    if rng.random() < 0.5:
+        off = rng.normal(scale=CALIBRATED, size=(4, robot.n))
+        names = ('theta', 'd', 'a', 'alpha')
+        told = {name: getattr(robot, name) + o for name, o in zip(names, off, strict=True)}
+        own, said = replace(robot, **told), 'calibrated'
+    poses = forward(own, q)
+    rotation = None if seen.rotation is None else poses[:, :3, :3]
+    made = replace(seen, position=poses[:, :3, 3], rotation=rotation, sigma=None)
+    return robot, sound.recording.with_measured(made), said
+
+
+def stamps_in_bursts(sound: Sound, rng: np.random.Generator) -> Made:
+    """Keep measurements in a buffer, and stamp them when it is sent."""
+    seen, size = _seen(sound.recording), int(rng.integers(*BUFFER))
+    index = np.arange(seen.t.size)
+    last = np.minimum((index // size + 1) * size - 1, index[-1])
+    way = np.linalg.norm(seen.position[last] - seen.position, axis=1)
+    if np.quantile(way, 0.75) < BRISK:
+        raise Hidden('the arm hardly moves while the buffer fills')
+    if np.ptp(np.diff(seen.t)) > 0.1 * np.median(np.diff(seen.t)):
+        raise Hidden('the instrument itself does not measure evenly')
+    t = seen.t[last] + SENT * (index - last + size)
+    made = sound.recording.with_measured(replace(seen, t=t))
+    return sound.robot, made, f'{size} at a time'
+
+
+def camera_inverted(sound: Sound, rng: np.random.Generator) -> Made:
+    """Give the pose of a fixed board in a camera on the arm, as the camera has it."""
+    seen = _seen(sound.recording)
+    if seen.rotation is None:
+        raise Hidden('a point cannot be inverted')
+    return sound.robot, sound.recording.with_measured(seen.inverted()), 'inverted'
+
+
 def _direction(rng: np.random.Generator) -> Array:
     way = rng.standard_normal(3)
     return np.asarray(way / np.linalg.norm(way))
@@ -361,6 +412,9 @@ KINDS: dict[str, Callable[[Sound, np.random.Generator], Made]] = {
         zero_velocities,
         clock,
         other,
+        computed,
+        stamps_in_bursts,
+        camera_inverted,
     )
 }
 """How each kind is made; raises `Hidden` where the recording would not show it."""

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -34,15 +36,54 @@ def about(axis: int, angle: float) -> np.ndarray:
     return out
 
 
+@dataclass(frozen=True, eq=False)
+class ScrewArm:
+    """
+    An arm as axes in its base at joint position zero, and its flange there.
+
+    Attributes
+    ----------
+    name : str
+    axes, points : array, shape (n, 3) [1, m]
+        Direction of every axis, which its joint turns about by the right hand, and a point on it.
+    flange, T_flange_tool : array, shape (4, 4) [m]
+
+    """
+
+    name: str
+    axes: np.ndarray
+    points: np.ndarray
+    flange: np.ndarray
+    T_flange_tool: np.ndarray = field(default_factory=lambda: np.eye(4))
+
+    def frames(self, q: np.ndarray) -> list[np.ndarray]:
+        """Return a frame on every axis, z along it, and the flange, each of shape (4, 4)."""
+        done, out = np.eye(4), []
+        for axis, point, angle in zip(self.axes, self.points, q, strict=True):
+            on = np.eye(4)
+            on[:3, 2], on[:3, 3] = axis, point
+            out.append(done @ on)  # only z and the place of it are asked for
+            turn = np.eye(4)
+            turn[:3, :3] = Rotation.from_rotvec(angle * axis).as_matrix()
+            turn[:3, 3] = point - turn[:3, :3] @ point
+            done = done @ turn
+        return [*out, done @ self.flange]
+
+
+Arm = Robot | ScrewArm
+
+
 def tool_pose(
-    robot: Robot, q: np.ndarray, tool: np.ndarray, offsets: np.ndarray | float = 0.0
+    robot: Arm, q: np.ndarray, tool: np.ndarray, offsets: np.ndarray | float = 0.0
 ) -> np.ndarray:
     """Return the pose of the tool; ``offsets``: how much further each joint really stands."""
     return np.asarray(_frames(robot, q + offsets)[-1] @ tool)
 
 
-def _frames(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
+def _frames(robot: Arm, q: np.ndarray) -> list[np.ndarray]:
     """Return the frame that each joint turns in, and the last frame, each of shape (4, 4)."""
+    if isinstance(robot, ScrewArm):
+        return robot.frames(q)
     at, out = np.eye(4), []
     rows = zip(robot.a, robot.alpha, robot.d, robot.theta + q, strict=True)
     for a, alpha, d, theta in rows:
@@ -55,7 +96,7 @@ def _frames(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
     return [*out, at]
 
 
-def joints_for(robot: Robot, pose: np.ndarray, tool: np.ndarray, near: np.ndarray) -> np.ndarray:
+def joints_for(robot: Arm, pose: np.ndarray, tool: np.ndarray, near: np.ndarray) -> np.ndarray:
     """Return what a controller, which knows no error, makes of a pose."""
     q = np.array(near, dtype=float)
     for _ in range(ROUNDS):

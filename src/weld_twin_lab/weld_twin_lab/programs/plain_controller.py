@@ -9,9 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm.robot import Robot
-
-from .plain_arm import joints_for, tool_pose
+from .plain_arm import Arm, joints_for, tool_pose
 from .plain_readers import Moves
 
 STEP = 0.005
@@ -34,7 +32,7 @@ class Driven(NamedTuple):
     tool: np.ndarray
 
 
-def driven(robot: Robot, moves: Moves, start: np.ndarray, speed: float) -> Driven:
+def driven(robot: Arm, moves: Moves, start: np.ndarray, speed: float) -> Driven:
     """
     Return what a controller makes of moves; it stands at the end of the first when it begins.
 
@@ -74,15 +72,13 @@ def driven(robot: Robot, moves: Moves, start: np.ndarray, speed: float) -> Drive
     )
 
 
-def _by_joints(
-    robot: Robot, q: np.ndarray, place: np.ndarray, tool: np.ndarray
-) -> list[np.ndarray]:
+def _by_joints(robot: Arm, q: np.ndarray, place: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
     end = place if place.ndim == 1 else joints_for(robot, place, tool, q)
     count = max(int(np.ceil(_length(robot, q, end, tool) / FINE)), 1)
     return [q + share * (end - q) for share in np.arange(1, count + 1) / count]
 
 
-def _straight(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
+def _straight(robot: Arm, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
     begin = tool_pose(robot, q, tool)
     way = end[:3, 3] - begin[:3, 3]
     turn = Rotation.from_matrix(end[:3, :3] @ begin[:3, :3].T).as_rotvec()
@@ -97,7 +93,7 @@ def _straight(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) ->
     return out
 
 
-def _length(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> float:
+def _length(robot: Arm, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> float:
     first, last = tool_pose(robot, q, tool), tool_pose(robot, end, tool)
     turn = Rotation.from_matrix(last[:3, :3] @ first[:3, :3].T).as_rotvec()
     return _size(last[:3, 3] - first[:3, 3], turn)

@@ -13,15 +13,17 @@ from typing import Any
 from weld_twin_core import __version__
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
-from . import correction_table
+from . import correction_table, urdf_table
 from .broken import fuzz
 from .cells import CELLS
 from .round_trips import round_trips
 
 RESULTS, TABLE, PARTS = 'programs.json', 'programs.md', 'parts'
 CORRECTIONS, CORRECTIONS_TABLE = 'corrections.json', 'corrections.md'
+URDF_ARMS, URDF_TABLE = 'urdf_arms.json', 'urdf_arms.md'
 SCHEMA = 'weld_twin/programs/1'
 MADE = Path('test/programs/made')
 """Programs as users have them, from the top of the source tree; left out where there are none."""
@@ -63,8 +65,8 @@ def study(
         'round_trips': trips,
         'fuzz': fuzzed,
     }
-    write_text(out / RESULTS, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / TABLE, summary(result), overwrite=True)
+    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
+    write_owned(out / TABLE, summary(result))
     return result
 
 
@@ -103,9 +105,61 @@ def corrections(
         'cases': cases,
     }
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / CORRECTIONS, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / CORRECTIONS_TABLE, correction_table.page(result), overwrite=True)
+    write_owned(out / CORRECTIONS, json.dumps(result, indent=1) + '\n')
+    write_owned(out / CORRECTIONS_TABLE, correction_table.page(result))
     return result
+
+
+def urdf_arms(out: Path, seed: int, arms: int, runner: Runner, engine: str) -> dict[str, Any]:
+    """
+    Take arms that are given as URDFs all the way, and write the results.
+
+    Parameters
+    ----------
+    out : Path
+    seed : int
+        Decides the arms.
+    arms : int
+    runner : Runner
+        Keeps what came of every arm; a run that was interrupted goes on from there.
+    engine : str
+        Tells the results of one version of the core from those of another.
+
+    """
+    tasks = [Task(of_urdf, (seed, k, engine), f'arm {k}') for k in range(arms)]
+    cases = runner.run(tasks)
+    result = {
+        'schema': SCHEMA,
+        'version': __version__,
+        'engine': engine,
+        'seed': seed,
+        'totals': urdf_table.totals(cases),
+        'cases': cases,
+    }
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / URDF_ARMS, json.dumps(result, indent=1) + '\n', overwrite=True)
+    write_text(out / URDF_TABLE, urdf_table.page(result), overwrite=True)
+    return result
+
+
+def of_urdf(seed: int, number: int, engine: str) -> dict[str, Any]:
+    """
+    Return what becomes of one arm; the simulator is loaded where it is needed.
+
+    Parameters
+    ----------
+    seed, number : int
+        Decide everything random in it.
+    engine : str
+        Only tells the results of one version of the core from those of another.
+
+    """
+    from ..blind.simulator import require_simulator
+
+    require_simulator()
+    from .urdf_trial import tried
+
+    return tried(seed, number)
 
 
 def corrected(language: str, seed: int, number: int, engine: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.output_directory import write_owned
 
 from ..real_robots.data import tables
 from .goals import Measure, measures
@@ -65,8 +66,8 @@ def study(
         'measures': [m._asdict() for m in found],
         'splits': entries,
     }
-    write_text(out / TABLE, page(entries, found), overwrite=True)
-    write_text(out / RESULTS, json.dumps(result, indent=1) + '\n', overwrite=True)
+    write_owned(out / TABLE, page(entries, found))
+    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
     return result
 
 

@@ -219,7 +219,7 @@ def turning(kind='revolute', inside=''):
         ),
         ('<robot name="r"/>', 'there is no link in it'),
         (
-            urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'fixed', 'a', 'c', '')),
+            urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'revolute', 'a', 'c', '')),
             'the chain has several ends (b, c); say which with --tip-link',
         ),
         (urdf(('j', 'fixed', 'a', 'b', ''), ('k', 'fixed', 'b', 'c', '')), 'no joint moves'),

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.bursts import Bursts, bursts
 from weld_twin_core.two_clocks import ONE_CLOCK, apart
 
 from ..messages.topics import (
@@ -38,7 +39,8 @@ class TopicInfo:
     start_ns, end_ns : int, optional [ns]
         Earliest and latest stamp.
     rate_hz : float, optional
-        From the median step; None with fewer than two messages.
+        From the median step; where they come in bursts the rate underneath; None with fewer than two
+        messages.
     gaps : int
         Steps longer than `GAP` median steps.
     longest_gap_s : float [s]
@@ -46,6 +48,8 @@ class TopicInfo:
         Messages that go back in time, repeat the stamp before, or have none.
     header : bool
         The stamps are those of headers, not of the recorder's clock.
+    sent : Bursts, optional
+        How they come, where that is in bursts.
     use : str
         What a diagnosis takes it for; empty for a topic it does not know.
 
@@ -64,6 +68,7 @@ class TopicInfo:
     repeated: int = 0
     unstamped: int = 0
     header: bool = False
+    sent: Bursts | None = None
 
 
 @dataclass(frozen=True)
@@ -194,8 +199,10 @@ def _describe(
     use = use if kind in types else ''
     if ns.size == 0:
         return TopicInfo(name, kind, count, use, unstamped=unstamped)
+    sent = bursts((np.sort(ns) - ns.min()) * 1e-9)
     median = float(np.median(forward)) if forward.size else 0.0
-    gaps = forward[forward > GAP * median]
+    beat = median if sent is None else sent.every * 1e9
+    gaps = forward[forward > GAP * beat]
     return TopicInfo(
         name,
         kind,
@@ -203,12 +210,13 @@ def _describe(
         use,
         int(ns.min()),
         int(ns.max()),
-        1e9 / median if median else None,
+        sent.rate if sent is not None else 1e9 / median if median else None,
         int(gaps.size),
         float(gaps.max(initial=0)) * 1e-9,
         int((steps < 0).sum()),
         int((steps == 0).sum()),
         unstamped,
+        sent=sent,
     )
 
 
@@ -227,6 +235,7 @@ def _judge(
     if joints and measured:
         sentence = apart(_span(joints), _span(measured))
         missing += [] if sentence is None else [f'{sentence}. {ONE_CLOCK}']
+    notes += [f"'{t.name}' is {t.sent.words}" for t in found if t.sent is not None]
     if measured is not None and measured.use == 'point':
         notes.append('positions only: errors that turn the tool in place stay invisible')
     for use, effects in (('wrench', 'tool loads'), ('temperature', 'thermal growth')):

@@ -42,6 +42,8 @@ TYPES = {
     Role.TEMPERATURE: (TEMPERATURE.type,),
 }
 """Message types from which each role is read."""
+INJECTED = 'effects'
+"""Key of the provenance under which the simulator and the injector tell what they put in."""
 
 
 def read_recording(
@@ -108,6 +110,8 @@ def read_recording(
     )
     if touched:
         return touching(whole, touched, made)
+    if names.measured_inverse and whole.measured is not None:
+        whole = whole.with_measured(whole.measured.inverted())
     return _with_what_is_missing(whole, made, _ends(names, samples))
 
 
@@ -116,7 +120,12 @@ def _with_what_is_missing(
 ) -> Recording:
     lacking = never_recorded(made)
     uneven = () if recording.joints.static else uneven_ends(ends)
-    return replace(recording, incomplete=(*lacking, *uneven), notes=(*recording.notes, *lacking))
+    return replace(
+        recording,
+        incomplete=(*lacking, *uneven),
+        notes=(*recording.notes, *lacking),
+        simulated=INJECTED in made,
+    )
 
 
 def _ends(names: TopicNames, samples: Mapping[Role, Samples]) -> dict[str, Ends]:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from weld_twin_core.errors import DataError
 
+from ..files.whole_files import followed
 from ..messages.typestore import TYPES, decode
 from .growing import NOTES, UNFINISHED, lock, unfinished
 from .salvage import Damage, Found
@@ -70,7 +71,7 @@ def recover(path: Path | str, out: Path | str | None = None) -> Recovery:
 
     """
     source = _source(Path(path))
-    target = _target(source) if out is None else Path(out)
+    target = _target(source) if out is None else followed(out)
     if target.exists():
         raise DataError(f"'{target}' exists already and is not overwritten; choose with --out")
     damage = Damage()

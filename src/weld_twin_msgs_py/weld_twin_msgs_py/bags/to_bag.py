@@ -56,6 +56,7 @@ def write_recording(
     deviation: Array | None = None,
     storage: str = 'mcap',
     provenance: Mapping[str, Any] | None = None,
+    beside: Mapping[str, str] | None = None,
 ) -> None:
     """
     Write a recording under the standard topics.
@@ -80,6 +81,8 @@ def write_recording(
         'mcap' or 'sqlite3'.
     provenance : mapping, optional
         More about the recording's making: effects, seed.
+    beside : mapping, optional
+        Texts that lie in the bag's directory, by name of the file.
 
     Raises
     ------
@@ -105,7 +108,7 @@ def write_recording(
         parts.append(entries.sure_poses(recording.joints.t, *twin, covariance))
     if deviation is not None and recording.measured is not None and len(deviation):
         parts.append(entries.vectors(DEVIATION.name, recording.measured.t, deviation))
-    with BagWriter(path, storage=storage, provenance=made) as bag:
+    with BagWriter(path, storage=storage, provenance=made, beside=beside) as bag:
         bag.write_all(merge(*parts, key=itemgetter(0)))
 
 

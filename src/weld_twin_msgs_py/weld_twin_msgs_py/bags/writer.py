@@ -9,8 +9,6 @@ The bag grows in a hidden directory beside its final place and is renamed when i
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +17,8 @@ from typing import Any
 
 from weld_twin_core.errors import DataError
 
+from ..files.scratch import Scratch
+from ..files.whole_files import followed, write_text
 from ..messages.from_messages import stamp_ns
 from ..messages.typestore import PROVENANCE_PREFIX, TYPES
 from .segment import Channel, Segment, check_storage, clear_write_errors
@@ -33,12 +33,14 @@ class BagWriter:
     Parameters
     ----------
     path : Path or str
-        Must not exist yet.
+        Must not exist yet. A link that leads nowhere yet is followed.
     storage : str
         'mcap' or 'sqlite3'.
     provenance : mapping, optional
         How the bag came about (robot, effects, seed, version); plain JSON values, kept in the
         bag's ``custom_data`` and read back by `provenance`.
+    beside : mapping, optional
+        Texts that lie in the bag's directory, by name of the file.
 
     """
 
@@ -48,11 +50,13 @@ class BagWriter:
         *,
         storage: str = 'mcap',
         provenance: Mapping[str, Any] | None = None,
+        beside: Mapping[str, str] | None = None,
     ) -> None:
-        self.path = Path(path)
+        self.path = followed(path)
         self._storage = check_storage(storage)
         self._provenance = dict(provenance or {})
-        self._scratch: Path | None = None
+        self._beside = dict(beside or {})
+        self._scratch: Scratch | None = None
         self._segment: Segment | None = None
 
     def open(self) -> BagWriter:
@@ -67,10 +71,8 @@ class BagWriter:
         """
         self._refuse_existing()
         with self._clear_errors():
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            scratch = tempfile.mkdtemp(prefix=f'.{self.path.name}-', dir=self.path.parent)
-            self._scratch = Path(scratch)
-            self._segment = Segment(self._scratch / self.path.name, self._storage)
+            self._scratch = Scratch(self.path.parent, f'.{self.path.name}-')
+            self._segment = Segment(self._scratch.path / self.path.name, self._storage)
         return self
 
     def write(self, topic: str, message: Any, log_ns: int | None = None) -> None:
@@ -143,8 +145,11 @@ class BagWriter:
         try:
             with self._clear_errors():
                 self._segment.close(custom_data(self._provenance))
+                made = self._scratch.path / self.path.name
+                for name, text in self._beside.items():
+                    write_text(made / name, text)
                 self._refuse_existing()
-                (self._scratch / self.path.name).rename(self.path)
+                made.rename(self.path)
         finally:
             self.discard()
 
@@ -154,7 +159,7 @@ class BagWriter:
         if segment is not None:
             segment.abort()
         if self._scratch is not None:
-            shutil.rmtree(self._scratch, ignore_errors=True)
+            self._scratch.close()
         self._scratch = None
 
     def __enter__(self) -> BagWriter:

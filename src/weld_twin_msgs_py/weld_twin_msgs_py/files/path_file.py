@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator
 from pathlib import Path as FilePath
 
 from weld_twin_core.errors import PathError
@@ -40,7 +41,7 @@ def read_path(path: FilePath | str) -> tuple[Path, Torch]:
 def _points(path: FilePath | str) -> list[list[float]]:
     rows = csv.DictReader(read_text(path, 'path file').splitlines(), skipinitialspace=True)
     points = []
-    for row in rows:
+    for row in _whole(rows):
         try:
             points.append([float(row[axis]) for axis in 'xyz'])
         except (KeyError, TypeError, ValueError):
@@ -48,3 +49,11 @@ def _points(path: FilePath | str) -> list[list[float]]:
                 f'line {rows.line_num} must have numbers in the columns x, y, z'
             ) from None
     return points
+
+
+def _whole(rows: csv.DictReader[str]) -> Iterator[dict[str, str]]:
+    """Yield the rows; what the reader of tables cannot take is told with its line."""
+    try:
+        yield from rows
+    except csv.Error as error:
+        raise PathError(f'line {rows.line_num} is no row of a table: {error}') from None

@@ -80,6 +80,10 @@ def _robot() -> Schema:
             'joints': {'type': 'array', 'items': _joint(), 'minItems': 1},
             'links': {'type': 'array', 'items': _object(mass), 'description': 'one per joint'},
             'payload': _object(mass),
+            'controller': _said(
+                _object({'base': frame, 'flange': frame, 'base_link': TEXT, 'flange_link': TEXT}),
+                "the controller's base in the base, and its flange at the end of the last row",
+            ),
             'source': _said(TEXT, 'where the numbers come from'),
             'plausible': _object(
                 {

@@ -4,17 +4,24 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
-import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from weld_twin_core.errors import DataError
 
 
+def followed(path: Path | str) -> Path:
+    """Return where a path leads: to the place that a link names, which may not exist yet."""
+    place = Path(path)
+    return Path(os.path.realpath(place)) if place.is_symlink() else place
+
+
 def write_text(path: Path | str, text: str, *, overwrite: bool = False) -> None:
     """
-    Write a text file beside its place, then move it there.
+    Write a text file beside its place, then move it there; a link is followed.
 
     Raises
     ------
@@ -22,21 +29,43 @@ def write_text(path: Path | str, text: str, *, overwrite: bool = False) -> None:
         The file exists and ``overwrite`` is not set, or the place cannot be written.
 
     """
-    target = Path(path)
+    target = followed(path)
     if target.exists() and not overwrite:
-        raise DataError(f"'{target}' exists already and is not overwritten")
-    scratch: str | None = None
+        raise DataError(f"'{path}' exists already and is not overwritten")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            'w', encoding='utf-8', dir=target.parent, prefix=f'.{target.name}-', delete=False
-        ) as file:
-            scratch = file.name
-            file.write(text)
-        os.chmod(scratch, 0o644)
-        os.replace(scratch, target)
+        with _beside(target) as (scratch, file):
+            with open(file, 'w', encoding='utf-8', closefd=False) as stream:
+                stream.write(text)
+            os.fchmod(file, 0o644)
+            os.replace(scratch, target)
     except OSError as error:
-        if scratch is not None:
-            with suppress(OSError):
-                os.unlink(scratch)
-        raise DataError(f"'{target}' cannot be written: {error.strerror or error}") from None
+        raise DataError(f"'{path}' cannot be written: {error.strerror or error}") from None
+
+
+@contextmanager
+def _beside(target: Path) -> Iterator[tuple[Path, int]]:
+    """
+    Yield a hidden file beside another and its descriptor; it is gone afterwards unless it was moved.
+
+    It has one name only: what a killed writer left is taken by the next one, and writers at the same
+    time wait for each other.
+    """
+    scratch = target.with_name(f'.{target.name}.writing')
+    while True:
+        file = os.open(scratch, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(file, fcntl.LOCK_EX)
+        with suppress(FileNotFoundError):  # the one before has moved it away
+            if os.path.samestat(os.fstat(file), os.stat(scratch)):
+                break
+        os.close(file)
+    try:
+        os.ftruncate(file, 0)
+        yield scratch, file
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(scratch)
+        raise
+    finally:
+        os.close(file)

@@ -301,6 +301,8 @@ class TopicNames:
         What the joint states put before the names of the robot's joints.
     joint_map : tuple of (str, str)
         Joints of the robot and what the joint states call them, before the prefix.
+    measured_inverse : bool
+        Whether measured poses are those of something fixed seen from the arm, to be inverted.
 
     """
 
@@ -313,6 +315,7 @@ class TopicNames:
     contact: str = CONTACT.name
     joint_prefix: str = field(default='', metadata=NO_TOPIC)
     joint_map: tuple[tuple[str, str], ...] = field(default=(), metadata=NO_TOPIC)
+    measured_inverse: bool = field(default=False, metadata=NO_TOPIC)
 
     @classmethod
     def topics(cls) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ Where a maker's controller has its frames and joints, on the model of a robot.
 
 The models of this project stand on the floor and count joint 3 from joint 2, as ROS drivers do.
 FANUC's and Yaskawa's controllers have their origin at the height of the second axis, and FANUC
-counts joint 3 from the ground.
+counts joint 3 from the ground. Of a URDF the base and the flange are links.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from weld_twin_core.arm.catalog import load, names
-from weld_twin_core.arm.fingerprint import fingerprint
+from weld_twin_core.arm.controller_frames import ControllerFrames
+from weld_twin_core.arm.controller_lookup import bundled_name, controller_frames
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
@@ -138,33 +138,33 @@ def controller_of(
         Frames that were given, shape (4, 4) [m].
 
     """
-    origin, mix, notes = np.eye(4), np.eye(robot.n), []
-    flange = np.array(robot.T_flange_tool)
-    if np.abs(flange[:3, 3]).max() > 1e-9:
-        flange = np.eye(4)
-    name = bundled_name(robot)
-    if name:
-        flange = np.array(load(name).T_flange_tool)
+    frames, name = controller_frames(robot), bundled_name(robot)
+    origin, mix, notes = np.array(frames.base), np.eye(robot.n), _linked(frames)
     begin, maker = AT_SECOND_AXIS.get(language, ('none', ''))
     if name.startswith(begin):
-        origin[2, 3] = robot.d[0]
-        notes.append(
-            f'positions count from the origin of {maker}, {robot.d[0]:.4g} m above the floor'
-        )
+        if robot.controller is None:
+            origin[2, 3] = robot.d[0]
+            notes.append(
+                f'positions count from the origin of {maker}, {robot.d[0]:.4g} m above the floor'
+            )
         if language == COUPLED:
             mix[2, 1] = 1.0
             notes.append('J3 counts from the ground, as the teach pendant shows it')
     own = np.array(robot.T_flange_tool)
-    return Controller(origin, flange, mix, own, _lower(tools), _lower(bases), notes)
+    return Controller(
+        origin, np.array(frames.flange), mix, own, _lower(tools), _lower(bases), notes
+    )
 
 
 def _lower(frames: Mapping[str, Array] | None) -> dict[str, Array]:
     return {name.lower(): value for name, value in (frames or {}).items()}
 
 
-def bundled_name(robot: Robot) -> str:
-    """Return the name of the bundled robot with the same kinematics; empty for none."""
-    own = fingerprint(robot)
-    if robot.name in names() and fingerprint(load(robot.name)) == own:
-        return robot.name
-    return next((name for name in names() if fingerprint(load(name)) == own), '')
+def _linked(frames: ControllerFrames) -> list[str]:
+    """Return which links of a URDF were taken for the controller's base and flange."""
+    if not frames.base_link:
+        return []
+    return [
+        f'positions count from link {frames.base_link!r} of the URDF, and tools from link '
+        f'{frames.flange_link!r}; --base-link and --flange-link choose others'
+    ]

@@ -3,9 +3,10 @@
 """
 Points as a table, ``.csv``: a line each, joints or poses by the names of the columns.
 
-Joints: one column for every joint, by its name, in rad (``_deg`` after the name: degrees). Poses:
-``x y z`` [m] with ``qx qy qz qw``. Optional: ``move`` (joint, linear), ``speed`` (m/s, of joint
-moves the share of full speed), ``dwell`` [s]. Lines that begin with ``#`` are comments.
+Joints: one column for every joint, by its name, in rad or, where it slides, in m; a unit may stand
+behind the name: ``_deg``, ``_mm``, ``[deg]``, ``[mm]``. Poses: ``x y z`` [m] with ``qx qy qz qw``.
+Optional: ``move`` (joint, linear), ``speed`` (m/s, of joint moves the share of full speed),
+``dwell`` [s]. Lines that begin with ``#`` are comments.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
+from ..files.csv_text import unguarded
 from .build import Program, Ref, Step
 from .context import Context
 from .notation import Notation, joint_notation
@@ -26,6 +28,11 @@ from .source import Source, number_at, split_outside, stripped
 
 NAME = 'csv'
 POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
+_TURNS = {'': 1.0, '_rad': 1.0, ' [rad]': 1.0} | dict.fromkeys(
+    ('_deg', ' [deg]', ' [\N{DEGREE SIGN}]'), np.pi / 180.0
+)
+_SLIDES = {'': 1.0, '_m': 1.0, ' [m]': 1.0, '_mm': 1e-3, ' [mm]': 1e-3}
+"""What may stand behind the name of a joint, and what its numbers are then in SI."""
 _KINDS: dict[str, Kind] = {'joint': 'joint', 'linear': 'linear'}
 SPEED = 0.1
 """m/s, and share of full speed, without a column."""
@@ -52,7 +59,7 @@ def read(sources: Sequence[Source], context: Context) -> Program:
             for part in split_outside(source.text, place, place + len(line), ',')
         ]
         if head is None:
-            head = [source.text[slice(*part)].strip('"') for part in parts]
+            head = [unguarded(source.text[slice(*part)].strip('"')) for part in parts]
             columns, notation = _columns(source, place, head, context)
             continue
         if len(parts) != len(head):
@@ -71,11 +78,19 @@ def _columns(
     joints = context.robot.joint_names
     if len(set(head)) != len(head):
         raise DataError(f'{source.where(place)}: a column is named twice')
-    for suffix, unit in (('', 1.0), ('_deg', np.pi / 180.0)):
-        names = [name + suffix for name in joints]
-        if all(name in head for name in names):
-            units = np.where(context.robot.prismatic, 1.0, unit)
-            return names, joint_notation(units, np.eye(context.robot.n), 9, 'joints')
+    found = [
+        next(((joint + end, unit) for end, unit in ends.items() if joint + end in head), None)
+        for joint, ends in zip(
+            joints,
+            (_SLIDES if slides else _TURNS for slides in context.robot.prismatic),
+            strict=True,
+        )
+    ]
+    named = [item for item in found if item is not None]
+    if len(named) == len(joints):
+        units = np.array([unit for _, unit in named])
+        notation = joint_notation(units, np.eye(context.robot.n), 9, 'joints')
+        return [name for name, _ in named], notation
     if all(name in head for name in POSE):
         return list(POSE), CSV_POSE
     raise DataError(

@@ -64,7 +64,7 @@ LANGUAGES: dict[str, Language] = {
     'joint-trajectory': Language(
         'ROS', ('.yaml', '.yml', '.json'), r'\bjoint_names\b', read_trajectory, CSV_POSE
     ),
-    'csv': Language('any', ('.csv',), r'\A(?:\s*#[^\n]*\n)*[\w" ]+,', read_csv, CSV_POSE),
+    'csv': Language('any', ('.csv',), r'\A(?:\s*#[^\n]*\n)*[\w" \[\]]+,', read_csv, CSV_POSE),
     'rapid': Language(
         'ABB',
         ('.mod', '.prg', '.modx'),

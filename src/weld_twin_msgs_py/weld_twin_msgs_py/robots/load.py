@@ -22,7 +22,10 @@ URDF_SUFFIXES = ('.urdf', '.xml')
 
 
 def load_robot(
-    spec: str | Path, base_link: str | None = None, tip_link: str | None = None
+    spec: str | Path,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+    flange_link: str | None = None,
 ) -> Robot:
     """
     Return a robot.
@@ -33,6 +36,8 @@ def load_robot(
         Name of a bundled model, or path of a YAML or URDF file.
     base_link, tip_link : str, optional
         Ends of the chain in a URDF; left out, its root and its only leaf (or ``tool0``).
+    flange_link : str, optional
+        Where the controller has its flange in a URDF; left out, it is found by its name.
 
     Raises
     ------
@@ -46,7 +51,7 @@ def load_robot(
     if suffix == '.xacro':
         raise ModelError(f"'{spec}' is a xacro file; run 'xacro {spec}' to make the URDF of it")
     if suffix in URDF_SUFFIXES:
-        return with_lent_masses(read_urdf(path, base_link, tip_link))
+        return with_lent_masses(read_urdf(path, base_link, tip_link, flange_link))
     if suffix in YAML_SUFFIXES or path.is_file():
         robot = read_robot_yaml(path)
     elif spec.lower() in catalog.names():
@@ -56,8 +61,10 @@ def load_robot(
             f'{spec!r} is neither a bundled robot ({", ".join(catalog.names())}) nor a .yaml or '
             '.urdf file'
         )
-    if base_link is not None or tip_link is not None:
-        raise ModelError(f'{spec!r} is no URDF, so it has no base link or tip link to choose')
+    if any(link is not None for link in (base_link, tip_link, flange_link)):
+        raise ModelError(
+            f'{spec!r} is no URDF, so it has no base link, tip link or flange link to choose'
+        )
     return robot
 
 

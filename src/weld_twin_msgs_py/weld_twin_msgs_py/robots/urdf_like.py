@@ -19,17 +19,31 @@ from weld_twin_core.arrays import Array
 from ..files.whole_files import write_text
 from ..files.yaml_file import read_text
 from .axes_to_dh import inverse
+from .controller_links import FLANGE
 from .urdf_read import chain_of, read_urdf
-from .urdf_tree import MOVABLE, Joint
-from .urdf_write import joint_frames, numbers, roll_pitch_yaw
+from .urdf_tree import MOVABLE, Joint, read_tree
+from .urdf_write import add_fixed, fix, joint_frames, numbers, roll_pitch_yaw
+
+SAME = 1e-12
+"""Numbers of frames [m, and parts of unit vectors] that differ by rounding alone."""
 
 
 class GivenUrdf(NamedTuple):
-    """A URDF and the links between which it was read."""
+    """A URDF, the links between which it was read, and the link of the controller's flange."""
 
     path: Path
     base_link: str | None = None
     tip_link: str | None = None
+    flange_link: str | None = None
+
+
+class Hand(NamedTuple):
+    """Frames in the base at joint position zero: of the last joint, of the tip, and of the tip with
+    the tool as it was given, (4, 4) each."""
+
+    carrier: Array
+    plain: Array
+    tip: Array
 
 
 def write_urdf_like(
@@ -44,7 +58,9 @@ def write_urdf_like(
     Write a robot into a copy of the URDF that it was read from.
 
     The origin of every moving joint is set so that its axis and the links behind it are where the
-    robot has them; the origin of the last fixed joint before the tip holds the tool.
+    robot has them; the origin of the last fixed joint before the tip holds the tool. Where the tip
+    is the controller's flange, or carries it, a link ``controller_flange`` keeps the flange where
+    it is, and a fixed joint more holds the tool.
 
     Parameters
     ----------
@@ -62,48 +78,88 @@ def write_urdf_like(
     DataError
         The file exists and ``overwrite`` is not set, or the place cannot be written.
     ModelError
-        The given file cannot be read, or its chain ends in a moving joint, so that a tool that
-        moved has no place in it.
+        The given file cannot be read.
 
     """
     nominal = read_urdf(*given)
     based = replace(robot, T_world_base=nominal.T_world_base)
-    chain, start = chain_of(*given)
+    chain, start = chain_of(*given[:3])
     root = fromstring(read_text(given.path, 'URDF'), forbid_dtd=True)
-    named = {
+    joints = {
         item.get('name'): item for item in root.iter('joint') if item.find('parent') is not None
     }
-    for joint, origin in _origins(chain, start, nominal, based):
-        _set(named[joint.name], origin)
+    last = max(k for k, joint in enumerate(chain) if joint.kind in MOVABLE)
+    was, now = joint_frames(nominal), joint_frames(based)
+    origins, carrier = _moving(chain[: last + 1], start, was, now)
+    plain = now[-1] @ inverse(based.T_flange_tool) @ nominal.T_flange_tool
+    hand = Hand(carrier, plain, now[-1])
+    carried = _carried(given, nominal, chain[-1].child)
+    for joint, origin in [*origins, *_fixed(chain[last + 1 :], hand, carried)]:
+        _set(joints[joint.name], origin)
+    if carried:
+        _put_between(root, joints[chain[-1].name], hand, len(chain) > last + 1, nominal)
     for k, note in enumerate(notes):
         root.insert(k, Comment(f' {note.replace("--", "-")} '))
     text = '<?xml version="1.0"?>\n' + tostring(root, encoding='unicode') + '\n'
     write_text(path, text, overwrite=overwrite)
 
 
-def _origins(
-    chain: list[Joint], start: Array, nominal: Robot, robot: Robot
-) -> list[tuple[Joint, Array]]:
-    """Return the joints whose origin changes, each with its new origin (4, 4)."""
-    was, now = joint_frames(nominal), joint_frames(robot)
-    moving = [joint.kind in MOVABLE for joint in chain]
+def _moving(
+    chain: list[Joint], start: Array, was: list[Array], now: list[Array]
+) -> tuple[list[tuple[Joint, Array]], Array]:
+    """Return the moving joints, each with its new origin (4, 4), and where the last one is."""
     out: list[tuple[Joint, Array]] = []
     before, after, fixed, k = start, start, np.eye(4), 0
-    last = len(moving) - 1 - moving[::-1].index(True)
-    for joint, moves in zip(chain[: last + 1], moving, strict=False):
+    for joint in chain:
         before = before @ joint.T_parent_joint
-        if not moves:
+        if joint.kind not in MOVABLE:
             fixed = fixed @ joint.T_parent_joint
             continue
         new = now[k] @ inverse(was[k]) @ before
         out.append((joint, inverse(after @ fixed) @ new))
         after, fixed, k = new, np.eye(4), k + 1
-    behind = chain[last + 1 :]
-    if behind:
-        for joint in behind[:-1]:
-            fixed = fixed @ joint.T_parent_joint
-        out.append((behind[-1], inverse(after @ fixed) @ now[-1]))
+    return out, after
+
+
+def _carried(given: GivenUrdf, nominal: Robot, tip: str) -> bool:
+    """Tell whether the flange is the tip or hangs on it: a tool that moves must not take it along."""
+    assert nominal.controller is not None
+    above, link = read_tree(given.path).above, nominal.controller.flange_link
+    while link != tip and link in above:
+        link = above[link].parent
+    return link == tip
+
+
+def _fixed(behind: list[Joint], hand: Hand, carried: bool) -> list[tuple[Joint, Array]]:
+    """Return the fixed joints before the tip whose origins change: the first, and that of the tool."""
+    if not behind:
+        return []
+    goal = hand.plain if carried or len(behind) > 1 else hand.tip
+    rest = np.eye(4)
+    for joint in behind[1:]:
+        rest = rest @ joint.T_parent_joint
+    out = [(behind[0], inverse(hand.carrier) @ goal @ inverse(rest))]
+    if len(behind) > 1 and not carried:
+        tool = behind[-1].T_parent_joint @ inverse(hand.plain) @ hand.tip
+        out.append((behind[-1], tool))
     return out
+
+
+def _put_between(root: Element, joint: Element, hand: Hand, fixed: bool, nominal: Robot) -> None:
+    """Let the last joint lead to a link that the tip and the controller's flange are fixed to."""
+    assert nominal.controller is not None
+    at = hand.plain if fixed else hand.carrier
+    T_tip, T_plain = inverse(at) @ hand.tip, inverse(at) @ hand.plain
+    if np.abs(T_tip - np.eye(4)).max() < SAME:
+        return
+    child = joint.find('child')
+    assert child is not None
+    tip, end = str(child.get('link')), f'{joint.get("name")}_end'
+    child.set('link', end)
+    SubElement(root, 'link', {'name': end})
+    fix(root, f'{end}_to_{tip}', end, tip, T_tip)
+    flange = inverse(nominal.T_flange_tool) @ nominal.controller.flange
+    add_fixed(root, end, FLANGE, T_plain @ flange)
 
 
 def _set(joint: Element, origin: Array) -> None:

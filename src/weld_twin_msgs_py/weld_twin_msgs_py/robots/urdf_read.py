@@ -4,21 +4,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from weld_twin_core.arm.controller_frames import ControllerFrames
 from weld_twin_core.arm.robot import STANDARD_GRAVITY, Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
 from .axes_to_dh import Axis, dh_rows, inverse
+from .controller_links import FLANGE, base_link_of, flange_link_of
 from .urdf_tree import MOVABLE, Joint, Tree, parse_tree, read_tree
 from .wrong_units import refuse_wrong_units
 
 
 def read_urdf(
-    path: Path | str, base_link: str | None = None, tip_link: str | None = None
+    path: Path | str,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+    flange_link: str | None = None,
 ) -> Robot:
     """
     Read a URDF.
@@ -31,8 +37,12 @@ def read_urdf(
     ----------
     path : Path or str
     base_link, tip_link : str, optional
-        Left out: the root, and the only leaf or ``tool0``. The base may also be a link that is
-        fixed beside the chain, as ``base`` of a UR arm is.
+        Left out: the root, and the only leaf that moves or ``tool0``. The base may also be a link
+        that is fixed beside the chain, as ``base`` of a UR arm is.
+    flange_link : str, optional
+        Where the controller has its flange; left out, it is found by its name, see
+        `controller_links`. Its base is the base link that was asked for; left out, ``base`` beside
+        ``base_link``, or that, where the chain has them.
 
     Raises
     ------
@@ -40,11 +50,15 @@ def read_urdf(
         The file is no usable URDF, or the chain between the links is no serial arm.
 
     """
-    return _of_tree(read_tree(path), path, base_link, tip_link)
+    return _of_tree(read_tree(path), path, base_link, tip_link, flange_link)
 
 
 def parse_urdf(
-    text: str, source: str, base_link: str | None = None, tip_link: str | None = None
+    text: str,
+    source: str,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+    flange_link: str | None = None,
 ) -> Robot:
     """
     Read the text of a URDF, as `/robot_description` carries it; otherwise as `read_urdf`.
@@ -55,7 +69,7 @@ def parse_urdf(
         The text is no usable URDF, or the chain between the links is no serial arm.
 
     """
-    return _of_tree(parse_tree(text, source), source, base_link, tip_link)
+    return _of_tree(parse_tree(text, source), source, base_link, tip_link, flange_link)
 
 
 def chain_of(
@@ -77,17 +91,36 @@ def chain_of(
     return _chain(tree, start, tip), T_base_start
 
 
-def _of_tree(tree: Tree, path: Path | str, base_link: str | None, tip_link: str | None) -> Robot:
+def _of_tree(
+    tree: Tree,
+    path: Path | str,
+    base_link: str | None,
+    tip_link: str | None,
+    flange_link: str | None,
+) -> Robot:
     try:
         base = _base(tree, base_link)
         tip = _tip(tree, base, tip_link)
         start, T_base_start = _start(tree, base, tip)
         chain = _chain(tree, start, tip)
+        origin = base_link_of(tree, base, chain, base_link)
+        flange = flange_link_of(tree, chain, tip, flange_link)
         robot = _robot(tree, chain, base, T_base_start, f'URDF {Path(path).name}')
+        robot = replace(robot, controller=_controller(robot, origin, flange))
         refuse_wrong_units(robot)
     except ModelError as error:
         raise ModelError(f"URDF '{path}': {error}") from None
     return robot
+
+
+def _controller(
+    robot: Robot, origin: tuple[str, Array], flange: tuple[str, Array]
+) -> ControllerFrames:
+    """Return the frames of two links, that of the base in the base and that of the flange in the tip."""
+    (base_link, T_base), (flange_link, T_tip) = origin, flange
+    return ControllerFrames(
+        inverse(robot.T_world_base) @ T_base, robot.T_flange_tool @ T_tip, base_link, flange_link
+    )
 
 
 def _base(tree: Tree, wanted: str | None) -> str:
@@ -101,13 +134,23 @@ def _base(tree: Tree, wanted: str | None) -> str:
 def _tip(tree: Tree, base: str, wanted: str | None) -> str:
     if wanted is not None:
         return _known(tree, wanted, 'tip')
-    if len(tree.leaves) == 1:
-        return tree.leaves[0]
+    leaves = [leaf for leaf in tree.leaves if leaf != FLANGE]
+    ends = [leaf for leaf in leaves if _moves(tree, leaf)] or leaves
+    if len(ends) == 1:
+        return ends[0]
     if 'tool0' in tree.links:
         return 'tool0'
-    raise ModelError(
-        f'the chain has several ends ({", ".join(tree.leaves)}); say which with --tip-link'
-    )
+    raise ModelError(f'the chain has several ends ({", ".join(ends)}); say which with --tip-link')
+
+
+def _moves(tree: Tree, link: str) -> bool:
+    """Tell whether a joint moves somewhere above a link."""
+    for _ in tree.links:
+        joint = tree.above.get(link)
+        if joint is None or joint.kind in MOVABLE:
+            return joint is not None
+        link = joint.parent
+    return False
 
 
 def _known(tree: Tree, link: str, end: str) -> str:

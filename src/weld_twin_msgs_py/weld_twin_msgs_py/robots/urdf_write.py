@@ -10,11 +10,14 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 import numpy as np
 
+from weld_twin_core.arm.controller_lookup import controller_frames
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import transform
 from weld_twin_core.arrays import Array
 
 from ..files.whole_files import write_text
+from .axes_to_dh import inverse
+from .controller_links import BASE, FLANGE
 from .urdf_tree import turn
 
 EFFORT = '1000.0'
@@ -29,6 +32,8 @@ def write_urdf(
 ) -> None:
     """
     Write a URDF from the measuring frame (link ``world``) to the tool (link ``tool``).
+
+    The controller's base and flange are links too, so that they are read again.
 
     Parameters
     ----------
@@ -53,19 +58,29 @@ def write_urdf(
     parent, ahead = 'world', robot.T_world_base
     for k, name in enumerate(robot.joint_names):
         before, after = _split_row(robot, k)
-        joint = _joint(root, name, parent, f'link_{k + 1}', ahead @ before)
+        joint = fix(root, name, parent, f'link_{k + 1}', ahead @ before)
         _motion(joint, robot, k)
         parent, ahead = f'link_{k + 1}', after
         link = SubElement(root, 'link', {'name': parent})
         if robot.mass is not None and robot.com is not None:
             _inertial(link, float(robot.mass[k]), after[:3, :3] @ robot.com[k] + after[:3, 3])
-    _joint(root, 'flange_to_tool', parent, 'tool', ahead @ robot.T_flange_tool)
+    frames = controller_frames(robot)
+    tool_on_flange = inverse(frames.flange) @ robot.T_flange_tool
+    add_fixed(root, 'world', BASE, robot.T_world_base @ frames.base)
+    add_fixed(root, parent, FLANGE, ahead @ frames.flange)
+    fix(root, 'flange_to_tool', FLANGE, 'tool', tool_on_flange)
     tool = SubElement(root, 'link', {'name': 'tool'})
     if robot.payload_mass > 0.0:
         _inertial(tool, robot.payload_mass, robot.payload_com)
     indent(root)
     text = '<?xml version="1.0"?>\n' + tostring(root, encoding='unicode') + '\n'
     write_text(path, text, overwrite=overwrite)
+
+
+def add_fixed(root: Element, parent: str, name: str, T: Array) -> None:
+    """Add a link that is fixed to another at a place (4, 4) in it."""
+    fix(root, f'{parent}_to_{name}', parent, name, T)
+    SubElement(root, 'link', {'name': name})
 
 
 def joint_frames(robot: Robot) -> list[Array]:
@@ -95,7 +110,8 @@ def _split_row(robot: Robot, k: int) -> tuple[Array, Array]:
     return transform(turned, turned @ along) @ spin, np.eye(4)
 
 
-def _joint(root: Element, name: str, parent: str, child: str, T: Array) -> Element:
+def fix(root: Element, name: str, parent: str, child: str, T: Array) -> Element:
+    """Add a fixed joint between two links, the child at a place (4, 4) in the parent."""
     joint = SubElement(root, 'joint', {'name': name, 'type': 'fixed'})
     SubElement(joint, 'parent', {'link': parent})
     SubElement(joint, 'child', {'link': child})

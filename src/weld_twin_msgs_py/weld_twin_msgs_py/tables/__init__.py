@@ -3,14 +3,13 @@
 """Tables of joint angles and measured positions or poses, as laboratories leave them."""
 
 from .build import Table, read_table
-from .contacts import quoted, read_contacts, write_touches
+from .contacts import read_contacts, write_touches
 from .table_options import TableOptions
 from .two_tables import read_two_tables
 
 __all__ = [
     'Table',
     'TableOptions',
-    'quoted',
     'read_contacts',
     'read_table',
     'read_two_tables',

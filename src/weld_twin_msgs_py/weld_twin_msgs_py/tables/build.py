@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-import re
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 from zlib import crc32
@@ -21,9 +21,10 @@ from .agreement import misfit
 from .cells import Cells, read_cells
 from .clock_column import stamps
 from .header import Columns, find_columns
+from .joint_readings import Units, joint_angles, joint_units
 from .rotations import AGREES, disagreement, find_convention, rotations
-from .table_options import TableOptions, flag_of
-from .unit_guess import METRES, RADIANS, angle_unit, length_unit
+from .table_options import TableOptions
+from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit
 from .words import OWN, tokens
 
 _FAR = 10.0
@@ -32,6 +33,20 @@ _FARTHEST = 1e9
 """A coordinate beyond this is a slip in any unit, and its square may be no number."""
 _TOO_GOOD = 2e-6
 """A typical misfit [m] below what any tracker repeats, a fifth of its best."""
+_JUDGED = 300
+"""Rows, evenly over the table, from which units are told: two readings differ in all of them."""
+LAST_STAMP = 2.0**31
+"""Seconds since 1970 that a stamp of ROS can hold, until January 2038."""
+BEYOND = (
+    'the stamps lie beyond January 2038, the last that a bag can hold: they are counted from the '
+    'first row'
+)
+_KELVINS = {'degC': 1.0, 'K': 1.0, 'degF': 5.0 / 9.0}
+"""Units of temperature, and their degree [K]."""
+_FREEZING = {'degC': 0.0, 'K': 273.15, 'degF': 32.0}
+"""Where water freezes, in each unit."""
+_HOT = 150.0
+"""No arm is so warm [degC]: without a unit, larger numbers are kelvins."""
 _WRONG = 0.05
 """A typical misfit beyond this share of the arm's reach means that the table is wrong or misread."""
 
@@ -70,6 +85,13 @@ def read_table(path: Path | str, robot: Robot, options: TableOptions | None = No
 
 def table_of(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) -> Table:
     """Return what the cells of a table mean; the same errors as `read_table`."""
+    return stations(cells, robot, options, said)[0]
+
+
+def stations(
+    cells: Cells, robot: Robot, options: TableOptions, said: list[str]
+) -> tuple[Table, Units]:
+    """Return what a table means, and the units of the joints whose columns name none."""
     path = cells.path
     try:
         return _read(cells, robot, options, said)
@@ -83,36 +105,65 @@ def table_of(cells: Cells, robot: Robot, options: TableOptions, said: list[str])
         ) from None
 
 
-def _read(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) -> Table:
+def _read(
+    cells: Cells, robot: Robot, options: TableOptions, said: list[str]
+) -> tuple[Table, Units]:
     columns = find_columns(cells.header, robot, options)
     cells = _usable(cells, columns, options, said)
     said.append('joint columns are ' + ', '.join(columns.joints))
-    unit = columns.unit(columns.joints)
-    q = joint_angles(cells, robot, columns.joints, options, said, unit)
+    raw = cells.stack(columns.joints)
+    judge = partial(_relative_misfit, cells, robot, columns, options)
+    units = joint_units(raw, robot, columns.joints, options, said, judge)
+    q = joint_angles(cells, robot, columns.joints, options, said, units)
     position, scale = _position(cells, robot, q, columns, options, said)
     rotation = _rotation(cells, robot, q, columns, options, said) if columns.rotation else None
     sigma = _sigma(cells, columns, scale, said) if columns.sigma else None
     _check(cells, robot, q, position, options, said)
-    t, sentence = stamps(cells, columns.time, columns.unit((columns.time or '',)), columns.date)
-    said.append(sentence)
-    if t is None:
-        epoch, t = own_epoch(cells.path), np.arange(float(len(q)))
-    else:
-        epoch, t = round(float(t[0])) * 1_000_000_000, t - round(float(t[0]))
-    temperature = None
-    if columns.temperature is not None:
-        values = cells.numbers(columns.temperature)
-        temperature = Signal(t, values)
-        said.append(f'temperature is {columns.temperature!r} in degC')
+    epoch, t = _clock(cells, columns, said)
     recording = Recording(
         cells.path.stem,
         JointMotion(t, q, static=True),
         Measurements(t, position, rotation, sigma),
-        temperature=temperature,
-        epoch_ns=max(epoch, 0),
+        temperature=_temperature(cells, columns, t, said),
+        epoch_ns=epoch,
         notes=tuple(said),
     )
-    return Table(recording, tuple(said))
+    return Table(recording, tuple(said)), units
+
+
+def _clock(cells: Cells, columns: Columns, said: list[str]) -> tuple[int, Array]:
+    """Return what the stamps count from [ns since 1970] and the stamps, shape (M,) [s]."""
+    t, sentence = stamps(cells, columns.time, columns.unit(columns.time), columns.date)
+    said.append(sentence)
+    if t is None:
+        return own_epoch(cells.path), np.arange(float(len(cells.rows)))
+    first = round(float(t[0]))
+    if t[-1] >= LAST_STAMP:
+        said.append(BEYOND)
+    if not 0.0 <= t[0] <= t[-1] < LAST_STAMP:
+        return own_epoch(cells.path), t - first
+    return first * 1_000_000_000, t - first
+
+
+def _temperature(cells: Cells, columns: Columns, t: Array, said: list[str]) -> Signal | None:
+    name = columns.temperature
+    if name is None:
+        return None
+    values = cells.numbers(name)
+    unit = columns.unit(name) or ('K' if np.median(values) > _HOT else 'degC')
+    scale = factor(_KELVINS, unit, name, 'the temperature')
+    said.append(f'temperature is {name!r} in {unit}')
+    return Signal(t, (values - _FREEZING[unit]) * scale)
+
+
+def _relative_misfit(
+    cells: Cells, robot: Robot, columns: Columns, options: TableOptions, q: Array
+) -> float:
+    """Return how far joints and positions are from belonging together, as a share of the way."""
+    position, _ = _position(cells, robot, q, columns, options, [])
+    rows = np.unique(np.linspace(0, len(q) - 1, _JUDGED).astype(int))
+    spread = float(np.linalg.norm(position[rows].std(axis=0)))
+    return float(np.median(misfit(robot, q[rows], position[rows]))) / max(spread, 1e-9)
 
 
 def own_epoch(path: Path) -> int:
@@ -161,85 +212,6 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
     )
 
 
-def joint_angles(
-    cells: Cells,
-    robot: Robot,
-    names: tuple[str, ...],
-    options: TableOptions,
-    said: list[str],
-    unit: str | None = None,
-) -> Array:
-    """
-    Return the joint columns of a table, shape (M, n) [rad or m], and say how they were read.
-
-    Parameters
-    ----------
-    cells : Cells
-    robot : Robot
-    names : tuple of str
-        The columns, in the robot's order.
-    options : TableOptions
-    said : list of str
-        Sentences are added to it.
-    unit : str, optional
-        That the header gives.
-
-    """
-    q = cells.stack(names)
-    turning = ~robot.prismatic
-    given = options.angle_unit or unit
-    unit, sentence = angle_unit(q[:, turning], given, 'joint angles')
-    if sentence:
-        said.append(sentence)
-    q[:, turning] *= RADIANS[unit]
-    q = as_modelled(q, robot, options, said)
-    outside = ((q < robot.lower - 1e-6) | (q > robot.upper + 1e-6)).any(axis=1)
-    if outside.any():
-        said.append(f'{outside.sum()} rows leave the joint limits of robot {robot.name!r}')
-    return q
-
-
-def as_modelled(q: Array, robot: Robot, options: TableOptions, said: list[str]) -> Array:
-    """
-    Return joint columns, shape (M, n) [rad or m], counted as the model counts them.
-
-    Signs come first, then what one joint adds to another, then offsets, which are in the
-    model's sense.
-    """
-    for name in ('joint_signs', 'joint_offsets'):
-        given = getattr(options, name)
-        if given is not None and len(given) != robot.n:
-            raise DataError(f'{flag_of(name)} needs {robot.n} numbers, got {len(given)}')
-    if options.joint_signs is not None:
-        q = q * np.array(options.joint_signs)
-        said.append('signs of the joints are ' + _listed(options.joint_signs))
-    if options.coupled is not None:
-        q = _coupled(q, options.coupled)
-        said.append(f'joints are coupled by {options.coupled}')
-    if options.joint_offsets is not None:
-        q = q + np.array(options.joint_offsets) * np.where(robot.prismatic, 1e-3, np.pi / 180.0)
-        said.append(
-            f'added to the joints are {_listed(options.joint_offsets)} deg (mm for a slide)'
-        )
-    return q
-
-
-def _listed(values: tuple[float, ...]) -> str:
-    return ', '.join(f'{value:g}' for value in values)
-
-
-def _coupled(q: Array, text: str) -> Array:
-    """Return joint columns after '3+2': what the model's third joint is, the second added."""
-    match = re.fullmatch(r'\s*(\d+)\s*([+-])\s*(\d+)\s*', text)
-    count = q.shape[1]
-    one, other = (int(match[1]), int(match[3])) if match else (0, 0)
-    if match is None or not (1 <= one <= count and 1 <= other <= count) or one == other:
-        raise DataError(f'--coupled needs two joints such as 3+2 or 3-2, got {text!r}')
-    out = np.array(q)
-    out[:, one - 1] += (1.0 if match[2] == '+' else -1.0) * q[:, other - 1]
-    return out
-
-
 def _position(
     cells: Cells,
     robot: Robot,
@@ -247,30 +219,48 @@ def _position(
     columns: Columns,
     options: TableOptions,
     said: list[str],
-) -> tuple[Array, float]:
-    """Return measured positions (M, 3) [m] and the factor from the table's unit."""
+) -> tuple[Array, str]:
+    """Return measured positions (M, 3) [m] and the table's unit of length."""
+    named = columns.position or columns.target
+    off = () if columns.position else columns.difference
+    sign = 1.0 if options.difference == 'add' else -1.0
+    told = next((u for u in (options.length_unit, *map(columns.unit, named + off)) if u), None)
+    raw = cells.stack(named) + (sign * cells.stack(off) if off else 0.0)
+    unit, sentence = length_unit(raw, robot, q, told)
+    what = 'a measured position' if columns.position else 'a position'
+    position = _metres(cells, named, columns, options, unit, what)
     if columns.position:
-        named = columns.position
-        position = cells.stack(named)
         said.append('measured positions are ' + ', '.join(named))
         if any(set(tokens(name)) & OWN for name in named):
             said.append(
                 f'{named[0]} may be what the controller computes; only an instrument measures'
             )
     else:
-        named = columns.target
-        sign = 1.0 if options.difference == 'add' else -1.0
-        position = cells.stack(named) + sign * cells.stack(columns.difference)
+        position = position + sign * _metres(cells, off, columns, options, unit, what)
         word = 'plus' if sign > 0.0 else 'minus'
         said.append(
             f'measured = target ({", ".join(named)}) {word} difference '
             f'({", ".join(columns.difference)}); --difference decides'
         )
-    given = options.length_unit or columns.unit(named)
-    unit, sentence = length_unit(position, robot, q, given)
     if sentence:
         said.append(sentence)
-    return position * METRES[unit], METRES[unit]
+    return position, unit
+
+
+def _metres(
+    cells: Cells,
+    names: tuple[str, ...],
+    columns: Columns,
+    options: TableOptions,
+    usual: str,
+    what: str,
+) -> Array:
+    """Return columns of lengths [m], each in its own unit where the header gives it one."""
+    scale = [
+        factor(METRES, options.length_unit or columns.unit(name) or usual, name, what)
+        for name in names
+    ]
+    return np.asarray(cells.stack(names) * scale)
 
 
 def _rotation(
@@ -292,11 +282,15 @@ def _rotation(
                 'quaternion or joint columns may not be what they seem'
             )
         return rotation
-    given = options.rotation_unit or columns.unit(columns.rotation)
-    unit, sentence = angle_unit(values, given, 'measured angles')
+    own = [options.rotation_unit or columns.unit(name) for name in columns.rotation]
+    told = next((unit for unit in own if unit), None)
+    unit, sentence = angle_unit(values, told, 'measured angles')
     if sentence:
         said.append(sentence)
-    angles = values * RADIANS[unit]
+    angles = values * [
+        factor(RADIANS, each or unit, name, 'a measured angle')
+        for each, name in zip(own, columns.rotation, strict=True)
+    ]
     convention = options.rotation
     if convention is None:
         convention, sentence = find_convention(angles, robot, q)
@@ -304,8 +298,11 @@ def _rotation(
     return rotations(angles, convention)
 
 
-def _sigma(cells: Cells, columns: Columns, scale: float, said: list[str]) -> Array:
-    values = cells.stack(columns.sigma) * scale
+def _sigma(cells: Cells, columns: Columns, unit: str, said: list[str]) -> Array:
+    values = cells.stack(columns.sigma) * [
+        factor(METRES, columns.unit(name) or unit, name, 'a standard deviation')
+        for name in columns.sigma
+    ]
     said.append('standard deviations are ' + ', '.join(columns.sigma) + ', joined by mean square')
     return np.asarray(np.sqrt((values**2).mean(axis=1)))
 

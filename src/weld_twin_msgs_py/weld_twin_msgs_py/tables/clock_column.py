@@ -14,8 +14,9 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
 from .cells import Cells
+from .unit_guess import factor
 
-_SECONDS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
+_SECONDS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0}
 """Units a clock may count in."""
 _LARGEST = (('s', 1e11), ('ms', 1e14), ('us', 1e17), ('ns', np.inf))
 """Beyond these, stamps since 1970 must be in the next finer unit."""
@@ -45,7 +46,8 @@ def stamps(
     if np.isnan(values).any() or (values.size > 1 and np.diff(values).min() <= 0.0):
         return None, f'stamps in {column!r} do not increase from row to row; {order}'
     chosen = unit or next(name for name, top in _LARGEST if abs(values).max() < top)
-    return values * _SECONDS[chosen], f'stamps in {column!r} are in {chosen}'
+    scale = factor(_SECONDS, chosen, column, 'the time')
+    return values * scale, f'stamps in {column!r} are in {chosen}'
 
 
 def _parsed(cells: Cells, column: str, date: str | None) -> Array | None:

@@ -18,12 +18,15 @@ from weld_twin_core.contacts import Artefact, Contact, Contacts
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 
+from ..files.csv_text import csv_text
 from ..files.whole_files import write_text
-from .build import Table, joint_angles, own_epoch
+from .build import Table, own_epoch
 from .cells import Cells, read_cells
-from .header import CONTACTS, joint_columns
+from .header import CONTACTS, joint_columns, unit_of
+from .joint_readings import joint_angles
 from .table_options import TableOptions
-from .unit_guess import METRES
+from .unit_guess import METRES, factor
+from .words import shortened
 
 WORDS = {
     'contact': CONTACTS,
@@ -60,15 +63,12 @@ def write_touches(path: Path, motion: Mapping[str, Any]) -> None:
         'joint_names', 'q' [rad, m] and 'contact', one label per posture.
 
     """
-    lines = [','.join((*motion['joint_names'], 'contact'))]
-    for q, label in zip(motion['q'], motion['contact'], strict=True):
-        lines.append(','.join((*(f'{value:.7f}' for value in q), quoted(label))))
-    write_text(path, '\n'.join(lines) + '\n', overwrite=True)
-
-
-def quoted(label: str) -> str:
-    """Return a label as a cell of a table has it."""
-    return '"' + label.replace('"', '""') + '"' if set(label) & set(',"') else label
+    rows = [
+        (*(f'{value:.7f}' for value in q), label)
+        for q, label in zip(motion['q'], motion['contact'], strict=True)
+    ]
+    header = (*motion['joint_names'], 'contact')
+    write_text(path, csv_text(header, rows), overwrite=True)
 
 
 def read_contacts(
@@ -152,7 +152,7 @@ def _columns(cells: Cells) -> dict[str, str]:
     if 'contact' not in out:
         raise DataError(
             f"table '{cells.path}' has no column 'contact' that says what each posture touched; "
-            'its columns are ' + ', '.join(cells.header)
+            'its columns are ' + shortened(cells.header)
         )
     return out
 
@@ -171,12 +171,11 @@ def _lengths(
     values = cells.numbers(name)
     if np.isnan(values).all():
         return None
-    last = re.split(r'[^0-9a-z]+', name.lower().rstrip('])'))[-1]
-    unit = options.length_unit or (last if last in METRES else None)
+    unit = options.length_unit or unit_of(name)
     if unit is None:
         unit = 'mm' if np.nanmax(np.abs(values)) > ARM else 'm'
         said.append(f'{name} is in {unit}; --length-unit decides')
-    return values * METRES[unit]
+    return values * factor(METRES, unit, name, 'a length')
 
 
 def _kinds(

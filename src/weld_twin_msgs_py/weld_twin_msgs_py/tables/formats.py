@@ -77,9 +77,6 @@ class Read(NamedTuple):
 
 
 _MOTIVE = r'^(?:Rigid Body|Marker|Rigid Body Marker) (?P<what>.+?)(?: [0-9A-F]{6,}| \d+)?'
-_LIST = 'list of points (SpatialAnalyzer and others)'
-_REMARKS = r'\A(?:\s*//.*\n)*'
-_NUMBER = r'[-+]?[\d.]+(?:[eE][-+]?\d+)?'
 _RTDE = (
     (r'^timestamp$', 'time [s]'),
     (r'^actual_q_(\d)$', r'actual_q_\1 [rad]'),
@@ -125,19 +122,6 @@ FORMATS: tuple[Format, ...] = (
         named_by=r'^MARKER_NAMES\t(.*)',
         gap='0 0 0',
     ),
-    Format(
-        _LIST,
-        rf'{_REMARKS}(?:[^,\n]+,\s*){{1,3}}{_NUMBER}(?:,\s*{_NUMBER}){{2}}\s*\n',
-        r'^[^/]',
-        (),
-    ),
-    Format(
-        _LIST,
-        rf'{_REMARKS}(?:\S+[ \t]+){{1,3}}{_NUMBER}(?:[ \t]+{_NUMBER}){{2}}\s*\n',
-        r'^[^/]',
-        (),
-        ' ',
-    ),
 )
 """The first whose mark is found counts."""
 _UNITS = {'meters': 'm', 'millimeters': 'mm', 'centimeters': 'cm', 'm': 'm', 'mm': 'mm'}
@@ -148,18 +132,8 @@ def recognised(text: str) -> Format | None:
     top = '\n'.join(text.splitlines()[:_HEAD]) + '\n'
     for known in FORMATS:
         if re.search(known.mark, top):
-            return known if known.names or _is_list(top, known) else None
+            return known
     return None
-
-
-def _is_list(top: str, known: Format) -> bool:
-    """Return whether every line ends in three numbers, with names before and none of a header."""
-    lines = [line for line in top.splitlines() if line.strip() and line[:2] != '//']
-    rows = [_split(line, known) for line in lines]
-    return all(
-        len(row) == len(rows[0]) and not _number(row[0]) and all(map(_number, row[-3:]))
-        for row in rows
-    )
 
 
 def read(known: Format, text: str, marker: str | None) -> Read:
@@ -186,11 +160,9 @@ def read(known: Format, text: str, marker: str | None) -> Read:
             f'it begins as the {known.name} writes it, and the names of columns are gone'
         )
     split = [_split(line, known) for line in lines]
-    if not known.names:
-        return _points(known, split, at, marker)
     header = _names(known, lines, split, at)
     first = at + 1 + known.below
-    if known.named_by and first < len(split) and split[first] and not _number(split[first][0]):
+    if known.named_by and first < len(split) and split[first] and not is_number(split[first][0]):
         header, first = split[first], first + 1  # QTM writes names over the columns if asked to
     found, said = _meant(known, header, text, marker)
     rows, numbers = [], []
@@ -212,7 +184,12 @@ def _split(line: str, known: Format) -> list[str]:
     if known.delimiter == ' ':
         return line.split()
     sign = ';' if known.delimiter == ',' and ';' in line and ',' not in line else known.delimiter
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=sign), [])]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=sign), [])]
+    except csv.Error:
+        raise DataError(
+            'a cell has no end; look for a quotation mark that is not closed'
+        ) from None
 
 
 def _names(known: Format, lines: Sequence[str], split: list[list[str]], at: int) -> list[str]:
@@ -285,26 +262,12 @@ def one_of(names: list[str], marker: str | None) -> str:
 
 def _seen(cells: list[str], known: Format) -> list[str]:
     """Return a row with a place that was not seen left empty."""
-    if known.gap and [_number(c) and float(c) == 0.0 for c in cells[-3:]] == [True] * 3:
+    if known.gap and [is_number(c) and float(c) == 0.0 for c in cells[-3:]] == [True] * 3:
         return [*cells[:-3], '', '', '']
     return cells
 
 
-def _points(known: Format, split: list[list[str]], at: int, marker: str | None) -> Read:
-    """Return a list of points: names, then x, y, z; ``marker`` is the group that is meant."""
-    rows, numbers = [], []
-    for k, cells in enumerate(split[at:], start=at + 1):
-        if len(cells) < 4 or cells[0].startswith('//'):
-            continue
-        if marker is None or marker in cells[:-3]:
-            rows.append([' '.join(cells[:-3]), *cells[-3:]])
-            numbers.append(k)
-    if not rows:
-        raise DataError(f'no point belongs to {marker!r}; --marker names a group')
-    return Read(['point', 'x', 'y', 'z'], rows, numbers, [f'read as a {known.name}'])
-
-
-def _number(text: str) -> bool:
+def is_number(text: str) -> bool:
     try:
         float(text)
     except ValueError:

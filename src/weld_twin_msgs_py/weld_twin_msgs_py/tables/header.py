@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from weld_twin_core.arm.robot import Robot
@@ -17,6 +17,7 @@ from .words import (
     CLOCK,
     DATE,
     DIFFERENCE,
+    EXTERNAL,
     FANUC,
     JOINT,
     KUKA,
@@ -29,7 +30,8 @@ from .words import (
     TARGET,
     TEMPERATURE,
     TURNS,
-    UNITS,
+    parted,
+    shortened,
     tokens,
 )
 
@@ -67,9 +69,9 @@ class Columns:
     date: str | None = None
     units: dict[str, str | None] = field(default_factory=dict)
 
-    def unit(self, names: Iterable[str]) -> str | None:
-        """Return the unit the header gives the columns, None when it gives none."""
-        return next((self.units[name] for name in names if self.units.get(name)), None)
+    def unit(self, name: str | None) -> str | None:
+        """Return the unit the header gives a column, None when it gives none."""
+        return None if name is None else self.units.get(name)
 
 
 def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> Columns:
@@ -117,16 +119,13 @@ def joint_columns(header: Sequence[str], robot: Robot, options: TableOptions) ->
 
 
 def _taken_apart(name: str) -> Named:
-    words = tokens(name)
-    unit = None
-    if len(words) > 1 and words[-1] in UNITS:
-        unit = UNITS[words[-1]]
-        words = words[:-1]
+    words, unit = parted(name)
     for k, word in enumerate(words):
         kind, axis = _axis(word, words)
         if kind:
             said = {'quaternion': QUATERNION, 'angle': TURNS}.get(kind, set())
             stem = [w for w in words[:k] + words[k + 1 :] if w not in said]
+            stem += ['d'] if re.fullmatch(r'd[xyz]', word) else []
             return Named(name, tuple(stem), axis, kind, unit)
     return Named(name, tuple(words), unit=unit)
 
@@ -138,6 +137,8 @@ def _axis(word: str, words: Sequence[str]) -> tuple[str, str]:
         return 'quaternion', word
     if word in ('x', 'y', 'z'):
         return ('angle' if others & TURNS else 'length'), word
+    if re.fullmatch(r'd[xyz]', word):  # a list of what is off, as instruments write it
+        return 'length', word[1]
     if re.fullmatch(r'q[xyzw]', word):
         return 'quaternion', word[1]
     if re.fullmatch(r'r[xyz]', word):
@@ -152,16 +153,59 @@ def _axis(word: str, words: Sequence[str]) -> tuple[str, str]:
 
 
 def _joints(parts: Sequence[Named], robot: Robot) -> tuple[str, ...]:
-    """Return columns with the joints' own names, else numbered ones."""
-    plain = {'_'.join(part.stem): part.name for part in parts if not part.axis}
-    own = [plain.get('_'.join(tokens(joint))) for joint in robot.joint_names]
-    if all(own):
-        return tuple(str(name) for name in own)
-    letters = {tokens(p.name)[0]: p.name for p in parts if tokens(p.name)[:1]}
-    if robot.n == len(LETTERS) and set(LETTERS) <= set(letters):
+    """
+    Return columns with the joints' own names; joints without one are numbered.
+
+    What slides may be an axis beside the arm: E1 of KUKA, eax_a of ABB.
+    """
+    own = _by_own_names(parts, robot)
+    missing = [joint for joint in robot.joint_names if joint not in own]
+    left = [part for part in parts if part.name not in own.values()]
+    slides = [joint for joint in missing if robot.prismatic[robot.index(joint)]]
+    beside = _beside_the_arm(left)
+    if slides and len(beside) == len(slides):
+        own |= dict(zip(slides, beside, strict=True))
+        missing = [joint for joint in missing if joint not in own]
+        left = [part for part in left if part.name not in beside]
+    if missing:
+        own |= dict(zip(missing, _in_order(left, len(missing), parts, robot), strict=True))
+    return tuple(own[joint] for joint in robot.joint_names)
+
+
+def _by_own_names(parts: Sequence[Named], robot: Robot) -> dict[str, str]:
+    """Return the columns called as joints are, with a unit behind or none, by joint."""
+    called = {'_'.join(parted(part.name)[0]): part.name for part in reversed(parts)}
+    called |= {'_'.join(tokens(part.name)): part.name for part in reversed(parts)}
+    names = {joint: called.get('_'.join(tokens(joint))) for joint in robot.joint_names}
+    found = {joint: name for joint, name in names.items() if name is not None}
+    # The x that was measured is no joint because a slide of a gantry is called so, too.
+    others = [part for part in parts if part.name not in found.values()]
+    axes = {part.axis for part in others if part.kind == 'length'}
+    return {
+        joint: name for joint, name in found.items() if tokens(joint)[-1] not in {*'xyz'} - axes
+    }
+
+
+def _beside_the_arm(parts: Sequence[Named]) -> list[str]:
+    """Return the columns of axes beside the arm in their order, such as E1 and eax_b."""
+    found = {}
+    for part in parts:
+        words = [word for word in part.stem or (part.axis,) if word]
+        pieces = [piece for word in words for piece in re.findall(r'[^0-9]+|[0-9]+', word)]
+        if len(pieces) == 2 and pieces[0] in EXTERNAL and re.fullmatch('[a-f1-6]', pieces[1]):
+            found[pieces[1]] = part.name
+    return [found[key] for key in sorted(found)]
+
+
+def _in_order(
+    left: Sequence[Named], count: int, parts: Sequence[Named], robot: Robot
+) -> tuple[str, ...]:
+    """Return so many columns that are numbered, or lettered as Yaskawa does it."""
+    letters = {tokens(p.name)[0]: p.name for p in left if tokens(p.name)[:1]}
+    if count == len(LETTERS) and set(LETTERS) <= set(letters):
         return tuple(letters[letter] for letter in LETTERS)
-    numbered = _numbered(parts)
-    whole = [list(range(robot.n)), list(range(1, robot.n + 1))]
+    numbered = _numbered(left)
+    whole = [list(range(count)), list(range(1, count + 1))]
     fitting = {words: group for words, group in numbered.items() if sorted(group) in whole}
     # What the encoders read comes before what the controller wanted.
     best = max((_rank(words) for words in fitting), default=0)
@@ -170,7 +214,8 @@ def _joints(parts: Sequence[Named], robot: Robot) -> tuple[str, ...]:
         found = 'more than one set of' if chosen else 'no'
         raise DataError(
             f'the table has {found} columns for the {robot.n} joints of robot {robot.name!r} '
-            f'({", ".join(robot.joint_names)}){_found(parts, numbered)}; --joint-columns decides'
+            f'({", ".join(robot.joint_names)}){_found(parts, _numbered(parts))}; '
+            '--joint-columns decides'
         )
     return tuple(chosen[0][k] for k in sorted(chosen[0]))
 
@@ -199,7 +244,7 @@ def _found(parts: Sequence[Named], numbered: Mapping[tuple[str, ...], Mapping[in
     joints = [name for group in numbered.values() for _, name in sorted(group.items())]
     others = [part.name for part in parts if part.name not in joints]
     told = [('joints', joints), ('besides', others)] if joints else [('columns', others)]
-    said = ', '.join(f'{word} {", ".join(names)}' for word, names in told if names)
+    said = ', '.join(f'{word} {shortened(names)}' for word, names in told if names)
     return f'; found {said}' if said else ''
 
 
@@ -236,7 +281,7 @@ def _lacking(parts: Sequence[Named]) -> str:
     others = [part.name for part in parts if part.name not in there.values()]
     said = [f'found {", ".join(there.values())}'] if there else []
     said += [f'missing {", ".join(missing)}'] if missing else []
-    said += [f'besides the joints there are {", ".join(others)}'] if others else []
+    said += [f'besides the joints there are {shortened(others)}'] if others else []
     return f' ({"; ".join(said)})' if said else ''
 
 
@@ -259,9 +304,12 @@ def _one_group(
     difference) never count as measured.
     """
     groups: dict[tuple[str, ...], dict[str, str]] = {}
+    twice: dict[tuple[str, ...], list[str]] = {}
     for part in parts:
         if part.kind == kind:
-            groups.setdefault(part.stem, {})[part.axis] = part.name
+            first = groups.setdefault(part.stem, {}).setdefault(part.axis, part.name)
+            if first != part.name:
+                twice.setdefault(part.stem, [first]).append(part.name)
     whole = {stem: group for stem, group in groups.items() if set(axes) <= set(group)}
     spread = SIGMA | DIFFERENCE
     named = [stem for stem in whole if set(stem) & words and not (set(stem) - words) & spread]
@@ -271,6 +319,11 @@ def _one_group(
     if len(named) > 1:
         listed = '; '.join(', '.join(whole[stem][axis] for axis in axes) for stem in named)
         raise DataError(f'several columns could serve ({listed}); {flag_of(option)} decides')
+    for stem in named:
+        if stem in twice:
+            raise DataError(
+                f'{" and ".join(twice[stem][:2])} mean the same; {flag_of(option)} decides'
+            )
     return tuple(whole[named[0]][axis] for axis in axes) if named else ()
 
 

@@ -15,6 +15,7 @@ _CHOICES = {
     'decimal': ('.', ','),
     'length_unit': ('m', 'mm'),
     'angle_unit': ('rad', 'deg'),
+    'slide_unit': ('m', 'mm'),
     'rotation_unit': ('rad', 'deg'),
     'rotation': (*EULER_ORDERS, ROTATION_VECTOR),
     'difference': ('add', 'subtract'),
@@ -49,8 +50,8 @@ class TableOptions:
         Three angles about x, y, z (or a rotation vector), or a quaternion x, y, z, w.
     rotation : str, optional
         'XYZ' means R = Rx Ry Rz (intrinsic); 'ZYX' is roll-pitch-yaw; 'rotvec' a rotation vector.
-    length_unit, angle_unit, rotation_unit : str, optional
-        Of positions, joint angles and measured angles.
+    length_unit, angle_unit, slide_unit, rotation_unit : str, optional
+        Of positions, joint angles, joints that slide, and measured angles.
     sigma_columns : tuple of 1 or 3 str, optional
         Standard deviation of the position, in its unit.
     temperature_column, time_column : str, optional
@@ -81,6 +82,7 @@ class TableOptions:
     rotation: str | None = None
     length_unit: str | None = None
     angle_unit: str | None = None
+    slide_unit: str | None = None
     rotation_unit: str | None = None
     sigma_columns: tuple[str, ...] | None = None
     temperature_column: str | None = None

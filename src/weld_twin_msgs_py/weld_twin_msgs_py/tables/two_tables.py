@@ -14,10 +14,11 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 
-from .build import Table, joint_angles, own_epoch, table_of
+from .build import BEYOND, LAST_STAMP, Table, own_epoch, stations, table_of
 from .cells import Cells, read_cells
 from .clock_column import stamps
 from .header import joint_columns, time_columns, unit_of
+from .joint_readings import joint_angles
 from .table_options import TableOptions
 
 STREAM = 0.2
@@ -66,9 +67,13 @@ def read_two_tables(
                 'for each station'
             )
         said.append('rows of both files are paired in their order')
-        return table_of(_joined(log, seen, names, q, own), robot, options, said)
-    dated = min(times[0], own[0]) > SINCE_1970
-    if not dated:
+        joined = _joined(log, seen, names, q, own)
+        return table_of(joined, robot, replace(options, time_column=None), said)
+    dated = bool(min(times[0], own[0]) > SINCE_1970)
+    if dated and max(times[-1], own[-1]) >= LAST_STAMP:
+        times, own, dated = times - times[0], own - times[0], False
+        said.append(BEYOND)
+    elif not dated:
         times, own = times - times[0], own - own[0]
         said.append(
             'both clocks are taken to begin with the first row of their file; --clock-offset '
@@ -97,12 +102,11 @@ def _moving(
     kept = replace(
         seen, rows=[seen.rows[k] for k in inside], lines=[seen.lines[k] for k in inside]
     )
-    still, said_all = table_of(_joined(log, kept, names, at, own[inside]), robot, options, said)
+    both = _joined(log, kept, names, at, own[inside])
+    options = replace(options, time_column=None)  # both share one now
+    (still, said_all), units = stations(both, robot, options, said)
     begin = still.epoch_ns * 1e-9
-    with_joints = replace(log, header=[*names], rows=[[repr(float(v)) for v in row] for row in q])
-    whole = joint_angles(
-        replace(with_joints, decimal='.'), robot, names, options, [], unit_of(names[0])
-    )
+    whole = joint_angles(log, robot, names, options, [], units)
     recording = replace(
         still,
         joints=JointMotion(times - begin, whole),

@@ -5,18 +5,21 @@
 from __future__ import annotations
 
 import re
+import unicodedata
+from collections.abc import Sequence
 
 MEASURED = {
-    'measurement', 'measured', 'meas', 'actual', 'act', 'tracker', 'laser', 'real', 'observed',
-    'ist', 'istwert', 'gemessen', 'messung', 'mess', 'messwert', 'current', 'feedback',
+    'measurement', 'measured', 'measure', 'meas', 'messen', 'actual', 'act', 'tracker', 'laser',
+    'real', 'observed', 'ist', 'istwert', 'gemessen', 'messung', 'mess', 'messwert', 'current',
+    'feedback',
 }  # fmt: skip
 """Before or after an axis: what an instrument saw, or an encoder."""
 TARGET = {
-    't', 'target', 'goal', 'nominal', 'cmd', 'command', 'commanded', 'desired', 'set', 'ref',
-    'soll', 'sollwert', 'vorgabe', 'nenn', 'programmed', 'planned',
+    't', 'target', 'goal', 'nominal', 'nom', 'design', 'cmd', 'command', 'commanded', 'desired', 'set',
+    'ref', 'soll', 'sollwert', 'vorgabe', 'nenn', 'programmed', 'planned',
 }  # fmt: skip
 DIFFERENCE = {
-    'dif', 'diff', 'difference', 'delta', 'err', 'error', 'dev', 'deviation',
+    'd', 'dif', 'diff', 'difference', 'delta', 'err', 'error', 'dev', 'deviation',
     'abweichung', 'differenz', 'fehler',
 }  # fmt: skip
 SIGMA = {
@@ -34,6 +37,8 @@ JOINT = {
     'achse', 'gelenk', 'winkel', 'angle', 'angles', 'pos', 'position',
 }  # fmt: skip
 """Words of which one at least goes with the number of a joint, and none that is not here."""
+EXTERNAL = {'e', 'eax', 'extax', 'ext', 'external', 'extern', 'zusatzachse'}
+"""With a number or a letter from a to f: an axis beside the arm, such as a track."""
 NAMES_A_JOINT = JOINT - {'angle', 'angles', 'winkel', 'pos', 'position'}
 LETTERS = ('s', 'l', 'u', 'r', 'b', 't')
 """The joints of six-axis arms of Yaskawa."""
@@ -62,15 +67,62 @@ UNITS = {
     'deg': 'deg', 'degree': 'deg', 'degrees': 'deg', '\N{DEGREE SIGN}': 'deg', 'grad': 'deg',
     's': 's', 'sec': 's', 'seconds': 's', 'sekunden': 's', 'ms': 'ms', 'us': 'us', 'ns': 'ns',
     '\N{DEGREE SIGN}c': 'degC', 'degc': 'degC', 'celsius': 'degC',
+    'micrometer': 'um', 'micrometers': 'um', '\N{GREEK SMALL LETTER MU}m': 'um', 'micron': 'um',
+    'inch': 'in', 'inches': 'in', 'zoll': 'in', 'mrad': 'mrad', 'kelvin': 'K',
+    '\N{DEGREE SIGN}f': 'degF', 'degf': 'degF', 'fahrenheit': 'degF',
 }  # fmt: skip
 """How units are written, and what this project calls them."""
+IN_BRACKETS = {
+    **UNITS, 'in': 'in', '"': 'in', 'k': 'K', 'f': 'degF', 'c': 'degC', '\'': 'ft', 'ft': 'ft',
+    'min': 'min', 'h': 'h', 'msec': 'ms', '\N{GREEK SMALL LETTER MU}s': 'us',
+}  # fmt: skip
+"""What is a unit between brackets alone, and may be a word of its own elsewhere."""
 TEMPERATURE = re.compile(r'temp')
 DATE = re.compile(r'^(date|datum)\b')
 CLOCK = re.compile(r'time|stamp|zeit|^t$')
 """With a column of dates beside it: the time of day."""
+_LISTED = 40
+"""Names that fit into a message."""
+_BRACKETS = re.compile(r'[\[(<{]([^\[\](){}<>]*)[\])>}]\s*$')
 
 
 def tokens(name: str) -> list[str]:
     """Return the words and numbers of a header cell, in lower case; 'istX' is two words."""
-    parted = re.sub(r'(?<=[a-zäöü])(?=[XYZ]\b)', ' ', name)
-    return [t for t in re.split(r'[^0-9a-zäöüß\N{DEGREE SIGN}]+', parted.lower()) if t]
+    cut = re.sub(r'(?<=[a-zäöü])(?=[XYZ]\b)', ' ', _plain(name))
+    return [t for t in re.split(r'[^0-9a-zäöüß\N{DEGREE SIGN}μ]+', cut.lower()) if t]
+
+
+def parted(name: str) -> tuple[list[str], str | None]:
+    """Return the words of a header cell without its unit, and the unit as this project has it."""
+    found = bracketed(name)
+    if found is not None:
+        return tokens(found[0]), IN_BRACKETS[unit_word(found[1])]
+    words = tokens(name)
+    if len(words) > 1 and words[-1] in UNITS:
+        return words[:-1], UNITS[words[-1]]
+    return words, None
+
+
+def bracketed(name: str) -> tuple[str, str] | None:
+    """Return a header cell before its unit in brackets, and that unit; None where it has none."""
+    found = _BRACKETS.search(name)
+    if found is None or unit_word(found[1]) not in IN_BRACKETS:
+        return None
+    return name[: found.start()].strip(), found[1].strip()
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Return names in a row, of very many the first."""
+    more = len(names) - _LISTED
+    return ', '.join(names[:_LISTED]) + (f' and {more:,} more' if more > 0 else '')
+
+
+def unit_word(text: str) -> str:
+    """Return a unit as the tables of units have it, without brackets."""
+    return _plain(text).strip('[]() ').lower()
+
+
+def _plain(text: str) -> str:
+    """Return a text with one sign for the degree and one for the micro, of the several in use."""
+    degrees = text.replace('\N{MASCULINE ORDINAL INDICATOR}', '\N{DEGREE SIGN}')
+    return unicodedata.normalize('NFKC', degrees)

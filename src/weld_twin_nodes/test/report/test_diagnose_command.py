@@ -29,6 +29,7 @@ FILES = {
     'robot.urdf',
     'joint_offsets.csv',
     'robot_effects.yaml',
+    '.weld_twin_files.json',
 }
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -33,15 +34,25 @@ def add_robot(parser: argparse.ArgumentParser, *, required: bool = True) -> None
         metavar='R',
         help='a bundled robot (weld-twin info --robots lists them), a robot file or a URDF',
     )
-    parser.add_argument('--base-link', metavar='LINK', help='first link of a chain in a URDF')
+    parser.add_argument(
+        '--base-link',
+        metavar='LINK',
+        help="first link of a chain in a URDF; the controller's base is there too",
+    )
     parser.add_argument('--tip-link', metavar='LINK', help='last link of a chain in a URDF')
+    parser.add_argument(
+        '--flange-link',
+        metavar='LINK',
+        help='link of a URDF where the controller has its flange; left out, tool0, flange or the '
+        'last one that moves, as the file has it',
+    )
 
 
 def robot_of(args: argparse.Namespace) -> Robot:
     """Return the robot the options name."""
     from weld_twin_msgs_py.robots import load_robot
 
-    return load_robot(args.robot, args.base_link, args.tip_link)
+    return load_robot(args.robot, args.base_link, args.tip_link, args.flange_link)
 
 
 def given_urdf(args: argparse.Namespace) -> GivenUrdf | None:
@@ -52,7 +63,7 @@ def given_urdf(args: argparse.Namespace) -> GivenUrdf | None:
     path = Path(args.robot)
     if path.suffix.lower() not in URDF_SUFFIXES:
         return None
-    return GivenUrdf(path, args.base_link, args.tip_link)
+    return GivenUrdf(path, args.base_link, args.tip_link, args.flange_link)
 
 
 def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
@@ -97,6 +108,12 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
         metavar='JOINT=NAME',
         help='joints of the robot and what the joint states call them, such as joint_1=A1',
     )
+    group.add_argument(
+        '--measured-inverse',
+        action='store_true',
+        help='the measured poses are those of something fixed seen from the arm, such as of a board '
+        'by a camera on the arm; they are inverted',
+    )
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
@@ -116,7 +133,12 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
             raise DataError(f"--joint-map takes JOINT=NAME, got '{text}'")
         pairs.append((joint, name))
     names = replace(TopicNames.within(args.namespace), **named)
-    return replace(names, joint_prefix=args.joint_prefix, joint_map=tuple(pairs))
+    return replace(
+        names,
+        joint_prefix=args.joint_prefix,
+        joint_map=tuple(pairs),
+        measured_inverse=args.measured_inverse,
+    )
 
 
 def add_pool(parser: argparse.ArgumentParser) -> None:
@@ -130,6 +152,44 @@ def add_pool(parser: argparse.ArgumentParser) -> None:
         metavar='ADDRESS',
         help='Dask cluster to run on instead; it must see the same directories',
     )
+
+
+def add_output(parser: argparse.ArgumentParser, text: str, default: str | None = None) -> None:
+    """Add the options of a command that writes a folder of files."""
+    parser.add_argument(
+        '--out', required=default is None, default=default, metavar='DIR', help=text
+    )
+    add_force(parser)
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """Add the option that settles what is in the way."""
+    parser.add_argument(
+        '--force',
+        action='store_true',
+        help='write also where files are in the way that weld-twin has not written, or that were '
+        'changed since; they are kept as NAME.kept-1',
+    )
+
+
+def output(args: argparse.Namespace, mark: str) -> AbstractContextManager[Path]:
+    """Return the folder that the options name, as `output_directory.new_directory` does."""
+    from ..offline.output_directory import new_directory
+
+    return new_directory(args.out, mark=mark, force=args.force)
+
+
+def add_file_output(parser: argparse.ArgumentParser, text: str, *, required: bool = False) -> None:
+    """Add the options of a command that writes one file."""
+    parser.add_argument('--out', required=required, metavar='FILE', help=text)
+    add_force(parser)
+
+
+def output_file(args: argparse.Namespace) -> AbstractContextManager[Path]:
+    """Return the file that the options name, as `output_directory.new_file` does."""
+    from ..offline.output_directory import new_file
+
+    return new_file(args.out, force=args.force)
 
 
 def add_bag_output(parser: argparse.ArgumentParser) -> None:

@@ -58,9 +58,16 @@ STEPS = (
 )
 
 
-def run_demo(out: Path | str, steps: tuple[Step, ...] = STEPS) -> None:
+def run_demo(out: Path | str, steps: tuple[Step, ...] = STEPS, *, force: bool = False) -> None:
     """
     Run the steps into a directory that appears when all are done.
+
+    Parameters
+    ----------
+    out : Path or str
+    steps : tuple of Step
+    force : bool
+        As `new_directory` takes it.
 
     Raises
     ------
@@ -70,7 +77,7 @@ def run_demo(out: Path | str, steps: tuple[Step, ...] = STEPS) -> None:
     """
     console = Console()
     robot = catalog.load(ROBOT)
-    with new_directory(out, mark=MARK) as folder:
+    with new_directory(out, mark=MARK, force=force) as folder:
         job = Job(folder, robot, effects_from_list(EFFECTS, robot), SEAM, RATE, SEED)
         columns = TextColumn('{task.description:<40}'), BarColumn(), TimeElapsedColumn()
         with Progress(*columns, console=console) as bars:

@@ -12,11 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core.errors import TwinError
+from weld_twin_msgs_py.files.scratch import Scratch
 
 from ..guarded import Guarded, Limits, Outcome
 from ..history import entry_of
 from ..history.plain_entry import plain
 from ..history.runs import DONE, FAILED, REFUSED, UNSOUND, Run
+from ..offline.output_directory import new_directory
+from ..report.diagnosis_files import RESULT
 from .listed import Listed
 
 STATES = {0: DONE, 2: REFUSED, 3: UNSOUND}
@@ -38,14 +41,13 @@ def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, 
         Directory for what the command wrote; empty to keep nothing.
 
     """
-    with tempfile.TemporaryDirectory(prefix='fleet-') as place:
-        out = Path(place) / 'found'
+    with Scratch(Path(tempfile.gettempdir()), 'weld_twin-fleet-') as place:
+        out = place / 'found'
         done = _warm(limits).run(listed.words(out))
         state, sentence, entry = _read(listed, done, out)
         if keep and out.is_dir():
-            target = Path(keep) / key
-            shutil.rmtree(target, ignore_errors=True)
-            shutil.copytree(out, target)
+            with new_directory(Path(keep) / key, mark=RESULT, force=True) as kept:
+                shutil.copytree(out, kept, dirs_exist_ok=True)
     run = Run(key, listed.cell, listed.recording, state, sentence, done.seconds, done.memory)
     return {'run': asdict(run), 'entry': entry}
 

@@ -63,12 +63,12 @@ def placed(node: CellNode, robot: Robot) -> Robot:
     """
     values = node.setting('T_measuring_base')
     if values is not None:
-        return robot.with_frames(base=frame_from(values))
+        return robot.with_origin(frame_from(values))
     if not node.setting('base_from_tf'):
         return robot
     if node.arm is not None:  # it was asked for when the node took its robot
         return robot.with_frames(base=node.arm.T_world_base)
-    return robot.with_frames(base=base_on_tf(node))
+    return robot.with_origin(base_on_tf(node))
 
 
 def placed_twin(node: CellNode, twin: Twin) -> Twin:

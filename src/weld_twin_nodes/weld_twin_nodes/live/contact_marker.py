@@ -11,9 +11,9 @@ import numpy as np
 from std_srvs.srv import Trigger
 
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import CONTACT, JOINT_STATES
-from weld_twin_msgs_py.tables import quoted
 
 from .cell_node import CellNode
 from .run_node import run
@@ -101,8 +101,8 @@ class ContactMarker(CellNode):
             new = not path.exists()
             with path.open('a', encoding='utf-8') as file:
                 if new:
-                    file.write(','.join((*names, 'contact')) + '\n')
-                file.write(','.join((*(repr(float(v)) for v in q), quoted(label))) + '\n')
+                    file.write(csv_text((*names, 'contact'), []))
+                file.write(csv_text((*q.tolist(), label), []))
         except OSError as error:
             raise DataError(f"table '{path}' cannot be written: {error.strerror}") from None
 

@@ -39,7 +39,7 @@ class DeviationMarkers(CellNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('deviation_markers', **kwargs)
-        self._rotation = robot_of(self).T_world_base[:3, :3]
+        self._rotation = robot_of(self).T_world_origin[:3, :3]
         self._frame = measuring_frame(self)
         self._markers = self.offer(MARKERS)
         self.time_went_back()

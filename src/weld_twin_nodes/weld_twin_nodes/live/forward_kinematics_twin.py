@@ -63,7 +63,7 @@ class ForwardKinematicsTwin(ModelNode):
 
     def _tell_base(self) -> None:
         """Tell where the base is by the model: a model that was aligned has fitted it."""
-        base = self.stream.twin.robot.T_world_base
+        base = self.stream.twin.robot.T_world_origin
         now = self.get_clock().now().nanoseconds
         self._base.publish(self._encode(now, base[:3, 3], base[:3, :3]))
 

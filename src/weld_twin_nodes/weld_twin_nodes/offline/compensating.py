@@ -23,7 +23,7 @@ from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
-from .prediction import Predictor, Stretch, write_outside
+from .prediction import Predictor, Stretch, beside_bag
 from .told_twin import build_twin
 
 WHOLE = 0.999
@@ -130,9 +130,8 @@ def write_compensated(
         covariance=made.model.covariances(commands),
         storage=storage,
         provenance={'compensated_with': [effect.to_mapping() for effect in twin.effects]},
+        beside=beside_bag(made.model, made.outside),
     )
-    if made.model.posterior is not None:
-        write_outside(Path(path), made.outside)
 
 
 def told_trust(made: Compensated) -> list[str]:

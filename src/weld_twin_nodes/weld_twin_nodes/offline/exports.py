@@ -17,6 +17,7 @@ from weld_twin_core.diagnosis.soundness.mending import reading_map
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.twin.corrected import corrected, joint_offsets
+from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
@@ -48,17 +49,16 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     del notes
     robot = model.robot
     offsets = joint_offsets(robot, _causes(model)) + _zeros(model)
-    rows = [
-        *(f'# {line}' for line in _readings(model)),
-        'joint,offset,unit,shown,shown_unit,meaning',
-    ]
+    rows = []
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
         units = ('m', 'mm') if slides else ('rad', 'deg')
         told = f'{stands(name, offset, sliding=slides)} {to_mend(offset, sliding=slides)}'
-        meaning = f'"{told}"' if offset else ''
-        rows.append(f'{name},{float(offset)!r},{units[0]},{shown:.6f},{units[1]},{meaning}')
-    write_text(path, '\n'.join(rows) + '\n', overwrite=True)
+        meaning = told if offset else ''
+        rows.append((name, float(offset), units[0], f'{shown:.6f}', units[1], meaning))
+    remarks = ''.join(f'# {line}\n' for line in _readings(model))
+    table = csv_text(('joint', 'offset', 'unit', 'shown', 'shown_unit', 'meaning'), rows)
+    write_text(path, remarks + table, overwrite=True)
 
 
 def write_effects(path: Path, model: Model, notes: Sequence[str]) -> None:

@@ -13,6 +13,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.predicting.planned import plan_stations
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.programs import Context
@@ -26,6 +27,8 @@ YASKAWA = 'SLURBT'
 """What pendants call the joints."""
 MOST = 120
 """Stations of a plan: more make a model surer by less than one in a hundred each."""
+MOST_ASKED = 500
+"""Stations that may be asked for: at ten seconds each and the way between them, two hours."""
 LEAST = 24
 """Stations below which a fit names too little of what is there: plans that were carried out with 16
 left up to six times what was promised (docs/first_measurement.md)."""
@@ -61,10 +64,11 @@ class Planned:
 def planned(
     robot: Robot,
     tolerance: float,
-    minutes: float,
+    minutes: float | None,
     noise: float,
     seconds: float,
     spread: float,
+    postures: int | None = None,
 ) -> Planned:
     """
     Return the stations that a first measurement needs.
@@ -73,21 +77,27 @@ def planned(
     ----------
     robot : Robot
     tolerance : float [m]
-    minutes : float
-        There is time for.
+    minutes : float, optional
+        There is time for; left out, as many as ``postures`` take.
     noise : float [m]
         Of every measured coordinate.
     seconds : float [s]
         That one station takes, the way to it apart.
     spread : float [rad]
         Half the range of every joint.
+    postures : int, optional
+        So many stations and no other number; left out, as many as the tolerance needs.
 
     Raises
     ------
     DataError
-        There is no time for the fewest stations that can be judged.
+        There is no time for the fewest stations that can be judged, or for those asked for.
 
     """
+    if postures is not None:
+        return _so_many(robot, postures, minutes, (tolerance, noise, seconds, spread))
+    if minutes is None:
+        raise DataError('say for how long there is time, or how many postures are wanted')
     most = int(min(60.0 * minutes / seconds, MOST))
     if most >= LEAST:
         plan = plan_stations(robot, most, tolerance, noise, spread)
@@ -103,6 +113,24 @@ def planned(
     count = needed or most
     q = plan.q[:count][_way(robot, plan.q[:count])]
     return Planned(q, took[: most + 1], plan.sigma[: most + 1], plan.within[: most + 1], needed)
+
+
+def _so_many(
+    robot: Robot, count: int, minutes: float | None, given: tuple[float, float, float, float]
+) -> Planned:
+    """Return so many stations, however sure they make one."""
+    tolerance, noise, seconds, spread = given
+    if not LEAST <= count <= MOST_ASKED:
+        raise DataError(f'{count} postures are asked for; a plan has {LEAST} to {MOST_ASKED}')
+    plan = plan_stations(robot, count, tolerance, noise, spread)
+    q = plan.q[_way(robot, plan.q)]
+    took = _took(robot, plan.q, seconds)
+    if minutes is not None and took[-1] > minutes:
+        raise DataError(
+            f'{count} postures take {took[-1]:.1f} minutes, and there is time for {minutes:g}; '
+            'give more time or fewer postures'
+        )
+    return Planned(q, took, plan.sigma, plan.within, count)
 
 
 def _took(robot: Robot, q: Array, seconds: float) -> Array:
@@ -155,11 +183,14 @@ def write_plan(folder: Path, context: Context, language: str | None, plan: Plann
     labels = [
         f'{name} [{unit}]' for name, unit in zip(_labels(robot, language), units, strict=True)
     ]
-    rows = [','.join(['station', *labels, 'x [mm]', 'y [mm]', 'z [mm]'])]
-    for k, q in enumerate(plan.q, start=1):
-        cells = [f'{value:.4f}' for value in shown.numbers(q, [])]
-        rows.append(','.join([str(k), *cells, '', '', '']))
-    write_text(folder / TABLE, '\n'.join(rows) + '\n')
+    point = [f'{axis} [mm]' for axis in 'xyz']
+    if set(point) & set(labels):  # slides of a gantry may be called x, y, z, too
+        point = [f'measured {name}' for name in point]
+    rows = [
+        [k, *(f'{value:.4f}' for value in shown.numbers(q, [])), *[''] * len(point)]
+        for k, q in enumerate(plan.q, start=1)
+    ]
+    write_text(folder / TABLE, csv_text(['station', *labels, *point], rows))
 
 
 def _labels(robot: Robot, language: str | None) -> list[str]:

@@ -30,7 +30,6 @@ from weld_twin_msgs_py.files.diagnosis_model import (
 )
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
-from weld_twin_msgs_py.files.whole_files import write_text
 
 from .told_twin import build_twin
 
@@ -242,9 +241,8 @@ def write_prediction(
         deviation=deviation,
         storage=storage,
         provenance={**made, **(provenance or {})},
+        beside=beside_bag(model, outside),
     )
-    if model.posterior is not None:
-        write_outside(Path(path), outside)
     return Written(
         None if deviation is None else float(np.sqrt((deviation**2).sum(axis=1).mean())),
         outside,
@@ -258,13 +256,15 @@ def _deviation(twin: Twin, recording: Recording) -> Array | None:
     if measured is None or not measured.t.size:
         return None
     gap = measured.position - twin.poses(recording, measured.t).position
-    return np.asarray(gap @ twin.robot.T_world_base[:3, :3])
+    return np.asarray(gap @ twin.robot.T_world_origin[:3, :3])
 
 
-def write_outside(bag: Path, outside: Sequence[Stretch]) -> None:
-    """Write the stretches outside what was recorded into a bag's directory."""
+def beside_bag(model: Predictor, outside: Sequence[Stretch]) -> dict[str, str]:
+    """Return what lies in the bag's directory: the stretches outside what was recorded."""
+    if model.posterior is None:
+        return {}
     content = {'outside': [stretch._asdict() for stretch in outside]}
-    write_text(bag / BESIDE, json.dumps(content, indent=1) + '\n')
+    return {BESIDE: json.dumps(content, indent=1) + '\n'}
 
 
 def told_sureness(model: Predictor, got: Written) -> list[str]:

@@ -38,7 +38,8 @@ class SetUpChange:
     kind : str
         'load', 'tool' or 'instrument'.
     numbers : tuple of float
-        Of a load its mass [kg] and, where given, its centre of mass in the tool frame [m].
+        Of a load its mass [kg], below 0 where it was taken off, and, where given, its centre of mass
+        in the tool frame [m].
 
     """
 
@@ -69,8 +70,11 @@ def set_up_change(text: str) -> SetUpChange:
         raise DataError(
             f"what was changed is 'load=KG', 'load=KG,X,Y,Z', 'tool' or 'instrument', got '{text}'"
         )
-    if kind == 'load' and not 0.0 < numbers[0] < HEAVIEST:
-        raise DataError(f'a load is given in kg, above 0 and below {HEAVIEST:g}, got {text!r}')
+    if kind == 'load' and not 0.0 < abs(numbers[0]) < HEAVIEST:
+        raise DataError(
+            f'a load is given in kg, not 0 and below {HEAVIEST:g}, or below 0 where one was taken '
+            f'off; got {text!r}'
+        )
     return SetUpChange(kind, numbers)
 
 
@@ -112,11 +116,12 @@ def _loaded(recording: Recording, numbers: Sequence[float], robot: Robot) -> Rec
     if recording.wrench is not None:
         return recording
     t, poses = recording.joints.t, forward(robot, recording.joints.q)
-    force = np.tile(numbers[0] * robot.gravity, (t.size, 1))
-    tools = robot.T_world_base[:3, :3].T @ poses[:, :3, :3]
+    pull = numbers[0] * (robot.T_base_origin[:3, :3].T @ robot.gravity)
+    force = np.tile(pull, (t.size, 1))
+    tools = robot.T_world_origin[:3, :3].T @ poses[:, :3, :3]
     torque = np.cross(tools @ np.array(numbers[1:] or (0.0, 0.0, 0.0)), force)
-    pull = Signal(t, np.concatenate([force, torque], axis=1))
-    return replace(recording, wrench=pull, wrench_frame='base')
+    wrench = Signal(t, np.concatenate([force, torque], axis=1))
+    return replace(recording, wrench=wrench, wrench_frame='base')
 
 
 def _seen_from_before(recording: Recording, robot: Robot) -> Recording:

@@ -10,6 +10,8 @@ from weld_twin_core.twin.posterior import Posterior
 AS_GOOD = 1.1
 """Ratio of what a robot file leaves to what the whole model leaves up to which either may be taken: less
 is a matter of the stretches left out."""
+NOTHING_KNOWN = 3e-3
+"""Spread [m] from which a model knows nothing of a place: an arm as delivered is off by no more."""
 _BESIDES = 'noise and what no parameter explains come on top'
 
 
@@ -19,7 +21,10 @@ def where_it_holds(posterior: Posterior) -> list[str]:
         f'{v * 1e3:.2g} mm' for v in (posterior.recorded_m, posterior.anywhere_m)
     )
     out = [
-        f'The whole model is known to {recorded} where it was measured, but only to {anywhere} '
+        f'The whole model is known to {recorded} where it was measured (one standard deviation), and '
+        f'nothing is known of elsewhere in its reach: the postures are too alike; {_BESIDES}.'
+        if posterior.anywhere_m > NOTHING_KNOWN
+        else f'The whole model is known to {recorded} where it was measured, but only to {anywhere} '
         f'elsewhere in its reach (one standard deviation each); {_BESIDES}.'
         if anywhere != recorded
         else f'The whole model is known to {recorded} (one standard deviation); {_BESIDES}.'
@@ -37,6 +42,11 @@ def elsewhere(posterior: Posterior, corrected: bool) -> str:
     """
     if not corrected:
         return 'All this holds where it was measured, and says nothing of elsewhere in its reach.'
+    if posterior.anywhere_m > NOTHING_KNOWN:
+        return (
+            'All this holds where it was measured. Of elsewhere in its reach these recordings tell '
+            'nothing: the postures are too alike. Measure there before you weld there.'
+        )
     return (
         'All this holds where it was measured. Elsewhere in its reach the corrected robot may still '
         f'be off by {posterior.anywhere_m * 1e3:.2g} mm (one standard deviation): measure there '

@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from typing import Any
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_msgs_py.files import markdown
+from weld_twin_msgs_py.files.csv_text import csv_text
 
 from ..offline.task_pool import Runner, Task
 from .work import claim_case
@@ -53,21 +52,14 @@ def run_claims(
 
 def claims_csv(result: dict[str, Any]) -> str:
     """Return the table with a row for every claim."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator='\n')
     keys = ('claim', 'statement', 'where', 'verdict', 'held', 'cases', 'reason')
-    writer.writerow(keys)
-    writer.writerows([claim[key] for key in keys] for claim in result['claims'])
-    return out.getvalue()
+    return csv_text(keys, ([claim[key] for key in keys] for claim in result['claims']))
 
 
 def cases_csv(result: dict[str, Any]) -> str:
     """Return every measurement of every case."""
-    out = io.StringIO()
-    writer = csv.DictWriter(out, list(result['cases'][0]), lineterminator='\n')
-    writer.writeheader()
-    writer.writerows(result['cases'])
-    return out.getvalue()
+    keys = list(result['cases'][0])
+    return csv_text(keys, ([case.get(key, '') for key in keys] for case in result['cases']))
 
 
 def claims_markdown(result: dict[str, Any]) -> str:

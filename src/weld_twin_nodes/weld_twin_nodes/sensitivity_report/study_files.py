@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator, Sequence
 from math import isfinite
@@ -17,6 +15,7 @@ import numpy as np
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_core.sensitivity import Tolerance
+from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 
@@ -24,7 +23,7 @@ from .claims_table import cases_csv, claims_csv, claims_markdown
 from .figures import Drawing
 
 RESULT, CLAIMS, PAGE = 'sensitivity.json', 'claims.json', 'sensitivity.html'
-TASKS = 'tasks'
+TASKS, FIGURES = 'tasks', 'figures'
 
 
 def study_directory(path: Path | str) -> Path:
@@ -89,11 +88,8 @@ def _finite(value: Any) -> Any:
 
 def indices_csv(result: dict[str, Any]) -> str:
     """Return every index of every motion, grouping and output, a row each."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator='\n')
-    writer.writerow(('motion', 'by', 'output', 'name', 'S1', 'S1_half', 'ST', 'ST_half'))
-    writer.writerows(_rows(result))
-    return out.getvalue()
+    header = ('motion', 'by', 'output', 'name', 'S1', 'S1_half', 'ST', 'ST_half')
+    return csv_text(header, _rows(result))
 
 
 def _rows(result: dict[str, Any]) -> Iterator[list[Any]]:

@@ -21,10 +21,10 @@ from ..guarded import Guarded, Outcome
 from ..history import entry_of
 from ..history.database import Database
 from ..history.runs import Runs
+from .directory import Directory
 from .job import (
     DONE,
     FAILED,
-    FILE,
     FOUND,
     IMPORTED,
     OPEN,
@@ -58,9 +58,7 @@ class Queue:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._place = settings.directory / 'jobs'
-        self._place.mkdir(parents=True, exist_ok=True)
-        settings.directory.chmod(0o700)
+        self._directory = Directory(settings.directory)
         self._news = threading.Condition()
         self._stopped = False
         self._jobs = {job.key: job for job in self._kept()}
@@ -73,10 +71,7 @@ class Queue:
     def _kept(self) -> list[Job]:
         """Return the jobs of the folders; what was running waits again."""
         out = []
-        for folder in self._place.iterdir():
-            if not (folder / FILE).is_file():
-                shutil.rmtree(folder, ignore_errors=True)  # an upload that was cut off
-                continue
+        for folder in self._directory.kept():
             job = Job.read(folder)
             if job.state in OPEN:
                 job = replace(job, state=WAITING, said='')
@@ -85,11 +80,11 @@ class Queue:
 
     def folder(self, job: Job) -> Path:
         """Return the folder of a job."""
-        return self._place / job.key
+        return self._directory.jobs / job.key
 
     def user_folder(self, user: str) -> Path:
         """Return the folder of a user; it is there once something was kept in it."""
-        return self._settings.directory / 'users' / user
+        return self._directory.users / user
 
     def check_room(self, user: str) -> None:
         """
@@ -143,6 +138,7 @@ class Queue:
         Guarded.end_all()
         for worker in self._workers:
             worker.join(timeout=5.0)
+        self._directory.close()
 
     def _set(self, job: Job) -> None:
         with self._news:

@@ -57,7 +57,7 @@ class Deviations:
         *,
         base_told: bool = False,
     ) -> None:
-        self._rotation_base_world = robot.T_world_base[:3, :3].T
+        self._rotation_base_world = robot.T_world_origin[:3, :3].T
         self._pairing = Pairing(depth, max_gap)
         self._path_length = path_length
         self._metrics = RunningMetrics(path_length)

@@ -8,7 +8,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ...arm.controller_lookup import controller_frames
 from ...arm.robot import Robot
+from ...arm.rotation import rotation_matrix
 from ...arrays import Array
 from ...effects.effect import Effect
 from .readable import frame, metres, number, radians, size, turn
@@ -77,8 +79,15 @@ def _of_the_base(step: Array) -> str:
     return frame(step, 'of the measuring frame', _OF_THE_BASE)
 
 
+def _of_the_origin(step: Array, robot: Robot) -> Array:
+    """Return the move of the base of the rows, (6,) [m, rad], as one of the controller's base."""
+    lever = robot.T_world_origin[:3, 3] - robot.T_world_base[:3, 3]
+    swing = rotation_matrix(step[3:]) @ lever - lever
+    return np.concatenate([step[:3] + swing, step[3:]])
+
+
 def _base_pose(effect: Effect, robot: Robot) -> str:
-    moved = _of_the_base(effect.vector())
+    moved = _of_the_base(_of_the_origin(effect.vector(), robot))
     return (
         f'Correct the base frame by {moved}. If it was right when it was measured, the arm has '
         'moved: check the bolts of its foot.'
@@ -86,7 +95,9 @@ def _base_pose(effect: Effect, robot: Robot) -> str:
 
 
 def _tool_pose(effect: Effect, robot: Robot) -> str:
-    moved = frame(effect.vector(), 'of the flange', 'of the tool')
+    flange = controller_frames(robot).flange[:3, :3]
+    step = np.concatenate([flange.T @ effect.vector()[:3], effect.vector()[3:]])
+    moved = frame(step, 'of the flange', 'of the tool')
     return f'Correct the tool centre point by {moved}; a bent torch looks like this too.'
 
 

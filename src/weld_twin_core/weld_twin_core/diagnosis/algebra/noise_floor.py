@@ -16,6 +16,13 @@ SAME_STATION = 2e-3
 """Stations closer than this in every joint [rad, m] are repeats of one pose."""
 ENOUGH = 12
 """Samples, or repeats, from which on a median tells the noise to a quarter."""
+WIDEST = 3.5e-4
+"""
+Noise of a coordinate [m] beyond which what a model leaves is not taken for an instrument's.
+
+Trackers have 0.01 to 0.1 mm, optical ones and good cameras 0.1 to 0.35 mm. Noise that is wider has to
+show by itself, in repeats or differences, or be told with the data: a misfit looks the same.
+"""
 
 
 class NoiseFloor(NamedTuple):
@@ -56,7 +63,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
     independent = True
     for recording, part in zip(problem.recordings, residuals, strict=True):
         position = measured_axes(part[:3])
-        left = robust_spread(position)
+        left = _left(position)
         static = recording.joints.static
         direct = _repeats(recording.joints.q, position) if static else _differences(position)
         if direct is None and recording.measured is not None:
@@ -65,10 +72,15 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
             independent = False
         # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
         share = float(np.sqrt(position.shape[0] / 3.0))
-        least = left if direct is None else min(direct, left)
+        least = min(left, WIDEST) if direct is None else min(direct, left)
         estimates.append((share * least, part.shape[1]))
     values, counts = zip(*estimates, strict=True)
     return NoiseFloor(float(np.average(values, weights=counts)), independent)
+
+
+def _left(position: Array) -> float:
+    """Return the spread of what a model leaves; two heaps are no wider than they are apart."""
+    return min(robust_spread(position), float(np.sqrt((position**2).mean())))
 
 
 def _differences(position: Array) -> float | None:

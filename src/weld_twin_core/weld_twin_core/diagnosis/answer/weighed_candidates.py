@@ -60,5 +60,5 @@ def unexplained(
     case = Weighed(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
     if verdict.status == 'unknown' and placing is not None and placing.parts:
-        names = tuple(dict.fromkeys(str(part.group) for part in placing.parts))
+        names = tuple(dict.fromkeys(part.words for part in placing.parts))
     return Unexplained(shrink.rms_after_m, case.above_noise, names)

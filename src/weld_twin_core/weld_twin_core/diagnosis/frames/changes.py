@@ -37,6 +37,8 @@ ROWS = 9000
 SURE = 3.0
 """A change is told from this many standard errors on; of several numbers, the root of their mean
 chi-square. One in four hundred by chance."""
+REWEIGHTED = 6
+"""Fits with the weights of the last: so many until an outlier of a hundred noises has lost its own."""
 UNTOLD = 0.9
 """A coordinate whose spread after the data is this share of that before is not shown by them."""
 
@@ -118,23 +120,22 @@ def with_changes(
     found = model.found
     if not found:
         # What all recordings have in common must not pass for what differs between them.
-        model, precision = model.with_found(_geometry(model.robot)), None
+        model, precision = model.with_found(constant_errors(model.robot)), None
     prior = effect_precision(model) if precision is None else precision
     every = replace(problem.thinned(ROWS), changes=candidates)
-    free = _fitted(every, replace(model, changes=candidates), prior)
-    residual = every.residuals(free)
     count = sum(c.effect.coordinates().size for c in candidates) + prior.size
-    # Without weights: a recording that differs much must not count as a handful of outliers.
-    scale = robust_scale(every, residual, freedom=float(min(count, every.size // 2)))
+    freedom = float(min(count, every.size // 2))
+    free, scale = _freed(every, replace(model, changes=candidates), prior, freedom)
     chosen = _chosen(every, free, scale, prior, beliefs)
     picked = tuple(candidates[i] for i in sorted(chosen))
-    problem = replace(problem, changes=picked)
     model = replace(free, changes=tuple(free.changes[i] for i in sorted(chosen)))
-    model = _fitted(problem, model, prior)
+    few = replace(every, changes=picked)
+    model = fit(few, model, scale, prior, iterations=8).model
+    problem = replace(problem, changes=picked)
     return problem, model if found else model.with_found(())
 
 
-def _geometry(robot: Robot) -> tuple[Effect, ...]:
+def constant_errors(robot: Robot) -> tuple[Effect, ...]:
     """Return every constant error of every joint, at zero."""
     kinds = [
         k for k in REGISTRY.values() if k.cause and _constant(k) and k.of in ('joint', 'link')
@@ -156,11 +157,23 @@ def _candidates(problem: Problem, robot: Robot, families: Sequence[str]) -> tupl
     return tuple(out)
 
 
-def _fitted(problem: Problem, model: Model, precision: Array) -> Model:
-    """Return the model after a fit in which every sample counts."""
+def _freed(
+    problem: Problem, model: Model, precision: Array, freedom: float
+) -> tuple[Model, Scale]:
+    """
+    Return the model with everything free that may differ, and the noise that it leaves.
+
+    First every sample counts: a recording that differs much must not pass for a handful of outliers.
+    Once the differences are fitted, what is far off is an outlier, and it loses its weight in every
+    later fit; one of 10 mm would else make the noise of all.
+    """
     scale = robust_scale(problem, problem.residuals(model))
     even = replace(scale, weights=tuple(np.ones(m) for m in problem.samples))
-    return fit(problem, model, even, precision, iterations=8).model
+    model = fit(problem, model, even, precision, iterations=8).model
+    for _ in range(REWEIGHTED):
+        scale = robust_scale(problem, problem.residuals(model), freedom=freedom)
+        model = fit(problem, model, scale, precision, iterations=4).model
+    return model, robust_scale(problem, problem.residuals(model), freedom=freedom)
 
 
 def _chosen(

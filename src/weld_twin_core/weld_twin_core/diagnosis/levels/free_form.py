@@ -18,6 +18,9 @@ from .groups import Group, all_groups, wandering_groups
 from .sparse_groups import choosing, chosen, rival_weights, worth
 from .whole_arm import whole_arm_groups
 
+STANDS_OUT, NAMED = 0.5, 3
+"""Weight from which one place is named alone, and how many are named where none has it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -47,6 +50,14 @@ class Part:
             name = str(getattr(group, kind))
             out[name] = out.get(name, 0.0) + weight
         return dict(sorted(out.items(), key=lambda item: -item[1]))
+
+    @property
+    def words(self) -> str:
+        """Return the group as people read it, or the places where none stands out."""
+        places = self.weight_of('at')
+        if max(places.values(), default=1.0) > STANDS_OUT:
+            return str(self.group)
+        return ' or '.join(list(places)[:NAMED])
 
 
 @dataclass(frozen=True, eq=False)

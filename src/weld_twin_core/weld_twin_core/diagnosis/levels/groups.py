@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...arm.dynamics import wrench_rotation
 from ...arrays import Array
 from ...effects.curve import QUANTITIES
 from ...effects.effect import Effect
@@ -279,7 +280,8 @@ def _yielding(problem: Problem, k: int, maker: Features) -> Array:
     out = np.zeros((3, 6, wrench.shape[0]))
     force = wrench[:, :3]
     if maker.view.wrench_frame != 'tool':
-        force = np.einsum('mji,mj->mi', rotation, force)
+        axes = wrench_rotation(maker.view.robot, maker.view.frames, 'base')
+        force = np.einsum('mji,mj->mi', rotation, (axes @ force[..., None])[..., 0])
     for axis in range(3):
         out[axis, :3] = (rotation[:, :, axis] * force[:, axis, None]).T
     return problem.seen(k, out)

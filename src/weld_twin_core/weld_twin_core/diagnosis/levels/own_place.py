@@ -87,7 +87,7 @@ def beside_names(found: Search, unseen: Unseen) -> list[Beside]:
     out = []
     for at, on, columns in _forms(problem, unseen.scale, features, {e.at for e in model.found}):
         own = [s for e, s in zip(model.found, sizes, strict=True) if at in (e.at, 'instrument')]
-        gain, steady, fall = _worse_of([_told(base, columns) for base in bases])
+        gain, steady, fall = worse_of([told_by(base, columns) for base in bases])
         share = float(np.sqrt(max(fall, 0.0))) / max([*own, 1e-12])
         out.append(Beside(at, on, gain, steady, share))
     return out
@@ -139,7 +139,7 @@ def _lost(problem: Problem, k: int, maker: Features, features: list[Features], i
     return np.asarray(problem.seen(k, maker.column(('q', i))) * np.array(shapes)[:, None, :])
 
 
-def _told(base: Base, columns: Array) -> tuple[float, float, float]:
+def told_by(base: Base, columns: Array) -> tuple[float, float, float]:
     """Return what columns take off the squared unseen error: share, steadiness, mean square."""
     labels = base.unseen.labels
     names = np.unique(labels)
@@ -155,7 +155,7 @@ def _told(base: Base, columns: Array) -> tuple[float, float, float]:
     return told
 
 
-def _worse_of(ways: Sequence[tuple[float, float, float]]) -> tuple[float, float, float]:
+def worse_of(ways: Sequence[tuple[float, float, float]]) -> tuple[float, float, float]:
     """Return the least of each over the ways of leaving out."""
     gains, steadies, falls = zip(*ways, strict=True)
     return min(gains), min(steadies), min(falls)

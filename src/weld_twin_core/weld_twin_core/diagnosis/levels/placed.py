@@ -13,6 +13,7 @@ from ..algebra.fit import robust_fit, robust_scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..verdict.decision import Verdict
+from .arm_or_field import arm_first
 from .curved import ROWS, Curved
 from .formulas import Missed
 from .free_form import FreeForm, Part, free_form
@@ -55,6 +56,7 @@ def placed(
     form = _grouped(found, rival, beliefs)
     if any(one.on == 'place' for one in missed.forms):
         form = _with_field(form, beliefs)
+    form = arm_first(found, form, ROWS, beliefs)
     return _with_scatter(form, missed.scattered)
 
 

@@ -45,7 +45,9 @@ STEPS = 4
 """Steps of a fit that starts nearby; constants are nearly linear."""
 
 
-def alone(problem: Problem, model: Model, shrink: Shrink) -> Alone | None:
+def alone(
+    problem: Problem, model: Model, shrink: Shrink, *, many: bool = False
+) -> Alone | None:
     """
     Return what is left with the constants of a model alone, and how they are best changed for that.
 
@@ -56,6 +58,9 @@ def alone(problem: Problem, model: Model, shrink: Shrink) -> Alone | None:
         The whole model, fitted.
     shrink : Shrink
         What the whole model leaves on data that were not fitted.
+    many : bool
+        Whether many small errors were fitted together, of which none is certain by itself. Else
+        constants that were found mean the arm, and stay: frames and other zeros give way.
 
     Returns
     -------
@@ -75,7 +80,7 @@ def alone(problem: Problem, model: Model, shrink: Shrink) -> Alone | None:
     out = Alone((), recorded, unseen, whole, shrink.rms_after_m)
     if not _left(model):
         return out
-    start = _freed(constants)
+    start = _freed(constants, many=many)
     scale = replace(scale, position=max(scale.position, recorded / np.sqrt(3.0)))
     tried = max(_left_out(problem, start, scale, good, rows) for rows in _folds(problem))
     if tried >= LEAST_GAIN * unseen:
@@ -103,18 +108,20 @@ def _constants(model: Model) -> Model:
     return replace(model, known=(), found=held, changes=())
 
 
-def _freed(constants: Model) -> Model:
-    """Return the model with the zero of every joint beside the constants that it has."""
+def _freed(constants: Model, *, many: bool) -> Model:
+    """Return the model with zeros of all joints to be fitted beside the constants that it has."""
     own = {(effect.name, effect.site) for effect in constants.found}
     robot = constants.robot
-    more = [
+    more = tuple(
         kind(joint)  # type: ignore[call-arg]
         for kind in REGISTRY.values()
         if kind.set_at_controller
         for joint in joints_of(kind, robot.joint_names)
         if (kind.name, joint) not in own
-    ]
-    return constants.with_found((*constants.found, *more))
+    )
+    if many:
+        return constants.with_found((*constants.found, *more))
+    return replace(constants, known=constants.found, found=more)
 
 
 def _fitted(problem: Problem, start: Model, scale: Scale) -> Model:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arm.chain import frames
+from ...arm.mounting import rising
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...errors import DataError
@@ -40,8 +41,11 @@ link, and not so wide that a reflector turns away from the instrument or an arm 
 SLIDE = 0.3
 """The same of a joint that slides [m]."""
 CLEAR = 0.1
-"""Least height of wrist and tool above the base plane, and distance from the base's axis, in
-reaches: what keeps most postures out of the floor and the arm's own column."""
+"""Least height of wrist and tool above the plane that the base stands on or hangs from, and distance
+from the base's axis, in reaches: what keeps most postures out of the floor and the arm's column."""
+NEARER = 0.5
+"""Share of the room that the posture of the usual seam has, if that is less than `CLEAR`, and that the
+stations keep: a seam on a wall may lie near the plane that the arm is fixed to."""
 CANDIDATES = 160
 """Stations to choose from; twice as many make the choice better by per cents."""
 JUDGED = 48
@@ -134,14 +138,21 @@ def clear_postures(robot: Robot, spread: float) -> Array:
     half = np.where(robot.prismatic, SLIDE, spread)
     low, high = np.maximum(centre - half, robot.lower), np.minimum(centre + half, robot.upper)
     q = low + halton(robot.n, TRIED) * (high - low)
-    still = robot.with_frames(base=np.eye(4))
-    chain = frames(still, q)
-    wrist = [np.broadcast_to(row.z_point.T, (TRIED, 3)) for row in chain.rows[robot.n // 2 :]]
-    points = np.stack([*wrist, chain.flange_point, chain.position], axis=1)
     least = CLEAR * float(abs(robot.a).sum() + abs(robot.d).sum())
-    above = points[..., 2].min(axis=1) > least
-    off = np.linalg.norm(points[..., :2], axis=-1).min(axis=1) > least
+    (height,), (side,) = _room(robot, centre[None])
+    heights, sides = _room(robot, q)
+    above = heights > min(least, height - NEARER * abs(height))
+    off = sides > min(least, NEARER * side)
     return np.asarray(q[above & off])
+
+
+def _room(robot: Robot, q: Array) -> tuple[Array, Array]:
+    """Return the least height of wrist and tool, and distance from the base's axis, (K,) each [m]."""
+    chain = frames(robot.with_frames(base=np.eye(4)), q)
+    wrist = [np.broadcast_to(row.z_point.T, (len(q), 3)) for row in chain.rows[robot.n // 2 :]]
+    points = np.stack([*wrist, chain.flange_point, chain.position], axis=1)
+    heights = (rising(robot) * points[..., 2]).min(axis=1)
+    return heights, np.linalg.norm(points[..., :2], axis=-1).min(axis=1)
 
 
 def _columns(robot: Robot, q: Array, what: Directions) -> Array:

@@ -21,6 +21,7 @@ from ...arrays import Array
 from ...effects.hysteresis import SLIDING, Hysteresis
 from ...effects.loaded_play import SHARES
 from ...effects.measurement_scale import MeasurementScale
+from ...effects.thermal_growth import ThermalGrowth
 from ...twin.features import Features
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
@@ -38,6 +39,8 @@ LOOSE = (3e-3, 1e-2)
 """Prior spread of the arm's own errors [m, rad]."""
 LOOPS = (0.02, 0.1)
 """Travels [rad] over which loops of lost motion close, between a gap and a tenth of a turn."""
+GROWN = 3e-5
+"""Prior spread of a link's growth [1/K]: aluminium grows by 2.4e-5."""
 UNIT_OFF = 1e-3
 """Prior spread of the instrument's unit of length: half of what is plausible at all."""
 
@@ -170,12 +173,16 @@ class BaseChange:
         Noise of positions and of turns, and how many rows are independent, are those the change
         leaves: a step by itself makes residuals that hang together.
         """
-        after = replace(self, residual=self._left(self._new(shape)))
+        new = self._new(shape)
+        after = replace(self, residual=self._left(new))
+        # Of few stations frames and arm take most rows up; those tell nothing for a change.
+        size = float(sum(c * m for c, m in zip(self.rows, self.samples, strict=True)))
+        free = max(1.0 - (self.basis.shape[2] + new.shape[1]) / size, 0.0)
         total, fall = 0.0, 0.0
         for part in (slice(0, 3), slice(3, 6)):
             before, left = (float((c.residual[:, part] ** 2).sum()) for c in (self, after))
             if before > 0.0:
-                count = max(after.share * after.residual[:, part].size, 12.0)
+                count = max(after.share * free * after.residual[:, part].size, 12.0)
                 fall += 0.5 * count * float(np.log(before / max(left, 1e-12 * before)))
                 total += count
         return fall - 0.5 * float(self.columns.shape[2] * np.log(total))
@@ -200,7 +207,9 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
     frames = [_moved(maker, 'base', 6, c) for maker, c in pairs]
     tools = [_moved(maker, 'tool', 6, c) for maker, c in pairs]
     joints = [_moved(maker, 'q', model.robot.n, c) for maker, c in pairs]
-    arms = [np.concatenate([_arm(maker, c), _scaled(maker, c)]) for maker, c in pairs]
+    arms = [
+        np.concatenate([_arm(maker, c), _grown(maker, c), _scaled(maker, c)]) for maker, c in pairs
+    ]
     left, base, tool, joint, arm = (
         _stacked([_white(part, scale, k) for k, part in enumerate(each)])
         for each in ([part[None] for part in parts], frames, tools, joints, arms)
@@ -307,6 +316,19 @@ def _abrupt(maker: Features, i: int) -> list[Array]:
     unit = SLIDING if maker.twin.robot.prismatic[i] else 1.0
     loops = [Hysteresis(name, 0.0, travel * unit) for travel in LOOPS]
     return [*out, *(np.asarray(maker.shifts(loop)[0]['q', i]) for loop in loops)]
+
+
+def _grown(maker: Features, rows: int) -> Array:
+    """
+    Return columns of every link that grows with the temperature, shape (n, rows, M).
+
+    Without a temperature they are zero: what grows with an unknown one is a smooth change in time.
+    """
+    robot, view = maker.twin.robot, maker.view
+    if view.temperature is None:
+        return np.zeros((robot.n, rows, view.q.shape[0]))
+    growths = [ThermalGrowth(links=(name,)) for name in robot.joint_names]
+    return np.stack([GROWN * maker.columns(one, atoms=False)[0, :rows] for one in growths])
 
 
 def _scaled(maker: Features, rows: int) -> Array:

@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from .clocks import clocks
+from .computed import computed
 from .evidence import Checker
 from .gravity import gravity
 from .mixups import mixups
 from .orientation import orientation
 from .outliers import outliers
+from .parted import parted
 from .quantity import quantity
 from .repeats import repeats
 from .richness import motion
@@ -21,9 +23,11 @@ from .stuck import stuck
 CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
     'readings': (stuck, 'No reading stands still while the tool moves.'),
+    'tools': (parted, 'No recording has another tool than the first.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
     'gravity': (gravity, 'Gravity pulls down where the base stands.'),
     'orientation': (orientation, 'Orientations turn as the joints say.'),
+    'instrument': (computed, 'The poses have the noise of an instrument.'),
     'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),
     'stamps': (stamps, 'Stamps come regularly and without gaps.'),
     'repeats': (repeats, 'Nothing was recorded twice.'),

@@ -121,12 +121,26 @@ def turns_as(given: Given, way: str) -> Given:
     return replace(given, recordings=tuple(out))
 
 
+def poses_inverted(given: Given) -> Given:
+    """Return what was given with measured poses inverted; points stay as they are."""
+    out = []
+    for r in given.recordings:
+        turned = r.measured is not None and r.measured.rotation is not None
+        out.append(r.with_measured(measured(r).inverted()) if turned else r)
+    return replace(given, recordings=tuple(out))
+
+
 def robot_as(given: Given, name: str) -> Given:
     """Return what was given with a bundled robot that stands where the first did, same tool."""
     placed = catalog.load(name).with_frames(
         base=given.robot.T_world_base, tool=given.robot.T_flange_tool
     )
     return replace(given, robot=placed)
+
+
+def differing(given: Given, families: tuple[str, ...]) -> Given:
+    """Return what was given with errors of more families that may differ between recordings."""
+    return replace(given, may_change=tuple(dict.fromkeys([*given.may_change, *families])))
 
 
 def frames_fitted(given: Given, frames: Iterable[str]) -> Given:
@@ -180,6 +194,17 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     return replace(given, recordings=tuple(recordings))
 
 
+def stamped_evenly(given: Given, k: int, first: float, step: float) -> Given:
+    """Return what was given with measurements of recording k at first + step * 0, 1, 2, … [s]."""
+    recordings = list(given.recordings)
+    if recordings[k].measured is None:
+        return given
+    seen = measured(recordings[k])
+    even = first + step * np.arange(seen.t.size)
+    recordings[k] = recordings[k].with_measured(replace(seen, t=even))
+    return replace(given, recordings=tuple(recordings))
+
+
 def velocities_left_out(given: Given, k: int) -> Given:
     """Return what was given without the joint velocities of recording k."""
     recordings = list(given.recordings)
@@ -191,10 +216,13 @@ MENDS: dict[str, Callable[..., Given]] = {
     'joints': joints_as,
     'positions': positions_as,
     'orientations': turns_as,
+    'poses_inverted': poses_inverted,
     'robot': robot_as,
     'frames': frames_fitted,
     'base': base_turned,
     'stamps': stamps_as,
+    'even_stamps': stamped_evenly,
+    'may_change': differing,
     'velocities': velocities_left_out,
 }
 """What diagnosis.json calls each correction."""
@@ -213,7 +241,7 @@ def as_entry(mend: Mend | None) -> dict[str, Any] | None:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, frozenset | set):
+    if isinstance(value, frozenset | set | tuple):
         return sorted(value)
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 

@@ -310,7 +310,7 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     what = {'link_length': 'a', 'link_offset': 'd', 'link_twist': 'alpha'}[effect.name]
     size = f'{np.degrees(value):+.1f} degrees' if what == 'alpha' else f'{value * 1e3:+.1f} mm'
     words = (
-        f'The links are those of another robot than {case.model.robot.name!r}: {what} of '
-        f'{joint!r} differs by {size}, which no arm is off by.'
+        f'The links are not those of {case.model.robot.name!r} as the model has it: {what} of '
+        f'{joint!r} differs by {size}, more than industrial arms are off by.'
     )
     return [Finding.of(Mistake('other_robot', ('robot',), words, GIVE_ITS_MODEL, None))]

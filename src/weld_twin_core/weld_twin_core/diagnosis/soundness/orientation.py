@@ -29,13 +29,13 @@ def orientation(case: Case) -> Sequence[Finding]:
     if angle < WRONG:
         return ()
     shot = case.snapshot
-    turned = _turn(shot, shot.framed())
+    turned = disagreement(shot, shot.framed())
     points = shot.with_turns([None] * len(shot.recordings))
     if turned < WRONG or gap(points.problem, points.framed()) > UNEXPLAINED:
         return ()
     for way, (words, undo) in WAYS.items():
         trial = shot.with_turns(_changed(shot, undo))
-        if _turn(trial, trial.framed()) < 0.2 * turned:
+        if disagreement(trial, trial.framed()) < 0.2 * turned:
             sentence = f'{words}; undone, they agree with the joints.'
             remedy = 'Mend the convention where the orientations are exported'
             mend = partial(turns_as, way=way)
@@ -58,8 +58,11 @@ def _changed(shot: Snapshot, undo: Undo) -> list[Array | None]:
     return out
 
 
-def _turn(shot: Snapshot, model: Model) -> float:
+def disagreement(shot: Snapshot, model: Model) -> float:
+    """Return the median angle [rad] that a model leaves of orientations; 0 where none are."""
     parts = [p for p in shot.problem.residuals(model) if len(p) > 3]
+    if not parts:
+        return 0.0
     return float(np.median(np.concatenate([_angle(p) for p in parts])))
 
 

@@ -104,11 +104,14 @@ def _mistake(arm: Model, before: float, after: float) -> Mistake:
     lengths = [e for e in arm.found if e.name in LENGTHS]
     worst = max(lengths, key=lambda e: abs(float(e.vector()[0])))
     words = (
-        f'The links are those of another robot than {arm.robot.name!r}: {LENGTHS[worst.name]} of '
+        f'The links are not those of {arm.robot.name!r} as the model has it: {LENGTHS[worst.name]} of '
         f'{str(worst.site)!r} differs by {float(worst.vector()[0]) * 1e3:+.1f} mm; with other '
         f'lengths the gap falls from {length(before)} to {length(after)}.'
     )
     return Mistake('other_robot', ('robot',), words, GIVE_ITS_MODEL, None)
 
 
-GIVE_ITS_MODEL = 'Give the model of the arm that was measured; its siblings differ by as much'
+GIVE_ITS_MODEL = (
+    'Give the model of the arm that was measured (siblings differ by as much); if it is this one, '
+    'and less precisely built than industrial arms are, put its own lengths into the robot file'
+)

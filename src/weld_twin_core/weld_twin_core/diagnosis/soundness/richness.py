@@ -15,12 +15,27 @@ LITTLE = 0.02
 """A joint that moves less [rad, m] shows next to nothing."""
 VISIBLE = (1e-3, 5e-3)
 """A frame error [m, rad] that the data should show."""
+TWO_ARMS = 12
+"""Turning joints from which a chain holds two arms: of six each. An arm on a gantry that welds on a
+positioner has nine, or ten with seven axes."""
 AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
 
 
 def motion(case: Case) -> Sequence[Finding]:
     """Return joints that hardly move or never reverse, and frames that cannot be told apart."""
-    return [*_hardly(case), *_one_way(case), *_frames(case)]
+    return [*_two_arms(case), *_hardly(case), *_one_way(case), *_frames(case)]
+
+
+def _two_arms(case: Case) -> Iterator[Finding]:
+    """Yield that the chain has the joints of two arms."""
+    turning = int((~case.model.robot.prismatic).sum())
+    if turning >= TWO_ARMS:
+        yield Finding(
+            'note',
+            f'The chain of {case.model.robot.name!r} has {turning} turning joints, as two arms '
+            'together have; if only one was measured, give its own chain (--base-link, --tip-link): '
+            'errors of the other take up its own.',
+        )
 
 
 def _hardly(case: Case) -> Iterator[Finding]:

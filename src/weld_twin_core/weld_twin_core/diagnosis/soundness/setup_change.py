@@ -14,6 +14,7 @@ from ...arrays import Array
 from ..algebra.problem import Model, Problem
 from .base_change import BaseChange, base_change, thinned
 from .evidence import Case, Finding, distance, length
+from .lengths import instant
 from .smooth_shapes import CONSTANTS, other_shapes
 from .snapshot import measured
 
@@ -226,21 +227,19 @@ def _moved(case: Case, step: Step) -> str:
             f'The set-up moved by {length(step.size)} before {step.recording}; have the base '
             'aligned, so that each recording gets its own.'
         )
-    unit = _unit(case, step.recording)
-    when = f'station {step.time:.4g}' if unit == 'stations' else f't = {step.time:.4g} s'
     return (
-        f'The set-up of {step.recording} moved by {length(step.size)} at {when}; split the '
+        f'The set-up of {step.recording} moved by {length(step.size)} at '
+        f'{instant(recording, step.time)}; split the '
         'recording there and have the base aligned, so that each part gets its own.'
     )
 
 
 def _settled(case: Case, found: Settling) -> str:
+    recording = next(r for r in case.recordings if r.name == found.recording)
+    constant, unit = found.time_constant, 's'
+    if recording.joints.static:
+        constant, unit = constant / float(np.median(np.diff(measured(recording).t))), 'stations'
     return (
         f'The set-up of {found.recording} settles by {length(found.size)} with a time constant of '
-        f'{found.time_constant:.3g} {_unit(case, found.recording)}, as in warming up.'
+        f'{constant:.3g} {unit}, as in warming up.'
     )
-
-
-def _unit(case: Case, name: str) -> str:
-    static = any(r.name == name and r.joints.static for r in case.recordings)
-    return 'stations' if static else 's'

@@ -25,7 +25,7 @@ from ...effects.tool_slip import ToolSlip
 from ...recording import Recording
 from ..algebra.problem import Problem
 from .base_change import BaseChange
-from .lengths import length
+from .lengths import instant, length
 from .limits import (
     DATED,
     DATED_MOVING,
@@ -80,7 +80,7 @@ class Slip:
 
     def sentence(self, recording: Recording) -> str:
         """Return what happened, in words."""
-        at = f'station {self.time:.4g}' if recording.joints.static else f't = {self.time:.4g} s'
+        at = instant(recording, self.time)
         what = {
             KNOCKED: 'Instrument or base were knocked',
             JUMPED: 'The reflector jumped in its nest, or the tool in its holder',

@@ -55,8 +55,8 @@ class Snapshot:
 
     @property
     def problem(self) -> Problem:
-        """Return the snapshot as a problem with both frames free."""
-        return Problem(self.recordings, FRAMES)
+        """Return the snapshot as a problem with both frames and what may differ free."""
+        return Problem(self.recordings, FRAMES, changes=self.model.changes)
 
     @property
     def robot(self) -> Robot:
@@ -66,8 +66,12 @@ class Snapshot:
     def mended(self, mend: Mend) -> Snapshot:
         """Return the snapshot after a correction."""
         out = mend(Given(self.recordings, self.robot, FRAMES))
-        known = self.model.known if out.robot.joint_names == self.robot.joint_names else ()
-        return Snapshot(out.recordings, replace(self.model, robot=out.robot, known=known))
+        model = replace(self.model, robot=out.robot)
+        if out.robot.joint_names != self.robot.joint_names:
+            # What is known of a joint, or differs at it, means nothing on another robot.
+            frames = tuple(c for c in model.changes if c.effect.site is None)
+            model = replace(model, known=(), changes=frames)
+        return Snapshot(out.recordings, model)
 
     def with_turns(self, turns: list[Array | None]) -> Snapshot:
         """Return the snapshot with other measured rotations, or none."""

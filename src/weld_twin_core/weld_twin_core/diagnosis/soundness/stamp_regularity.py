@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...arrays import Array
+from ...bursts import bursts
 from ..algebra.robust_spread import robust_spread
 from .evidence import Case, Finding
 from .snapshot import measured
@@ -41,6 +42,10 @@ def stamps(case: Case) -> Sequence[Finding]:
 
 
 def _stream(t: Array, name: str) -> Iterator[Finding]:
+    sent = bursts(t)
+    if sent is not None:
+        yield Finding('warning', f'{name} are {sent.words}: none has its own time.')
+        return
     steps = np.diff(t)
     usual = float(np.median(steps))
     gaps = steps > GAP * usual

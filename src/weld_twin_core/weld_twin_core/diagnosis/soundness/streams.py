@@ -11,11 +11,17 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bursts import Bursts, bursts
 from ...recording import Recording
 from ...two_clocks import ONE_CLOCK
-from .evidence import Mistake, listed
-from .limits import LIKE_LENGTH, MOVED, STILL_SPEED
-from .mending import Given, measured, stamps_as, velocities_left_out
+from ..algebra.problem import FRAMES
+from ..frames.aligned import aligned
+from .evidence import Case, Mistake, length, listed
+from .limits import EVEN, EVEN_LEAST, LIKE_LENGTH, MOVED, STILL_SPEED
+from .mending import Given, measured, stamped_evenly, stamps_as, velocities_left_out
+
+ROUNDS = 2
+"""Times that frames and delay are found in turn; a third changes nothing."""
 
 
 def streams(given: Given) -> list[Mistake]:
@@ -25,7 +31,8 @@ def streams(given: Given) -> list[Mistake]:
         if recording.measured is None or recording.joints.static:
             continue
         out += _velocities(recording, k, given.robot.joint_names)
-        out += _apart(recording, k)
+        apart = list(_apart(recording, k))
+        out += apart or _in_bursts(given, k)
     return out
 
 
@@ -81,3 +88,46 @@ def _apart(recording: Recording, k: int) -> Iterator[Mistake]:
         mend,
         of_all=False,
     )
+
+
+def _in_bursts(given: Given, k: int) -> Iterator[Mistake]:
+    """Yield that measurements were stamped when they were sent, where an even clock explains more."""
+    recording = given.recordings[k]
+    found = bursts(measured(recording).t)
+    if found is None or recording.contacts is not None:
+        return
+    before, even, after = _evenly(given, k, found)
+    if before < EVEN_LEAST or EVEN * after > before:
+        return
+    t = measured(recording).t
+    waited = float(np.median(t - even.first - even.step * np.arange(t.size)))
+    yield Mistake(
+        'stamps_in_bursts',
+        ('clock',),
+        f'The measurements of {recording.name} are {even.words}: they waited in a buffer, '
+        f'{waited * 1e3:.0f} ms in the middle. Stamped evenly and so much earlier, the gap falls '
+        f'from {length(before)} to {length(after)}.',
+        "Record the instrument's own time of each measurement, or send each at once; --apply "
+        'stamps them anew',
+        partial(stamped_evenly, k=k, first=even.first, step=even.step),
+        of_all=False,
+    )
+
+
+def _evenly(given: Given, k: int, found: Bursts) -> tuple[float, Bursts, float]:
+    """Return the median gap [m] as stamped, the even stamps that explain most, and their gap."""
+    alone = replace(given, recordings=(given.recordings[k],))
+    even = found
+    for _ in range(ROUNDS):
+        (late,) = _posed(stamped_evenly(alone, 0, even.first, even.step)).lags
+        if late is None:
+            break
+        # A delay that grows evenly is another first stamp and another step.
+        first = even.first - (late.late + late.rate * (even.first - late.middle))
+        even = even._replace(first=first, step=even.step * (1.0 - late.rate))
+    return _posed(alone).gap, even, _posed(stamped_evenly(alone, 0, even.first, even.step)).gap
+
+
+def _posed(given: Given) -> Case:
+    """Return a recording with both frames fitted, wherever they are."""
+    return Case(*aligned(given.recordings, given.robot, FRAMES, ()))

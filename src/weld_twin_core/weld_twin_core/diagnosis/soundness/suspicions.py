@@ -14,7 +14,7 @@ import numpy as np
 from ...arm import catalog
 from ...arm.robot import Robot
 from ...arrays import Array
-from .mending import Mend, joints_as, positions_as, robot_as
+from .mending import Mend, joints_as, poses_inverted, positions_as, robot_as
 
 DEGREE = np.pi / 180.0
 INCH = 0.0254
@@ -62,6 +62,7 @@ def suspicions(robot: Robot) -> Iterator[Suspicion]:
     yield from _zeros(robot)
     yield from _couplings(robot)
     yield from _mirror()
+    yield _on_the_arm()
 
 
 def doubles(robot: Robot) -> Iterator[Suspicion]:
@@ -216,6 +217,15 @@ def _mirror() -> Iterator[Suspicion]:
     words = 'the measuring frame is left-handed: one axis of the positions has the wrong sign'
     remedy = 'Turn the sign of one axis where the positions are exported'
     yield _positions('sign', words, remedy, [1.0, -1.0, 1.0])
+
+
+def _on_the_arm() -> Suspicion:
+    words = (
+        'measured poses are those of something fixed seen from the arm (a camera on the arm that '
+        'looks at a board), not of the tool'
+    )
+    remedy = 'Give --measured-inverse, and have base and tool aligned (--align base,tool)'
+    return Suspicion('camera_inverted', ('instrument',), words, remedy, poses_inverted)
 
 
 def _signed(at: tuple[str, ...], words: str, sign: Array) -> Suspicion:

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from ...arm.bulk import kernel_of
 from ...arm.chain import Frames, forward, frames
+from ...arm.mounting import rising
 from ...arm.robot import Robot
 from ...arm.rotation import rotation_matrix, rotation_vector, transform
 from ...arrays import Array
@@ -244,13 +245,13 @@ def _ranks(robot: Robot, q: Array, seed: Array | None) -> Array:
     chain = frames(robot, some)
     condition, _, margin = _posture(robot, some, chain)
     room = np.minimum(margin.min(axis=-1) / _COMFORTABLE, 1.0)
-    suits = np.where(_above_base(chain), 1.0, 0.1)
+    suits = np.where(_above_base(robot, chain), 1.0, 0.1)
     return np.asarray(-room / condition.max(axis=-1) * suits)
 
 
-def _above_base(chain: Frames) -> Mask:
+def _above_base(robot: Robot, chain: Frames) -> Mask:
     """Tell, shape (K,), whether joints stay on the arm's side of the surface the base stands on."""
-    up, foot = chain.base_rotation[:, 2], chain.base_point
+    up, foot = rising(robot) * chain.base_rotation[:, 2], chain.base_point
     samples = chain.position.shape[:-1]
     heights = [np.moveaxis(row.z_point, 0, -1) @ up - foot @ up for row in chain.rows]
     lowest = [np.broadcast_to(height, samples).min(axis=-1) for height in heights]

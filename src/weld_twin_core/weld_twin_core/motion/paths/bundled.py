@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from ...arm.mounting import rising, up
 from ...arm.robot import Robot
+from ...arm.rotation import rotation_matrix, transform
 from ...arrays import Array
 from ...errors import PathError, ReachError
 from ..inverse import solve_path
@@ -26,6 +28,14 @@ _COMFORT_LIMIT = 0.15
 """Distance to a joint limit [rad] from which a place is as good as any."""
 _COMFORT_CONDITION = 40.0
 """Condition number of the Jacobian up to which a place is as good as any."""
+
+
+_STANDING = (0.15, 0.3, 0.05, 0.45, -0.1)
+"""Heights of seams over the foot of an arm that stands, in lengths of the arm [1]."""
+_HANGING = (0.65, 0.55, 0.75, 0.45, 0.85)
+"""The same below the foot of an arm that hangs from a ceiling [1]."""
+_HEADINGS = (0.0, 0.5 * np.pi, -0.5 * np.pi, np.pi)
+"""Turns about the first axis [rad]: an arm's zero may look to any side of its base."""
 
 
 class Place(NamedTuple):
@@ -112,19 +122,20 @@ def default_seam(robot: Robot, kind: str = 'line', torch: Torch | None = None) -
     if kind not in _SHAPES:
         raise PathError(f'no bundled seam is of kind {kind!r}; there are ' + ', '.join(KINDS))
     best: tuple[float, Path | None] = (-np.inf, None)
-    for place in _places(robot):
-        path = _SHAPES[kind](place)
-        comfort = _comfort(robot, path, torch or Torch())
-        if comfort > 1.0:
-            return path
-        if comfort > best[0]:
-            best = comfort, path
-    if best[1] is None:
-        raise ReachError(
-            f'{robot.name} reaches none of the places tried for a seam of kind {kind!r}; '
-            'describe a seam in its workspace'
-        )
-    return best[1]
+    for places in _places(robot):
+        for place in places:
+            path = _SHAPES[kind](place)
+            comfort = _comfort(robot, path, torch or Torch())
+            if comfort > 1.0:
+                return path
+            if comfort > best[0]:
+                best = comfort, path
+        if best[1] is not None:
+            return best[1]
+    raise ReachError(
+        f'{robot.name} reaches none of the places tried for a seam of kind {kind!r}; '
+        'describe a seam in its workspace'
+    )
 
 
 def _comfort(robot: Robot, path: Path, torch: Torch) -> float:
@@ -138,20 +149,29 @@ def _comfort(robot: Robot, path: Path, torch: Torch) -> float:
     return min(room, _COMFORT_CONDITION / float(solution.condition.max()))
 
 
-def _places(robot: Robot) -> Iterator[Place]:
-    """Yield places from the likeliest on, scaled with the robot."""
-    size = reach(robot)
-    base = robot.T_world_base
-    weight = float(np.linalg.norm(robot.gravity))
-    up = -robot.gravity / weight if weight > 0.0 else np.array([0.0, 0.0, 1.0])
+def _places(robot: Robot) -> Iterator[list[Place]]:
+    """Yield places from the likeliest on, scaled with the robot; later lists are rarely needed."""
+    over = [0.0 if rising(robot) > 0.0 else np.pi, 0.0, 0.0]
+    foot = robot.T_world_base @ transform(rotation_matrix(over), np.zeros(3))
+    above = robot.T_world_base[:3, :3] @ up(robot)
     # Hanging from a ceiling, the wire points away from the base and the work lies far from it.
-    heights = (0.15, 0.3, 0.05, 0.45, -0.1) if up[2] > -0.5 else (0.65, 0.55, 0.75, 0.45, 0.85)
+    hangs = foot[:3, 2] @ above < -0.5
+    for heights in (_HANGING, _STANDING) if hangs else (_STANDING, _HANGING):
+        for heading in _HEADINGS:
+            turned = foot @ transform(rotation_matrix([0.0, 0.0, heading]), np.zeros(3))
+            yield [*_places_at(turned, turned[:3, :3].T @ above, heights, reach(robot))]
+
+
+def _places_at(
+    base: Array, above: Array, heights: Sequence[float], size: float
+) -> Iterator[Place]:
+    """Yield places in front of a base, on heights in sizes of the robot."""
     for height in heights:
         for distance in (0.5, 0.4, 0.6, 0.3):
             for along in ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)):
-                flat = np.asarray(along) - (up @ along) * up
+                flat = np.asarray(along) - (above @ along) * above
                 if np.linalg.norm(flat) < 0.5:
                     continue
                 centre = base[:3, :3] @ [distance * size, 0.0, height * size] + base[:3, 3]
                 direction = base[:3, :3] @ (flat / np.linalg.norm(flat))
-                yield Place(centre, direction, base[:3, :3] @ up, 0.25 * size)
+                yield Place(centre, direction, base[:3, :3] @ above, 0.25 * size)

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
     require_simulator()
     from weld_twin_core import __version__
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...blind.cause_sizes import FAMILIES
     from ...blind.diagnosing import engine_digest
@@ -76,9 +76,9 @@ def run(args: argparse.Namespace) -> int:
         'sums': summary(rows),
         'cases': rows,
     }
-    write_text(out / RESULT, json.dumps(content, indent=1) + '\n', overwrite=True)
+    write_owned(out / RESULT, json.dumps(content, indent=1) + '\n')
     text = table(rows, made)
-    write_text(out / TABLE, text, overwrite=True)
+    write_owned(out / TABLE, text)
     print(text, end='')
     return 0
 

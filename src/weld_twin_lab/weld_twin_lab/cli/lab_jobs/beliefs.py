@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     """Move every number, write the table and print it."""
     import json
 
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...blind.belief_study import study
     from ...blind.belief_table import table
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     with runner_of(args, out / STORE, 'deciding') as runner:
         result = study(Path(args.cases), Path(args.truths), runner, args.refit, only)
     text = table(result)
-    write_text(out / RESULT, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / TABLE, text, overwrite=True)
+    write_owned(out / RESULT, json.dumps(result, indent=1) + '\n')
+    write_owned(out / TABLE, text)
     print(text, end='')
     return 0

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     import sys
 
     from weld_twin_core.errors import DataError
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...contacts.data import ARMS
     from ...contacts.splits import study
@@ -57,21 +57,19 @@ def run(args: argparse.Namespace) -> int:
             raise DataError(f'--arms: there is no arm {name!r}; they are {", ".join(ARMS)}')
     out = Path(args.out)
     entries = study(Path(args.data), arms, out / 'splits', tell)
-    write_text(
-        out / 'contacts.json', json.dumps(summary(entries), indent=1) + '\n', overwrite=True
-    )
-    write_text(out / 'contacts.md', table(entries), overwrite=True)
+    write_owned(out / 'contacts.json', json.dumps(summary(entries), indent=1) + '\n')
+    write_owned(out / 'contacts.md', table(entries))
     print(table(entries), end='')
     if args.sealed:
         from ...contacts.sealed import sealed
 
         score = sealed(args.sealed, out / 'sealed', tell)
-        write_text(out / 'sealed.json', json.dumps(score, indent=1) + '\n', overwrite=True)
+        write_owned(out / 'sealed.json', json.dumps(score, indent=1) + '\n')
         print(', '.join(f'{key} {value}' for key, value in score.items()))
     if args.postures:
         from ...contacts.postures import postures
 
         needed = postures(args.postures, out / 'postures', tell)
-        write_text(out / 'postures.json', json.dumps(needed, indent=1) + '\n', overwrite=True)
+        write_owned(out / 'postures.json', json.dumps(needed, indent=1) + '\n')
         print(json.dumps(needed))
     return 0

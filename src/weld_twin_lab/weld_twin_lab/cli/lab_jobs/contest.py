@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the contest and print the tables."""
     import json
 
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...contest import course, told
 
@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     errors, measured = _arms(args, methods) if args.ur5 and args.ur10 else ({}, {})
     content['arms_mean_m'] = errors
     text = told.page(table, content['methods'], content['closer'], errors, measured)
-    write_text(out / 'contest.json', json.dumps(content, indent=1) + '\n', overwrite=True)
-    write_text(out / 'contest.md', text, overwrite=True)
+    write_owned(out / 'contest.json', json.dumps(content, indent=1) + '\n')
+    write_owned(out / 'contest.md', text)
     print(text, end='')
     return 0
 

@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     import warnings
     from collections import Counter
 
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...transfer.degenerate import drawn, tried
 
@@ -49,6 +49,6 @@ def run(args: argparse.Namespace) -> int:
         'statuses': dict(counts),
         'bad': bad,
     }
-    write_text(args.out, json.dumps(result, indent=1) + '\n', overwrite=True)
+    write_owned(args.out, json.dumps(result, indent=1) + '\n')
     print(', '.join(f'{name} {number}' for name, number in sorted(counts.items())))
     return FAILED if bad else 0

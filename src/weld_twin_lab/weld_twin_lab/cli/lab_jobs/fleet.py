@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run what is not done yet, compare, write the results, print the table."""
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...fleet.run_pages import fleet_page
 
@@ -54,8 +54,8 @@ def run(args: argparse.Namespace) -> int:
     if args.kills:
         result['kills'] = _kills(out, args.kill_recordings, args.kills)
     text = fleet_page(result)
-    write_text(out / RESULT, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / TABLE, text, overwrite=True)
+    write_owned(out / RESULT, json.dumps(result, indent=1) + '\n')
+    write_owned(out / TABLE, text)
     print(text)
     speed, kills = result.get('speed', {}), result.get('kills', {})
     fine = speed.get('differing_rows', 0) == 0 and kills.get('lost_or_rewritten', 0) == 0

@@ -78,14 +78,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _written(out: Path, content: Mapping[str, Any]) -> int:
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...gate.table import page
 
     told = page(content)
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / RESULT, json.dumps(content, indent=1) + '\n', overwrite=True)
-    write_text(out / TABLE, told, overwrite=True)
+    write_owned(out / RESULT, json.dumps(content, indent=1) + '\n')
+    write_owned(out / TABLE, told)
     print(told)
     print(f'gate: {"passed" if content["passed"] else "FAILED"}, {out / RESULT}')
     return 0 if content['passed'] else MISSED

@@ -25,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
     import json
     import sys
 
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...benchmark.growing_page import draw, measured, page
 
@@ -35,8 +35,8 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     out.mkdir(parents=True, exist_ok=True)
     found = measured(args.only, tell)
-    write_text(out / 'growth.json', json.dumps(found, indent=1) + '\n', overwrite=True)
-    write_text(out / 'growth.md', page(found), overwrite=True)
+    write_owned(out / 'growth.json', json.dumps(found, indent=1) + '\n')
+    write_owned(out / 'growth.md', page(found))
     draw(found, out / 'growth.png')
     print(page(found), end='')
     return 0

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fill the databases, time the pages, write the table."""
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...fleet.page_times import GOAL, page_times, table
 
@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     out.mkdir(parents=True, exist_ok=True)
     text = table(rows, args.cells, args.diagnoses)
-    write_text(out / TABLE, text, overwrite=True)
+    write_owned(out / TABLE, text)
     print(text)
     if lacking:
         print(lacking)

@@ -4,9 +4,11 @@
 
 In every language drawn programs are read again by the product and by an independent reader, and programs
 are broken at random (programs.json, programs.md). Seams of arms with sealed causes are recorded,
-diagnosed, corrected as programs and driven by the plant (corrections.json, corrections.md); with --seams
-0, or with --drawn 0 and --broken 0, one part is left out. A run that was interrupted goes on where it
-stopped. Exits with 1 when a program is read wrongly, or a broken one not met with words.
+diagnosed, corrected as programs and driven by the plant (corrections.json, corrections.md). Arms given
+as URDFs are planned, simulated, measured, diagnosed and corrected (urdf_arms.json, urdf_arms.md). With
+--seams 0, --urdf-arms 0, or --drawn 0 and --broken 0, one part is left out. A run that was interrupted
+goes on where it stopped. Exits with 1 when a program is read wrongly, or a broken one not met with
+words.
 """
 
 from __future__ import annotations
@@ -35,6 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='N',
         help='sealed seams a language that the plant runs before and after (default: 1)',
     )
+    parser.add_argument(
+        '--urdf-arms',
+        type=int,
+        default=0,
+        metavar='N',
+        help='arms given as URDFs that go all the way (default: 0)',
+    )
     parser.add_argument('--seed', type=int, default=1, metavar='N', help='decides the seams')
     parser.add_argument(
         '--made', default='test/programs/made', metavar='DIR', help='programs as users have them'
@@ -55,7 +64,20 @@ def run(args: argparse.Namespace) -> int:
         with runner_of(args, out / PARTS, 'correcting') as runner:
             found = corrections(out, args.seed, args.seams, runner, engine_digest(), list(CELLS))
         print(page(found))
+    if args.urdf_arms:
+        _given_as_urdfs(args)
     return missed
+
+
+def _given_as_urdfs(args: argparse.Namespace) -> None:
+    """Take arms that are given as URDFs all the way, and print what they add up to."""
+    from ...blind.diagnosing import engine_digest
+    from ...programs.study import PARTS, urdf_arms
+    from ...programs.urdf_table import page
+
+    out = Path(args.out)
+    with runner_of(args, out / PARTS, 'arms') as runner:
+        print(page(urdf_arms(out, args.seed, args.urdf_arms, runner, engine_digest())))
 
 
 def _read(args: argparse.Namespace) -> int:

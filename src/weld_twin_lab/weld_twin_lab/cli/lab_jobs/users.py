@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Measure, write the results, print the table."""
     from weld_twin_core.errors import DataError
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...fleet.run_pages import users_page
 
@@ -58,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
         result = _measured(args, Path(place))
     out = Path(args.out)
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / RESULT, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / TABLE, users_page(result), overwrite=True)
+    write_owned(out / RESULT, json.dumps(result, indent=1) + '\n')
+    write_owned(out / TABLE, users_page(result))
     print(users_page(result))
     fine = result['one_user_times_command'] <= ONE and result['times_serial_work'] <= MANY
     refused = all(said.startswith('refused') for said in result['malicious'].values())

@@ -74,11 +74,11 @@ def _written(out: Path, kept: list[Entry], entry: Entry) -> list[Entry]:
     """Write the rows with a new one among them; return them."""
     import json
 
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...benchmark.waiting import merged, page
 
     rows = merged(kept, [entry])
-    write_text(out / WAITS, json.dumps(rows, indent=1) + '\n', overwrite=True)
-    write_text(out / 'waits.md', page(rows), overwrite=True)
+    write_owned(out / WAITS, json.dumps(rows, indent=1) + '\n')
+    write_owned(out / 'waits.md', page(rows))
     return rows

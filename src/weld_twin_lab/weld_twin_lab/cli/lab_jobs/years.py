@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run what is not done yet, write the results, print the table."""
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...blind.diagnosing import engine_digest
     from ...blind.simulator import require_simulator
@@ -43,8 +43,8 @@ def run(args: argparse.Namespace) -> int:
     with runner_of(args, out / 'done', 'living through years') as runner:
         result = run_years(args.seed, args.years, args.cells, args.full, engine_digest(), runner)
     text = page(result, args.seed)
-    write_text(out / RESULT, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / TABLE, text, overwrite=True)
+    write_owned(out / RESULT, json.dumps(result, indent=1) + '\n')
+    write_owned(out / TABLE, text)
     print(text)
     kept = {name: result['drawn'][name] for name in GOALS}
     met = [

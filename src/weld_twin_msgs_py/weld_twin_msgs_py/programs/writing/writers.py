@@ -10,6 +10,7 @@ import numpy as np
 
 from weld_twin_core.errors import DataError
 
+from ...files.csv_text import guarded
 from ..notation import ABB_POSE, KUKA_POSE, UR_POSE
 from .exported import Exported, ExportMove, comma
 
@@ -226,7 +227,8 @@ def _trajectory_point(step: ExportMove, clock: float) -> list[str]:
 
 def _csv(program: Exported) -> str:
     rows = [f'# {text}' for text in program.comments]
-    rows.append(','.join(['move', *program.context.robot.joint_names, 'speed', 'dwell']))
+    names = map(guarded, program.context.robot.joint_names)
+    rows.append(','.join(['move', *names, 'speed', 'dwell']))
     for step in program.moves:
         speed = step.share if step.kind == 'joint' else step.speed
         dwell = max(step.dwell, 0.001) if step.stop else 0.0

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..options import add_robot, robot_of
+from ..options import add_output, add_robot, output, robot_of
 from ..program_options import add_program_options, context_of, quantity, start_of
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('program', metavar='PROGRAM', help='program; a .dat is found beside it')
     add_robot(parser)
     parser.add_argument('--model', metavar='FILE', help='diagnosis.json, or an effects file')
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+    add_output(parser, 'where results go')
     parser.add_argument(
         '--controller', default='', metavar='L', help='language, where the file does not tell it'
     )
@@ -61,14 +61,12 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.programs.languages import language_of
     from weld_twin_msgs_py.programs.source import read_source
 
-    from ...offline.output_directory import new_directory
-
     robot = robot_of(args)
     language = language_of(read_source(args.program), args.program, args.controller)
     context = context_of(args, robot, language)
     program = read_program(args.program, context, language)
     if not args.model:
-        with new_directory(args.out, mark=RESULT) as place:
+        with output(args, RESULT) as place:
             entry = {'schema': 'weld_twin/correction/1', 'program': program.sources[0].name}
             _write_texts(place, program, [source.text for source in program.sources])
             _write_entry(place, entry | {'language': language, 'model': None})
@@ -86,7 +84,6 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
     from weld_twin_msgs_py.files.whole_files import write_text
 
     from ...offline.correcting import corrected_program, correction_entry, program_model
-    from ...offline.output_directory import new_directory
     from ...offline.told_twin import other_readings
     from ...report.correction_page import correction_page, headline
 
@@ -104,7 +101,7 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
     entry = correction_entry(made, robot, caps)
     inputs = [hashed('program', args.program), hashed('model', args.model)]
     entry['inputs'] = [item.as_dict() for item in inputs]
-    with new_directory(args.out, mark=RESULT) as place:
+    with output(args, RESULT) as place:
         _write_texts(place, program, made.texts)
         write_text(place / PAGE, correction_page(entry, inputs))
         _write_entry(place, entry)

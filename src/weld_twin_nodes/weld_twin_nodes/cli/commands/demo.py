@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import argparse
 
+from ..options import add_output
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument(
-        '--out', default='out', metavar='DIR', help='directory for the results (default: out)'
-    )
+    add_output(parser, 'directory for the results (default: out)', default='out')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -26,5 +26,5 @@ def run(args: argparse.Namespace) -> int:
         ) from None
     from ...demo import run_demo
 
-    run_demo(args.out)
+    run_demo(args.out, force=args.force)
     return 0

@@ -19,7 +19,16 @@ from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..options import add_robot, add_topics, given_urdf, robot_of, topics_of, twin_of
+from ..options import (
+    add_output,
+    add_robot,
+    add_topics,
+    given_urdf,
+    output,
+    robot_of,
+    topics_of,
+    twin_of,
+)
 
 if TYPE_CHECKING:
     from weld_twin_core.diagnosis import Diagnosis
@@ -52,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_next(parser)
     _add_causes(parser)
     _add_sheet(parser)
-    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
+    add_output(parser, 'directory for the results')
     add_topics(parser)
 
 
@@ -77,7 +86,7 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar=('BAG', 'WHAT'),
         help='what was changed in the cell for one of the bags: load=KG hung from the tool point '
-        '(load=KG,X,Y,Z: there in the tool frame [m]), another tool, or the instrument moved; may '
+        '(load=KG,X,Y,Z: there in the tool frame [m]; below 0: taken off), another tool, or the instrument moved; may '
         'be given again',
     )
     parser.add_argument(
@@ -194,13 +203,12 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose, write the results, print the verdict."""
     from rich.console import Console
 
-    from ...offline.output_directory import new_directory
     from ...report import print_summary
     from ...report.diagnosis_files import PAGE, PDF, RESULT, write_results
     from ...report.pdf import print_page
 
     sheet = _sheet(args)
-    with new_directory(args.out, mark=RESULT) as place:
+    with output(args, RESULT) as place:
         diagnosis = _diagnosis(args)
         write_results(place, diagnosis, _inputs(args), given_urdf(args), sheet)
         if args.pdf:

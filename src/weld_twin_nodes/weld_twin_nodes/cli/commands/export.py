@@ -8,7 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..options import add_robot, given_urdf, robot_of
+from ..options import add_file_output, add_robot, given_urdf, output_file, robot_of
 
 _FORMATS = ('yaml', 'urdf', 'offsets', 'effects', 'left-over')
 
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'all effects, for the nominal robot; left-over: the effects that a corrected robot '
         'cannot hold (default: yaml)',
     )
-    parser.add_argument('--out', metavar='FILE', help='file to write (default: print it)')
+    add_file_output(parser, 'file to write (default: print it)')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -33,7 +33,6 @@ def run(args: argparse.Namespace) -> int:
     from functools import partial
     from tempfile import TemporaryDirectory
 
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.files.diagnosis_model import read_model
     from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
@@ -52,7 +51,6 @@ def run(args: argparse.Namespace) -> int:
             write(Path(scratch) / name, model, notes)
             sys.stdout.write((Path(scratch) / name).read_text(encoding='utf-8'))
         return 0
-    if Path(args.out).exists():
-        raise DataError(f"'{args.out}' exists already and is not overwritten")
-    write(Path(args.out), model, notes)
+    with output_file(args) as path:
+        write(path, model, notes)
     return 0

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..options import add_robot, robot_of
+from ..options import add_file_output, add_robot, output_file, robot_of
 from ..program_options import add_program_options, context_of, quantity
 
 
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME',
         help='urscript, krl, rapid, inform, fanuc-ls, joint-trajectory or csv',
     )
-    parser.add_argument('--out', required=True, metavar='FILE', help='program; must not exist')
+    add_file_output(parser, 'program to write', required=True)
     parser.add_argument(
         '--full-speed',
         action='store_true',
@@ -52,13 +52,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write program and sheet."""
+    with output_file(args) as made:
+        lines = write_program(args, made, Path(args.out))
+    print('\n'.join(lines))
+    return 0
+
+
+def _guide(program: Path) -> Path:
+    """Return where the sheet of a program goes: beside it."""
+    return program.with_name(f'{program.name}.md')
+
+
+def write_program(args: argparse.Namespace, out: Path, told_as: Path) -> list[str]:
+    """
+    Write program and sheet, and return what to tell.
+
+    Parameters
+    ----------
+    args : Namespace
+        Of this command.
+    out : Path
+        Program to write.
+    told_as : Path
+        Where it will be found.
+
+    """
     from weld_twin_msgs_py.files.whole_files import write_text
     from weld_twin_msgs_py.programs.writing import sheet
 
     from ...offline.exporting import FAST, SLOW, Speeds, export
 
     _check(args)
-    out = Path(args.out)
     context = context_of(args, robot_of(args), args.controller)
     share, tool = FAST if args.full_speed else SLOW
     speed = quantity(args.speed.removesuffix('/s'), ('mm', 'm'), '--speed') if args.speed else 0.0
@@ -76,13 +100,12 @@ def run(args: argparse.Namespace) -> int:
     if not args.full_speed:
         told += ' That is for the first run; --full-speed writes it faster.'
     write_text(out, text)
-    guide = out.with_name(f'{out.name}.md')
-    write_text(guide, sheet(made, args.controller, out.name, told, notes), overwrite=True)
-    print(f'{out}: {len(made.moves)} moves in {args.controller}, {fast}')
-    for note in notes:
-        print(f'note: {note}')
-    print(f'how to load it and to record: {guide}')
-    return 0
+    write_text(_guide(out), sheet(made, args.controller, out.name, told, notes))
+    return [
+        f'{told_as}: {len(made.moves)} moves in {args.controller}, {fast}',
+        *(f'note: {note}' for note in notes),
+        f'how to load it and to record: {_guide(told_as)}',
+    ]
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -97,5 +120,3 @@ def _check(args: argparse.Namespace) -> None:
         )
     if not (0.0 <= args.dwell <= 600.0 and 0 <= args.trigger <= 9999):
         raise DataError('--dwell must be 0 to 600 s, and --trigger the number of an output')
-    if Path(args.out).exists():
-        raise DataError(f"'{args.out}' exists already and is not overwritten")

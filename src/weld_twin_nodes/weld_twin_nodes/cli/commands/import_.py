@@ -58,6 +58,7 @@ def _add_reading(parser: argparse.ArgumentParser) -> None:
     group.add_argument('--time-column', metavar='A')
     group.add_argument('--length-unit', choices=('m', 'mm'))
     group.add_argument('--angle-unit', choices=('rad', 'deg'), help='unit of the joint angles')
+    group.add_argument('--slide-unit', choices=('m', 'mm'), help='unit of joints that slide')
     group.add_argument('--rotation-unit', choices=('rad', 'deg'), help='unit of measured angles')
     group.add_argument(
         '--rotation',
@@ -123,13 +124,14 @@ def run(args: argparse.Namespace) -> int:
     recording, said = _read(args, robot, options)
     measured = recording.measured
     assert measured is not None
-    expected = Twin(robot).poses(recording, measured.t)
+    nominal = Twin(robot)
+    expected = nominal.poses(recording, measured.t)
     off = measured.position - expected.position
     write_recording(
         args.out,
         recording,
         robot,
-        twin=expected,
+        twin=nominal.poses(recording),
         deviation=off,
         storage=args.storage,
         provenance={'source': args.file, 'assumptions': list(said)},

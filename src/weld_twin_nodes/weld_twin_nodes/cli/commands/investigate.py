@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..options import add_robot
+from ..options import add_force, add_robot
 
 EXPERIMENT, BAG = 'experiment.yaml', 'recording'
 SLOWER = 2.0
@@ -51,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='what was changed in the cell for the new bags, where it was not what was asked: '
         'load=KG, tool, instrument, or nothing',
     )
+    add_force(parser)
     parser.add_argument(
         '--live',
         action='store_true',
@@ -162,6 +163,7 @@ def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
     words = [('--align', args.align), ('--effects-known', args.effects_known)]
     words += [('--cell-box', args.cell_box)]
     words += [('--base-link', args.base_link), ('--tip-link', args.tip_link)]
+    words += [('--flange-link', args.flange_link)]
     # A box may begin with a minus, and is then taken for an option unless it is joined.
     options = [f'{word}={value}' for word, value in words if value]
     return begin(args.robot, options, budget)
@@ -196,18 +198,18 @@ def _round(
     changes: str,
 ) -> dict[str, Any]:
     """Diagnose everything so far, and ask or end; return the state after it."""
-    from weld_twin_msgs_py.files.whole_files import write_text
-
     from ...offline.investigation import PAGE, foreseen, take_in, write_state
+    from ...offline.output_directory import write_owned
     from ...report.investigation_page import headline, investigation_page
 
     place = directory / f'round-{len(state["rounds"])}'
-    state = take_in(state, bags, *_heard(state, bags, changes, place), changes)
+    heard = _heard(state, bags, changes, place, force=args.force)
+    state = take_in(state, bags, *heard, changes)
     asked = state['rounds'][-1]['asked']
     if asked is not None:
         _write_experiment(args, place, state, asked)
     write_state(directory, state)
-    write_text(directory / PAGE, investigation_page(state), overwrite=True)
+    write_owned(directory / PAGE, investigation_page(state))
     print(headline(state))
     if asked is not None:
         print(f'{asked["reason"]} Beforehand: {foreseen(asked)}.')
@@ -217,7 +219,7 @@ def _round(
 
 
 def _heard(
-    state: dict[str, Any], bags: list[str], changes: str, place: Path
+    state: dict[str, Any], bags: list[str], changes: str, place: Path, *, force: bool
 ) -> tuple[Mapping[str, Any], str]:
     """Diagnose all recordings, and the experiments by themselves; return what to believe."""
     from weld_twin_core.errors import TwinError
@@ -230,12 +232,13 @@ def _heard(
     told = {**changed(state), **(dict.fromkeys(bags, changes) if changes else {})}
     # Seen with another tool, or from elsewhere, they cannot be held against the first.
     by_itself = not first or any(what in FRAMES for what in told.values())
-    found = _diagnosed([*first, *later, *bags], state, place, told, confirm=by_itself)
+    every = [*first, *later, *bags]
+    found = _diagnosed(every, state, place, told, confirm=by_itself, force=force)
     if by_itself:
         return weighed(found)
     beside = place.with_name(f'{place.name}-experiments')
     try:
-        return weighed(found, _diagnosed([*later, *bags], state, beside, told))
+        return weighed(found, _diagnosed([*later, *bags], state, beside, told, force=force))
     except TwinError:  # too few to be diagnosed by themselves
         return weighed(found)
 
@@ -246,6 +249,7 @@ def _diagnosed(
     place: Path,
     changes: Mapping[str, str],
     *,
+    force: bool,
     confirm: bool = False,
 ) -> dict[str, Any]:
     """Run the diagnosis as its own command does; return the content of diagnosis.json."""
@@ -256,7 +260,7 @@ def _diagnosed(
     diagnose.add_arguments(parser)
     left = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
     words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
-    words += ['--experiment-minutes', f'{left:g}']
+    words += ['--experiment-minutes', f'{left:g}', *(['--force'] if force else [])]
     words += ['--confirm'] if confirm else []
     words += [word for bag in bags if bag in changes for word in ('--changed', bag, changes[bag])]
     diagnose.run(parser.parse_args(words))
@@ -268,21 +272,30 @@ def _write_experiment(
     args: argparse.Namespace, place: Path, state: dict[str, Any], asked: dict[str, Any]
 ) -> None:
     """Write the experiment for the generator, and as a program where a controller is named."""
-    from weld_twin_core.errors import TwinError
     from weld_twin_msgs_py.files.joint_file import write_joint_motion
+
+    from ...offline.output_directory import new_directory
+
+    with new_directory(place, mark=EXPERIMENT, force=args.force, shared=True) as made:
+        write_joint_motion(made / EXPERIMENT, asked.pop('motion'), asked['sentence'])
+        if args.controller:
+            _write_program(args, state['robot'], made, place)
+
+
+def _write_program(args: argparse.Namespace, robot: str, made: Path, place: Path) -> None:
+    from weld_twin_core.errors import TwinError
     from weld_twin_msgs_py.programs.languages import LANGUAGES
 
     from . import export_program
 
-    write_joint_motion(place / EXPERIMENT, asked.pop('motion'), asked['sentence'])
-    if not args.controller:
-        return
     suffix = LANGUAGES[args.controller].extensions[0] if args.controller in LANGUAGES else '.txt'
+    name = f'experiment{suffix}'
     parser = argparse.ArgumentParser()
     export_program.add_arguments(parser)
-    words = [str(place / EXPERIMENT), '--robot', state['robot']]
-    words += ['--controller', args.controller, '--out', str(place / f'experiment{suffix}')]
+    words = [str(made / EXPERIMENT), '--robot', robot]
+    words += ['--controller', args.controller, '--out', str(made / name)]
     try:
-        export_program.run(parser.parse_args(words))
+        lines = export_program.write_program(parser.parse_args(words), made / name, place / name)
     except TwinError as error:
-        print(f'note: no program was written: {error}')
+        lines = [f'note: no program was written: {error}']
+    print('\n'.join(lines))

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..options import add_robot, add_topics, robot_of, topics_of
+from ..options import add_output, add_robot, add_topics, output, robot_of, topics_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FRAMES',
         help='frames that are not known, and are fitted: base, tool, or base,tool',
     )
-    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
+    add_output(parser, 'directory for the results')
     add_topics(parser)
 
 
@@ -53,7 +53,6 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_core.metrics.performance import performance_of
     from weld_twin_msgs_py.bags import read_recording
 
-    from ...offline.output_directory import new_directory
     from ...offline.placed_robot import placed
 
     nominal = robot_of(args)
@@ -62,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     robot, notes = placed(recording, nominal, align)
     found = performance_of(recording, robot)
     notes += _warnings(found, align)
-    with new_directory(args.out, mark=RESULT) as place:
+    with output(args, RESULT) as place:
         _write(place, found, recording, robot, notes, args)
     _print(found, notes, Console(width=WIDTH, highlight=False, markup=False))
     print(f'report: {Path(args.out) / PAGE}')

@@ -12,7 +12,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..options import add_robot, robot_of
+from ..options import add_force, add_robot, output, robot_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -40,7 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_robot(parser)
     add = parser.add_argument
     add('--tolerance', type=float, required=True, metavar='MM', help='of the tool, such as 0.3')
-    add('--minutes', type=float, required=True, metavar='M', help='there is time for')
+    add('--minutes', type=float, metavar='M', help='there is time for')
+    add('--postures', type=int, metavar='N', help='so many, in place of as many as are needed')
     add(
         '--noise',
         type=float,
@@ -66,7 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add('--controller', metavar='NAME', help=f'also write a program: {", ".join(SUFFIXES)}')
     add('--trigger', type=int, default=1, metavar='N', help='output that tells the instrument')
-    add('--out', metavar='DIR', help='directory for the files; it must not exist')
+    add('--out', metavar='DIR', help='directory for the files')
+    add_force(parser)
     add_program_options(parser)
 
 
@@ -76,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
     from weld_twin_core.errors import DataError
 
-    from ...offline.measurement_plan import planned
+    from ...offline.measurement_plan import SURE, planned
 
     if args.controller is not None and args.controller not in SUFFIXES:
         known = ', '.join(SUFFIXES)
@@ -85,7 +87,10 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.controller and not args.out:
         raise DataError('--controller writes a program; say with --out where')
-    if not (0.0 < args.seconds <= 3600.0 and 0.0 < args.minutes <= 10_000.0):
+    if args.minutes is None and args.postures is None:
+        raise DataError('say with --minutes for how long there is time, or how many --postures')
+    minutes = 1.0 if args.minutes is None else args.minutes
+    if not (0.0 < args.seconds <= 3600.0 and 0.0 < minutes <= 10_000.0):
         raise DataError('--minutes and --seconds must be above zero')
     robot = robot_of(args)
     plan = planned(
@@ -95,8 +100,14 @@ def run(args: argparse.Namespace) -> int:
         args.noise * 1e-3,
         args.seconds,
         radians(args.spread),
+        args.postures,
     )
     _print_table(plan, args.tolerance)
+    if args.postures is not None and plan.within[-1] < SURE:
+        print(
+            f'{args.postures} poses keep {args.tolerance:g} mm at {plan.within[-1]:.0%} of '
+            'postures; more of them, less noise or a smaller --spread help'
+        )
     if args.out:
         _write(args, robot, plan)
     return 0
@@ -125,12 +136,11 @@ def _write(args: argparse.Namespace, robot: Robot, plan: Planned) -> None:
     import numpy as np
 
     from ...offline.measurement_plan import STATIONS, TABLE, write_plan
-    from ...offline.output_directory import new_directory
     from ..program_options import context_of
 
     # Without a controller the table counts as the model does, which this one's language does too.
     context = context_of(args, robot, args.controller or 'csv')
-    with new_directory(args.out, mark=TABLE) as folder:
+    with output(args, TABLE) as folder:
         write_plan(folder, context, args.controller, plan)
         if args.controller:
             _write_program(args, context, folder)

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import argparse
 
+from ..options import add_file_output, output_file
+
 EXAMPLE = 'weld-twin policy --namespace left --remap joint_states:=/cell/states --out left.xml'
 
 
@@ -26,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--nodes', nargs='+', default=[], metavar='NODE', help='nodes it is for (default: all)'
     )
-    parser.add_argument('--out', metavar='FILE', help='file to write (default: print it)')
+    add_file_output(parser, 'file to write (default: print it)')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is None:
         print(text, end='')
         return 0
-    write_text(args.out, text)
+    with output_file(args) as path:
+        write_text(path, text)
     print(f'{args.out}: policy for {", ".join(args.nodes) or "all nodes"}')
     return 0

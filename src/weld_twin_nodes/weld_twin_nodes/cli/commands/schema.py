@@ -6,11 +6,13 @@ from __future__ import annotations
 
 import argparse
 
+from ..options import add_file_output, output_file
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('kind', metavar='KIND', help='robot, effects, seam or artefact')
-    parser.add_argument('--out', metavar='FILE', help='file to write (default: print it)')
+    add_file_output(parser, 'file to write (default: print it)')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -27,5 +29,6 @@ def run(args: argparse.Namespace) -> int:
     if args.out is None:
         print(text, end='')
     else:
-        write_text(args.out, text)
+        with output_file(args) as path:
+            write_text(path, text)
     return 0

@@ -16,7 +16,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..options import add_robot, add_topics, robot_of, topics_of
+from ..options import add_output, add_robot, add_topics, robot_of, topics_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('bag', nargs='?', metavar='BAG', help='study the motion recorded in a bag')
     add_robot(parser, required=False)
-    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
+    add_output(parser, 'directory for the results')
     _add_question(parser.add_argument_group('what is studied'))
     _add_effort(parser.add_argument_group('how much is run, and where'))
     add_topics(parser)
@@ -156,18 +156,29 @@ def run(args: argparse.Namespace) -> int:
     setting = _setting(args)
     if args.figure:
         from ...sensitivity_report import make_figures
-        from ...sensitivity_report.study_files import study_directory
+        from ...sensitivity_report.make_study import study_files
+        from ...sensitivity_report.study_files import FIGURES, study_directory
 
         assert setting is not None
-        place = study_directory(args.out) / 'figures'
-        for drawing in make_figures(place, setting, args.figure):
-            print(f'{place / drawing.name}.svg: {drawing.caption}')
+        place = study_directory(args.out)
+        with study_files(place, args.force) as made:
+            drawings = make_figures(made / FIGURES, setting, args.figure)
+        for drawing in drawings:
+            print(f'{place / FIGURES / drawing.name}.svg: {drawing.caption}')
         return 0
     robots = _claims_robots(args)
     with closing(pool_of(args.scheduler, args.workers, ahead=_WORK)) as pool, _progress() as tell:
         from ...sensitivity_report import make_study
 
-        page = make_study(args.out, pool, setting, claims_on=robots, tell=tell, seed=args.seed)
+        page = make_study(
+            args.out,
+            pool,
+            setting,
+            claims_on=robots,
+            tell=tell,
+            seed=args.seed,
+            force=args.force,
+        )
     _print_summary(Path(args.out))
     print(f'page: {page}')
     return 0

@@ -13,6 +13,8 @@ import argparse
 
 GIGABYTE = 1_000_000_000
 """Bytes."""
+LAST_PORT = 65_535
+"""A port is a number of sixteen bits."""
 TOKEN = 24
 """Bytes of chance in a token."""
 
@@ -56,6 +58,10 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_nodes.serve import Settings
     from weld_twin_nodes.serve.running import serve
 
+    if not 0 <= args.port <= LAST_PORT:
+        raise DataError(
+            f'--port takes 0 to {LAST_PORT}, got {args.port}; 0 takes any that is free'
+        )
     if args.workers < 1 or args.upload <= 0.0 or args.memory < 1.0 or args.minutes <= 0.0:
         raise DataError(
             '--workers takes 1 or more, --memory 1 GB or more, the others more than none'

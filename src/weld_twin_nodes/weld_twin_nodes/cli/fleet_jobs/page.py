@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 
 from ..history_jobs import opened
+from ..options import add_output, output
 
 INDEX = 'index.html'
 
@@ -16,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--db', required=True, metavar='URL', help='an SQLite file, or postgresql+psycopg://...'
     )
-    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the pages')
+    add_output(parser, 'directory for the pages')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -25,13 +26,12 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_nodes.fleet.cell_page import cell_page
     from weld_twin_nodes.fleet.ranking_page import ranking_page
     from weld_twin_nodes.offline.content_hash import digest
-    from weld_twin_nodes.offline.output_directory import new_directory
     from weld_twin_nodes.report.quantities import counted
 
     def file(cell: str) -> str:
         return f'cell_{digest(cell)[:16]}.html'
 
-    with opened(args) as database, new_directory(args.out, mark=INDEX) as place:
+    with opened(args) as database, output(args, INDEX) as place:
         cells = database.cells()
         for cell in cells:
             write_text(place / file(cell), cell_page(database, cell, INDEX))

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from weld_twin_core.arrays import Array
+from weld_twin_msgs_py.files.csv_text import csv_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,11 +62,8 @@ class Drawing:
     @property
     def csv(self) -> str:
         """Return the table as CSV; floats read back exactly."""
-        out = io.StringIO()
-        writer = csv.writer(out, lineterminator='\n')
-        writer.writerow(self.table)
-        writer.writerows(zip(*(np.asarray(c).tolist() for c in self.table.values()), strict=True))
-        return out.getvalue()
+        columns = (np.asarray(c).tolist() for c in self.table.values())
+        return csv_text(list(self.table), zip(*columns, strict=True))
 
 
 def panels(count: int, height: float = 3.1, **options: Any) -> tuple[Figure, Sequence[Axes]]:

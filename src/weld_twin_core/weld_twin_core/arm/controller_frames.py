@@ -1,0 +1,118 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The controller's own base and flange on a robot whose rows begin and end elsewhere.
+
+Denavit-Hartenberg rows begin on the first axis and end on the last one, wherever a URDF has its
+base link and its flange: an axis `0 0 -1` turns the base of the rows over, and the end of the rows
+slides along the last axis. The numbers of a controller mean the links.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, readonly
+from ..errors import DataError
+from .rotation import matrix_from_quaternion, quaternion_from_matrix, transform
+
+_KEYS = {'base', 'flange', 'base_link', 'flange_link'}
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerFrames:
+    """
+    Where a controller has its base and its flange.
+
+    Attributes
+    ----------
+    base : array, shape (4, 4) [m]
+        ``T_base_origin``: the controller's base in the base frame of the rows.
+    flange : array, shape (4, 4) [m]
+        The controller's flange in the frame at the end of the last row.
+    base_link, flange_link : str
+        What a URDF calls them; empty where there is none.
+
+    Raises
+    ------
+    DataError
+        A frame has the wrong shape or a value that is not finite.
+
+    """
+
+    base: Array = field(default_factory=lambda: np.eye(4))
+    flange: Array = field(default_factory=lambda: np.eye(4))
+    base_link: str = ''
+    flange_link: str = ''
+
+    def __post_init__(self) -> None:
+        for key in ('base', 'flange'):
+            frame = readonly(getattr(self, key), (4, 4), f'{key} of the controller')
+            object.__setattr__(self, key, frame)
+
+    @classmethod
+    def from_mapping(cls, data: Mapping[str, Any]) -> ControllerFrames:
+        """
+        Build the frames from the mapping a robot file holds.
+
+        Parameters
+        ----------
+        data : mapping
+            ``base`` and ``flange``, each with ``xyz`` and ``quat_xyzw``, and the names of links.
+
+        Raises
+        ------
+        DataError
+            A key is unknown, or a frame is none.
+
+        """
+        unknown = sorted(set(map(str, data)) - _KEYS)
+        if unknown:
+            raise DataError(
+                f'controller has the unknown key {unknown[0]!r}; known keys are '
+                + ', '.join(sorted(_KEYS))
+            )
+        return cls(
+            frame_of(data.get('base'), 'controller base'),
+            frame_of(data.get('flange'), 'controller flange'),
+            str(data.get('base_link', '')),
+            str(data.get('flange_link', '')),
+        )
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the mapping that `from_mapping` reads."""
+        names = {'base_link': self.base_link, 'flange_link': self.flange_link}
+        return {
+            'base': pose_mapping(self.base),
+            'flange': pose_mapping(self.flange),
+            **{key: name for key, name in names.items() if name},
+        }
+
+
+def frame_of(value: Any, name: str) -> Array:
+    """
+    Return the frame (4, 4) of a mapping with ``xyz`` [m] and ``quat_xyzw``; of None the identity.
+
+    Raises
+    ------
+    DataError
+        A number is missing or not finite, or the quaternion is not of length 1.
+
+    """
+    if value is None:
+        return np.eye(4)
+    position = readonly(value.get('xyz', (0.0, 0.0, 0.0)), (3,), f'{name} xyz')
+    quaternion = value.get('quat_xyzw', (0.0, 0.0, 0.0, 1.0))
+    return transform(matrix_from_quaternion(quaternion, f'{name} quat_xyzw'), position)
+
+
+def pose_mapping(matrix: Array) -> dict[str, list[float]]:
+    """Return the mapping that `frame_of` reads, of a frame (4, 4) [m]."""
+    return {
+        'xyz': matrix[:3, 3].tolist(),
+        'quat_xyzw': quaternion_from_matrix(matrix[:3, :3]).tolist(),
+    }

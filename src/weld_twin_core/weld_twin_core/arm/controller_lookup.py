@@ -1,0 +1,45 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the controller of any robot has its base and flange: said by it, or known of its arm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .catalog import load, names
+from .controller_frames import ControllerFrames
+from .fingerprint import fingerprint
+from .robot import Robot
+
+NO_TOOL = 1e-9
+"""Length of a tool [m] up to which it is none: such a frame only turns the flange as it is drawn."""
+
+
+def controller_frames(robot: Robot) -> ControllerFrames:
+    """
+    Return the controller's base and flange on a robot.
+
+    A robot that says them has its own; an arm with the rows of a bundled one has the flange of that;
+    of any other robot file the rows begin at the base and end at the flange, which a tool frame
+    without a length turns.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    """
+    if robot.controller is not None:
+        return robot.controller
+    name = bundled_name(robot)
+    if name:
+        return ControllerFrames(flange=load(name).T_flange_tool)
+    bare = np.abs(robot.T_flange_tool[:3, 3]).max() <= NO_TOOL
+    return ControllerFrames(flange=robot.T_flange_tool if bare else np.eye(4))
+
+
+def bundled_name(robot: Robot) -> str:
+    """Return the name of the bundled robot with the same kinematics; empty for none."""
+    own = fingerprint(robot)
+    if robot.name in names() and fingerprint(load(robot.name)) == own:
+        return robot.name
+    return next((name for name in names() if fingerprint(load(name)) == own), '')

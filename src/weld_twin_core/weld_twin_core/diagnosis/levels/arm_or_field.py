@@ -1,0 +1,114 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Is it the instrument, or an arm that was never seen turning its tool?
+
+Where the tool keeps one direction, the joints are a function of the place, and errors of the arm
+and a field over the workspace are one and the same. An arm is off by tenths of a millimetre as it
+is delivered, an instrument is not: the arm is to be looked at first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..algebra.fit import Fit, robust_fit, robust_scale
+from ..algebra.problem import Problem, Scale
+from ..beliefs import Beliefs
+from ..hypotheses.search import Search
+from ..unseen.regions import posture_regions
+from ..unseen.unseen_stretches import Base, Unseen
+from .free_form import FreeForm, Part
+from .groups import Group, all_groups, smooth_field, spanned
+from .own_place import told_by, worse_of
+
+AS_GOOD = 0.9
+"""Share of what a field takes off unseen data that an arm must take off to be one with it. Of two
+that are one they take the same to a few hundredths."""
+FIELD = 0.2
+"""Belief left for the instrument then: trackers and cameras are checked, and arms are not."""
+STATIC = ('constant', 'load')
+"""What an arm is off by at rest, whatever it did before."""
+
+
+def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> FreeForm:
+    """
+    Return a form whose field of the instrument is a set with the joints, where they are one.
+
+    Contacts have no instrument: what looks like a field is the arm's there.
+
+    Parameters
+    ----------
+    found : Search
+    form : FreeForm
+    rows : int
+        Rows that the two are compared on.
+    beliefs : Beliefs
+
+    """
+    fields = [part for part in form.parts if part.group.at == 'instrument']
+    if not fields:
+        return form
+    small = found.problem.thinned(rows)
+    start = found.baseline.model
+    bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
+    joints = _joints(small, bare, scale)
+    if not joints:
+        return form
+    bases = _bases(small, bare, scale)
+    arm = _gain(bases, [group for each in joints.values() for group in each])
+    touched = small.untracked
+    if not touched and arm < AS_GOOD * _gain(bases, [_field(small, bare, scale)]):
+        return form
+    gains = {name: max(_gain(bases, groups), 0.0) for name, groups in joints.items()}
+    whole = sum(gains.values())
+    if whole <= 0.0:
+        return form
+    left = 0.0 if touched else FIELD
+    sizes = {name: (1.0 - left) * gain / whole for name, gain in gains.items()}
+    rest = tuple(part for part in form.parts if part not in fields)
+    part = _shared(fields, joints, sizes, left)
+    return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
+
+
+def _shared(
+    fields: Sequence[Part], joints: dict[str, list[Group]], sizes: dict[str, float], left: float
+) -> Part:
+    """Return one part of all the joints and, where there is one, the instrument."""
+    ordered = sorted(sizes, key=lambda name: -sizes[name])
+    rivals = [(joints[name][0], sizes[name]) for name in ordered]
+    if left > 0.0:
+        rivals.append((fields[0].group, left))
+    share = sum(part.share for part in fields)
+    return Part(joints[ordered[0]][0], fields[0].ridge, tuple(rivals), share)
+
+
+def _joints(problem: Problem, bare: Fit, scale: Scale) -> dict[str, list[Group]]:
+    """Return what every joint and its link can be off by at rest."""
+    names = bare.model.robot.joint_names
+    out: dict[str, list[Group]] = {}
+    for group in all_groups(problem, bare.model, scale):
+        if group.at in names and group.on in STATIC:
+            out.setdefault(group.at, []).append(group)
+    return out
+
+
+def _field(problem: Problem, bare: Fit, scale: Scale) -> Group:
+    features = problem.features(bare.model)
+    parts = [smooth_field(problem, k, maker) for k, maker in enumerate(features)]
+    return spanned(problem, scale, 'instrument', 'place', (), parts)
+
+
+def _bases(problem: Problem, bare: Fit, scale: Scale) -> list[Base]:
+    unseen = Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size))
+    whole = range(len(unseen.parts))
+    return [one.base(whole) for one in (unseen, unseen.by(posture_regions(problem)))]
+
+
+def _gain(bases: Sequence[Base], groups: Sequence[Group]) -> float:
+    """Return the share of the squared unseen error that groups take off together."""
+    columns = np.concatenate([group.columns for group in groups])
+    return worse_of([told_by(base, columns) for base in bases])[0]

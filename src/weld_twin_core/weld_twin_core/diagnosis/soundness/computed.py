@@ -1,0 +1,152 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Were the poses measured, or did somebody compute them from the joint positions?
+
+A controller publishes its own forward kinematics, with the constants of its own model. Some rigid
+arm then agrees with every posture to the last digit. No real arm is so rigid, and no instrument so
+good: gears, bearings and air leave hundredths of a millimetre whatever constants are fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...arrays import Array
+from ...recording import JointMotion, Recording
+from ..algebra.fit import fit
+from ..algebra.noise_floor import SAME_STATION
+from ..algebra.prior import effect_precision
+from ..algebra.problem import FRAMES, Model, Problem, Scale
+from ..frames.changes import constant_errors
+from .evidence import Case, Finding, Mistake, length
+from .limits import COMPUTED, ROUNDED, UNEXPLAINED
+from .mending import measured
+
+SAMPLES = 120
+"""Postures compared: several times the numbers that a rigid arm has."""
+ENOUGH = 2.0
+"""Numbers that must be measured for every one that is fitted: fewer agree with any arm."""
+NEAR = 2e-4
+"""Gap [m] that a first, linear step must leave at most; errors of a degree leave less."""
+GRIDS = (1e-5, 1e-6)
+"""Steps [m] to which positions are rounded where hundredths of a millimetre or less are written."""
+ANGLES = (*(10.0**-k for k in (3, 4, 5, 6)), *(np.radians(10.0**-k) for k in (2, 3, 4)))
+"""Steps [rad] to which joint positions are rounded where they are written, in radians or degrees."""
+ON_GRID = 1e-3
+"""Share of a step within which a number lies on it."""
+OVER = 1.3
+"""What is left over what rounding alone leaves, at most."""
+
+
+def computed(case: Case) -> Sequence[Finding]:
+    """Return the recordings whose poses were computed from the joint positions beside them."""
+    return [
+        Finding.of(_mistake(recording, left))
+        for k, recording in enumerate(case.recordings)
+        if not recording.simulated and (left := _left(case, k)) is not None
+    ]
+
+
+def _mistake(recording: Recording, left: float) -> Mistake:
+    much = 'to the last digit' if left < 1e-7 else f'to {length(max(left, 1e-6))}'
+    return Mistake(
+        'computed',
+        ('instrument',),
+        f'The poses of {recording.name} agree with a rigid arm {much}, with no noise: they were '
+        'computed from these joint positions, as the controller does, and not measured.',
+        "Record what an instrument measures (a tracker, a camera, contacts); a controller's own "
+        'pose (tool0, tcp_pose) tells what it believes, not where the tool is',
+        None,
+        of_all=False,
+    )
+
+
+def _left(case: Case, k: int) -> float | None:
+    """Return what a rigid arm leaves of a recording [m] where that is no more than rounding."""
+    if case.gap > UNEXPLAINED:
+        return None
+    bare = Model(
+        case.model.robot, (case.model.bases[k],), case.model.known + case.model.changed(k)
+    )
+    model = bare.with_found(constant_errors(bare.robot))
+    tried = [_stations(recording, k, model) for recording in _paired(case, k)]
+    near = [(one, started) for one in tried if one is not None and (started := _near(one, model))]
+    if not near:
+        return None
+    problem, (start, _) = min(near, key=lambda pair: pair[1][1])
+    left = _gap(problem, _fitted(problem, start, 12))
+    return left if left < max(COMPUTED, _rounding(problem, start)) else None
+
+
+def _paired(case: Case, k: int) -> Iterator[Recording]:
+    """
+    Yield the measurements as stations: with the joints at their stamps, before, after, in order.
+
+    A pose that was computed belongs to one joint state, whatever its own stamp says.
+    """
+    recording = case.recordings[k]
+    joints, seen = recording.joints, measured(recording)
+    each = [case.motions[k]]
+    if not joints.static:
+        after = np.searchsorted(joints.t, seen.t).clip(1, joints.t.size - 1)
+        each += [joints.q[after - 1], joints.q[after]]
+        if joints.t.size == seen.t.size:
+            each.append(joints.q)
+    for q in each:
+        yield Recording(recording.name, JointMotion(seen.t, q, static=True), seen)
+
+
+def _stations(recording: Recording, k: int, model: Model) -> Problem | None:
+    """Return some postures that differ as a problem; None where they are too few."""
+    seen, q = measured(recording), recording.joints.q
+    _, first = np.unique(np.round(q / SAME_STATION), axis=0, return_index=True)
+    first = np.sort(first)
+    pick = first[np.unique(np.linspace(0, first.size - 1, SAMPLES).round().astype(int))]
+    some = Recording(
+        recording.name, JointMotion(seen.t[pick], q[pick], static=True), seen.take(pick)
+    )
+    problem = Problem((some,), frozenset(FRAMES))
+    fitted = problem.frame_count + effect_precision(model).size
+    return problem if 3 * pick.size > ENOUGH * fitted else None
+
+
+def _near(problem: Problem, model: Model) -> tuple[Model, float] | None:
+    """Return the model after one step, and what it leaves; None where that is far off."""
+    stepped = _fitted(problem, model, 1)
+    left = _gap(problem, stepped)
+    return (stepped, left) if left < NEAR else None
+
+
+def _fitted(problem: Problem, model: Model, iterations: int) -> Model:
+    scale = Scale(COMPUTED, COMPUTED, tuple(np.ones(m) for m in problem.samples))
+    return fit(problem, model, scale, effect_precision(model), iterations=iterations).model
+
+
+def _gap(problem: Problem, model: Model) -> float:
+    """Return the median distance that is left [m], made up for what the fit took."""
+    (part,) = problem.residuals(model)
+    taken = (problem.frame_count + effect_precision(model).size) / problem.size
+    return float(np.median(np.linalg.norm(part[:3], axis=0))) / float(np.sqrt(1.0 - taken))
+
+
+def _rounding(problem: Problem, model: Model) -> float:
+    """Return the distance [m] that rounding of the numbers leaves, where that is little; else 0."""
+    (recording,), (maker,) = problem.recordings, problem.features(model)
+    turning = ~model.robot.prismatic
+    step, angle = _grid(measured(recording).position, GRIDS), _grid(recording.joints.q, ANGLES)
+    reach = [maker.column(('q', i))[:3] for i in np.flatnonzero(turning)]
+    squares = np.sum([(column**2).sum(axis=0).mean() for column in reach])
+    out = OVER * float(np.sqrt((3.0 * step**2 + squares * angle**2) / 12.0))
+    return out if out < ROUNDED else 0.0
+
+
+def _grid(values: Array, steps: Sequence[float]) -> float:
+    """Return the coarsest step that all numbers are whole multiples of, or 0."""
+    for step in sorted(steps, reverse=True):
+        counts = values / step
+        if np.abs(counts - counts.round()).max() < ON_GRID:
+            return float(step)
+    return 0.0

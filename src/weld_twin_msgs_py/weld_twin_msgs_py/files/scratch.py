@@ -1,0 +1,161 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Hidden directories to work in: gone afterwards, and after a kill swept by the next.
+
+Who works in one holds a lock on a file in it. The system lets go of the lock when the process ends,
+however it ends, so a directory whose lock is free is nobody's any more.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+LOCK = '.weld_twin_lock'
+"""The file that is locked; a directory without it is none of ours."""
+_DRAWN = '[a-z0-9_]{8}'
+"""What `tempfile.mkdtemp` draws after the prefix."""
+
+
+class Scratch:
+    """
+    A new hidden directory; a context manager that yields its path, or `close` by hand.
+
+    Parameters
+    ----------
+    parent : Path
+        Made if it is not there.
+    prefix : str
+        Of the name, which is drawn. What killed processes left of this prefix is swept first.
+    rescue : callable, optional
+        Told every directory that is swept, before it goes.
+
+    Raises
+    ------
+    OSError
+        The place cannot be written.
+
+    """
+
+    def __init__(
+        self, parent: Path, prefix: str, rescue: Callable[[Path], object] | None = None
+    ) -> None:
+        parent.mkdir(parents=True, exist_ok=True)
+        sweep(parent, prefix, rescue)
+        self.path, lock = _made(parent, prefix)
+        self._held: int | None = lock
+
+    def close(self) -> None:
+        """Remove the directory; may be called again."""
+        held, self._held = self._held, None
+        if held is not None:
+            _remove(self.path)
+            os.close(held)
+
+    def leave(self) -> None:
+        """Let go of the directory as it is; the next sweep rescues and removes it."""
+        held, self._held = self._held, None
+        if held is not None:
+            os.close(held)
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def sweep(parent: Path, prefix: str, rescue: Callable[[Path], object] | None = None) -> None:
+    """
+    Remove the scratch directories of processes that have ended.
+
+    Parameters
+    ----------
+    parent : Path
+    prefix : str
+    rescue : callable, optional
+        Told every directory before it goes; no other process sweeps it meanwhile.
+
+    """
+    own = re.compile(re.escape(prefix) + _DRAWN)
+    try:
+        found = [entry for entry in os.scandir(parent) if own.fullmatch(entry.name)]
+    except OSError:
+        return
+    for entry in found:
+        if not entry.is_dir(follow_symlinks=False) or not _mine(entry):
+            continue
+        folder = Path(entry.path)
+        held = _hold(folder)
+        if held is None:
+            with suppress(OSError):
+                folder.rmdir()  # killed before it had a lock: removed only if it is empty
+            continue
+        try:
+            if rescue is not None:
+                rescue(folder)
+            _remove(folder)
+        finally:
+            os.close(held)
+
+
+def _mine(entry: os.DirEntry[str]) -> bool:
+    with suppress(OSError):
+        return entry.stat(follow_symlinks=False).st_uid == os.geteuid()
+    return False
+
+
+def _made(parent: Path, prefix: str) -> tuple[Path, int]:
+    """Return a new directory and the lock on it, which another's sweep may be first to take."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
+        with suppress(FileNotFoundError):
+            made = os.open(folder / LOCK, os.O_CREAT | os.O_RDWR | os.O_EXCL, 0o600)
+            held = _hold(folder)
+            if held is None and (folder / LOCK).exists():
+                return folder, made  # a file system without locks; nobody can sweep here either
+            os.close(made)
+            if held is not None:
+                return folder, held
+
+
+def _hold(folder: Path) -> int | None:
+    """Return the lock of a directory; None where another process has it, or it has none."""
+    try:
+        held = os.open(folder / LOCK, os.O_RDWR | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.samestat(os.fstat(held), os.stat(folder / LOCK)):
+            return held
+    except OSError:
+        pass
+    os.close(held)
+    return None
+
+
+def _remove(folder: Path) -> None:
+    """Remove a directory, its lock last, so that a kill in between leaves what can be swept."""
+    with suppress(OSError):
+        for entry in list(os.scandir(folder)):
+            if entry.name == LOCK:
+                continue
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            else:
+                os.unlink(entry.path)
+    shutil.rmtree(folder, ignore_errors=True)

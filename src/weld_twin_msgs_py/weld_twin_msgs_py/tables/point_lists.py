@@ -1,0 +1,152 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Lists of points without a header: names, then x, y, z, as SpatialAnalyzer and others write them.
+
+A comparison has two points to a name, nominal and measured, and often what they differ by, which
+tells the one from the other. Targets of joints in RAPID are a list, too.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import product
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+
+from .formats import Read, is_number
+
+_LOOK = 40
+"""Lines at the top in which a list is told."""
+_NAMES = (1, 2, 3)
+"""Names before the numbers: collection, group, point."""
+_POINT, _PAIR = 3, 6
+_WITH_DIFFERENCE = (9, 10)
+"""Numbers of a point, of nominal and measured, and of these with their difference and its size."""
+_ROUNDED = 2e-3
+"""Points and their difference are rounded; in millimetres, to a micrometre and coarser."""
+_JOINT_TARGET = re.compile(r'\[\s*\[([^\[\]]*)\]\s*,\s*\[([^\[\]]*)\]\s*\]')
+_AXES = 6
+_NO_AXIS = 1e8
+"""9E9 stands for an external axis that is not there."""
+
+
+def is_point_list(text: str) -> bool:
+    """Return whether every line ends in numbers of points, with names before and no header."""
+    rows = _rows(text, _LOOK)
+    return bool(rows) and _layout(rows) is not None
+
+
+def read_point_list(text: str, marker: str | None) -> Read:
+    """
+    Return the points of a list; of nominal and measured points the measured ones.
+
+    Parameters
+    ----------
+    text : str
+    marker : str, optional
+        The group of points that is meant.
+
+    Raises
+    ------
+    DataError
+        No point belongs to the group, or a line differs from the others.
+
+    """
+    rows = _rows(text)
+    layout = _layout(rows[:_LOOK])
+    assert layout is not None
+    names, first, sentence = layout
+    count = len(rows[0][1])
+    kept = []
+    for line, cells in rows:
+        if len(cells) != count:
+            raise DataError(
+                f'line {line} of the list of points has {len(cells)} cells, not {count}'
+            )
+        if marker is None or marker in cells[:names]:
+            start = names + first
+            kept.append((line, [' '.join(cells[:names]), *cells[start : start + _POINT]]))
+    if not kept:
+        raise DataError(f'no point belongs to {marker!r}; --marker names a group')
+    said = ['read as a list of points (SpatialAnalyzer and others)', *sentence]
+    return Read(['point', 'x', 'y', 'z'], [row for _, row in kept], [k for k, _ in kept], said)
+
+
+def _rows(text: str, most: int | None = None) -> list[tuple[int, list[str]]]:
+    """Return number and cells of the lines that are no remarks."""
+    lines = [
+        (k, line)
+        for k, line in enumerate(text.splitlines()[:most], start=1)
+        if line.strip() and not line.lstrip().startswith('//')
+    ]
+    comma = bool(lines) and ',' in lines[0][1]
+    return [
+        (k, [cell.strip() for cell in line.split(',')] if comma else line.split())
+        for k, line in lines
+    ]
+
+
+def _layout(rows: list[tuple[int, list[str]]]) -> tuple[int, int, list[str]] | None:
+    """Return how many names there are, at which number the point begins, and what to say."""
+    cells = [row for _, row in rows]
+    width = len(cells[0])
+    if any(len(row) != width or is_number(row[0]) for row in cells):
+        return None
+    for names, count in product(_NAMES, (_POINT, _PAIR, *_WITH_DIFFERENCE)):
+        if names + count != width or not all(is_number(c) for row in cells for c in row[names:]):
+            continue
+        values = np.array([[float(c) for c in row[names:]] for row in cells])
+        found = _measured(values)
+        if found is not None:
+            return names, *found
+    return None
+
+
+def _measured(values: Array) -> tuple[int, list[str]] | None:
+    """Return where in a row the measured point begins, and what to say of it."""
+    count = values.shape[1]
+    if count == _POINT:
+        return 0, []
+    if count == _PAIR:
+        return _POINT, [
+            'the first three numbers of a line are taken as nominal, the last three as measured'
+        ]
+    one, other, off = values[:, :3], values[:, 3:6], values[:, 6:9]
+    room = _ROUNDED * max(1.0, float(np.abs(off).max()))
+    for start, difference in ((_POINT, other - one), (0, one - other)):
+        if np.abs(difference - off).max() <= room:
+            return start, ['of nominal and measured points the measured ones are taken']
+    return None
+
+
+def is_joint_targets(text: str) -> bool:
+    """Return whether a text holds targets of joints in RAPID, and is no program of moves."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    found = sum(1 for line in lines if _joints(line))
+    return found > 0 and ('jointtarget' in text.lower() or 2 * found >= len(lines))
+
+
+def read_joint_targets(text: str) -> Read:
+    """Return the targets of joints in the order in which they stand."""
+    found = [
+        (k, *axes) for k, line in enumerate(text.splitlines(), start=1) for axes in _joints(line)
+    ]
+    here = [k for k in range(_AXES) if all(abs(float(ext[k])) < _NO_AXIS for _, _, ext in found)]
+    header = [f'rax_{k + 1} [deg]' for k in range(_AXES)] + [f'eax_{"abcdef"[k]}' for k in here]
+    rows = [[*arm, *(ext[k] for k in here)] for _, arm, ext in found]
+    said = ['read as targets of joints in RAPID, in the order of the file']
+    return Read(header, rows, [k for k, _, _ in found], said)
+
+
+def _joints(line: str) -> list[tuple[list[str], list[str]]]:
+    """Return arm and external axes of every target in a line."""
+    out = []
+    for match in _JOINT_TARGET.finditer(line):
+        arm, ext = ([cell.strip() for cell in part.split(',')] for part in match.groups())
+        if len(arm) == len(ext) == _AXES and all(map(is_number, (*arm, *ext))):
+            out.append((arm, ext))
+    return out

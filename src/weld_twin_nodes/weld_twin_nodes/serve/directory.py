@@ -1,0 +1,135 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The directory of a server: marked as such, held by one server at a time.
+
+A server works only in a directory that is new, empty, or marked by an earlier one, and removes only
+what it made there itself. The mark is a file that is locked while a server runs; the system lets go of
+the lock when its process ends, however it ends.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.whole_files import followed
+
+from .job import FILE, UPLOADS
+
+MARK = '.weld_twin_server.json'
+"""Tells that the directory is a server's; locked while one runs."""
+SCHEMA = 'weld_twin/server/1'
+JOBS, USERS = 'jobs', 'users'
+PRIVATE = 0o700
+"""Mode of what a server makes here: recordings of others are nobody's business."""
+_KEY = re.compile(r'[0-9a-f]{32}')
+"""Name of a job's folder, as `Job.new` draws it."""
+
+
+class Directory:
+    """
+    A directory in which this server alone works, until `close`.
+
+    Parameters
+    ----------
+    path : Path
+        A link is followed.
+
+    Raises
+    ------
+    DataError
+        It holds something else, another server works in it, or it cannot be written.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = followed(path)
+        self._held: int | None = None
+        try:
+            self._open()
+        except OSError as error:
+            self.close()
+            raise DataError(f"'{path}' cannot be written: {error.strerror or error}") from None
+        except DataError:
+            self.close()
+            raise
+
+    @property
+    def jobs(self) -> Path:
+        """Return where the folders of jobs lie."""
+        return self.path / JOBS
+
+    @property
+    def users(self) -> Path:
+        """Return where the folders of users lie."""
+        return self.path / USERS
+
+    def kept(self) -> Iterator[Path]:
+        """Yield the folders of jobs, and remove uploads that were cut off."""
+        for folder in sorted(self.jobs.iterdir()):
+            if folder.is_symlink() or not _KEY.fullmatch(folder.name) or not folder.is_dir():
+                continue  # a person's
+            if (folder / FILE).is_file():
+                yield folder
+            elif all(entry.name == UPLOADS or FILE in entry.name for entry in folder.iterdir()):
+                shutil.rmtree(folder, ignore_errors=True)
+
+    def close(self) -> None:
+        """Let another server in."""
+        held, self._held = self._held, None
+        if held is not None:
+            os.close(held)
+
+    def _open(self) -> None:
+        if os.path.lexists(self.path) and not self.path.is_dir():
+            raise DataError(f"'{self.path}' is a file; give a folder with --dir")
+        if not self.path.exists():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with suppress(FileExistsError):  # another server was first, and is told by its lock
+                self.path.mkdir(mode=PRIVATE)
+        if not (self.path / MARK).is_file() and not self._is_free():
+            raise DataError(
+                f"'{self.path}' holds something else already; give a folder of its own with --dir"
+            )
+        self._lock()
+        for folder in (self.jobs, self.users):
+            folder.mkdir(mode=PRIVATE, exist_ok=True)
+
+    def _is_free(self) -> bool:
+        """Tell whether nothing lies there, or what a server without a mark left: its jobs alone."""
+        names = {entry.name for entry in self.path.iterdir()}
+        if names - {JOBS, USERS, MARK}:
+            return False
+        jobs = list(self.jobs.iterdir()) if JOBS in names else []
+        return all(_KEY.fullmatch(folder.name) for folder in jobs)
+
+    def _lock(self) -> None:
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
+        self._held = os.open(self.path / MARK, flags, 0o600)
+        try:
+            fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise DataError(
+                f"another server works in '{self.path}'{_of(self._held)}; end it, or give another "
+                '--dir'
+            ) from None
+        except OSError:  # a file system without locks
+            pass
+        told = json.dumps({'schema': SCHEMA, 'process': os.getpid()}) + '\n'
+        os.ftruncate(self._held, 0)
+        os.pwrite(self._held, told.encode(), 0)
+
+
+def _of(held: int) -> str:
+    """Return which process holds a mark."""
+    with suppress(ValueError, LookupError, TypeError):
+        return f' (process {int(json.loads(os.pread(held, 1000, 0))["process"])})'
+    return ''

@@ -9,11 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from weld_twin_core import __version__
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs.repeated import repeated
 from weld_twin_core.twin.program_accuracy import Accuracy, along_seams
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
@@ -246,6 +250,46 @@ def correction_entry(made: CorrectedProgram, robot: Robot, caps: Caps) -> dict[s
         'left': [{'seam': seam, 'why': why} for seam, why in sorted(made.found.left.items())],
         'notes': list(made.notes),
     }
+
+
+def way(made: CorrectedProgram, model: ProgramModel) -> list[dict[str, Any]]:
+    """
+    Return where the tool was meant to go and where it is commanded to instead, for `verifying`.
+
+    Returns
+    -------
+    list of mapping
+        For each stretch ``tool`` (``T_flange_tool``), and ``meant`` and ``commanded``: poses in the base
+        frame of the model by position [m] and rotation vector [rad], one for one. Along corrected
+        linear and circular moves; at the ends of all moves where there are none.
+
+    """
+    out = []
+    seams = any(
+        move.kind != 'joint' and move.seam not in made.found.left
+        for piece in made.found.travel.pieces
+        for move in piece.moves
+    )
+    for piece in made.found.travel.pieces:
+        motion = repeated(model.robot, made.found.program, piece)
+        meant, commanded = model.wanted(piece), model.wanted(piece._replace(motion=motion))
+        for k, move in enumerate(piece.moves):
+            chosen = piece.move == k
+            if not seams:
+                chosen = np.zeros(chosen.size, dtype=bool)
+                chosen[piece.ends[k]] = True
+            if move.seam in made.found.left or (seams and move.kind == 'joint'):
+                continue
+            poses = {'meant': _six(meant[chosen]), 'commanded': _six(commanded[chosen])}
+            out.append({'tool': move.tool.tolist(), **poses})
+    return out
+
+
+def _six(poses: Array) -> list[list[float]]:
+    """Return poses (N, 4, 4) as positions and rotation vectors, to a nanometre."""
+    turns = [rotation_vector(pose[:3, :3]) for pose in poses]
+    both = np.concatenate([poses[:, :3, 3], np.array(turns).reshape(-1, 3)], axis=1)
+    return [[float(value) for value in row] for row in np.round(both, 9)]
 
 
 def _accuracy(value: Accuracy | None) -> dict[str, Any] | None:

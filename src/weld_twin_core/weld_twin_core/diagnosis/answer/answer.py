@@ -87,7 +87,6 @@ def answer(
         effects=effects,
         confidence=verdict.confidence,
         indistinguishable=verdict.sets,
-        same=never_parted(found, verdict.sets),
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),
         shrink=shrink,
@@ -101,7 +100,7 @@ def answer(
         **_parted(unseen, told, shares, verdict, rival),
         signs=own,
         contacts=contact_spreads(found, unseen),
-        **_compared(found, examined),
+        **_compared(found, examined, verdict),
     )
 
 
@@ -158,8 +157,8 @@ def _of_effect(cause: Cause, verdict: Verdict, signs: Signs) -> Mapping[str, flo
     return signs.causes[cause.members[0]] if named else {}
 
 
-def _compared(found: Search, examined: Examined) -> dict[str, Any]:
-    """Return the recordings, what they say of each other, and what the checks say of that."""
+def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, Any]:
+    """Return the recordings, what they say of each other, and what no recording can say."""
     named = examined.given.may_change
     return {
         'recordings': found.problem.recordings,
@@ -169,4 +168,5 @@ def _compared(found: Search, examined: Examined) -> dict[str, Any]:
         'changed': changed(found, named),
         'may_change': named,
         'unsound': examined.told(found.final.model.found),
+        'same': never_parted(found, verdict.sets),
     }

@@ -45,9 +45,7 @@ STEPS = 4
 """Steps of a fit that starts nearby; constants are nearly linear."""
 
 
-def alone(
-    problem: Problem, model: Model, shrink: Shrink, *, many: bool = False
-) -> Alone | None:
+def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False) -> Alone | None:
     """
     Return what is left with the constants of a model alone, and how they are best changed for that.
 

@@ -38,7 +38,7 @@ GROUPS = {
 """What `tools/setup` is asked for, and the extras it means; 'run' is what `make demo` needs."""
 OLDEST = '3.10'
 """The lowest Python that the lock is for."""
-PYTHONS = re.compile(r'-(py2\.py3|py3|cp31[0-4])-(none|abi3|cp31[0-4])-|-cp3\d-abi3-')
+PYTHONS = re.compile(r'-((py2\.)?py3|(py|cp)31[0-4])-(none|abi3|cp31[0-4])-|-cp3\d-abi3-')
 """Wheels for the Pythons that are supported, from 3.10 to 3.14."""
 PLATFORMS = re.compile(r'(any|manylinux\w*(\.manylinux\w*)*_x86_64)\.whl$')
 """Wheels for the platform that ROS 2 is on PyPI for; elsewhere the lock is not used."""
@@ -129,13 +129,15 @@ def requirement(package: dict[str, Any]) -> str:
 
 
 def hashes_of(package: dict[str, Any]) -> Iterator[str]:
-    """Yield the hashes of a package's wheels that fit; of its source where it has no wheel at all."""
-    wheels = package.get('wheels', [])
-    for wheel in wheels:
-        name = wheel.get('name') or wheel['url'].rsplit('/', 1)[-1]
-        if PYTHONS.search(name) and PLATFORMS.search(name):
-            yield wheel['hashes']['sha256']
-    if not wheels and 'sdist' in package:
+    """Yield the hashes of a package's wheels that fit; where none does, of its source."""
+    fit = [
+        wheel['hashes']['sha256']
+        for wheel in package.get('wheels', [])
+        for name in [wheel.get('name') or wheel['url'].rsplit('/', 1)[-1]]
+        if PYTHONS.search(name) and PLATFORMS.search(name)
+    ]
+    yield from fit
+    if not fit and 'sdist' in package:
         yield package['sdist']['hashes']['sha256']
 
 

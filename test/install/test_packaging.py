@@ -80,7 +80,9 @@ def test_package_names_the_project_where_it_lies_and_what_changed(package):
     changes = pytest.importorskip('catkin_pkg.changelog', reason='needs catkin_pkg')
     found = reader.parse_package(str(ROOT / 'src' / package / 'package.xml'), warnings=[])
     assert [person.name for person in found.maintainers] == ['weld_twin contributors']
-    assert {url.type for url in found.urls} == {'website', 'repository', 'bugtracker'}
+    assert (
+        found.urls == []
+    )  # the project has no address of its own yet; one that leads nowhere is none
     text = (ROOT / 'src' / package / 'CHANGELOG.rst').read_text()
     assert changes.get_changelog_from_path(str(ROOT / 'src' / package), package) is not None
     assert text.splitlines()[1] == f'Changelog for package {package}'
@@ -105,6 +107,25 @@ def imported(package, *, at_once=False):
                 yield from (name.name.split('.')[0] for name in node.names)
             elif isinstance(node, ast.ImportFrom) and node.level == 0:
                 yield node.module.split('.')[0]
+
+
+KEYS = {'urdf_parser_py': 'urdfdom_py'}
+"""Keys of rosdep that are neither the name of the module nor that with `python3-` before it."""
+NO_KEYS = {'rosbags', 'mcap', 'lz4'}
+"""What rosdep has no key for; CONTRIBUTING says where it comes from."""
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_package_xml_names_what_is_imported(package):
+    """What belongs to an extra of pyproject.toml alone is asked for where it is used."""
+    xml = ElementTree.parse(ROOT / 'src' / package / 'package.xml').getroot()
+    named = {item.text for item in xml.iter('exec_depend')}
+    needed = [re.match(r'[\w.-]+', item).group() for item in PROJECT['dependencies']]
+    always = {MODULES.get(name, name.replace('-', '_')) for name in needed} - NO_KEYS
+    for module in sorted(set(imported(package)) & (always | ROS | set(PACKAGES)) - {package}):
+        keys = {KEYS.get(module, module), f'python3-{module}'}
+        assert keys & named, f'{package} imports {module}'
+    assert set(re.findall(r'`(\w+)`', (ROOT / 'CONTRIBUTING.md').read_text())) >= NO_KEYS
 
 
 @pytest.mark.parametrize('package', PACKAGES)

@@ -359,3 +359,44 @@ def test_the_base_is_taken_from_tf_and_told_when_it_moves(cell, other):
     said = "'base_link' has moved in 'tracker' by 4 mm and 0 degrees since this node started"
     node = '/forward_kinematics_twin'
     cell.wait(lambda: any(said in text for _, text in health.told[node]), said)
+
+
+def test_running_nodes_follow_publishers_of_one_type_after_the_other(cell, other):
+    """Each publisher comes after the nodes, has the topic for itself, and goes."""
+    remap = ['--ros-args', '-r', 'measured/tool_pose:=/tracker']
+    module = 'weld_twin_nodes.live.deviation_analyzer'
+    options = ['-p', 'measured_frame:=probe']
+    nodes = [
+        cell.start(['python', '-m', module, *remap, *options]),
+        cell.start('forward_kinematics_twin'),
+    ]
+    deviations, poses = cell.collect('/deviation'), cell.collect(TWIN_POSE.name)
+    base, stamp = cell.publisher(TWIN_BASE), [S]
+    base.publish(cell.messages.pose(S, np.zeros(3), np.eye(3), 'world'))
+    plain = ('sensor_msgs/JointState', lambda: lambda ns: cell.messages.joint_state(ns, NAMES, Q))
+    joints = [(name, lambda m=make, v=values: m(*v)) for name, make, values, _ in JOINTS.values()]
+    turns = zip([*MEASURED.values()], [*joints[:2], plain, joints[0]], strict=True)
+    for (measured, make, _, expected), (state, make_state) in turns:
+        theirs = [
+            (other.create_publisher(kind(measured), '/tracker', 10), make()),
+            (other.create_publisher(kind(state), '/joint_states', 10), make_state()),
+        ]
+
+        def step(theirs=theirs, begun=stamp[0]):
+            stamp[0] += S // 100
+            for publisher, message in theirs:
+                publisher.publish(message(stamp[0]))
+            time.sleep(BEAT)
+            new = begun + BEAT * S
+            return all(len(tap) and tap.stamps[-1] > new for tap in (deviations, poses))
+
+        cell.wait(step, f'deviations by {measured} and {state}')
+        np.testing.assert_allclose(
+            from_messages.vector3(deviations.last), expected, atol=1e-8, err_msg=measured
+        )
+        np.testing.assert_allclose(
+            from_messages.pose(poses.last)[0], forward(ROBOT, Q)[:3, 3], atol=1e-12, err_msg=state
+        )
+        for publisher, _ in theirs:
+            other.destroy_publisher(publisher)
+    assert [node.stop() for node in nodes] == [0, 0]

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Array
 
@@ -19,6 +20,12 @@ MANY = 0.4
 random one step in ten is."""
 LEAST = 5
 """Bursts below which there is no rate of bursts."""
+WINDOW = 5
+"""Bursts whose least delay is that of the time: some were sent right after a sample."""
+SKIPPED = 0.6
+"""Steps that the least delay must grow by at once for a sample to have been lost."""
+SETTLED = 3
+"""Times that lost samples and the step are found in turn."""
 SOONEST = 0.05
 """Quantile of the delays of the last sample of a burst that counts as the least; a few may be off."""
 
@@ -29,18 +36,21 @@ class Bursts(NamedTuple):
 
     Attributes
     ----------
-    count : int
+    number : int
     every : float [s]
         Median time from burst to burst.
     first, step : float [s]
         Stamps as of an even clock, which the last sample of each burst keeps nearly.
+    lost : array of int
+        Samples before which one is missing; twice where two are.
 
     """
 
-    count: int
+    number: int
     every: float
     first: float
     step: float
+    lost: NDArray[np.int_]
 
     @property
     def rate(self) -> float:
@@ -51,7 +61,7 @@ class Bursts(NamedTuple):
     def words(self) -> str:
         """Return what is to be said of it, to follow the name of the stream."""
         return (
-            f'stamped in {self.count} bursts, one every {self.every * 1e3:.3g} ms; '
+            f'stamped in {self.number} bursts, one every {self.every * 1e3:.3g} ms; '
             f'{self.rate:#.4g} Hz underneath'
         )
 
@@ -72,7 +82,7 @@ def bursts(t: Array) -> Bursts | None:
     >>> import numpy as np
     >>> from weld_twin_core.bursts import bursts
     >>> sent = np.repeat(np.arange(10) * 0.4 + 0.3, 4) + np.tile(np.arange(4) * 1e-4, 10)
-    >>> print(bursts(sent).count, round(bursts(sent).rate, 2))
+    >>> print(bursts(sent).number, round(bursts(sent).rate, 2))
     10 10.0
 
     """
@@ -85,7 +95,43 @@ def bursts(t: Array) -> Bursts | None:
     last = np.append(np.flatnonzero(~inside), t.size - 1)
     if last.size < LEAST:
         return None
+    start, lost = np.append(0, last[:-1] + 1), np.zeros(0, dtype=int)
+    for _ in range(SETTLED):
+        counted = last + np.searchsorted(lost, last, side='right')
+        step = float(np.polyfit(counted, t[last], 1)[0])
+        lost = _lost(t[last] - step * last, start, step)
+    counted = last + np.searchsorted(lost, last, side='right')
+    step = float(np.polyfit(counted, t[last], 1)[0])
     # What was measured last before it was sent waited least.
-    step = float(np.polyfit(last, t[last], 1)[0])
-    first = float(np.quantile(t[last] - step * last, SOONEST))
-    return Bursts(last.size, float(np.median(np.diff(t[last]))), first, step)
+    first = float(np.quantile(t[last] - step * counted, SOONEST))
+    return Bursts(last.size, float(np.median(np.diff(t[last]))), first, step, lost)
+
+
+def _lost(delay: Array, start: NDArray[np.int_], step: float) -> NDArray[np.int_]:
+    """Return the samples before which one is missing: from there on all come a step later."""
+    out: list[int] = []
+    for k in range(1, delay.size):
+        before = float(delay[max(k - WINDOW, 0) : k].min())
+        later = float(delay[k : k + WINDOW].min()) - before
+        if later > SKIPPED * step and delay.size - k >= 2:
+            missing = max(round(later / step), 1)
+            out += [int(start[k])] * missing
+            delay = np.where(np.arange(delay.size) >= k, delay - missing * step, delay)
+    return np.array(out, dtype=int)
+
+
+def evenly(first: float, step: float, lost: NDArray[np.int_], size: int, count: int) -> Array:
+    """
+    Return the stamps of an even clock, shape (size,) [s].
+
+    Parameters
+    ----------
+    first, step : float [s]
+    lost : array of int
+        As `Bursts` has it, counted in ``count`` samples.
+    size, count : int
+        How many stamps are wanted, of how many: evenly thinned where they are fewer.
+
+    """
+    index = np.arange(size) * (count / size)
+    return np.asarray(first + step * (index + np.searchsorted(lost, index, side='right')))

@@ -41,14 +41,14 @@ def taught(sure_from=0.9, **levels):
 
 def test_log_odds_are_a_sum_over_signs():
     trust = taught(sure_from=0.5, answer_named=(1.0, {'margin': 2.0, 'rise': -1.0}))
-    told = trust.told('answer', 'named', {'margin': 2.0, 'rise': 3.0})
+    told = trust.learned('answer', 'named', {'margin': 2.0, 'rise': 3.0})
     odds = 1.0 + 2.0 * (2.0 - 1.0) / 2.0 - 1.0 * (3.0 - 1.0) / 2.0
     assert told == pytest.approx(1.0 / (1.0 + math.exp(-odds)))
 
 
 def test_a_sign_says_no_more_beyond_what_was_learned_from():
     trust = taught(sure_from=0.5, answer_named=(0.0, {'margin': 1.0}))
-    far, edge = (trust.told('answer', 'named', {'margin': x}) for x in (900.0, 5.0))
+    far, edge = (trust.learned('answer', 'named', {'margin': x}) for x in (900.0, 5.0))
     assert far == edge
 
 
@@ -60,35 +60,40 @@ def test_a_sign_says_no_more_beyond_what_was_learned_from():
 def test_a_gap_beyond_all_that_was_learned_from_is_told_what_the_evidence_says(gap, bias, told):
     trust = taught(sure_from=0.9, answer_named=(bias, {'gap': 0.0}))
     signs = {'gap': gap, 'belief': 0.7}
-    assert trust.told('answer', 'named', signs) == pytest.approx(told)
+    assert trust.learned('answer', 'named', signs) == pytest.approx(told)
 
 
 def test_the_evidence_alone_makes_no_answer_sure():
     trust = taught(sure_from=0.9, answer_named=(-6.0, {'gap': 0.0}))
-    assert trust.told('answer', 'named', {'gap': 9.0, 'belief': 0.97}) == 0.8
+    signs = {'gap': 9.0, 'belief': 0.97}
+    assert trust.learned('answer', 'named', signs) == 0.8
+    assert not trust.sure('answer', 'named', signs)
 
 
 def test_a_sign_that_is_missing_counts_as_usual():
     trust = taught(sure_from=0.5, answer_named=(0.4, {'margin': 1.0}))
-    assert trust.told('answer', 'named', {}) == pytest.approx(1.0 / (1.0 + math.exp(-0.4)))
+    assert trust.learned('answer', 'named', {}) == pytest.approx(1.0 / (1.0 + math.exp(-0.4)))
 
 
 @pytest.mark.parametrize(('constants', 'share'), [(2.0, 0.75), (0.0, 0.0)])
 def test_a_constant_named_where_joints_rest_is_a_sign_of_its_own(constants, share):
     trust = taught(sure_from=0.5, answer_named=(0.0, {'constant_at_rest': -1.0}))
-    told = trust.told('answer', 'named', {'constants': constants, 'moving': 0.25})
+    told = trust.learned('answer', 'named', {'constants': constants, 'moving': 0.25})
     assert told == pytest.approx(1.0 / (1.0 + math.exp((share - 1.0) / 2.0)))
 
 
 def test_few_cases_allow_no_certainty():
     trust = taught(answer_named=(40.0, {}))
-    assert trust.told('answer', 'named', {}) == 0.99
+    assert trust.learned('answer', 'named', {}) == 0.99
 
 
-@pytest.mark.parametrize(('bias', 'told'), [(2.3, 0.909), (2.1, 0.8), (0.0, 0.5)])
-def test_what_is_below_the_bound_is_not_told_as_sure(bias, told):
+@pytest.mark.parametrize(
+    ('bias', 'told', 'sure'), [(2.3, 0.909, True), (2.1, 0.891, False), (0.0, 0.5, False)]
+)
+def test_an_answer_is_believed_as_it_was_learned_and_sure_from_the_bound_on(bias, told, sure):
     verdict = trusted_verdict(NAMED, {}, taught(sure_from=0.9, answer_named=(bias, {})))
     assert verdict.confidence == pytest.approx(told, abs=1e-3)
+    assert verdict.sure is sure
 
 
 def test_an_answer_that_nothing_was_learned_of_stays_as_it_is():
@@ -140,6 +145,6 @@ def test_what_this_package_has_learned_can_be_read():
 
 def test_a_family_that_is_missing_counts_as_not_named():
     trust = taught(sure_from=0.5, answer_named=(0.0, {'named_backlash': 1.0}))
-    absent, named = (trust.told('answer', 'named', s) for s in ({}, {'named_backlash': 1.0}))
+    absent, named = (trust.learned('answer', 'named', s) for s in ({}, {'named_backlash': 1.0}))
     assert absent == pytest.approx(1.0 / (1.0 + math.exp(0.5)))
     assert named == pytest.approx(0.5)

@@ -24,7 +24,7 @@ MADE = {
     'stamps': {'k': 0, 'late': 0.3, 'rate': 1e-4, 'middle': 5.0},
     'velocities': {'k': 0},
     'poses_inverted': {},
-    'even_stamps': {'k': 0, 'first': 0.1, 'step': 0.02},
+    'even_stamps': {'k': 0, 'first': 0.1, 'step': 0.02, 'lost': (5, 9), 'count': 100},
     'may_change': {'families': ('tool_pose',)},
 }
 

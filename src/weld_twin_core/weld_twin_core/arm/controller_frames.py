@@ -20,7 +20,7 @@ from ..arrays import Array, readonly
 from ..errors import DataError
 from .rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
-_KEYS = {'base', 'flange', 'base_link', 'flange_link'}
+_KEYS = {'base', 'flange', 'foot', 'base_link', 'flange_link'}
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,13 @@ class ControllerFrames:
     Attributes
     ----------
     base : array, shape (4, 4) [m]
-        ``T_base_origin``: the controller's base in the base frame of the rows.
+        The controller's base, which positions of programs count from, in the base frame of the rows.
     flange : array, shape (4, 4) [m]
         The controller's flange in the frame at the end of the last row.
+    foot : array, shape (4, 4) [m], optional
+        The link that the arm stands in, in the base frame of the rows: deviations, wrenches and
+        places of the base speak of it. Left out, it is the controller's base; they differ for
+        arms as Universal Robots', whose `base` is turned against `base_link`.
     base_link, flange_link : str
         What a URDF calls them; empty where there is none.
 
@@ -46,12 +50,14 @@ class ControllerFrames:
 
     base: Array = field(default_factory=lambda: np.eye(4))
     flange: Array = field(default_factory=lambda: np.eye(4))
+    foot: Array | None = None
     base_link: str = ''
     flange_link: str = ''
 
     def __post_init__(self) -> None:
-        for key in ('base', 'flange'):
-            frame = readonly(getattr(self, key), (4, 4), f'{key} of the controller')
+        for key in ('base', 'flange', 'foot'):
+            given = self.base if key == 'foot' and self.foot is None else getattr(self, key)
+            frame = readonly(given, (4, 4), f'{key} of the controller')
             object.__setattr__(self, key, frame)
 
     @classmethod
@@ -62,7 +68,8 @@ class ControllerFrames:
         Parameters
         ----------
         data : mapping
-            ``base`` and ``flange``, each with ``xyz`` and ``quat_xyzw``, and the names of links.
+            ``base``, ``flange`` and ``foot``, each with ``xyz`` and ``quat_xyzw``, and the names
+            of links.
 
         Raises
         ------
@@ -79,16 +86,19 @@ class ControllerFrames:
         return cls(
             frame_of(data.get('base'), 'controller base'),
             frame_of(data.get('flange'), 'controller flange'),
+            frame_of(data['foot'], 'controller foot') if 'foot' in data else None,
             str(data.get('base_link', '')),
             str(data.get('flange_link', '')),
         )
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the mapping that `from_mapping` reads."""
+        assert self.foot is not None
         names = {'base_link': self.base_link, 'flange_link': self.flange_link}
         return {
             'base': pose_mapping(self.base),
             'flange': pose_mapping(self.flange),
+            'foot': pose_mapping(self.foot),
             **{key: name for key, name in names.items() if name},
         }
 

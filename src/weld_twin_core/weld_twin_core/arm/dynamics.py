@@ -71,7 +71,7 @@ def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
     chain : Frames
         The chain at the samples.
     frame : str
-        Where the wrench is expressed: 'tool', or 'base' for the base that the controller has.
+        Where the wrench is expressed: 'tool', or 'base' for the link that the arm stands in.
 
     """
     if frame == 'tool':

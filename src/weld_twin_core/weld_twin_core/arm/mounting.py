@@ -29,7 +29,7 @@ def rising(robot: Robot) -> float:
     """
     Return 1 where the arm rises from its foot along z of its first row, -1 where against it.
 
-    The second axis tells it; where that meets the foot, z of the controller's base does.
+    The second axis tells it; where that meets the foot, z of the link that it stands in does.
 
     Parameters
     ----------

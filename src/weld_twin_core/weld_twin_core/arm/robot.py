@@ -166,15 +166,17 @@ class Robot:
 
     @property
     def T_base_origin(self) -> Array:
-        """Return the controller's base in the base frame of the rows, shape (4, 4) [m]."""
-        return np.eye(4) if self.controller is None else self.controller.base
+        """Return the link that the arm stands in, in the base frame of the rows, (4, 4) [m]."""
+        if self.controller is None or self.controller.foot is None:
+            return np.eye(4)
+        return self.controller.foot
 
     @property
     def T_world_origin(self) -> Array:
-        """Return the controller's base in the world, shape (4, 4) [m]: the base people speak of."""
+        """Return the base that people speak of in the world, shape (4, 4) [m]: the arm's foot."""
         if self.controller is None:
             return self.T_world_base
-        return np.asarray(self.T_world_base @ self.controller.base)
+        return np.asarray(self.T_world_base @ self.T_base_origin)
 
     def index(self, joint: str) -> int:
         """
@@ -221,7 +223,7 @@ class Robot:
 
     def with_origin(self, T_world_origin: Array) -> Robot:
         """
-        Return the same arm with the controller's base elsewhere.
+        Return the same arm with its foot elsewhere, see `T_world_origin`.
 
         Parameters
         ----------
@@ -230,7 +232,7 @@ class Robot:
         """
         if self.controller is None:
             return self.with_frames(base=T_world_origin)
-        return self.with_frames(base=T_world_origin @ np.linalg.inv(self.controller.base))
+        return self.with_frames(base=T_world_origin @ np.linalg.inv(self.T_base_origin))
 
     def check_positions(self, q: Array) -> None:
         """

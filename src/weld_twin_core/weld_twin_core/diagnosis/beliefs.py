@@ -120,7 +120,7 @@ class Beliefs:
 
     several: int = _many(4)
     """Effects found on stations from which on the many are tried as well, and taken if they
-    predict unseen stations better. A judgement: one more than `crowd` allows."""
+    predict unseen stations better. A judgement."""
 
     better: float = _many(0.95)
     """RMS on unseen stations, as a share of that of the few, that the many must stay below. A
@@ -229,10 +229,6 @@ class Beliefs:
     """Effects whose squares sum to this many times the square of their sum cancel each other.
     Moved: nothing changes."""
 
-    crowd: int = _verdict(3)
-    """Separate causes at once beyond which they are more likely one that the library lacks.
-    Moved: less: 3 verdicts change, 33 right; more: none changes."""
-
     carried: float = _verdict(1.3)
     """What remains on a held-out motion over what remains on unseen stretches of those fitted:
     beyond this the model does not carry over, as a cause would that was found. Moved: less:
@@ -296,10 +292,6 @@ class Beliefs:
     families: float = _verdict(0.75)
     """Belief in the families named where nothing is left: dozens of errors at once are seldom
     put together on purpose. Moved: nothing changes."""
-
-    unsteady: float = _levels(0.8)
-    """Belief at most in a name that does not come back on every half of the data that would show
-    it: what is told to those who are not sure."""
 
     # Place, dependence and name --------------------------------------------------------------
 

@@ -23,7 +23,7 @@ from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.carried import carried
-from .levels.curved import curved
+from .levels.curved import curved, standing
 from .levels.formulas import formulas
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
@@ -36,7 +36,7 @@ from .stability.steadied import came_back, steadied
 from .trust.signs import Signs, signs_of_answer
 from .trust.signs_of_found import signs_of_found
 from .unseen.carrying import carrying
-from .unseen.held_out_shrink import held_out_shrink
+from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
 from .unseen.parted_elsewhere import parted_elsewhere
 from .unseen.unseen_stretches import Unseen
@@ -163,20 +163,23 @@ def _explained(
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
     found, least = parted_elsewhere(found, holdout, beliefs)
     found, stability = steadied(found, repeated(found), beliefs)
-    evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least)
+    chance = reached_by_chance(found, unseen, holdout, beliefs)
+    evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least, chance)
     verdict = decide(evidence, beliefs)
-    rival = curved(found, verdict, beliefs)
+    rival = curved(found, beliefs)
     verdict, missed = formulas(found, unseen, verdict, rival, beliefs)
+    verdict, rival = standing(found, verdict, rival, beliefs)
     back = came_back(found, verdict, stability)
     each = signs_of_found(found, unseen, evidence, verdict, back, holdout)
     own = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks, each)
     unseen.forget_other_parts()
     places = placed(found, verdict, rival, missed, beliefs)
     progress('held against curves without a formula')
-    found, unseen, shrink = carried(found, unseen, shrink, verdict, rival, holdout, beliefs)
-    found = _held(found, examined.given.robot)
+    found, unseen, shrink, verdict = carried(
+        found, unseen, shrink, verdict, rival, holdout, beliefs
+    )
+    found = _by_itself(_held(found, examined.given.robot), shrink)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
-    found = _by_itself(found, shrink)
     progress('weighed what the data leave open')
     told = (Signs(own, each), rival, places, limits, stability)
     return answer(found, unseen, evidence, verdict, shrink, examined, posterior, *told)

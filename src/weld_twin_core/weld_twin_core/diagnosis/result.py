@@ -17,7 +17,7 @@ from ..recording import Recording
 from ..twin.posterior import Posterior, as_dict
 from .algebra.problem import Model
 
-SCHEMA = 'weld_twin/diagnosis/1'
+SCHEMA = 'weld_twin/diagnosis/2'
 NAMING = ('identified', 'ambiguous')
 """Verdicts that name something; the others are unknown, none and unsound."""
 MISTAKES = (
@@ -236,11 +236,6 @@ class CameBack:
         """Return the share of the halves on which it came back."""
         return self.times / self.of
 
-    @property
-    def bound(self) -> float:
-        """Return how far to believe that it comes back the next time, by the rule of succession."""
-        return (self.times + 1.0) / (self.of + 2.0)
-
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``came_back``."""
         instead = [{'effect': s.effect, 'joint': s.joint, 'times': n} for s, n in self.instead]
@@ -268,6 +263,16 @@ class Cause:
         nothing that can be carried over stands for it.
     came_back : CameBack or None
         How often it is named again on halves of the data; None where too few can tell.
+    probability : float
+        That one of its names is right; that its place is, where it has no name of an effect.
+    sure : bool
+        Whether that keeps the promise of being wrong hardly ever.
+    effect : int or None
+        Its index in `Diagnosis.effects` and in `Diagnosis.indistinguishable`.
+    rest : bool
+        Whether it is what is left beside everything that is told; its share is the unexplained.
+    slot : int or None
+        Which effect found by the search it is; for the steps of a diagnosis alone.
 
     """
 
@@ -278,10 +283,19 @@ class Cause:
     share_ci90: tuple[float, float]
     members: tuple[int, ...] = ()
     came_back: CameBack | None = None
+    probability: float = 0.0
+    sure: bool = False
+    effect: int | None = None
+    rest: bool = False
+    slot: int | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.causes``."""
         return {
+            'probability': self.probability,
+            'sure': self.sure,
+            'effect': self.effect,
+            'rest': self.rest,
             'place': [{'at': at, 'probability': p} for at, p in self.place],
             'dependence': [{'on': on, 'probability': p} for on, p in self.dependence],
             'name': [
@@ -465,9 +479,10 @@ class Diagnosis:
     status : str
         'identified', 'ambiguous', 'unknown', 'none' or 'unsound'.
     effects : tuple of Found
-        The effects named, with standard errors, those that move the tool most first.
+        The effects found, whatever the status, with standard errors; those that move the tool most
+        first.
     confidence : float
-        Probability that the set of effects named is right.
+        Probability that the whole answer is right, as such answers were.
     indistinguishable : tuple of tuple of Site
         One group per effect: what these data cannot tell apart.
     reasons : tuple of str
@@ -539,9 +554,10 @@ class Diagnosis:
     """How well contacts agree, where contacts took the place of an instrument."""
     same: tuple[tuple[Site, ...], ...] = ()
     """Those of ``indistinguishable`` that are the same error on any motion, the one to set first."""
-    learned: float | None = None
-    """How often such answers were right; ``confidence`` tells less where it is not sure, or does not
-    always come back. None where nothing was learned of such answers."""
+    sure: bool = False
+    """Whether the answer keeps the promise of being wrong hardly ever; docs/trust.md has it."""
+    complete: float = 0.0
+    """Probability that no cause above the noise and a tenth of the squared gap is missing."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
@@ -565,11 +581,14 @@ class Diagnosis:
         }
 
     def _verdict(self) -> dict[str, Any]:
+        confidence = None if self.status == 'unsound' else self.confidence
         return {
             'status': self.status,
             'effects': [found.as_dict() for found in self.effects],
-            'confidence': None if self.status == 'unsound' else self.confidence,
-            'learned': self.learned if self.status != 'unsound' else None,
+            'confidence': confidence,
+            'learned': confidence,
+            'sure': self.sure,
+            'complete': None if confidence is None else self.complete,
             'indistinguishable': [
                 [{'effect': s.effect, 'joint': s.joint} for s in group]
                 for group in self.indistinguishable

@@ -60,7 +60,7 @@ def test_learned_belief_is_as_often_right_as_it_says():
 def test_sure_and_wrong_is_bounded_on_cases_never_seen():
     trust = trust_of(examples(1500, 5, slope=4.0))
     fresh = examples(4000, 6, slope=4.0)
-    sure = [trust.told('answer', 'named', e.signs) > 0.8 for e in fresh]
+    sure = [trust.sure('answer', 'named', e.signs) for e in fresh]
     wrong = [s and not e.right for s, e in zip(sure, fresh, strict=True)]
     assert np.mean(wrong) <= 0.01
     assert np.mean(sure) > 0.2
@@ -162,5 +162,6 @@ def test_a_family_never_seen_is_believed_like_its_kind():
 def test_a_name_that_does_not_always_come_back_is_not_sure():
     trust = trust_of(examples(1500, 13))
     signs = {'belief': 0.9, 'margin': 6.0, 'left': 0.0}
-    assert trust.told('answer', 'named', signs) > 0.9
-    assert trust.told('answer', 'named', {**signs, 'own_back': 0.97}) == 0.8
+    assert trust.learned('answer', 'named', signs) > 0.9
+    assert trust.sure('answer', 'named', signs)
+    assert not trust.sure('answer', 'named', {**signs, 'own_back': 0.97})

@@ -12,12 +12,12 @@ from weld_twin_core.diagnosis.result import Cause, Site
 from weld_twin_core.diagnosis.trust.model import Trust
 from weld_twin_core.diagnosis.trust.trusted import trusted_cause
 
-from ..blind.judging import CONFIDENT, NOT_IN_LIBRARY
+from ..blind.judging import NOT_IN_LIBRARY
 from ..blind.measures import Measure
 from ..blind.statistics import Estimate, bootstrap, share
 from .judged import Case
 from .levels_of_truth import levels_of
-from .told import confidence, sure_and_right
+from .told import is_sure, sure_and_right
 
 SEEN, PLAIN = 1.0, 3.0
 """Effect RMS over noise from which a cause can be seen, and from which it is plain."""
@@ -56,9 +56,9 @@ def goal_measures(cases: Sequence[Case], trust: Trust) -> list[Measure]:
 def _of_causes(cases: Sequence[Case], trust: Trust) -> list[Measure]:
     """Return the measures of named causes, and of what is said as sure."""
     single = [c for c in cases if c.judged.kind == 'single' and c.judged.stratum >= SEEN]
-    wrong = [confidence(c, trust) > CONFIDENT and not c.right for c in cases]
+    wrong = [is_sure(c, trust) and not c.right for c in cases]
     return [
-        Measure('sure_wrong', 'sure (> 0.8) and wrong', share(wrong), 0.01, False),
+        Measure('sure_wrong', 'sure and wrong', share(wrong), 0.01, False),
         Measure(
             'single_sure',
             'one cause in the library, 1 noise or more: right and sure',
@@ -146,7 +146,8 @@ def _belief_in(
     names = told['name']
     assert isinstance(names, list)
     sites = tuple((Site(n['effect'], n['joint']), float(n['probability'])) for n in names)
-    bare = Cause((), (), sites, 0.0, (0.0, 0.0))
+    slot = None if told.get('effect', 0) is None else 0
+    bare = Cause((), (), sites, 0.0, (0.0, 0.0), slot=slot)
     cause = trusted_cause(bare, case.judged.status, {**case.row['signs'], **more}, trust)
     return sum(p for site, p in cause.name if site.effect == family)
 

@@ -17,6 +17,7 @@ from weld_twin_core.diagnosis.trust.trusted import group_of, level_group_of
 
 from ..blind.judging import Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
+from .whole import whole
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""
@@ -122,7 +123,9 @@ def _case(row: Mapping[str, Any]) -> Case:
         return Case(row, told, bool(row['right']), bool(row['honest']))
     truth = {**row['truth'], 'causes': (), 'alike': [*row['truth']['alike'], *_absorbed(row)]}
     told = judge(truth, {'verdict': {'effects': (), **row['verdict']}})
-    right = told.right and _sets_hold(row)
+    several = 'shown' in row['truth']
+    right = whole(row['truth'], row['verdict']).right if several else told.right
+    right = right and _sets_hold(row)
     sealed = row['sealed']
     as_good = sealed['after'] < AS_GOOD * sealed['floor'] and told.status in NAMING
     return Case(row, told, right, right or (as_good and bool(row['truth']['sites'])))
@@ -180,11 +183,12 @@ def _examples(case: Case) -> Iterator[Example]:
     yield Example(name, f'answer {group}', signs, case.right, signs['belief'])
     if status == 'none':
         return
-    group = level_group_of(status, row['signs'])
     truths = levels_of(row['truth'])
     at_work = _at_work(row['truth'])
     for cause, more in zip(row['verdict']['causes'], row['cause_signs'], strict=True):
         both = {**signs, **more}
+        slot = status in NAMING if 'effect' not in cause else cause['effect'] is not None
+        group = level_group_of(status, row['signs'], named=slot)
         if cause['place']:
             here = cause['place'][0]['at']
             hit = any(here in truth.places for truth in truths)
@@ -194,7 +198,7 @@ def _examples(case: Case) -> Iterator[Example]:
             hit = any(on in truth.dependences for truth in truths)
             yield Example(name, f'dependence {group}', both, hit, more['dependence'])
         sites = [(item['effect'], item['joint']) for item in cause['name']]
-        if sites and status in NAMING:
+        if sites and (slot or group == 'families'):
             hit = any(site in at_work for site in sites)
             told = sum(item for key, item in more.items() if key in ('name', 'name_second'))
             yield Example(name, f'name {group}', both, hit, min(told, 1.0))

@@ -146,23 +146,25 @@ def trust_of(examples: Sequence[Example]) -> Trust:
 def _unseen_worth(parts: Sequence[Part]) -> dict[str, Any]:
     """Return what beliefs are worth, each by weights that had not seen its case."""
     learned, right, before = (np.concatenate([part[k] for part in parts]) for k in range(3))
-    told = np.concatenate([_capped(part) for part in parts])
+    sure = np.concatenate([_sure(part) for part in parts])
     return {
         name: {
             'ece': round(
                 float(calibration_error(list(p), list(map(bool, right))).value or 0.0), 4
             ),
-            'sure_and_wrong': round(float(((p > TOLD_UNSURE) & ~right).mean()), 4),
-            'sure': round(float((p > TOLD_UNSURE).mean()), 4),
+            'sure_and_wrong': round(float((is_sure & ~right).mean()), 4),
+            'sure': round(float(is_sure.mean()), 4),
         }
-        for name, p in (('by hand', before), ('learned', learned), ('told', told))
+        for name, p, is_sure in (
+            ('by hand', before, before > TOLD_UNSURE),
+            ('learned', learned, sure),
+        )
     }
 
 
-def _capped(part: Part) -> Array:
-    """Return what is told: no more than `TOLD_UNSURE` where it is not sure."""
-    sure = part.may & (part.unseen >= part.bound.sure_from)
-    return np.where(sure, part.unseen, np.minimum(part.unseen, TOLD_UNSURE))
+def _sure(part: Part) -> NDArray[np.bool_]:
+    """Return which examples are told as sure."""
+    return np.asarray(part.may & (part.unseen >= part.bound.sure_from))
 
 
 def _together(parts: Mapping[str, Part], risk: float) -> dict[str, Part]:

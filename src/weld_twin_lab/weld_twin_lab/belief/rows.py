@@ -31,6 +31,7 @@ TRUTH = (
     'test',
     'levels',
     'at_work',
+    'shown',
 )
 VERDICT = ('status', 'confidence', 'indistinguishable', 'causes')
 
@@ -51,16 +52,17 @@ def slim(row: Mapping[str, Any]) -> dict[str, Any]:
     truth = out['truth']
     out['truth'] = {'name': row['name'], **{key: truth[key] for key in TRUTH if key in truth}}
     out['verdict'] = {key: row['verdict'][key] for key in VERDICT}
-    return dict(_rounded(out))
+    return dict(rounded(out))
 
 
-def _rounded(value: Any) -> Any:
+def rounded(value: Any) -> Any:
+    """Return plain values with the digits that are kept."""
     if isinstance(value, float):
         return float(f'{value:.{DIGITS}g}')
     if isinstance(value, Mapping):
-        return {key: _rounded(item) for key, item in value.items()}
+        return {key: rounded(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_rounded(item) for item in value]
+        return [rounded(item) for item in value]
     return value
 
 

@@ -21,7 +21,7 @@ from .pictures import reliability_picture, risk_picture
 from .rows import seeds_of, slim
 from .table import page
 from .told import Belief, belief_in, calibration
-from .trial import tried
+from .trial import USUAL, tried
 
 RESULT, PAGE = 'results.json', 'belief.md'
 RELIABILITY, RISK = 'reliability.svg', 'risk.svg'
@@ -33,7 +33,7 @@ MIX = (
 )
 
 
-def rows_of(seed: int, count: int, runner: Runner) -> list[dict[str, Any]]:
+def rows_of(seed: int, count: int, runner: Runner, mix: str = USUAL) -> list[dict[str, Any]]:
     """
     Return the rows of the first cases of a seed; those in the runner's store are not made anew.
 
@@ -41,9 +41,11 @@ def rows_of(seed: int, count: int, runner: Runner) -> list[dict[str, Any]]:
     ----------
     seed, count : int
     runner : Runner
+    mix : str
+        As `tried` takes it.
 
     """
-    tasks = [Task(tried, (seed, number), f'case {number}') for number in range(count)]
+    tasks = [Task(tried, (seed, number, mix), f'case {number}') for number in range(count)]
     return [slim(row) for row in runner.run(tasks)]
 
 
@@ -129,7 +131,7 @@ def _both(examples: Sequence[Example], trust: Trust) -> dict[str, Any]:
 
 def _sure_wrong(case: Case, trust: Trust) -> bool:
     belief = belief_in([e for e in examples_of([case]) if e.level.startswith('answer ')], trust)
-    return bool(((belief.after > 0.8) & ~belief.right).any())
+    return bool((belief.sure & ~belief.right).any())
 
 
 def _in_words(case: Case) -> dict[str, Any]:

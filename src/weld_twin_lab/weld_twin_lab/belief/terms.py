@@ -99,6 +99,22 @@ _CAUSE = {
     **_LEFT,
     **_MOTION,
 }
+_STANDS = {
+    'own_mass': 1,
+    'own_margin': 1,
+    'own_nats': 1,
+    'own_back': 1,
+    'own_left': -1,
+    'own_wander': -1,
+    'own_wander_place': -1,
+    'cancel': -1,
+    'refused': -1,
+    'alike': -1,
+    'separate': 0,
+    'gap': 0,
+    **{f'cause_is_{kind}': 0 for kind in _KINDS},
+}
+"""Whether an effect stands that was found beside what has no name."""
 TERMS: dict[str, dict[str, int]] = {
     'answer named': {'belief': 1, **_NAMED, **_IN_ANSWER, **_ANSWER_FORMS},
     'answer unknown': {
@@ -127,6 +143,23 @@ TERMS: dict[str, dict[str, int]] = {
         'left_at_joint_sure': 1,
         **_MOTION,
         **_TRAVELLED,
+    },
+    'answer partly': {
+        'belief': 1,
+        'left': 0,
+        'after': 0,
+        'structure_gain': 0,
+        'structure_sure': 0,
+        'mass': 1,
+        'separate': -1,
+        'cancel': -1,
+        'refused': -1,
+        'own_back': 1,
+        'weakest': 1,
+        'gap': 0,
+        'curve_gain': -1,
+        'static': 0,
+        'aligned': -1,
     },
     'answer none': {
         'belief': 1,
@@ -175,6 +208,9 @@ TERMS: dict[str, dict[str, int]] = {
         'curve_sure': 1,
         **_CAUSE,
     },
+    'place partly': {'place': 1, 'place_second': -1, **_CAUSE, **_STANDS},
+    'dependence partly': {'dependence': 1, 'dependence_second': -1, **_CAUSE, **_STANDS},
+    'name partly': {'name': 1, **_CAUSE, **_STANDS},
     'name named': {
         'name': 1,
         'belief': 1,

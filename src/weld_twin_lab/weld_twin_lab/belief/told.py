@@ -30,13 +30,16 @@ class Belief(NamedTuple):
     Attributes
     ----------
     before, after : array, shape (N,)
-    right : array of bool, shape (N,)
+        By hand, and as learned.
+    right, sure : array of bool, shape (N,)
+        Which were right, and which are told as sure.
 
     """
 
     before: Array
     after: Array
     right: NDArray[np.bool_]
+    sure: NDArray[np.bool_]
 
 
 def belief_in(examples: Sequence[Example], trust: Trust) -> Belief:
@@ -49,12 +52,13 @@ def belief_in(examples: Sequence[Example], trust: Trust) -> Belief:
     trust : Trust
 
     """
-    after = [trust.told(*_level(e), e.signs) for e in examples]
+    after = [trust.learned(*_level(e), e.signs) for e in examples]
     before = [e.told for e in examples]
     return Belief(
         np.array(before),
         np.array([b if a is None else a for a, b in zip(after, before, strict=True)]),
         np.array([e.right for e in examples], dtype=bool),
+        np.array([trust.sure(*_level(e), e.signs) for e in examples], dtype=bool),
     )
 
 
@@ -75,7 +79,7 @@ def calibration(belief: Belief, told: Array) -> dict[str, Any]:
 
     """
     right = list(map(bool, belief.right))
-    sure = told > CONFIDENT
+    sure = belief.sure if told is belief.after else told > CONFIDENT
     wrong = sure & ~belief.right
     return {
         'ece': calibration_error(list(told), right)._asdict(),
@@ -127,12 +131,12 @@ def sure_and_right(case: Case, trust: Trust) -> bool:
     trust : Trust
 
     """
-    return case.right and confidence(case, trust) > CONFIDENT
+    return case.right and is_sure(case, trust)
 
 
-def confidence(case: Case, trust: Trust) -> float:
+def is_sure(case: Case, trust: Trust) -> bool:
     """
-    Return what is believed of an answer as a whole.
+    Return whether an answer as a whole is told as sure.
 
     Parameters
     ----------
@@ -141,5 +145,4 @@ def confidence(case: Case, trust: Trust) -> float:
 
     """
     signs: Mapping[str, float] = case.row['signs']
-    told = trust.told('answer', group_of(case.judged.status, signs), signs)
-    return float(signs['belief'] if told is None else told)
+    return trust.sure('answer', group_of(case.judged.status, signs), signs)

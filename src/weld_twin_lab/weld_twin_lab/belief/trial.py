@@ -24,32 +24,65 @@ from ..blind.diagnosing import engine_digest
 from ..blind.displacement import rms
 from ..blind.making import Case, truth_of
 from .mix import drawn
+from .several import several
+from .visible import shown
+
+USUAL, SEVERAL = 'usual', 'several'
+"""Mixes of cases."""
 
 
-def tried(seed: int, number: int) -> dict[str, Any]:
+def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     """
     Return the row of one case: its truth, what was said of it, and the signs it was said on.
 
     Parameters
     ----------
     seed, number : int
-        Of the case, as `mix.drawn` takes them.
+        Of the case, as the mix takes them.
+    mix : str
+        `USUAL` for `mix.drawn`; `SEVERAL` for `several.several`, whose rows tell which causes
+        show.
 
     """
     name = f'{seed}/{number}'
     try:
-        case, poor = drawn(seed, number)
+        case, poor, held_out = _drawn(seed, number, mix)
     except Exception as error:
         return {'name': name, 'error': f'not drawn: {error}'}
+    row = {'poor': poor, **row_of(name, case, held_out=held_out)}
+    if mix == SEVERAL:
+        row['truth']['shown'] = shown(case)
+    return row
+
+
+def _drawn(seed: int, number: int, mix: str) -> tuple[Case, str, bool]:
+    """Return a case, how its motion was made poor, and whether it has a held-out recording."""
+    if mix == SEVERAL:
+        case, held_out = several(seed, number)
+        return case, '', held_out
+    return (*drawn(seed, number), True)
+
+
+def row_of(name: str, case: Case, *, held_out: bool = True) -> dict[str, Any]:
+    """
+    Return the row of a case.
+
+    Parameters
+    ----------
+    name : str
+    case : Case
+    held_out : bool
+        Whether its held-out recording is given to the diagnosis.
+
+    """
     row: dict[str, Any] = {
         'name': name,
-        'poor': poor,
         'engine': engine_digest()[:16],
         'truth': truth_of(name, case),
     }
     start = time.process_time()
     try:
-        told = _diagnosed(case)
+        told = _diagnosed(case, held_out=held_out)
     except Exception as error:
         return {**row, 'error': f'{type(error).__name__}: {error}'}
     row['seconds'] = time.process_time() - start
@@ -69,22 +102,27 @@ def said(told: Diagnosis) -> dict[str, Any]:
     signs = told.signs if isinstance(told.signs, Signs) else Signs({})
     return {
         'verdict': whole['verdict'],
+        'model': [(e['effect'], e.get('joint')) for e in (whole['model'] or {}).get('found', ())],
         'unsound': [item['kind'] for item in whole['unsound']],
         'signs': dict(signs.answer),
         'cause_signs': [dict(item) for item in signs.causes],
     }
 
 
-def _diagnosed(case: Case) -> Diagnosis:
+def _diagnosed(case: Case, *, held_out: bool) -> Diagnosis:
     cell = case.cell
     train, holdout = (_recorded(case, use) for use in (layout.TRAIN, layout.HOLDOUT))
+    also = [
+        as_recording(f'{layout.TRAIN}_{k + 2}', record(cell, case.causes, taken))
+        for k, taken in enumerate(case.also)
+    ]
     return diagnose(
-        [train],
+        [train, *also],
         cell.robot,
         align=frozenset(cell.align),
         known=effects_from_list([dict(item) for item in cell.known], cell.robot),
         exclude=case.excluded,
-        holdout=[holdout],
+        holdout=[holdout] if held_out else [],
         experiment=False,
     )
 

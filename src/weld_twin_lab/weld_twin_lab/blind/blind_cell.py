@@ -102,6 +102,25 @@ def draw_cell(robot: str, kind: str, families: Sequence[str], rng: np.random.Gen
     )
 
 
+def fitted_out(cell: Cell, align: tuple[str, ...] | None, noise_m: float | None) -> Cell:
+    """
+    Return a cell with other frames to be fitted, and an instrument of another noise.
+
+    Parameters
+    ----------
+    cell : Cell
+    align : tuple of str, optional
+    noise_m : float, optional
+        RMS length [m].
+
+    """
+    if align is not None:
+        cell = replace(cell, align=align)
+    if noise_m is not None:
+        cell = replace(cell, tracker=replace(cell.tracker, sigma=noise_m / float(np.sqrt(3.0))))
+    return cell
+
+
 def _springs(joints: Sequence[str], rng: np.random.Generator) -> tuple[Cause, ...]:
     """Return joints that give under a load, by how much being known."""
     return tuple(

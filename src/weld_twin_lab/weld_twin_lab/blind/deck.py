@@ -71,6 +71,10 @@ class Lot:
         Of the causes; the construction where the kind is 'ambiguous'.
     strata : tuple of int
         Which of `STRATA` each cause is to be in.
+    align : tuple of str, optional
+        Frames that the diagnosis is to fit; drawn with the cell where left out.
+    noise_m : float, optional
+        RMS length of the measurement noise [m]; drawn with the cell where left out.
 
     """
 
@@ -79,6 +83,8 @@ class Lot:
     motion: str
     families: tuple[str, ...]
     strata: tuple[int, ...]
+    align: tuple[str, ...] | None = None
+    noise_m: float | None = None
 
 
 def lots(

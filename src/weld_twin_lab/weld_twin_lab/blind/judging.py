@@ -15,7 +15,7 @@ from .ambiguous import Site
 from .cause_sizes import SIZES, site
 
 CONFIDENT = 0.8
-"""Confidence above which a wrong answer counts as confidently wrong."""
+"""Probability above which what says no more of itself counts as sure: older answers, other methods."""
 IN_LIBRARY = frozenset({'single', 'double', 'triple', 'ambiguous'})
 NOT_IN_LIBRARY = frozenset({'outside', 'withheld'})
 SEMI_REAL, AS_IT_IS = 'semi-real', 'as it is'
@@ -41,6 +41,7 @@ class Judged:
     status : str
         Of the verdict, or 'error'.
     confidence : float
+    sure : bool
     stratum : float
         Effect RMS over noise, of the weakest cause.
     set : str
@@ -67,6 +68,7 @@ class Judged:
     said: str
     status: str
     confidence: float
+    sure: bool
     stratum: float
     set: str
     named: bool
@@ -79,7 +81,7 @@ class Judged:
     @property
     def confidently_wrong(self) -> bool:
         """Return whether it names what is wrong, or denies what is there, and is sure of it."""
-        return self.confidence > CONFIDENT and not self.right and self.status != 'unknown'
+        return self.sure and not self.right and self.status != 'unknown'
 
     @property
     def in_library(self) -> bool:
@@ -114,6 +116,7 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
         _said(groups),
         status,
         float(verdict.get('confidence') or 0.0),
+        is_sure(verdict),
         float(min(truth['ratios'], default=0.0)),
         _set(exact, matched, groups),
         whole and bool(answer) and status != 'error',
@@ -123,6 +126,21 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
         _breadth(groups),
         _errors(truth, diagnosis, groups) if exact and diagnosis else (),
     )
+
+
+def is_sure(verdict: Mapping[str, Any]) -> bool:
+    """
+    Return whether an answer is told as sure.
+
+    Parameters
+    ----------
+    verdict : mapping
+        As diagnosis.json has it; the first schema tells only a confidence, and 0.8 at the most of
+        what is not sure.
+
+    """
+    told = verdict.get('sure')
+    return float(verdict.get('confidence') or 0.0) > CONFIDENT if told is None else bool(told)
 
 
 def _sites(items: Iterable[Sequence[Any]]) -> list[Site]:

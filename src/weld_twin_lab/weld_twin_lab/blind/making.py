@@ -31,6 +31,7 @@ from .blind_cell import (
     as_recording,
     deviation,
     draw_cell,
+    fitted_out,
     floor,
     record,
     take,
@@ -45,6 +46,8 @@ TRIES = 30
 """
 Cells and motions drawn for a case before it is given up; causes that cannot show need another.
 """
+MOTIONS_OF = {'both': ('stations', 'seams')}
+"""Motions of the recordings of a case, where there are several."""
 DECOY = 0.1
 """Share of cases with their causes in the library from which another family is taken out."""
 
@@ -68,6 +71,8 @@ class Case:
     train, holdout, test : Take
     fresh : bool
         Whether hold-out and test are other motions than the training's.
+    also : tuple of Take
+        Further recordings to be diagnosed with the training's.
 
     """
 
@@ -81,6 +86,7 @@ class Case:
     holdout: Take
     test: Take
     fresh: bool
+    also: tuple[Take, ...] = ()
 
 
 def make(
@@ -207,16 +213,19 @@ def _eased(lot: Lot, attempt: int) -> Lot:
 
 
 def _attempt(lot: Lot, rng: np.random.Generator, spans: tuple[float, float], poor: str) -> Case:
-    cell = draw_cell(lot.robot, lot.motion, lot.families, rng)
+    drawn = draw_cell(lot.robot, lot.motion, lot.families, rng)
+    cell = fitted_out(drawn, lot.align, lot.noise_m)
     span = float(rng.uniform(*spans))
-    train = poorer(take(cell, lot.motion, span, rng), poor, rng)
+    first, *others = MOTIONS_OF.get(lot.motion, (lot.motion,))
+    train = poorer(take(cell, first, span, rng), poor, rng)
     causes, alike, ratios = _causes(lot, cell, train, span, rng)
     fresh = bool(rng.random() < 0.5)
     holdout, test = (
-        take(cell, lot.motion, span, rng) if fresh else again(train, rng) for _ in range(2)
+        take(cell, first, span, rng) if fresh else again(train, rng) for _ in range(2)
     )
     excluded = _excluded(lot, rng)
-    return Case(lot, cell, causes, alike, ratios, excluded, train, holdout, test, fresh)
+    also = tuple(take(cell, other, span, rng) for other in others)
+    return Case(lot, cell, causes, alike, ratios, excluded, train, holdout, test, fresh, also)
 
 
 def _causes(

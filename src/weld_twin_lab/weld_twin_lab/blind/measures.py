@@ -342,7 +342,7 @@ QUESTIONS = (
     ),
     Question(
         'confident_wrong',
-        'sure (> 0.8) and wrong',
+        'sure and wrong',
         lambda case: True,
         lambda case: case.confidently_wrong,
         0.01,

@@ -11,7 +11,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 
 from .blind_cell import Cell, Take, deviation
-from .cause_sizes import MOVING, Cause, draw, plausible, scaled
+from .cause_sizes import MOVING, Cause, draw, plausible, scaled, site
 from .deck import STRATA
 from .displacement import correlation, rms
 
@@ -70,6 +70,8 @@ def draw_causes(
     offs: list[Array] = []
     for family, stratum in zip(families, strata, strict=True):
         cause, off = _one(cell, family, STRATA[stratum], taken, offs, rng)
+        if site(cause) in map(site, causes):
+            raise Unseen(f'{family} twice at one place')
         causes.append(cause)
         offs.append(off)
     return causes, [rms(off) / cell.noise for off in offs]

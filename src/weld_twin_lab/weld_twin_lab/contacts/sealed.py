@@ -101,7 +101,7 @@ def _opened(found: Diagnosis, truth: tuple[str, str | None], slacks: float) -> d
         'confidence': found.confidence,
         'named': [list(item) for item in named],
         'right': right if seen else truth not in named,
-        'sure_and_wrong': found.status == 'identified' and found.confidence >= SURE and not right,
+        'sure_and_wrong': found.status == 'identified' and found.sure and not right,
         'spread_m': None if found.contacts is None else found.contacts.held_out_spread_m,
     }
 

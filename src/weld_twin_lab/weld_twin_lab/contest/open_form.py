@@ -91,6 +91,9 @@ class Answer:
         likely it is that one.
     unknown, none : float
         How likely something unnamed is at work, and nothing at all.
+    sure : tuple of bool, optional
+        Whether each cause is told as sure, then whether the whole is; left out, what is likelier
+        than `blind.judging.CONFIDENT` counts as sure.
 
     """
 
@@ -98,6 +101,7 @@ class Answer:
     causes: tuple[Cause, ...] = ()
     unknown: float = 0.0
     none: float = 0.0
+    sure: tuple[bool, ...] | None = None
 
 
 def write_case(

@@ -131,9 +131,15 @@ def _belief(answer: Answer, sites: Sequence[Site]) -> float:
 def _sure_wrong(answer: Answer, case: Sealed) -> bool:
     """Return whether it is sure of a cause that is none, or of nothing where something is."""
     right = {at for sites in answers_of(case.truth) for at in sites} if case.named else set()
-    sure = [(effect, joint) for effect, joint, p in _names(answer) if p > CONFIDENT]
-    denied = answer.none > CONFIDENT and case.truth['kind'] != 'none'
-    return denied or any(at not in right for at in sure)
+    if answer.sure is None:
+        sure = [[(effect, joint)] for effect, joint, p in _names(answer) if p > CONFIDENT]
+        denies = answer.none > CONFIDENT
+    else:
+        told = zip(answer.causes, answer.sure, strict=False)
+        sure = [[(effect, joint) for effect, joint, _ in cause] for cause, known in told if known]
+        denies = answer.none > 0.0 and answer.sure[-1]
+    denied = denies and case.truth['kind'] != 'none'
+    return denied or any(not right & set(group) for group in sure)
 
 
 def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nominal: str) -> str:

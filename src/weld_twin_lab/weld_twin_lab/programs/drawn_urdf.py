@@ -10,7 +10,7 @@ signs, frames and link names of a maker's URDFs there; no formula is shared with
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -33,6 +33,7 @@ HANDS = {
 }
 """Last link that moves, links fixed to it one after the other, and the controller's flange."""
 GRAVITY = 9.80665
+"""Standard gravity [m/s^2]."""
 RANGE = 2.8
 """Half the range of every joint [rad]."""
 
@@ -72,7 +73,7 @@ class DrawnArm:
 
     def of_plant(self, q: np.ndarray) -> np.ndarray:
         """Return joints of the plant, shape (N, 6), from those of the URDF."""
-        return q * self.sign + self.zero
+        return np.asarray(q * self.sign + self.zero)
 
 
 def drawn_arm(seed: int, number: int) -> DrawnArm:
@@ -90,26 +91,19 @@ def drawn_arm(seed: int, number: int) -> DrawnArm:
     names = [f'{"joint_a" if maker == "kuka" else "joint_"}{k + 1}' for k in range(6)]
     plant = _rows(rng, names, maker == 'ur')
     sign = rng.choice([-1.0, 1.0], 6)
-    column = np.eye(4)
-    column[:3, :3] = _column(rng, kind)
+    stand = _stand(rng, kind, maker)
     if kind != 'sideways':
         sign[0] = 1.0 if kind == 'up' else -1.0
-    root = 'world' if rng.random() < 0.5 else 'base_link'
-    upright = np.eye(3) if root == 'base_link' else Rotation.random(random_state=rng).as_matrix()
-    # True up is z of the root; `upright` turns the base link in it.
-    plant['gravity'] = (column[:3, :3].T @ upright.T @ [0.0, 0.0, -GRAVITY]).tolist()
-    beside = _beside(rng, maker)
-    told = bool(rng.random() < 0.6)
-    origin = np.eye(4) if told or beside is None else beside
-    foot = np.linalg.inv(origin) @ column
+    down = stand.upright.T @ [0.0, 0.0, -GRAVITY]
+    plant['gravity'] = (stand.column[:3, :3].T @ down).tolist()
+    foot = np.linalg.inv(stand.origin) @ stand.column
     plant['base'] = _entry(foot)
     zero = 0.5 * np.pi * np.round(rng.uniform(-1.0, 1.0, 6)) * (np.arange(6) > 0)
     links = _links(plant, zero)
     torch = along(0, rng.uniform(-0.1, 0.1)) @ along(2, rng.uniform(0.2, 0.4))
     torch = torch @ about(1, rng.uniform(-0.8, 0.8)) @ about(2, rng.uniform(-3.0, 3.0))
-    flange = links[-1].rotation @ _cube(rng)
     hand = np.eye(4)
-    hand[:3, :3], hand[:3, 3] = flange, links[-1].position
+    hand[:3, :3], hand[:3, 3] = links[-1].rotation @ _cube(rng), links[-1].position
     axes = [(sign[k] * axis, point) for k, (axis, point) in enumerate(_axes(plant, zero))]
     controller = ScrewArm(
         f'arm {number}',
@@ -118,22 +112,38 @@ def drawn_arm(seed: int, number: int) -> DrawnArm:
         foot @ hand,
         torch,
     )
-    urdf = _urdf(
-        rng, number, (maker, root, upright, beside), (plant, column, axes, links), hand, torch
-    )
-    options = ['--base-link', 'base_link'] if told else []
-    return DrawnArm(
-        number,
-        kind,
-        maker,
-        root,
-        plant,
-        sign,
-        zero,
-        controller,
-        urdf,
-        [*options, '--tip-link', 'tcp'],
-    )
+    urdf = _urdf(rng, f'drawn_{number}', maker, stand, (plant, axes, links), (hand, torch))
+    options = [*(['--base-link', 'base_link'] if stand.told else []), '--tip-link', 'tcp']
+    return DrawnArm(number, kind, maker, stand.root, plant, sign, zero, controller, urdf, options)
+
+
+class _Stand(NamedTuple):
+    """
+    How an arm stands.
+
+    ``column`` is the arm's column in the base link, ``upright`` turns the base link in the root,
+    whose z is up; ``beside`` is ROS-Industrial's link `base`, and ``told`` that the user names the
+    base link.
+    """
+
+    column: np.ndarray
+    root: str
+    upright: np.ndarray
+    beside: np.ndarray | None
+    told: bool
+
+    @property
+    def origin(self) -> np.ndarray:
+        """Return the controller's base in the base link, shape (4, 4)."""
+        return np.eye(4) if self.told or self.beside is None else self.beside
+
+
+def _stand(rng: np.random.Generator, kind: str, maker: str) -> _Stand:
+    column = np.eye(4)
+    column[:3, :3] = _column(rng, kind)
+    root = 'world' if rng.random() < 0.5 else 'base_link'
+    upright = np.eye(3) if root == 'base_link' else Rotation.random(random_state=rng).as_matrix()
+    return _Stand(column, root, upright, _beside(rng, maker), bool(rng.random() < 0.6))
 
 
 def _rows(rng: np.random.Generator, names: list[str], ur: bool) -> dict[str, Any]:
@@ -213,45 +223,52 @@ def _entry(T: np.ndarray) -> dict[str, list[float]]:
 
 def _urdf(
     rng: np.random.Generator,
-    number: int,
-    names: tuple[str, str, np.ndarray, np.ndarray | None],
-    arm: tuple[Any, np.ndarray, list[tuple[np.ndarray, np.ndarray]], list[screws.Motion]],
-    hand: np.ndarray,
-    torch: np.ndarray,
+    name: str,
+    maker: str,
+    stand: _Stand,
+    arm: tuple[Any, list[tuple[np.ndarray, np.ndarray]], list[screws.Motion]],
+    hand: tuple[np.ndarray, np.ndarray],
 ) -> str:
     """Return the URDF: frames of links as a maker draws them, masses where the plant has them."""
-    maker, root, upright, beside = names
-    plant, column, axes, links = arm
-    last, fixed, flange = HANDS[maker]
-    out = [f'<robot name="drawn_{number}">', '<link name="base_link"/>']
-    if root == 'world':
+    out = [f'<robot name="{name}">', '<link name="base_link"/>']
+    if stand.root == 'world':
         turned = np.eye(4)
-        turned[:3, :3], turned[:3, 3] = upright, rng.uniform(-1.0, 1.0, 3)
+        turned[:3, :3], turned[:3, 3] = stand.upright, rng.uniform(-1.0, 1.0, 3)
         out += ['<link name="world"/>', _joint('stand', 'world', 'base_link', turned)]
-    if beside is not None:
-        out += ['<link name="base"/>', _joint('base_fixed', 'base_link', 'base', beside)]
+    if stand.beside is not None:
+        out += ['<link name="base"/>', _joint('base_fixed', 'base_link', 'base', stand.beside)]
+    (plant, axes, links), (flange, torch) = arm, (stand.column @ hand[0], hand[1])
+    last, fixed, named = HANDS[maker]
+    prefix = 'arm_link' if maker == 'franka' else 'link_'
+    children = [*(f'{prefix}{k + 1}' for k in range(5)), last]
+    frames = _frames(rng, stand.column, axes, flange if last == named else None)
     parent, at = 'base_link', np.eye(4)
-    along_axes = bool(rng.random() < 0.5)
-    for k, (axis, point) in enumerate(axes):
-        child = last if k == 5 else f'{"arm_link" if maker == "franka" else "link_"}{k + 1}'
-        frame = _frame(rng, column, axis, point, along_axes)
-        if child == flange:
-            frame = column @ hand
-        spot = frame[:3, :3].T @ (column[:3, :3] @ axis)
-        name = plant['joints'][k]['name']
-        out.append(_joint(name, parent, child, np.linalg.inv(at) @ frame, spot))
-        com = column[:3, :3] @ screws_point(links[k], plant['links'][k]['com']) + column[:3, 3]
-        com = frame[:3, :3].T @ (com - frame[:3, 3])
-        out.append(_link(child, plant['links'][k]['mass'], com))
+    for k, (child, frame) in enumerate(zip(children, frames, strict=True)):
+        axis = frame[:3, :3].T @ (stand.column[:3, :3] @ axes[k][0])
+        joint = plant['joints'][k]['name']
+        out.append(_joint(joint, parent, child, np.linalg.inv(at) @ frame, axis))
+        com = screws_point(links[k], plant['links'][k]['com'])
+        com = np.linalg.inv(frame) @ stand.column @ [*com, 1.0]
+        out.append(_link(child, plant['links'][k]['mass'], com[:3]))
         parent, at = child, frame
-    for name in fixed:
-        frame = column @ hand
-        if name != flange:
-            frame = frame @ about(1, -0.5 * np.pi)
-        out += [f'<link name="{name}"/>', _joint(name, parent, name, np.linalg.inv(at) @ frame)]
-        parent, at = name, frame
+    for link in fixed:
+        frame = flange if link == named else flange @ about(1, -0.5 * np.pi)
+        out += [f'<link name="{link}"/>', _joint(link, parent, link, np.linalg.inv(at) @ frame)]
+        parent, at = link, frame
     out += ['<link name="tcp"/>', _joint('torch', parent, 'tcp', torch), '</robot>']
     return '\n'.join(out) + '\n'
+
+
+def _frames(
+    rng: np.random.Generator,
+    column: np.ndarray,
+    axes: list[tuple[np.ndarray, np.ndarray]],
+    last: np.ndarray | None,
+) -> list[np.ndarray]:
+    """Return the joints' frames in the base link; ``last`` is that of the last one if it is fixed."""
+    along_axes = bool(rng.random() < 0.5)
+    out = [_frame(rng, column, axis, point, along_axes) for axis, point in axes]
+    return out if last is None else [*out[:-1], last]
 
 
 def screws_point(motion: screws.Motion, point: list[float]) -> np.ndarray:

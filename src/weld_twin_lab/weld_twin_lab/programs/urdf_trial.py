@@ -13,9 +13,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
-from io import StringIO
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,6 +27,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_msgs_py.programs import Context, controller_of
 from weld_twin_msgs_py.programs.writing import Exported, ExportMove, written
 from weld_twin_msgs_py.robots import load_robot
+from weld_twin_nodes.cli.in_process import weld_twin
 
 from ..plant.plant import run
 from ..plant.plant_recording import Command
@@ -76,7 +75,7 @@ class Cell:
         t = 10.0 * np.arange(1.0, len(q) + 1.0)
         command = Command(t, self.arm.of_plant(np.asarray(q)), True)
         made = run(robot, list(causes), command, Tracker(), np.random.default_rng(0))
-        return made.position, Rotation.from_quat(made.quaternion).as_matrix()
+        return made.position, Rotation.from_quat(np.asarray(made.quaternion)).as_matrix()
 
 
 def _on_plant(arm: DrawnArm, tool: np.ndarray) -> dict[str, Any]:
@@ -85,7 +84,7 @@ def _on_plant(arm: DrawnArm, tool: np.ndarray) -> dict[str, Any]:
     command = Command(np.array([1.0]), arm.of_plant(np.zeros((1, 6))), True)
     made = run(bare, [], command, Tracker(), np.random.default_rng(0))
     end = np.eye(4)
-    end[:3, :3] = Rotation.from_quat(made.quaternion[0]).as_matrix()
+    end[:3, :3] = Rotation.from_quat(np.asarray(made.quaternion)[0]).as_matrix()
     end[:3, 3] = made.position[0]
     T = np.linalg.inv(end) @ arm.controller.flange @ tool
     turn = Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
@@ -131,15 +130,11 @@ def command(*words: str) -> str:
         Its exit code is not 0; the message is its last line.
 
     """
-    from weld_twin_nodes.cli.main import main
-
-    said, wrong = StringIO(), StringIO()
-    with redirect_stdout(said), redirect_stderr(wrong):
-        code = main(list(words))
-    if code != 0:
-        lines = (wrong.getvalue() or said.getvalue()).strip().splitlines() or ['']
+    said = weld_twin(*words)
+    if said.code != 0:
+        lines = (said.err or said.out).strip().splitlines() or ['']
         raise CommandFailed(f'{words[0]}: {lines[-1]}')
-    return said.getvalue()
+    return said.out
 
 
 def _through(seed: int, number: int, arm: DrawnArm, place: Path) -> dict[str, Any]:
@@ -413,9 +408,8 @@ def _files(cell: Cell, seam: np.ndarray) -> dict[str, Any]:
     places = []
     for robot in arms:
         assert robot.controller is not None
-        bare = robot.with_frames(
-            base=np.linalg.inv(robot.T_base_origin), tool=robot.controller.flange
-        )
+        base = np.linalg.inv(robot.controller.base)
+        bare = replace(robot, T_world_base=base, T_flange_tool=robot.controller.flange)
         places.append(forward(bare, seam)[:, :3, 3])
     bare_arm = cell.arm.controller
     nominal = np.array([tool_pose(bare_arm, q, np.eye(4))[:3, 3] for q in seam])

@@ -58,6 +58,28 @@ def _poses_of_tf(message: Any, frame: str) -> Iterator[Any]:
         yield from _pose_of_transform(each, frame)
 
 
+def _pose_of_rigid_bodies(message: Any, name: str) -> Iterator[Any]:
+    """
+    Yield the pose of one body that a motion capture system sees; of the only one if none is named.
+
+    Raises
+    ------
+    DataError
+        There are several, and none is named.
+
+    """
+    bodies = message.rigidbodies
+    if not name and len(bodies) > 1:
+        seen = ', '.join(sorted(body.rigid_body_name for body in bodies))
+        raise DataError(
+            f'it holds the bodies {seen}; say which of them was measured as TOPIC:BODY, to a node '
+            'as measured_frame'
+        )
+    for body in bodies:
+        if not name or body.rigid_body_name == name:
+            yield SimpleNamespace(header=message.header, pose=body.pose)
+
+
 def _joints_of_controller_state(message: Any, part: str) -> Iterator[Any]:
     """
     Yield the joint state of a `JointTrajectoryControllerState`: what was commanded.
@@ -111,6 +133,8 @@ def _joints_of_dynamic_state(message: Any, _: str) -> Iterator[Any]:
 POSES: Mapping[str, Plain] = {
     'geometry_msgs/msg/TransformStamped': _pose_of_transform,
     'tf2_msgs/msg/TFMessage': _poses_of_tf,
+    'mocap4r2_msgs/msg/RigidBodies': _pose_of_rigid_bodies,
+    'mocap_msgs/msg/RigidBodies': _pose_of_rigid_bodies,
 }
 """Types that hold poses."""
 JOINTS: Mapping[str, Plain] = {

@@ -110,7 +110,8 @@ class Intake:
     def remarks(self) -> list[str]:
         """Return what is to be told of names and frames that were taken for granted."""
         told = (self.joints, self.measuring_frame, self.wrench_frame)
-        remarks = [*(each.remark for each in told), self.joints.velocity_remark]
+        joints = self.joints
+        remarks = [*(each.remark for each in told), joints.velocity_remark, joints.beside.remark]
         return [remark for remark in remarks if remark]
 
     def last(self, role: Role) -> int | None:

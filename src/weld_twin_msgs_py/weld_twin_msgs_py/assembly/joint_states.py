@@ -16,6 +16,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError, ModelError
 
 from ..messages import from_messages
+from .beside import Beside
 
 TRAVEL = 0.02
 """
@@ -110,8 +111,12 @@ class JointStates:
     ----------
     others : int
         Messages that hold no joint of the robot.
+    strangers : dict of str
+        Names of the joints in those messages, in their order.
     parts : int
         Messages that hold some joints and wait for the rest.
+    beside : Beside
+        The joints that are none of the robot's.
     remark, velocity_remark : str
         What is to be told of the names, and of velocities; empty where there is nothing.
 
@@ -139,10 +144,15 @@ class JointStates:
         self._usual: Any = None
         self._low, self._high = zip(*self._ranges, strict=True)
         self._pick = _picker(range(robot.n))
+        self._apart: tuple[int, ...] = ()
+        columns = enumerate(zip(*self._names, strict=False)) if self._given else ()
+        start = next((k for k, column in columns if len(set(column)) > 1), 0)
+        self.beside = Beside(robot.name, tuple(name[start:] for name in self._names))
         self._spread: set[str] = set()
         self._stamp = 0
         self._parts: dict[str, tuple[float, float]] = {}
         self.others = self.parts = 0
+        self.strangers: dict[str, None] = {}
         self.remark = ''
         self.velocity_remark = ''
 
@@ -205,6 +215,8 @@ class JointStates:
                 raise Missing('the joint state names no joint')
             if not (self._take_own_names(message) or self._take_prefix(message.name)):
                 self.others += 1
+                self.beside.take(message.name, message.position)
+                self.strangers.update(dict.fromkeys(message.name))
                 return None
             present = self._names
         if 0 < len(present) < len(self._names):
@@ -213,6 +225,9 @@ class JointStates:
         self._check(q)
         self._usual = message.name
         self._pick = _picker([list(message.name).index(name) for name in self._names])
+        own = set(self._names)
+        self._apart = tuple(k for k, name in enumerate(message.name) if name not in own)
+        self._take_beside(message)
         return JointSample(stamp, q, from_messages.joint_velocities(message, self._names))
 
     def _take_own_names(self, message: Any) -> bool:
@@ -271,6 +286,8 @@ class JointStates:
         if len(position) != count or len(velocity) not in (0, count):
             return None
         # What runs in C runs as fast after two idle milliseconds; bytecode takes five times as long.
+        if self._apart:
+            self._take_beside(message)
         q = self._pick(position)
         qd = self._pick(velocity) if len(velocity) else ()
         if not (all(map(ge, q, self._low)) and all(map(le, q, self._high))):
@@ -278,6 +295,11 @@ class JointStates:
         if not (isfinite(sum(q)) and isfinite(sum(qd))):
             return None
         return JointSample(stamp, np.array(q), np.array(qd) if qd else None)
+
+    def _take_beside(self, message: Any) -> None:
+        """Take what a message with all joints of the robot has beside them."""
+        name, position = message.name, message.position
+        self.beside.take([name[k] for k in self._apart], [position[k] for k in self._apart])
 
     def _check(self, q: Array) -> None:
         """Refuse what lies beyond the limits; the robot has the sentence."""
@@ -297,6 +319,8 @@ class JointStates:
             for name, a, b in zip(present, q, unknown if qd is None else qd, strict=True)
         }
         self._spread.update(present)
+        self._apart = tuple(k for k, name in enumerate(message.name) if name not in present)
+        self._take_beside(message)
         if len(self._spread) < len(self._names):
             missing = next(name for name in self._names if name not in self._spread)
             listed = ', '.join(message.name)

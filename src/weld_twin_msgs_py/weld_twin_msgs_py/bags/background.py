@@ -10,11 +10,14 @@ from itertools import islice
 from threading import Condition, Thread
 from typing import Any, NamedTuple
 
-from weld_twin_core.errors import TwinError
+from weld_twin_core.errors import DataError, TwinError
 
 from .growing import GrowingBag
+from .recover_command import recover_command
 from .segment import Channel
 
+CLOSED_WITHIN = 15.0
+"""Seconds that a bag may take to be finished: a slow disk, 5 MB/s, writes the usual queue of 64 MB."""
 BATCH = 500
 """Messages written between two looks at the time."""
 ITEM = 200
@@ -100,6 +103,13 @@ class BackgroundBag:
         with self._changed:
             return dict(self._written), dict(self._dropped)
 
+    def end(self) -> bool:
+        """Take nothing more; return whether what waited is written and the bag is finished."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify()
+        return not self._thread.is_alive()
+
     def close(self) -> None:
         """
         Write what waits and finish the bag.
@@ -110,10 +120,14 @@ class BackgroundBag:
             It could not all be written.
 
         """
-        with self._changed:
-            self._closing = True
-            self._changed.notify()
-        self._thread.join()
+        self.end()
+        self._thread.join(CLOSED_WITHIN)
+        if self._thread.is_alive():
+            raise DataError(
+                f"the bag '{self._bag.path}' is not complete: the disk has taken nothing for "
+                f'{CLOSED_WITHIN:g} s; what it took is kept: '
+                f"'{recover_command(self._bag.path, self._bag.folder)}'"
+            )
         if self.failure is not None:
             raise self.failure
 

@@ -29,7 +29,7 @@ from ..messages.topics import (
 from .columns import LEFT_OUT, Stream
 from .contacts import marks, touching
 from .ends import Ends, never_recorded, uneven_ends
-from .needed import POSE_TYPES, no_joints, no_measurements
+from .needed import POSE_TYPES, no_joints, no_measurements, other_names
 from .reader import BagReader
 from .regular import fill_regular
 
@@ -97,6 +97,7 @@ def read_recording(
         raise DataError(
             f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
             f'{robot.name!r}: {", ".join(robot.joint_names)}'
+            f'{other_names(robot, tuple(intake.joints.strangers))}'
         )
     samples = {role: stream.samples() for role, stream in streams.items()}
     whole = assembled(

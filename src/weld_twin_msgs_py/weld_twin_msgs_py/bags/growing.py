@@ -19,8 +19,9 @@ from typing import Any
 from weld_twin_core.errors import DataError
 
 from ..files.whole_files import write_text
+from .recover_command import recover_command
 from .segment import Channel, check_storage, clear_write_errors, sync
-from .segments import Segments
+from .segments import METADATA, Segments
 from .writer import custom_data
 
 UNFINISHED = '.unfinished'
@@ -186,18 +187,29 @@ class GrowingBag:
         if self.folder.exists():
             raise DataError(
                 f"'{self.folder}' is a recording that was cut short and is not overwritten; make "
-                f"a bag of it with 'weld-twin recover {self.path}', or choose another name"
+                f"a bag of it with '{recover_command(self.path, self.folder)}', or choose another name"
             )
 
     def _clear_errors(self) -> Any:
         return clear_write_errors(
-            self.path, f"; what was recorded until then is kept: 'weld-twin recover {self.path}'"
+            self.path,
+            lambda: (
+                '; what was recorded until then is kept: '
+                f"'{recover_command(self.path, self.folder)}'"
+            ),
         )
 
 
 def unfinished(path: Path) -> Path:
     """Return where a bag grows."""
     return path.with_name(path.name + UNFINISHED)
+
+
+def is_growing(folder: Path) -> bool:
+    """Return whether a directory is that of a recording under way or cut short, renamed or not."""
+    if folder.name.endswith(UNFINISHED):
+        return True
+    return (folder / NOTES).is_file() and not (folder / METADATA).is_file()
 
 
 def lock(folder: Path) -> int:

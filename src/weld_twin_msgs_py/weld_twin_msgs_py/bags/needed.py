@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+from weld_twin_core.arm.robot import Robot
 
 from ..assembly.foreign_types import POSES, split_topic
 from ..messages.topics import BY_NAME, JOINT_STATES, MEASURED_POINT, MEASURED_POSE, TopicNames
@@ -14,6 +16,8 @@ POSE_TYPES = (*_PLAIN_POSES, *POSES)
 """Message types from which measured poses are read."""
 Present = Mapping[str, tuple[str, int]]
 """Type and number of messages of every topic of a bag."""
+_LISTED = 12
+"""Names of joints that fit into a message."""
 _INPUTS = frozenset(TopicNames.topics())
 _RESULTS = tuple(name for name in BY_NAME if name not in _INPUTS)
 """What the nodes make themselves: never to be diagnosed as if it were measured."""
@@ -32,6 +36,17 @@ def no_measurements(names: TopicNames, present: Present) -> str:
     return f"no measurements on '{names.pose}' or '{names.point}'" + _meant(
         present, kinds, (names.pose, names.point)
     )
+
+
+def other_names(robot: Robot, there: Sequence[str]) -> str:
+    """Return which joints are there in place of the robot's, and the option that joins them."""
+    if not there:
+        return ''
+    told = f'; it holds {", ".join(there[:_LISTED])}' + (' and more' * (len(there) > _LISTED))
+    # Drivers that number their joints do so along the arm.
+    ordered = there if len(there) == robot.n else ('NAME',) * robot.n
+    pairs = ' '.join(f'{own}={name}' for own, name in zip(robot.joint_names, ordered, strict=True))
+    return f'{told}. If these are the same joints, say so with --joint-map {pairs}'
 
 
 def _meant(present: Present, kinds: tuple[tuple[str, str], ...], asked: tuple[str, ...]) -> str:

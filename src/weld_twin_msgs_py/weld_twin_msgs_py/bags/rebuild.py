@@ -17,7 +17,7 @@ from weld_twin_core.errors import DataError
 
 from ..files.whole_files import followed
 from ..messages.typestore import TYPES, decode
-from .growing import NOTES, UNFINISHED, lock, unfinished
+from .growing import NOTES, UNFINISHED, is_growing, lock, unfinished
 from .salvage import Damage, Found
 from .salvage_mcap import salvage_mcap
 from .salvage_sqlite import salvage_sqlite
@@ -75,7 +75,7 @@ def recover(path: Path | str, out: Path | str | None = None) -> Recovery:
     if target.exists():
         raise DataError(f"'{target}' exists already and is not overwritten; choose with --out")
     damage = Damage()
-    with _held(source), clear_write_errors(target), _scratch(target) as folder:
+    with _held(source), clear_write_errors(target, _elsewhere), _scratch(target) as folder:
         counts = _copy(source, folder, target.name, damage)
         if not counts:
             said = '; '.join(damage.sentences) or 'there is none'
@@ -85,6 +85,11 @@ def recover(path: Path | str, out: Path | str | None = None) -> Recovery:
         folder.rename(target)
         sync(target.parent)
     return Recovery(source, target, dict(counts), tuple(damage.sentences))
+
+
+def _elsewhere() -> str:
+    """Return what may help where the copy cannot be written."""
+    return '; say a place on another disk with --out'
 
 
 def _source(path: Path) -> Path:
@@ -109,7 +114,7 @@ def _files(source: Path) -> list[Path]:
     if source.is_file():
         return [source]
     files = storage_files(source)
-    if source.name.endswith(UNFINISHED):
+    if is_growing(source):
         folders = (item for item in source.iterdir() if item.is_dir())
         files += [file for folder in folders for file in storage_files(folder)]
     if not files:
@@ -120,7 +125,7 @@ def _files(source: Path) -> list[Path]:
 @contextmanager
 def _held(source: Path) -> Iterator[None]:
     """Keep the recorder, and another recovery, off an unfinished bag."""
-    held = lock(source) if source.name.endswith(UNFINISHED) else -1
+    held = lock(source) if is_growing(source) else -1
     try:
         yield
     finally:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
@@ -286,13 +286,23 @@ def sync(path: Path) -> None:
 
 
 @contextmanager
-def clear_write_errors(path: Path, left: str = '') -> Iterator[None]:
-    """Turn what a full or missing disk makes the storages raise into one sentence."""
+def clear_write_errors(path: Path, left: Callable[[], str] = str) -> Iterator[None]:
+    """
+    Turn what a full or missing disk makes the storages raise into one sentence.
+
+    Parameters
+    ----------
+    path : Path
+        The bag that is written.
+    left : callable
+        Returns what is to be said behind it, by the time that it happens.
+
+    """
     try:
         yield
     except (OSError, sqlite3.Error) as error:
         reason = getattr(error, 'strerror', None) or str(error)
-        raise DataError(f"bag '{path}' cannot be written: {reason}{left}") from None
+        raise DataError(f"bag '{path}' cannot be written: {reason}{left()}") from None
 
 
 def check_storage(storage: str) -> str:

@@ -11,7 +11,8 @@ import yaml
 
 from weld_twin_core.errors import DataError
 
-from .growing import UNFINISHED, unfinished
+from .growing import UNFINISHED, is_growing, unfinished
+from .recover_command import recover_command
 from .segment import SUFFIXES
 from .segments import INFORMATION, METADATA
 
@@ -87,12 +88,12 @@ def refuse_unfinished(path: Path) -> None:
         There is no bag, or it is not finished.
 
     """
-    growing = path if path.name.endswith(UNFINISHED) else unfinished(path)
-    named = growing.with_name(growing.name[: -len(UNFINISHED)])
+    growing = path if is_growing(path) else unfinished(path)
+    named = growing.with_name(growing.name.removesuffix(UNFINISHED))
     if growing.is_dir() and not (path.exists() and path != growing):
         raise DataError(
             f"the recording of '{named}' is still running or was cut short; what is on the disk "
-            f"becomes a bag with 'weld-twin recover {named}'"
+            f"becomes a bag with '{recover_command(named, growing)}'"
         )
     if not path.exists():
         raise DataError(f"there is no bag at '{path}'")

@@ -9,6 +9,8 @@ it looks up by name are replaced by these.
 
 from __future__ import annotations
 
+import errno
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,8 @@ SMALL = 64_000_000
 """Bytes that are unpacked whatever the ratio."""
 MOST = 2_000_000_000
 """Bytes that are never unpacked in memory."""
+_HEAD = 18
+"""Bytes of the longest header of a zstd frame (RFC 8878), which may tell the size of its content."""
 _PIECE = 1 << 20
 """Bytes read at once."""
 
@@ -67,17 +71,37 @@ def unpack_file(packed: Path, out: Path) -> None:
     Raises
     ------
     DataError
-        It holds more than can be meant.
+        It holds more than can be meant, or than there is room for.
 
     """
     most = max(SMALL, RATIO * packed.stat().st_size)
+    free = shutil.disk_usage(out.parent).free
+    with packed.open('rb') as raw:
+        told = zstd.get_frame_info(raw.read(_HEAD)).decompressed_size or 0
+    if told > most:
+        raise _bomb()
+    if told > free:
+        raise _no_room(packed, out, f'unpacks to {told / 1e9:.1f} GB')
     done = 0
-    with packed.open('rb') as raw, zstd.open(raw, 'rb') as source, out.open('wb') as sink:
-        while piece := source.read(_PIECE):
-            done += len(piece)
-            if done > most:
-                raise _bomb()
-            sink.write(piece)
+    try:
+        with packed.open('rb') as raw, zstd.open(raw, 'rb') as source, out.open('wb') as sink:
+            while piece := source.read(_PIECE):
+                done += len(piece)
+                if done > most:
+                    raise _bomb()
+                sink.write(piece)
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            raise _no_room(packed, out, 'unpacks to more than that') from None
+        raise
+
+
+def _no_room(packed: Path, out: Path, what: str) -> DataError:
+    free = shutil.disk_usage(out.parent).free
+    return DataError(
+        f"'{packed}' {what}, and '{out.parent}' has room for {free / 1e9:.1f} GB; make room, or "
+        'set TMPDIR to a place that has it'
+    )
 
 
 def guard_rosbags() -> None:

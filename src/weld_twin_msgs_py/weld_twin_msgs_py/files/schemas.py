@@ -81,8 +81,12 @@ def _robot() -> Schema:
             'links': {'type': 'array', 'items': _object(mass), 'description': 'one per joint'},
             'payload': _object(mass),
             'controller': _said(
-                _object({'base': frame, 'flange': frame, 'base_link': TEXT, 'flange_link': TEXT}),
-                "the controller's base in the base, and its flange at the end of the last row",
+                _object(
+                    dict.fromkeys(('base', 'flange', 'foot'), frame)
+                    | {'base_link': TEXT, 'flange_link': TEXT}
+                ),
+                "the controller's base, and the link the arm stands in (foot), in the base; the "
+                "controller's flange at the end of the last row",
             ),
             'source': _said(TEXT, 'where the numbers come from'),
             'plausible': _object(

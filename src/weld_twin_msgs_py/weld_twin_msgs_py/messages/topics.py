@@ -56,7 +56,11 @@ class Qos:
         )
 
 
-_UNSTAMPED = ('std_msgs/msg/String', 'visualization_msgs/msg/MarkerArray')
+_UNSTAMPED = (
+    'std_msgs/msg/String',
+    'visualization_msgs/msg/MarkerArray',
+    'tf2_msgs/msg/TFMessage',
+)
 """Types of the table that begin with something else than a header."""
 
 

@@ -33,7 +33,7 @@ from .urdf_tree import MOVABLE, Joint, Tree
 
 BASE, FLANGE = 'controller_base', 'controller_flange'
 """Links of files of our own; a URDF that has them says what is meant."""
-_BASES = (BASE, 'base', 'base_link')
+_BASES = (BASE, 'base')
 """What the controller's base is called, the surest name first."""
 _WORLDS = ('world', 'map', 'odom', 'cell', 'ground')
 """Roots that are a place and no robot."""
@@ -49,11 +49,11 @@ class Placed(NamedTuple):
     steps: int
 
 
-def base_link_of(
+def foot_of(
     tree: Tree, base: str, chain: Sequence[Joint], wanted: str | None
-) -> tuple[str, Array]:
+) -> tuple[Placed, Placed]:
     """
-    Return the link that the controller has its base in, and where it is in the base of the chain.
+    Return the link that the arm stands in and the controller's base, placed in the first link.
 
     Parameters
     ----------
@@ -63,21 +63,21 @@ def base_link_of(
     chain : sequence of Joint
         From base to tip.
     wanted : str or None
-        The link that was asked for with --base-link; it is the one.
+        The link that was asked for with --base-link; it is both.
 
     """
     if wanted is not None:
-        return base, np.eye(4)
+        return Placed(base, np.eye(4), 0), Placed(base, np.eye(4), 0)
     fixed = _fixed_to(tree, base)
     moving = [joint for joint in chain if joint.kind in MOVABLE]
     prefix = _prefix([joint.name for joint in moving])
     named = {name.removeprefix(prefix): placed for name, placed in fixed.items()}
+    foot = fixed[moving[0].parent if base in _WORLDS and moving[0].parent in fixed else base]
+    foot = named.get('base_link', foot)
     for name in _BASES:
         if name in named and not (name == 'base' and _above(tree, named, 'base', 'base_link')):
-            return named[name].link, named[name].T
-    if base in _WORLDS and moving[0].parent in fixed:
-        return moving[0].parent, fixed[moving[0].parent].T
-    return base, np.eye(4)
+            return foot, named[name]
+    return foot, foot
 
 
 def flange_link_of(

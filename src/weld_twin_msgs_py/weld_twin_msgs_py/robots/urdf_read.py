@@ -15,7 +15,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
 from .axes_to_dh import Axis, dh_rows, inverse
-from .controller_links import FLANGE, base_link_of, flange_link_of
+from .controller_links import FLANGE, Placed, flange_link_of, foot_of
 from .urdf_tree import MOVABLE, Joint, Tree, parse_tree, read_tree
 from .wrong_units import refuse_wrong_units
 
@@ -103,7 +103,7 @@ def _of_tree(
         tip = _tip(tree, base, tip_link)
         start, T_base_start = _start(tree, base, tip)
         chain = _chain(tree, start, tip)
-        origin = base_link_of(tree, base, chain, base_link)
+        origin = foot_of(tree, base, chain, base_link)
         flange = flange_link_of(tree, chain, tip, flange_link)
         robot = _robot(tree, chain, base, T_base_start, f'URDF {Path(path).name}')
         robot = replace(robot, controller=_controller(robot, origin, flange))
@@ -114,12 +114,13 @@ def _of_tree(
 
 
 def _controller(
-    robot: Robot, origin: tuple[str, Array], flange: tuple[str, Array]
+    robot: Robot, origin: tuple[Placed, Placed], flange: tuple[str, Array]
 ) -> ControllerFrames:
-    """Return the frames of two links, that of the base in the base and that of the flange in the tip."""
-    (base_link, T_base), (flange_link, T_tip) = origin, flange
+    """Return the frames of links: foot and base placed in the first, the flange in the tip."""
+    (foot, base), (flange_link, T_tip) = origin, flange
+    rows = inverse(robot.T_world_base)
     return ControllerFrames(
-        inverse(robot.T_world_base) @ T_base, robot.T_flange_tool @ T_tip, base_link, flange_link
+        rows @ base.T, robot.T_flange_tool @ T_tip, rows @ foot.T, base.link, flange_link
     )
 
 

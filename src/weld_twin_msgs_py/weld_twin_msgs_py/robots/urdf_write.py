@@ -67,6 +67,7 @@ def write_urdf(
     frames = controller_frames(robot)
     tool_on_flange = inverse(frames.flange) @ robot.T_flange_tool
     add_fixed(root, 'world', BASE, robot.T_world_base @ frames.base)
+    add_fixed(root, 'world', 'base_link', robot.T_world_origin)
     add_fixed(root, parent, FLANGE, ahead @ frames.flange)
     fix(root, 'flange_to_tool', FLANGE, 'tool', tool_on_flange)
     tool = SubElement(root, 'link', {'name': 'tool'})

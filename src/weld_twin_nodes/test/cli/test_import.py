@@ -84,3 +84,29 @@ def test_a_table_misread_is_refused_with_the_option_that_decides(
     assert sentence in result.err
     assert len(result.err.splitlines()) == 1
     assert not (tmp_path / 'bag').exists()
+
+
+def test_a_motion_of_two_files_becomes_a_bag_with_two_clocks(weld_twin, tmp_path):
+    """Joints at 100 Hz, the tracker at 30 Hz on a clock of its own that is 20 ms late."""
+    t, seen = np.arange(0.0, 6.0, 0.01), np.arange(0.5, 5.5, 1.0 / 30.0)
+    start = np.array([0.2, -1.3, 1.4, -1.5, -1.4, 0.3])
+    turns = np.array([0.5, 0.4, -0.6, 0.7, 0.5, 0.9])
+
+    def joints(at):
+        return start + turns * np.sin(0.7 * at[:, None] + np.arange(6.0))
+
+    point = forward(ROBOT, joints(seen - 0.02))[:, :3, 3]
+    head = ','.join(['time [s]', *(f'joint_{k} [deg]' for k in range(1, 7))])
+    log = np.column_stack([t + 100.0, np.degrees(joints(t))])
+    np.savetxt(tmp_path / 'log.csv', log, delimiter=',', header=head, comments='', fmt='%.6f')
+    track = np.column_stack([seen + 7.0, 1e3 * point])
+    head = 'time [s],x [mm],y [mm],z [mm]'
+    np.savetxt(tmp_path / 'track.csv', track, delimiter=',', header=head, comments='', fmt='%.6f')
+    result = weld_twin('import', tmp_path / 'log.csv', '--measured', tmp_path / 'track.csv',
+                       '--clock-offset', 0.5, '--robot', 'ur5', '--out', tmp_path / 'bag')  # fmt: skip
+    assert result.code == 0, result.err
+    assert f'{seen.size} measurements along a motion' in result.out
+    back = read_recording(tmp_path / 'bag', ROBOT)
+    assert not back.joints.static and back.joints.t.size == t.size
+    late = forward(ROBOT, back.joints.at(back.measured.t - 0.02)[0])[:, :3, 3]
+    assert np.linalg.norm(back.measured.position - late, axis=1).max() < 2e-5

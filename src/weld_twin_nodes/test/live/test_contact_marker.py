@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Marking a contact by hand, over DDS: what the arm does decides whether there is one."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,12 @@ pytestmark = pytest.mark.cells
 
 S = 1_000_000_000
 Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+
+
+def last_answer(cell):
+    answer = cell.trigger('/contact_marker/mark')
+    assert not answer.success
+    return answer.message
 
 
 def test_an_arm_that_stands_is_marked_and_one_that_moves_is_not(tmp_path):
@@ -45,6 +53,10 @@ def test_an_arm_that_stands_is_marked_and_one_that_moves_is_not(tmp_path):
         )
         cell.wait(lambda: heard.messages, 'the contact')
         assert {message.header.frame_id for message in heard.messages} == {'front a'}
+        cell.wait(lambda: 's old' in cell.trigger('/contact_marker/mark').message, 'its age')
+        age = re.search(r'the last joint state .* is (.*) s old; is the', last_answer(cell))
+        assert age is not None
+        assert 1.0 <= float(age[1]) < 20.0
 
     found = read_contacts(table, robot).recording
     assert set(found.contacts.labels) == {'front a'}

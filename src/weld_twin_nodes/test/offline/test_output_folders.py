@@ -17,7 +17,6 @@ from weld_twin_nodes.offline.output_directory import new_directory, write_owned
 
 LIST = '.weld_twin_files.json'
 PROGRAM = 'PTP {A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\nPTP {A1 10,A2 -80,A3 80,A4 0,A5 5,A6 0}\n'
-PLAN = ('plan-measurement', '--robot', 'kuka_kr6_r900', '--tolerance', 0.3)
 
 
 def content(folder):
@@ -48,30 +47,6 @@ def program(tmp_path):
 def correct(weld_twin, program, out, *more):
     """Write a program back: the quickest command that writes a folder."""
     return weld_twin('correct-program', program, '--robot', 'kuka_kr6_r900', '--out', out, *more)
-
-
-def test_a_second_plan_keeps_what_the_operator_has_filled_in(weld_twin, tmp_path):
-    out = tmp_path / 'plan'
-    assert weld_twin(*PLAN, '--minutes', 9, '--out', out).code == 0
-    table = out / 'measurements.csv'
-    filled = table.read_text().replace('\n', '1.5\n')
-    table.write_text(filled)
-    (out / 'photos').mkdir()
-    (out / 'photos/cell.jpg').write_bytes(b'\xff\xd8')
-    before = content(out)
-    again = weld_twin(*PLAN, '--minutes', 9, '--out', out)
-    assert again.code == 2 and again.err.count('\n') == 1
-    assert f"'{table}' was changed after weld-twin wrote it" in again.err
-    assert '--force' in again.err
-    assert content(out) == before
-    forced = weld_twin(*PLAN, '--minutes', 9, '--out', out, '--force')
-    assert forced.code == 0
-    assert "'measurements.csv' was not overwritten and is kept as 'measurements.kept-1.csv'" in (
-        forced.err
-    )
-    assert (out / 'measurements.kept-1.csv').read_text() == filled
-    assert table.read_text() == filled.replace('1.5\n', '\n')
-    assert (out / 'photos/cell.jpg').read_bytes() == b'\xff\xd8'
 
 
 def test_a_web_site_is_not_taken_for_pages_of_a_fleet(weld_twin, tmp_path):
@@ -108,13 +83,13 @@ def test_a_folder_of_an_earlier_version_has_no_list_so_nothing_in_it_is_replaced
     out = tmp_path / 'better'
     assert correct(weld_twin, program, out).code == 0
     (out / LIST).unlink()
-    assert correct(weld_twin, program, out).code == 0  # it would write the same
-    (out / LIST).unlink()
     (out / 'bracket.src').write_text('; my own\n')
     refused = correct(weld_twin, program, out)
-    assert refused.code == 2 and 'bracket.kept-1.src' in refused.err
+    assert refused.code == 2 and 'no list says that weld-twin wrote it' in refused.err
+    assert "--force, which keeps it as 'correction.kept-1.json'" in refused.err
     assert correct(weld_twin, program, out, '--force').code == 0
     assert (out / 'bracket.kept-1.src').read_text() == '; my own\n'
+    assert not (out / 'correction.kept-1.json').exists()  # it is the same as before
     assert (out / 'bracket.src').read_bytes() == program.read_bytes()
 
 

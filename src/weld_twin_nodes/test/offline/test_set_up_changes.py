@@ -45,6 +45,13 @@ def test_a_load_that_is_told_pulls_like_one_in_the_robot_file(ur5, stations, wor
     assert np.abs(bare.position - sagging.position).max() > 1e-5
 
 
+def test_a_load_that_was_taken_off_leaves_what_is_still_there(ur5, stations):
+    whole = replace(ur5, payload_mass=3.0)
+    (lighter,), _ = told([stations], {0: set_up_change('load=-1.25')}, whole)
+    left = wt.Twin(replace(ur5, payload_mass=1.75), [SPRING]).poses(stations)
+    assert np.allclose(left.position, wt.Twin(whole, [SPRING]).poses(lighter).position, atol=1e-9)
+
+
 def test_forces_that_were_measured_hold_the_load_already(ur5, stations):
     pull = wt.Signal(stations.joints.t, np.ones((9, 6)))
     measured = replace(stations, wrench=pull)
@@ -73,7 +80,7 @@ def test_another_tool_may_differ_and_is_left_as_measured(ur5, stations):
 
 
 @pytest.mark.parametrize(
-    'words', ['', 'load', 'load=', 'load=x', 'load=-2', 'load=1,2', 'tool=0.2']
+    'words', ['', 'load', 'load=', 'load=x', 'load=0', 'load=-2000', 'load=1,2', 'tool=0.2']
 )
 def test_other_words_are_refused(words):
     with pytest.raises(DataError, match=r'what was changed is|a load is given in kg'):

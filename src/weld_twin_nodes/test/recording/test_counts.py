@@ -17,6 +17,7 @@ from rosbags.highlevel import AnyReader
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
 from weld_twin_msgs_py.bags.segment import Channel
+from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import Status, bag_messages
 from weld_twin_msgs_py.messages.typestore import TYPES
 from weld_twin_nodes.live.completeness import NEW, SentBook, shortfall
@@ -127,7 +128,7 @@ def told(neighbours, node, inputs=(), heard=(), **reached):
     hears = json.dumps({topic: [count, 0] for topic, count in heard})
     own = Status(node, 0, '', {**health(node), 'reached': json.dumps(reached), 'heard': hears})
     others = [Status(f'{node}: {topic}', 0, '', {}) for topic in inputs]
-    neighbours.take(make.statuses(1, [own, *others]))
+    neighbours.take(from_messages.diagnostics(make.statuses(1, [own, *others])))
 
 
 def test_nodes_have_met_when_each_reaches_all_who_listen():

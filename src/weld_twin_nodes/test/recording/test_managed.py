@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+import signal
+import time
+
 import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
@@ -47,10 +50,16 @@ class Managed:
         self.cell.wait(answer.done, f'{self.name} to answer')
         return answer.result()
 
-    def change(self, name):
+    def begin(self, name):
+        """Ask for a transition; return what will have the answer."""
         number = getattr(Transition, f'TRANSITION_{name.upper()}')
         request = ChangeState.Request(transition=Transition(id=number))
-        return self._call(self._change, request).success
+        return self._change.call_async(request)
+
+    def change(self, name):
+        answer = self.begin(name)
+        self.cell.wait(answer.done, f'{self.name} to answer')
+        return answer.result().success
 
     @property
     def state(self):
@@ -115,6 +124,34 @@ def test_a_managed_live_diagnosis_listens_while_it_is_active(cell):
     cell.wait(lambda: listening() == 0, 'it to listen no more')
     assert diagnosis.change('cleanup')
     assert diagnosis.state == 'unconfigured'
+
+
+def test_a_recorder_serves_all_else_while_it_waits_for_a_node_that_stands_still(cell, tmp_path):
+    twin = cell.start('forward_kinematics_twin')
+    cell.start('recorder', managed=True, out=str(tmp_path / 'bag'), topics=['twin/tool_pose'])
+    recorder = Managed(cell, 'recorder')
+    assert recorder.change('configure')
+    assert recorder.change('activate')
+    health = HealthListener(cell.node)
+    met = lambda: health.values.get('/recorder: /twin/tool_pose', {}).get('publishers')  # noqa: E731
+    cell.wait(lambda: met() == '1', 'the recorder to see the twin')
+    twin.signal(signal.SIGSTOP)
+    try:
+        answer = recorder.begin('deactivate')
+        begun, longest = time.monotonic(), 0.0
+        while not answer.done():
+            asked = time.monotonic()
+            state = recorder.state
+            longest = max(longest, time.monotonic() - asked)
+            assert state == 'deactivating' or answer.done()
+            assert not recorder.change('activate') or answer.done()
+            time.sleep(0.3)
+    finally:
+        twin.signal(signal.SIGCONT)
+    assert answer.result().success
+    assert time.monotonic() - begun > 2.0 > longest
+    assert recorder.state == 'inactive'
+    assert 'activate is refused: the node is deactivating' in cell.processes[1].log
 
 
 def test_without_a_manager_nothing_waits(cell, tmp_path):

@@ -2,6 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command that recovers a recording which was cut short."""
 
+import re
+import shlex
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -30,6 +35,34 @@ def test_a_reader_leads_to_the_command(cut_short, weld_twin):
     said = weld_twin('info', cut_short)
     assert said.code == 2
     assert f"'weld-twin recover {cut_short}'" in said.err
+
+
+def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, weld_twin, monkeypatch):
+    """The disk of the recording has no room left for a copy; that of the present directory has."""
+    here = cut_short.parent.parent / f'elsewhere_{cut_short.parent.name}'
+    here.mkdir()
+    monkeypatch.chdir(here)
+    room = shutil.disk_usage(here)
+    full = room._replace(used=room.total, free=0)
+    usage = lambda place: full if Path(place) == cut_short.parent else room  # noqa: E731
+    monkeypatch.setattr(shutil, 'disk_usage', usage)
+    said = weld_twin('info', cut_short)
+    printed = re.search(r"'weld-twin (recover .*)'", said.err)
+    assert printed is not None
+    assert weld_twin(*shlex.split(printed[1])).code == 0
+    with BagReader(here / 'bag') as bag:
+        assert len(list(bag.messages([JOINT_STATES.name]))) == FLUSHED
+
+
+def test_a_recording_that_was_cut_short_and_renamed_is_found_and_recovered(cut_short, weld_twin):
+    renamed = cut_short.with_name('tuesday')
+    cut_short.with_name('bag.unfinished').rename(renamed)
+    said = weld_twin('info', renamed)
+    assert said.code == 2
+    assert f"'weld-twin recover {renamed}'" in said.err
+    assert weld_twin('recover', renamed).code == 0
+    with BagReader(cut_short.with_name('tuesday_recovered')) as bag:
+        assert len(list(bag.messages([JOINT_STATES.name]))) == FLUSHED
 
 
 def test_the_command_says_what_it_found_and_writes_where_it_is_told(cut_short, weld_twin):

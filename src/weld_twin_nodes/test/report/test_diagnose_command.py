@@ -89,7 +89,7 @@ def found(cell):
 
 def test_play_is_found_with_its_width(found):
     data = json.loads((found / 'diagnosis.json').read_text())
-    assert data['schema'] == 'weld_twin/diagnosis/1'
+    assert data['schema'] == 'weld_twin/diagnosis/2'
     verdict = data['verdict']
     assert verdict['status'] == 'identified'
     assert [(e['effect'], e['joint']) for e in verdict['effects']] == [('backlash', 'elbow_joint')]

@@ -142,7 +142,10 @@ def test_what_imitates_an_unknown_cause_says_nothing_of_it():
     case = replace(case, causes=(own,), contributions=None)
     page = plain(report_page(case))
     assert 'trails by' not in page and 'Nothing to enter' not in page
-    assert 'Nothing can be corrected yet' in page and 'corrected robot' not in page
+    # It helps on data that were not fitted, so it may be used, whatever it is.
+    assert 'Programs corrected by what fits best' in page and 'corrected robot' not in page
+    useless = replace(case, shrink=replace(case.shrink, ratio=1.0))
+    assert 'Nothing can be corrected yet' in plain(report_page(useless))
     assert 'with that mended' not in page
     assert 'Left with what fits best' in page and 'with this mended' not in page
     assert 'comes mostly from joint_a3' in page and 'Look at joint_a3' in page

@@ -287,7 +287,7 @@ def test_one_figure_is_the_same_in_card_table_switches_and_headline(page, mended
         page.locator(f'.switches input[data-switch="{k}"]').check()
     shown = [page.locator(place).inner_text() for place in ('#now-rms', '#now-max')]
     names = [f'{k + 1}. {switches(THREE)[k].label}' for k in mended]
-    told = 'all 3' if len(mended) == 3 else f'only {" and ".join(names)}'
+    told = 'all 3 causes' if len(mended) == 3 else f'only {" and ".join(names)}'
     row = page.get_by_role('rowheader', name=f'mended: {told}', exact=True).locator('..')
     cells = row.locator('td').all_inner_texts()[:2]
     assert [millimetres(text) for text in cells] == [millimetres(text) for text in shown]

@@ -12,6 +12,7 @@ from typing import Any
 
 from weld_twin_core.errors import DataError
 
+from .qos_overrides import PREFIX
 from .settings import Setting
 
 MODULES = {
@@ -25,7 +26,7 @@ MODULES = {
     'contact_marker': 'weld_twin_nodes.live.contact_marker',
 }
 ROS_OWN = ('use_sim_time', 'start_type_description_service')
-"""Parameters that every node of ROS 2 takes; so are those that begin with ``qos_overrides``."""
+"""Parameters that every node of ROS 2 takes; so are those of `QosOverrides`."""
 
 
 def node_class(name: str) -> Any:
@@ -53,7 +54,7 @@ def refuse_unknown(given: Iterable[str], own: Iterable[str]) -> None:
 
     """
     known = {*own, *ROS_OWN}
-    odd = [name for name in given if name not in known and not name.startswith('qos_overrides')]
+    odd = [name for name in given if name not in known and not name.startswith(PREFIX)]
     if not odd:
         return
     others = {item.name for name in MODULES for item in node_class(name).every_setting()}
@@ -89,14 +90,9 @@ def value_of(item: Setting) -> str:
         return str(item.default).lower()
     if isinstance(item.default, list):
         return '[' + ', '.join(str(value) for value in item.default) + ']'
-    if isinstance(item.default, str):
-        return repr(item.default)
-    return f'{item.default:g}' if isinstance(item.default, float) else _untyped(item.default)
-
-
-def _untyped(default: object) -> str:
-    """Return a whole number, or what stands for a parameter without a value."""
-    return str(default) if isinstance(default, int) else 'not set'
+    if item.numbers:
+        return 'not set'
+    return repr(item.default) if isinstance(item.default, str) else f'{item.default:g}'
 
 
 def range_of(item: Setting) -> str:

@@ -17,7 +17,7 @@ from weld_twin_msgs_py.assembly.frame_names import BASE, WORLD
 
 from .base_on_tf import base_on_tf
 from .cell_node import CellNode
-from .settings import NUMBERS, Setting
+from .settings import NO_NUMBERS, Setting
 
 FRAME_SETTINGS = (
     Setting(
@@ -34,9 +34,10 @@ FRAME_SETTINGS = (
     ),
     Setting(
         'T_measuring_base',
-        NUMBERS,
+        NO_NUMBERS,
         'where the base is in the measuring frame [m, rad]: x y z and a rotation vector, or x y z '
         'and a quaternion x y z w; not set: as the robot or its model has it',
+        numbers=True,
     ),
 )
 
@@ -62,7 +63,7 @@ def placed(node: CellNode, robot: Robot) -> Robot:
 
     """
     values = node.setting('T_measuring_base')
-    if values is not None:
+    if values != NO_NUMBERS:
         return robot.with_origin(frame_from(values))
     if not node.setting('base_from_tf'):
         return robot
@@ -80,7 +81,7 @@ def placed_twin(node: CellNode, twin: Twin) -> Twin:
     return twin if moved == 0.0 else Twin(robot, twin.effects)
 
 
-def frame_from(values: Sequence[float]) -> Array:
+def frame_from(values: Sequence[float] | str) -> Array:
     """
     Return the 4 x 4 matrix of x y z and a rotation vector or a quaternion.
 
@@ -90,11 +91,14 @@ def frame_from(values: Sequence[float]) -> Array:
         There are neither six nor seven finite numbers, or the quaternion is not of length 1.
 
     """
-    numbers = np.asarray(values, dtype=np.float64)
+    try:
+        numbers = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
     if numbers.size not in (6, 7) or not np.isfinite(numbers).all():
         raise ModelError(
             'T_measuring_base takes 6 numbers, x y z and a rotation vector, or 7, x y z and a '
-            f'quaternion x y z w, got {list(values)}'
+            f'quaternion x y z w, got {values if isinstance(values, str) else list(values)}'
         )
     if numbers.size == 6:
         return transform(rotation_matrix(numbers[3:]), numbers[:3])

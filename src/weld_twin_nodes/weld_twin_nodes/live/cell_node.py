@@ -17,15 +17,26 @@ from rclpy.node import Node
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import TwinError
+from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
+from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
-from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, MEASURED_POSE, VOLATILE, Topic
+from weld_twin_msgs_py.messages.topics import (
+    BY_NAME,
+    DIAGNOSTICS,
+    FRAMES,
+    MEASURED_POSE,
+    VOLATILE,
+    Topic,
+)
 
 from . import qos_events
 from .all_nodes import refuse_unknown
 from .health import Health, Input
-from .outputs import Output
-from .partners import unreached_subscribers
+from .losses import Losses
+from .outputs import NODE, REACHED, RUN, Output, read_told
+from .partners import readers, senders, unreached_subscribers
+from .qos_overrides import QosOverrides
 from .settings import SHARED, Setting
 from .typed_input import Turn, TypedInput, measured_turn, reader
 
@@ -41,11 +52,26 @@ Seconds an ending node waits in all until its subscribers have everything. Ackno
 milliseconds; what was lost on the way is sent again with Fast DDS's heartbeat, every 3 s, and on a
 busy machine the first of them may be lost too.
 """
+STANDS_STILL = 2.0
+"""
+Seconds it waits where a subscriber does not tell of itself, as the nodes of the project do once a
+second: one that stands still would keep it, and `ros2 launch` ends by force what takes 5 s.
+"""
+ACKNOWLEDGED = 0.2
+"""Seconds between two looks at who still tells of itself."""
+FORWARDS = 10.0
+"""Seconds of a jump of the clock forwards that is told: a bag that is played jumps by its pauses."""
 KNOWN = 2.0
 """
 Seconds for the middleware to match the subscriptions that the graph tells of. Discovery takes
 0.1 s, on a crowded machine a second; one that never matches asks for another quality of service.
 """
+
+
+BESIDE = 'joints beside'
+"""Under which a node keeps what it says of joints that are none of the robot's."""
+Statuses = dict[str, dict[str, str]]
+"""Names of statuses on `/diagnostics`, and what each tells by its keys."""
 
 
 class CellNode(Node):
@@ -67,17 +93,37 @@ class CellNode(Node):
         self._waiting: list[Callable[[], None]] = []
         self._partners: list[Callable[[], list[str]]] = []
         self._sources: list[TypedInput] = []
+        self._losses: dict[str, Losses] = {}
+        self._held: list[Input] = []
+        self._hearers: list[Callable[[Statuses], None]] = [self._hear_counts]
         self._unmatched: list[str] = []
         for item in self.every_setting():
             self.declare_parameter(item.name, item.default, item.descriptor())
         refuse_unknown(self._parameter_overrides, [item.name for item in self.every_setting()])
+        named = {*(topic.relative for topic in (*BY_NAME.values(), *FRAMES)), *self.own_topics()}
+        self.overrides = QosOverrides(
+            self, self._parameter_overrides, {self.resolve_topic_name(name) for name in named}
+        )
+        beside = self.setting('joints_beside') if self.has_parameter('joints_beside') else ''
+        self._carrying_nothing = tuple(name.strip() for name in beside.split(','))
         self.health = Health(self.get_fully_qualified_name(), self.setting('stale_after'))
         self.take_robot(None)
         self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
+        self._read_health = reader(DIAGNOSTICS.type)
+        self._told_at: dict[str, float] = {}
+        self._diagnosed: Any = self.create_subscription(
+            DIAGNOSTICS.message_class(),
+            DIAGNOSTICS.name,
+            self._hear,
+            DIAGNOSTICS.requested.to_rclpy(),
+            raw=True,
+        )
         self.every(HEALTH_EVERY, self._tell_health)
         self._jumps = self.get_clock().create_jump_callback(
             JumpThreshold(
-                min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
+                min_forward=Duration(seconds=FORWARDS),
+                min_backward=Duration(nanoseconds=-1),
+                on_clock_change=False,
             ),
             post_callback=self._jumped,
         )
@@ -86,6 +132,10 @@ class CellNode(Node):
     def every_setting(cls) -> tuple[Setting, ...]:
         """Return the parameters of this kind of node."""
         return (*SHARED, *cls.settings)
+
+    def own_topics(self) -> Sequence[str]:
+        """Return the names of topics that are none of the table."""
+        return ()
 
     def get_logger(self) -> RcutilsLogger:
         """Return the logger of this node."""
@@ -100,11 +150,36 @@ class CellNode(Node):
         """Tell what was sent in all, and stay until everybody has it."""
         if self.context.ok():
             self._tell_health()
-            latest = time.monotonic() + LAST_WORDS
+            self._tell_last_losses()
+            begun = time.monotonic()
             for output in self._outputs:
-                left = max(latest - time.monotonic(), 0.0)
-                output.wait_for_all_acked(Duration(seconds=left))
+                self._wait_for_readers(output, begun)
         super().destroy_node()  # type: ignore[no-untyped-call]
+
+    def _wait_for_readers(self, output: Output, begun: float) -> None:
+        """Wait until all who take an output have all of it, or stand still; and say so."""
+        while True:
+            live = readers(self, output.topic) <= self._live()
+            left = begun + (LAST_WORDS if live else STANDS_STILL) - time.monotonic()
+            slice_s = min(max(left, READY_EVERY), ACKNOWLEDGED)
+            if output.wait_for_all_acked(Duration(seconds=slice_s)):
+                return
+            if left <= 0.0:
+                break
+        self.get_logger().warning(
+            f'{output.topic}: a subscriber has not taken in all that was sent to it; this node ends '
+            'without waiting for it any longer'
+        )
+
+    def _live(self) -> set[str]:
+        """Return the nodes that have told of themselves just now; none is served at the end."""
+        with self._diagnosed.handle:
+            while (
+                taken := self._diagnosed.handle.take_message(self._diagnosed.msg_type, True)
+            ) is not None:
+                self._hear(taken[0])
+        now = time.monotonic()
+        return {node for node, told in self._told_at.items() if now - told < STANDS_STILL}
 
     def take_robot(self, robot: Robot | None, joint_names: tuple[str, ...] | None = None) -> None:
         """
@@ -122,7 +197,7 @@ class CellNode(Node):
         self.health.hardware_id = self.setting('hardware_id') or '/'.join(filter(None, parts))
 
     def setting(self, name: str) -> Any:
-        """Return the value of a parameter; None for a list of numbers that is not set."""
+        """Return the value of a parameter."""
         return self.get_parameter_or(name).value
 
     def every(self, period: float, action: Callable[[], None]) -> Any:
@@ -144,21 +219,20 @@ class CellNode(Node):
     def offer(self, topic: Topic, *, awaited: bool = True) -> Output:
         """Return a publisher of a topic of the table; ``wait_for_subscribers`` is for awaited."""
         name = self.resolve_topic_name(topic.relative)
+        offered = self.overrides.of(name, 'publisher', topic.offered)
         publisher = self.create_publisher(
             topic.message_class(),
             topic.relative,
-            topic.offered.to_rclpy(),
-            event_callbacks=qos_events.of_publisher(name, topic.offered, self._unmatched_event),
+            offered.to_rclpy(),
+            event_callbacks=qos_events.of_publisher(name, offered, self._unmatched_event),
         )
         output = Output(publisher, stamped=topic.stamped)
         if awaited:
             self._awaited.append(output)
-        if topic.offered.durability == VOLATILE and topic is not DIAGNOSTICS:
+        if offered.durability == VOLATILE and topic is not DIAGNOSTICS:
             self.health.outputs.append(output)
         self._outputs.append(output)
-        self._partners.append(
-            partial(unreached_subscribers, self, name, topic.type, topic.offered)
-        )
+        self._partners.append(partial(unreached_subscribers, self, name, topic.type, offered))
         return output
 
     def listen(
@@ -168,6 +242,7 @@ class CellNode(Node):
         *,
         required: bool = False,
         at_once: bool = False,
+        held: bool = False,
     ) -> Input:
         """
         Subscribe to a topic of the table once the outputs have their subscribers.
@@ -182,25 +257,34 @@ class CellNode(Node):
             The node can do nothing without this input; health calls its absence stale.
         at_once : bool
             Do not wait for the subscribers of the outputs.
+        held : bool
+            Its last value counts until the next one comes; that it does so without a source is told.
 
         """
         name = self.resolve_topic_name(topic.relative)
-        state = self.health.watch(name, required=required, steady=topic.steady)
+        state = self.watch(name, required=required, steady=topic.steady)
+        if held:
+            self._held.append(state)
         kinds = ACCEPTED.get(topic.name, (topic.type,))
         usual, read = kinds[0], {kinds[0]: reader(kinds[0])}
         turn = self._plain_turn(topic)
 
+        def use(message: Any) -> None:
+            if topic.stamped:
+                at = message.header.stamp
+                state.stamped(at.sec * 1_000_000_000 + at.nanosec)
+            callback(message)
+
         def guarded(kind: str, data: bytes) -> None:
-            state.received += 1
-            state.last = time.monotonic()
+            state.arrived()
             try:
                 if kind == usual:
-                    callback(read[usual](data))
+                    use(read[usual](data))
                     return
                 if kind not in read:
                     read[kind] = reader(kind)
                 for message in turn(kind, read[kind](data)):
-                    callback(message)
+                    use(message)
             except TwinError as error:
                 self.refuse(name, str(error))
             except Exception:
@@ -213,12 +297,33 @@ class CellNode(Node):
             self.when_ready(subscribe)
         return state
 
+    def watch(self, name: str, *, required: bool, steady: bool) -> Input:
+        """Return a new input, whose rate, age and losses are told from now on."""
+        state = self.health.watch(name, required=required, steady=steady)
+        self._losses[name] = Losses(state)
+        return state
+
+    def unwatch(self, name: str) -> None:
+        """Tell no more of an input."""
+        self.health.inputs.pop(name, None)
+        self._losses.pop(name, None)
+        self.health.lasting.pop(_loss_of(name), None)
+
+    def hear(self, hearer: Callable[[Statuses], None]) -> None:
+        """Hand on, from now on, what the nodes of the project tell of their health."""
+        self._hearers.append(hearer)
+
+    def hear_no_more(self, hearer: Callable[[Statuses], None]) -> None:
+        """End what `hear` began."""
+        self._hearers.remove(hearer)
+
     def stop_listening(self) -> None:
         """Take no input any more, until somebody listens again."""
         for source in self._sources:
             source.close()
+            self.unwatch(source.name)
         self._sources.clear()
-        self.health.inputs.clear()
+        self._held.clear()
         self.frames = None
 
     def _plain_turn(self, topic: Topic) -> Turn:
@@ -241,6 +346,8 @@ class CellNode(Node):
         wanted = topic.requested
         if self.setting('reliable_inputs'):
             wanted = replace(wanted, reliability=topic.offered.reliability)
+        name = self.resolve_topic_name(topic.relative)
+        wanted = self.overrides.of(name, 'subscription', wanted)
         source = TypedInput(
             self,
             topic,
@@ -254,7 +361,7 @@ class CellNode(Node):
         )
         self._sources.append(source)
         if required:
-            self.get_logger().info(f'waiting for {self.resolve_topic_name(topic.relative)}')
+            self.get_logger().info(f'waiting for {name}')
 
     def refuse(self, source: str, reason: str) -> None:
         """Count a sample that cannot be used, and say why, now and then."""
@@ -272,6 +379,13 @@ class CellNode(Node):
         if sentence not in self.health.remarks:
             self.health.remarks.append(sentence)
             self.get_logger().info(sentence)
+
+    def tell_beside(self, beside: Beside) -> None:
+        """Tell of joints that move and are none of the robot's: one may carry it."""
+        sentence = beside.warning(self._carrying_nothing) if beside.moving else ''
+        if sentence and self.health.lasting.get(BESIDE) != sentence:
+            self.get_logger().warning(sentence)
+            self.health.lasting[BESIDE] = sentence
 
     def warn(self, source: str, sentence: str) -> None:
         """Write a sentence into the log, unless one from the same source was written just now."""
@@ -342,7 +456,12 @@ class CellNode(Node):
         self.health.lasting[topic] = sentence
 
     def _jumped(self, jump: TimeJump) -> None:
-        sentence = f'time went back by {-jump.delta.nanoseconds * 1e-9:.3f} s; beginning anew'
+        by = jump.delta.nanoseconds * 1e-9
+        if by > 0.0:
+            if self.get_clock().now().nanoseconds > jump.delta.nanoseconds:  # it had a time before
+                self._tell_once(f'the clock jumped forwards by {by:,.3f} s')
+            return
+        sentence = f'time went back by {-by:.3f} s; beginning anew'
         self.get_logger().info(sentence)
         self.health.say(sentence)
         if self.frames is not None:
@@ -356,10 +475,61 @@ class CellNode(Node):
             self._tell_once(source.switched())
         for name, state in self.health.inputs.items():
             state.publishers = self.count_publishers(name)
+        self._look_at_losses()
+        self._look_at_held()
         self._look_at_partners()
         self._diagnostics.publish(
             self.messages.statuses(self.get_clock().now().nanoseconds, self.health.statuses())
         )
+
+    def _hear(self, data: bytes) -> None:
+        """Hand on what nodes of the project tell; statuses of others are not even read."""
+        if REACHED.encode() in data:
+            try:
+                statuses = from_messages.diagnostics(self._read_health(data))
+            except TwinError:  # somebody else's, and none of the inputs
+                return
+            for hearer in [*self._hearers]:
+                hearer(statuses)
+
+    def _hear_counts(self, statuses: Statuses) -> None:
+        """Hold what a node tells it has sent against what has come of it."""
+        for values in statuses.values():
+            if NODE in values:
+                self._told_at[values[NODE]] = time.monotonic()
+            for topic, sent in read_told(values).items():
+                if topic in self._losses:
+                    teller = values.get(NODE, ''), values.get(RUN, '')
+                    self._losses[topic].counted.tell(teller, sent, self.health.inputs[topic])
+
+    def _look_at_losses(self) -> None:
+        """Tell of an input that lacks messages when it begins and when it ends."""
+        now = time.monotonic()
+        for name, losses in self._losses.items():
+            for sentence in losses.look(senders(self, name), now):
+                self._tell_once(sentence)
+            self.health.lasting.pop(_loss_of(name), None)
+            if losses.telling:
+                self.health.lasting[_loss_of(name)] = losses.telling
+
+    def _look_at_held(self) -> None:
+        """Tell, as long as it is so, of a value that counts although nobody tells it any more."""
+        now = time.monotonic()
+        for state in self._held:
+            key, silent = f'held from {state.topic}', state.silent(now)
+            if not silent:
+                self.health.lasting.pop(key, None)
+                continue
+            if key not in self.health.lasting:
+                self.get_logger().warning(f'{state.topic}: silent; its last value still counts')
+            self.health.lasting[key] = (
+                f'{state.topic}: the value that counts is {silent:.1f} s old, nothing came since'
+            )
+
+    def _tell_last_losses(self) -> None:
+        for losses in self._losses.values():
+            for sentence in losses.ended():
+                self.get_logger().warning(sentence)
 
     def _lack(self, sentence: str) -> None:
         """Tell of what is missing here, from now on."""
@@ -384,3 +554,8 @@ class CellNode(Node):
         self.health.lasting.pop('partners', None)
         if unmatched:
             self.health.lasting['partners'] = '; '.join(unmatched)
+
+
+def _loss_of(name: str) -> str:
+    """Return under what the health keeps that messages of an input go missing."""
+    return f'loss of {name}'

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -36,6 +37,13 @@ class ContactMarker(CellNode):
 
     settings: ClassVar[tuple[Setting, ...]] = (
         Setting('label', 'a', 'what the tool touches now', live=True),
+        Setting(
+            'max_age',
+            1.0,
+            'age of the last joint state above which nothing is marked [s]',
+            0.05,
+            3600.0,
+        ),
         Setting('table', '', 'CSV file that every contact is added to; none when empty'),
     )
 
@@ -44,6 +52,7 @@ class ContactMarker(CellNode):
         self._lately: list[tuple[int, tuple[str, ...], np.ndarray]] = []
         self._marked: dict[str, int] = {}
         self._last = 0
+        self._heard = 0.0
         self._contacts = self.offer(CONTACT)
         self.listen(JOINT_STATES, self._on_joints, required=True)
         self.create_service(Trigger, '~/mark', self._mark)
@@ -58,6 +67,7 @@ class ContactMarker(CellNode):
         if self._lately and names != self._lately[-1][1]:
             return  # a gripper of its own on the same topic
         self._lately.append((stamp, names, q))
+        self._heard = time.monotonic()
         while stamp - self._lately[0][0] > 2e9 * PAUSE:
             self._lately.pop(0)
 
@@ -82,7 +92,12 @@ class ContactMarker(CellNode):
         """Return the last joint state of an arm that stands."""
         if not self._lately:
             raise DataError(f"nothing was heard on '{JOINT_STATES.name}'; is the arm on?")
-        newest = self._lately[-1]
+        newest, age = self._lately[-1], time.monotonic() - self._heard
+        if age > self.setting('max_age'):
+            raise DataError(
+                f"the last joint state on '{JOINT_STATES.name}' is {age:.1f} s old; is the arm "
+                'still on?'
+            )
         if newest[0] == self._last:
             raise DataError('no joint state has come since the last contact; is the arm still on?')
         if newest[0] - self._lately[0][0] < 1e9 * PAUSE:

@@ -15,6 +15,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.assembly import Intake, Role, Samples, assembled
+from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
 LONGEST = 50_000
@@ -67,6 +68,11 @@ class Window:
     def remarks(self) -> list[str]:
         """Return what is to be told of names and frames that were taken for granted."""
         return self._intake.remarks
+
+    @property
+    def beside(self) -> Beside:
+        """Return the joints that come along and are none of the robot's."""
+        return self._intake.joints.beside
 
     @property
     def last(self) -> int | None:

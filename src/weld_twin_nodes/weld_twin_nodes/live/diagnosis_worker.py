@@ -14,6 +14,7 @@ import pickle
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 _MODULE = 'weld_twin_nodes.live.diagnosis_worker'
 _NICENESS = 10
 """Added to that of the node: a diagnosis must not take time from the twin."""
+_DEAD_WITHIN = 1.0
+"""Seconds to wait for a process that was killed; one that writes to a dead disk may take for ever."""
+_LAST = 2000
+"""Characters of its standard error that are told: a traceback has about as many."""
 
 
 class Job(NamedTuple):
@@ -59,9 +64,18 @@ class Finding(NamedTuple):
 
 
 class Worker:
-    """Runs one job at a time in another process; nothing here waits for it."""
+    """
+    Runs one job at a time in another process; nothing here waits for it.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    tell : callable
+        Takes what the process writes on its standard error.
+
+    """
+
+    def __init__(self, tell: Callable[[str], object] = sys.stderr.write) -> None:
+        self._tell = tell
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
         self._result: Finding | str | None = None
@@ -78,10 +92,12 @@ class Worker:
             [sys.executable, '-m', _MODULE],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
         )
         # Handing over the data waits for the other interpreter to be up: not in the caller's time.
-        self._thread = threading.Thread(target=self._exchange, args=(self._process, job))
+        self._thread = threading.Thread(
+            target=self._exchange, args=(self._process, job), daemon=True
+        )
         self._thread.start()
 
     def take(self) -> Finding | str | None:
@@ -96,10 +112,12 @@ class Worker:
         if self._process is not None:
             self._process.kill()
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(_DEAD_WITHIN)
 
     def _exchange(self, process: subprocess.Popen[bytes], job: Job) -> None:
-        answer, _ = process.communicate(pickle.dumps(job))
+        answer, said = process.communicate(pickle.dumps(job))
+        if said and process.returncode >= 0:  # one that was stopped may say anything
+            self._tell(f'the diagnosis says: {said.decode(errors="replace").strip()[-_LAST:]}')
         if process.returncode == 0:
             self._result = pickle.loads(answer)
         else:
@@ -120,6 +138,7 @@ def find(job: Job) -> Finding:
     values: dict[str, Any] = {
         'status': diagnosis.status,
         'confidence': diagnosis.confidence,
+        'sure': diagnosis.sure,
         'gap_rms_m': gap.rms_m,
         'noise_floor_m': gap.noise_floor_m,
         'rms_after_m': shrink.rms_after_m,

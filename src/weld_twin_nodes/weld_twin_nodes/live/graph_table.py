@@ -16,7 +16,7 @@ from weld_twin_msgs_py.messages import topics as t
 from weld_twin_msgs_py.messages.topics import Topic
 
 _EVERYBODY_SAYS = ('/diagnostics', '/parameter_events', '/rosout')
-_EVERYBODY_HEARS = ('/clock',)
+_EVERYBODY_HEARS = ('/clock', '/diagnostics')
 _EVERYBODY_ANSWERS = tuple(
     f'~/{name}'
     for name in (
@@ -77,7 +77,7 @@ SPOKEN = {
     'trajectory_generator': _node(
         (t.JOINT_STATES, t.PLANNED_TRAJECTORY, t.PLANNED_PATH),
         (
-            *(t.DEVIATION, t.DIAGNOSTICS, t.JOINT_TRAJECTORY, t.PATH, t.ROBOT_DESCRIPTION),
+            *(t.DEVIATION, t.JOINT_TRAJECTORY, t.PATH, t.ROBOT_DESCRIPTION),
             *t.FRAMES,
         ),
     ),

@@ -11,6 +11,7 @@ from math import inf, isfinite
 
 from weld_twin_msgs_py.messages.to_messages import Status
 
+from ..streams.stamp_watch import StampWatch
 from .outputs import HEARD, NODE, REACHED, RUN, SENT, Output, reached
 from .outputs import told as sent_so_far
 
@@ -45,10 +46,26 @@ class Input:
         """Publishers that the subscription itself has met; the graph may know of more."""
         self.last_reason = ''
         self.last = 0.0
+        self.first: int | None = None
+        """Stamp of the first message, where they have stamps [ns]."""
+        self.lost = 0
+        """Messages that were sent and did not come, as far as it is known."""
+        self.stamps = StampWatch()
         self._required = required
         self._patience = patience
         self._rates: deque[float] = deque(maxlen=USUAL)
         self._before = (time.monotonic(), 0, 0, 0)
+
+    def arrived(self) -> None:
+        """Count a message."""
+        self.received += 1
+        self.last = time.monotonic()
+
+    def stamped(self, stamp: int) -> None:
+        """Take the stamp of the message that has just arrived [ns]; one that is not set is none."""
+        if stamp > 0:
+            self.first = stamp if self.first is None else self.first
+            self.stamps.add(stamp, self.last)
 
     def status(self, node: str, now: float) -> Status:
         """Return what happened since the last look."""
@@ -63,6 +80,7 @@ class Input:
         values = {
             'received': self.received,
             'refused': self.refused,
+            'lost': self.lost,
             'rate_hz': round(rate, 1),
             'publishers': self.publishers,
             'age_s': round(now - self.last, 3) if self.received else 'never',
@@ -70,12 +88,19 @@ class Input:
         }
         return Status(f'{node}: {self.topic}', level, message, values)
 
-    def _judge(self, now: float, n: int, bad: int, rate: float, others: int) -> tuple[int, str]:
+    def silent(self, now: float) -> float:
+        """Return for how long an input has been silent that was not before [s]; 0 where it is not."""
         usual = sorted(self._rates)[len(self._rates) // 2] if self._rates else 0.0
         silent = now - self.last
+        most = max(self._patience, 5.0 / usual if usual else 0.0)
+        return silent if self.received and silent > most else 0.0
+
+    def _judge(self, now: float, n: int, bad: int, rate: float, others: int) -> tuple[int, str]:
+        usual = sorted(self._rates)[len(self._rates) // 2] if self._rates else 0.0
+        silent = self.silent(now)
         if not self.received:
             return (STALE, 'nothing received yet') if self._required else (OK, 'not in use')
-        if silent > max(self._patience, 5.0 / usual if usual else 0.0):
+        if silent:
             return STALE, f'silent for {silent:.1f} s'
         if bad:
             level = ERROR if bad == n else WARN

@@ -26,6 +26,12 @@ JOINT_SETTINGS = (
         "'{joint_1: A1, joint_2: A2}'; names left out stay",
     ),
     Setting(
+        'joints_beside',
+        '',
+        'joints on the same topic that do not carry the arm, such as those of a gripper, separated '
+        'by commas: that they move is no cause for a warning',
+    ),
+    Setting(
         'joint_part',
         '',
         "part of a controller's state that is taken; empty: reference for commanded joints, "

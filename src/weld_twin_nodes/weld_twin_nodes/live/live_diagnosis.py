@@ -20,7 +20,7 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.told_twin import build_twin
 from .cell_frames import placed_twin
-from .diagnosis_window import Window
+from .diagnosis_window import SIGNALS, Window
 from .diagnosis_worker import Finding, Job, Worker
 from .input_settings import JOINT_SETTINGS, MEASURED_SETTINGS
 from .managed_node import ManagedNode
@@ -71,7 +71,7 @@ class LiveDiagnosis(ManagedNode):
             self.setting('measuring_frame'),
             self.joint_names,
         )
-        self._worker = Worker()
+        self._worker = Worker(self.get_logger().warning)
         self._begun = -float('inf')
         self._seen: int | None = None
         self._speaking = False
@@ -87,8 +87,8 @@ class LiveDiagnosis(ManagedNode):
     def begin(self) -> None:
         """Listen, and diagnose from time to time."""
         for topic, role in INPUTS.items():
-            required = role is Role.JOINTS
-            self.listen(topic, partial(self._take, role), required=required)
+            required, held = role is Role.JOINTS, role in SIGNALS
+            self.listen(topic, partial(self._take, role), required=required, held=held)
         self._measured = MeasuredInputs(
             self, partial(self._take, Role.POSE), partial(self._take, Role.POINT)
         )
@@ -100,7 +100,7 @@ class LiveDiagnosis(ManagedNode):
         if self._looking is not None:
             self.destroy_timer(self._looking)
         self._worker.stop()
-        self._worker = Worker()
+        self._worker = Worker(self.get_logger().warning)
         self.time_went_back()
         self._begun = -float('inf')
 
@@ -113,6 +113,7 @@ class LiveDiagnosis(ManagedNode):
         self._window.take(role, message)
         for remark in self._window.remarks:
             self.remark(remark)
+        self.tell_beside(self._window.beside)
 
     def time_went_back(self) -> None:
         """Forget the window."""

@@ -8,11 +8,8 @@ import time
 from collections.abc import Callable, Collection
 from typing import Any
 
-from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.topics import DIAGNOSTICS
-
 from .all_nodes import MODULES
-from .cell_node import CellNode
+from .cell_node import CellNode, Statuses
 from .outputs import NODE, Heard, read_heard, read_reached
 
 QUIET = 1.0
@@ -38,9 +35,8 @@ class Neighbours:
         self._reached: dict[str, dict[str, int]] = {}
         self._heard: dict[str, dict[str, Heard]] = {}
 
-    def take(self, message: Any) -> None:
+    def take(self, statuses: Statuses) -> None:
         """Take a node's health."""
-        statuses = from_messages.diagnostics(message)
         for values in statuses.values():
             node = values.get(NODE, '')
             if node:
@@ -116,12 +112,7 @@ class Meeting:
         self._begun = self._changed = time.monotonic()
         self._seen: Any = None
         self._neighbours = Neighbours()
-        self._health = node.create_subscription(
-            DIAGNOSTICS.message_class(),
-            DIAGNOSTICS.name,
-            self._neighbours.take,
-            DIAGNOSTICS.requested.to_rclpy(),
-        )
+        node.hear(self._neighbours.take)
         self._timer = node.every(LOOK_EVERY, self._look)
         self._told = False
 
@@ -141,7 +132,7 @@ class Meeting:
             self._node.health.say(sentence)
         self._node.health.lasting.pop('waiting', None)
         self._timer.cancel()
-        self._node.destroy_subscription(self._health)
+        self._node.hear_no_more(self._neighbours.take)
         self._action()
 
     def _missing(self, now: float) -> str:

@@ -50,8 +50,8 @@ class ModelNode(CellNode):
 
     def start(self) -> None:
         """Take input; to be called when the outputs are there."""
-        self.listen(TOOL_WRENCH, self._on_wrench)
-        self.listen(TEMPERATURE, self.stream.take_temperature)
+        self.listen(TOOL_WRENCH, self._on_wrench, held=True)
+        self.listen(TEMPERATURE, self.stream.take_temperature, held=True)
         self._input = self.listen(JOINT_STATES, self._on_joints, required=True)
 
     def time_went_back(self) -> None:
@@ -72,6 +72,7 @@ class ModelNode(CellNode):
     def _remark(self) -> None:
         for sentence in self.stream.remarks:
             self.remark(sentence)
+        self.tell_beside(self.stream.beside)
 
     @abstractmethod
     def publish(self, sample: Sample) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from weld_twin_msgs_py.messages.topics import Qos
+from weld_twin_msgs_py.messages.topics import BY_NAME, Qos
 
 UNKNOWN = '_NODE_NAME_UNKNOWN_'
 """What rmw calls a node whose participant has told of its topics and not of its nodes yet."""
@@ -48,6 +48,16 @@ def unheard_publishers(
     return out
 
 
+def senders(node: Node, topic: str) -> set[str]:
+    """Return the full names of the nodes that publish a topic."""
+    return {_name(info) for info in node.get_publishers_info_by_topic(topic)}
+
+
+def readers(node: Node, topic: str) -> set[str]:
+    """Return the full names of the nodes that subscribe to a topic."""
+    return {_name(info) for info in node.get_subscriptions_info_by_topic(topic)}
+
+
 def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
     """
     Return where the input may be that nobody publishes, in a sentence; empty where nowhere.
@@ -63,7 +73,10 @@ def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
         Types that are understood.
 
     """
+    longer = tuple(name for name in BY_NAME if name != own and name.endswith(own))
     for name, there in node.get_topic_names_and_types():
+        if name.endswith(longer):
+            continue  # it has another meaning, such as where the joints really are
         if name != topic and name.endswith(own) and set(there) & set(kinds):
             publishers = node.get_publishers_info_by_topic(name)
             if publishers:

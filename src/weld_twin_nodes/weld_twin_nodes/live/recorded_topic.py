@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -76,14 +75,18 @@ class RecordedTopic:
         self._class = message_class(kind)
         self._check = checked(kind)
         self._stamped = has_header(kind)
-        self._state = node.health.watch(
+        self._state = node.watch(
             name, required=False, steady=row.steady if row is not None else False
         )
         self.announced = False
         self._first: bytes | None = None
         self._last: bytes | None = None
         latched = row is not None and row.requested.durability == LATCHED
-        self._qos = self.suited(Qos(RELIABLE, DEEP, LATCHED if latched else VOLATILE))
+        self._chosen = node.overrides.has(name, 'subscription')
+        wanted = node.overrides.of(
+            name, 'subscription', Qos(RELIABLE, DEEP, LATCHED if latched else VOLATILE)
+        )
+        self._qos = self.suited(wanted)
         self._subscription = self._subscribe()
 
     @property
@@ -95,7 +98,9 @@ class RecordedTopic:
         return Sent(count, header_stamp(self._first), header_stamp(self._last))
 
     def suited(self, qos: Qos) -> Qos:
-        """Return a quality of service that every publisher there is can serve."""
+        """Return a quality of service that every publisher can serve, unless one was chosen."""
+        if self._chosen:
+            return qos
         offers = [info.qos_profile for info in self.publishers()]
         reliability, durability = qos.reliability, qos.durability
         forced = self._node.setting('reliable_inputs')
@@ -145,7 +150,7 @@ class RecordedTopic:
     def close(self) -> None:
         """Take nothing more."""
         self._node.destroy_subscription(self._subscription)
-        self._node.health.inputs.pop(self.name, None)
+        self._node.unwatch(self.name)
 
     def _subscribe(self) -> Any:
         return self._node.create_subscription(
@@ -163,8 +168,7 @@ class RecordedTopic:
             self._node.mismatch(self.name, sentence)
 
     def _take(self, data: bytes) -> None:
-        self._state.received += 1
-        self._state.last = time.monotonic()
+        self._state.arrived()
         try:
             whole = self._check(data)
         except TwinError as error:
@@ -173,4 +177,6 @@ class RecordedTopic:
         if self._first is None:
             self._first = whole
         self._last = whole
+        if self._stamped:
+            self._state.stamped(header_stamp(whole))
         self._write(self, whole)

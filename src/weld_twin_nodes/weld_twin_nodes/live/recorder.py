@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -49,9 +50,16 @@ class Recorder(ManagedNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('recorder', **kwargs)
         self._run: RecordingRun | None = None
+        self._ending = False
+        self._wound_down: Callable[[], None] | None = None
         self.add_on_set_parameters_callback(self._check)
         self.create_service(Trigger, '~/counts', self._tell)
         self.start()
+
+    def own_topics(self) -> Sequence[str]:
+        """Return what it is told to record."""
+        topics: list[str] = self.setting('topics')
+        return topics
 
     def prepare(self) -> None:
         """Refuse a path that cannot become a bag."""
@@ -64,16 +72,23 @@ class Recorder(ManagedNode):
     def begin(self) -> None:
         """Begin a bag."""
         self.prepare()
-        self._run = RecordingRun(self, self._done, joins=self.setting('managed'))
+        self._run = RecordingRun(self, self._done, joins=self.managed)
+
+    def wind_down(self, done: Callable[[], None]) -> None:
+        """Take in what is under way."""
+        if self._run is None:
+            done()
+            return
+        self._wound_down = done
+        self._run.end()
 
     def finish(self) -> None:
         """Complete the bag before anything else happens."""
-        if self._run is not None:
-            self._run.end_at_once()
-            self._close()
+        self._close()
 
     def end(self) -> None:
         """Begin to take in what is under way; the node is finished when it is there."""
+        self._ending = True
         if self._run is None:
             super().end()
         else:
@@ -88,8 +103,11 @@ class Recorder(ManagedNode):
         super().destroy_node()
 
     def _done(self) -> None:
-        """End the program, unless it goes on as a managed node does."""
-        if not self.active:
+        """Go on with the transition that waits for it, or end the program."""
+        waiting, self._wound_down = self._wound_down, None
+        if waiting is not None:
+            waiting()
+        if self._ending or not self.managed:
             self.finished = True
 
     def _close(self) -> None:

@@ -11,12 +11,11 @@ from typing import Any
 from weld_twin_core import __version__
 from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
 from weld_twin_msgs_py.bags.ends import COMPLETENESS
-from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_read import decoder
-from weld_twin_msgs_py.messages.topics import BY_NAME, DIAGNOSTICS, ROBOT_DESCRIPTION, Topic
+from weld_twin_msgs_py.messages.topics import BY_NAME, ROBOT_DESCRIPTION, Topic
 
 from .asked_nodes import AskedNodes
-from .cell_node import CellNode
+from .cell_node import CellNode, Statuses
 from .completeness import AT_START, SentBook, Shortfall, shortfall
 from .offered_channel import offered_channel
 from .outputs import Sent
@@ -82,12 +81,7 @@ class RecordingRun:
             node.resolve_topic_name(name): _row(name) for name in node.setting('topics')
         }
         self._subscribe()
-        self._health: Any = node.create_subscription(
-            DIAGNOSTICS.message_class(),
-            DIAGNOSTICS.name,
-            self._hear,
-            DIAGNOSTICS.requested.to_rclpy(),
-        )
+        node.hear(self._hear)
         self._timers = [node.every(LOOK_EVERY, self._look)]
         names = ', '.join([*self._topics, *(f'{name} when it appears' for name in self._untyped)])
         node.get_logger().info(f'recording into {self.out}: {names}')
@@ -132,8 +126,8 @@ class RecordingRun:
         if topic.name.endswith(ROBOT_DESCRIPTION.name) and topic.kind == ROBOT_DESCRIPTION.type:
             self._asked.describe(_TEXT(data).data)
 
-    def _hear(self, message: Any) -> None:
-        for values in from_messages.diagnostics(message).values():
+    def _hear(self, statuses: Statuses) -> None:
+        for values in statuses.values():
             self._book.take(values, time.monotonic())
 
     def counts(self) -> dict[str, Any]:
@@ -151,24 +145,13 @@ class RecordingRun:
             self._timers.append(self._node.every(DRAIN_EVERY, self._complete))
             self._complete()
 
-    def end_at_once(self) -> None:
-        """Take in what is under way, and come back when it is there; no callback is served."""
-        self.end()
-        while not self._concluded:
-            self._hear_waiting()
-            time.sleep(DRAIN_EVERY)
-            self._complete()
-
-    def _hear_waiting(self) -> None:
-        """Take the health messages that have reached this process and wait for their turn."""
-        handle = self._health.handle
-        with handle:
-            while (taken := handle.take_message(self._health.msg_type, False)) is not None:
-                self._hear(taken[0])
-
     def _complete(self) -> None:
         """Conclude once everything that was sent is there, or will not come any more."""
-        if self._concluded or self._ending_since is None:
+        if self._concluded:
+            if self._bag.end():  # the node serves all else while the disk takes the rest
+                self._done()
+            return
+        if self._ending_since is None:
             return
         now = time.monotonic()
         for topic in self._topics.values():
@@ -181,7 +164,6 @@ class RecordingRun:
         coming = lacking and now - self._moved < ARRIVED_WITHIN
         if not (untold or coming) or since > LONGEST or self._bag.failure is not None:
             self._conclude()
-            self._done()
 
     def _untold(self) -> list[str]:
         """Return the nodes recorded here that have not told what they sent since the end."""
@@ -253,7 +235,7 @@ class RecordingRun:
                 topic.take_waiting()
             self._conclude()
         self._asked.close()
-        self._node.destroy_subscription(self._health)
+        self._node.hear_no_more(self._hear)
         for topic in self._topics.values():
             topic.close()
         self._bag.close()

@@ -9,6 +9,7 @@ import re
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import rclpy
@@ -33,13 +34,31 @@ LOOP = 0.25
 """Seconds of one turn of the loop; also how late an end may be noticed."""
 
 
-def executor() -> Executor:
-    """Return the events executor, a third of the others' cost per message, where there is one."""
-    try:  # it came with an update of Jazzy
-        from rclpy.experimental import EventsExecutor
-    except ImportError:
-        return SingleThreadedExecutor()
-    return EventsExecutor()
+EXECUTORS = ('events', 'single_threaded')
+"""What the parameter ``executor`` may be."""
+
+
+def executor(name: str = EXECUTORS[0]) -> Executor:
+    """
+    Return what serves a node.
+
+    The events executor costs a third of the other per message; an rclpy that has none gives the
+    other.
+
+    Raises
+    ------
+    ModelError
+        There is none of that name.
+
+    """
+    if name not in EXECUTORS:
+        raise ModelError(f'executor must be one of {", ".join(EXECUTORS)}, got {name!r}')
+    if name == EXECUTORS[0]:
+        with suppress(ImportError):  # it came with an update of Jazzy
+            from rclpy.experimental import EventsExecutor
+
+            return EventsExecutor()
+    return SingleThreadedExecutor()
 
 
 class Stop:
@@ -69,7 +88,7 @@ def spin(node: CellNode, stop: Stop) -> None:
     The events executor can hang in an endless `spin`, and an idle one can miss SIGTERM; turns of
     bounded length do neither.
     """
-    runner = executor()
+    runner = executor(node.setting('executor'))
     runner.add_node(node)
     ending = False
     try:

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.parameter import Parameter
 
-NUMBERS = Parameter.Type.DOUBLE_ARRAY
-"""Default of a list of numbers that is not set."""
+NO_NUMBERS = ''
+"""
+Default of a list of numbers that is not set. ROS has no empty list of numbers: a parameter that is
+declared without a value makes `ros2 param dump` fail for the whole node.
+"""
 
 
 @dataclass(frozen=True)
@@ -22,14 +24,16 @@ class Setting:
     Attributes
     ----------
     name : str
-    default : bool, int, float, str, list of str, or `NUMBERS`
-        Also fixes the type.
+    default : bool, int, float, str or list of str
+        Also fixes the type, unless ``numbers`` is set.
     description : str
         What it is for, with its unit in square brackets.
     low, high : float, optional
         Range of a number, ends included.
     live : bool
         May be changed while the node runs.
+    numbers : bool
+        It is a list of numbers; `NO_NUMBERS` where it is not set.
 
     """
 
@@ -39,10 +43,13 @@ class Setting:
     low: float | None = None
     high: float | None = None
     live: bool = False
+    numbers: bool = False
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what `ros2 param describe` shows and rclpy enforces."""
-        out = ParameterDescriptor(description=self.description, read_only=not self.live)
+        out = ParameterDescriptor(
+            description=self.description, read_only=not self.live, dynamic_typing=self.numbers
+        )
         if self.low is None or self.high is None:
             return out
         if isinstance(self.default, float):
@@ -71,6 +78,12 @@ SHARED = (
         'hardware_id',
         '',
         'what the diagnostics call this robot; empty: the namespace and the name of the model',
+    ),
+    Setting(
+        'executor',
+        'events',
+        "what serves the node's messages: events, the quickest, or single_threaded, for an rclpy "
+        'without it; events becomes single_threaded there by itself',
     ),
     Setting('stale_after', 1.0, 'silence after which an input counts as stale [s]', 0.05, 3600.0),
 )

@@ -107,9 +107,14 @@ class MeasuredInputs:
         if self._tree is None or frame in ('', self._wanted):
             use(message)
             return
+        self._retry()
         if len(self._waiting) < MOST:
             self._waiting.append((time.monotonic(), source, message, use))
-        self._retry()
+            self._retry()
+        else:
+            self._node.refuse(
+                source, f'{MOST:,} measurements wait already for the transforms of their time'
+            )
 
     def _retry(self) -> None:
         """Use the measurements whose way is known by now, in the order they came."""

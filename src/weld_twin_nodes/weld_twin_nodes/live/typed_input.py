@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
@@ -21,6 +23,11 @@ from .partners import Senders, elsewhere, unheard_publishers
 
 Turn = Callable[[str, Any], Iterable[Any]]
 """A type and a message of it, to the messages that it stands for."""
+AGAIN = 0.05
+"""
+Seconds until a subscription of another type is tried (again). Fast DDS knows one type of a topic
+in a process, and forgets it when the executor has let go of the subscription before: a turn later.
+"""
 
 
 class TypedInput:
@@ -72,19 +79,38 @@ class TypedInput:
         self.kind = self._kinds[0]
         self._missing: set[str] = set()
         self._subscription: Any = None
-        self.adapt()
-        if self._subscription is None:
-            self._subscribe(self.kind)
+        self._trying: Any = None
+        self._delay = ''
+        self._subscribe()
 
     def adapt(self) -> None:
         """Follow the publishers where none is left of the type that is taken."""
+        if self._trying is None and self._wished() != self.kind:
+            self.close()
+            self._try_again()
+
+    def _wished(self) -> str:
+        """Return the type that the publishers have, the one that is taken if one of them has it."""
         there = {info.topic_type for info in self._node.get_publishers_info_by_topic(self.name)}
-        kind = next((kind for kind in (self.kind, *self._kinds) if kind in there), self.kind)
-        if kind != self.kind and kind not in self._missing:
-            self._subscribe(kind)
+        for kind in (self.kind, *self._kinds):
+            if kind in there and kind not in self._missing and self._readable(kind):
+                return kind
+        return self.kind
+
+    def _readable(self, kind: str) -> bool:
+        """Return whether a type is installed here; tell where it is not."""
+        try:
+            message_class(kind)
+        except ImportError as error:
+            self._missing.add(kind)
+            self._lack(f'{self.name} carries what cannot be read: {error}')
+            return False
+        return True
 
     def unheard(self) -> list[str]:
         """Return a sentence for every publisher of which nothing arrives, or where one may be."""
+        if self._subscription is None:
+            return [self._delay] if self._delay else []
         if self._required and not self._node.count_publishers(self.name):
             lost = elsewhere(self._node, self.name, self._topic.name, self._kinds)
             return [lost] if lost else []
@@ -96,37 +122,48 @@ class TypedInput:
 
     def matched(self) -> int:
         """Return how many publishers the subscription has met."""
-        return int(self._subscription.get_publisher_count())
+        return 0 if self._subscription is None else int(self._subscription.get_publisher_count())
 
     def close(self) -> None:
         """Take nothing more."""
-        self._node.destroy_subscription(self._subscription)
-
-    def _subscribe(self, kind: str) -> None:
-        """Take one type; go on with the one before where it is not installed."""
-        try:
-            wanted_class = message_class(kind)
-        except ImportError as error:
-            self._missing.add(kind)
-            self._lack(f'{self.name} carries what cannot be read: {error}')
-            return
+        if self._trying is not None:
+            self._node.destroy_timer(self._trying)
         if self._subscription is not None:
             self._node.destroy_subscription(self._subscription)
+        self._trying = self._subscription = None
+
+    def _try_again(self) -> None:
+        """Subscribe in a later turn of the executor."""
+        if self._trying is None:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self._trying = self._node.create_timer(AGAIN, self._subscribe, clock=steady)
+
+    def _subscribe(self) -> None:
+        """Take the type that the publishers have; try again later where it cannot be done yet."""
+        kind = self._wished()
+        try:
+            self._subscription = self._node.create_subscription(
+                message_class(kind),
+                self._topic.relative,
+                partial(self._take, kind),
+                self._wanted.to_rclpy(),
+                raw=True,
+                event_callbacks=qos_events.of_subscription(
+                    self.name, self._wanted, self._unmatched
+                ),
+            )
+        except RuntimeError as error:  # rclpy's own error of it has no public name
+            if self._trying is not None:  # the first try in a process may be too early
+                said = ' '.join(str(error).partition(', at /')[0].split())
+                self._delay = f'{self.name} cannot be taken as {kind} yet ({said}); tried again'
+            self._try_again()
+            return
+        if self._trying is not None:
+            self._node.destroy_timer(self._trying)
+        self._trying, self._delay = None, ''
         if kind != self._kinds[0]:
             self._remark(f'{self.name} is taken as {kind}')
         self.kind = kind
-
-        def take(data: bytes) -> None:
-            self._take(kind, data)
-
-        self._subscription = self._node.create_subscription(
-            wanted_class,
-            self._topic.relative,
-            take,
-            self._wanted.to_rclpy(),
-            raw=True,
-            event_callbacks=qos_events.of_subscription(self.name, self._wanted, self._unmatched),
-        )
 
 
 def measured_turn(part: str, fed_back: FedBack | None) -> Turn:

@@ -15,7 +15,6 @@ from math import exp, log
 from typing import Any
 
 from weld_twin_core.diagnosis.advice.chosen_pieces import NOTHING
-from weld_twin_core.diagnosis.advice.next_step import SURE
 from weld_twin_core.diagnosis.result import NAMING
 
 OWN, FOR, AGAINST, BEGIN = 0.36, 0.89, -0.84, 0.82
@@ -26,6 +25,8 @@ CLOSED = 0.93
 """Probability from which an answer that two diagnoses were asked for closes the question. A judgement:
 of the 202 cells that the weights were learned from, each judged by weights learned from the others, from
 0.92 to 0.98 one was believed wrongly, and from 0.9 two to four."""
+OLDER = 0.9
+"""Confidence from which an answer of the first schema, which says no more of itself, counts as sure."""
 MOST = 0.99
 """Probability that two diagnoses earn at the most: one of the 202 cells was believed wrongly, and the
 next might be another."""
@@ -68,7 +69,7 @@ def weighed(
         heard.sort(key=lambda one: one['verdict']['confidence'] or 0.0, reverse=True)
     stated = [one for one in heard if one['verdict']['status'] in STATED]
     for one in stated:
-        if (one['verdict']['confidence'] or 0.0) >= CLOSED and not _open_ends(one):
+        if one['verdict']['sure'] and not _open_ends(one):
             return one, _words(one)
     return _asking((stated or heard)[0], (together, alone)), ''
 
@@ -91,10 +92,24 @@ def closes(found: Mapping[str, Any]) -> str:
 
     """
     verdict = found['verdict']
-    if (verdict['confidence'] or 0.0) < SURE or verdict['status'] not in STATED:
+    if not is_sure(verdict) or verdict['status'] not in STATED:
         return ''
     open_ = verdict['status'] == 'ambiguous' and not _inseparable(found)
     return '' if open_ or _to_confirm(found) else _words(found)
+
+
+def is_sure(verdict: Mapping[str, Any]) -> bool:
+    """
+    Return whether an answer is told as sure.
+
+    Parameters
+    ----------
+    verdict : mapping
+        Of diagnosis.json, of either schema.
+
+    """
+    told = verdict.get('sure')
+    return float(verdict['confidence'] or 0.0) >= OLDER if told is None else bool(told)
 
 
 def belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> float:
@@ -144,7 +159,9 @@ def _with_belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> Mapping[
     verdict = found['verdict']
     if verdict['status'] not in STATED:
         return found
-    return {**found, 'verdict': {**verdict, 'confidence': belief(found, other)}}
+    told = belief(found, other)
+    earned = {'confidence': told, 'learned': told, 'sure': told >= CLOSED}
+    return {**found, 'verdict': {**verdict, **earned}}
 
 
 def _same(found: Mapping[str, Any], other: Mapping[str, Any], *, no_wider: bool = False) -> bool:

@@ -34,6 +34,8 @@ FAST = (EASY, 0.25)
 """The most of any run: share of the joints' speeds, and 250 mm/s, the reduced speed of ISO 10218."""
 SINGULAR = 200.0
 """Condition number of the Jacobian from which a place is near a singularity."""
+ANY_JOINTS = ('joint-trajectory', 'csv')
+"""Languages whose points are joints by name, in rad or m: any joint may be among them."""
 BACK = 2e-4
 """A program that is read again may be this far off [rad or m]: FANUC writes thousandths of degrees."""
 RATE = 50.0
@@ -92,6 +94,7 @@ def export(
 
     """
     robot = context.robot
+    _refuse_slides(robot, language)
     plan = _planned(path, robot, seam_speed)
     robot.check_positions(plan.q)
     moves = _moves(plan, context, speeds)
@@ -108,6 +111,16 @@ def export(
     text = written(made, language)
     _read_again(made, text, language)
     return made, text, [*_singular(robot, plan.q), *context.controller.notes]
+
+
+def _refuse_slides(robot: Robot, language: str) -> None:
+    """Refuse an arm with a joint that slides in a language whose axes are written as angles."""
+    slides = [n for n, slides in zip(robot.joint_names, robot.prismatic, strict=True) if slides]
+    if slides and language not in ANY_JOINTS:
+        raise DataError(
+            f'{slides[0]!r} of robot {robot.name!r} slides, and a program in {language} is written '
+            f'for axes that turn; choose {" or ".join(ANY_JOINTS)}, or leave the program out'
+        )
 
 
 def _planned(path: str | SeamPlan, robot: Robot, speed: float) -> Plan:

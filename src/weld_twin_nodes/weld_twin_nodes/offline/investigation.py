@@ -166,6 +166,7 @@ def believed(found: Mapping[str, Any]) -> dict[str, Any]:
     return {
         'status': verdict['status'],
         'confidence': verdict['confidence'],
+        'sure': verdict.get('sure'),
         'effects': [{'effect': e['effect'], 'joint': e.get('joint')} for e in verdict['effects']],
         'indistinguishable': verdict.get('indistinguishable') or [],
         'candidates': [

@@ -14,7 +14,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from pathlib import Path
 
 from weld_twin_core.errors import DataError
@@ -74,10 +73,9 @@ def new_directory(
     try:
         _finish(target, tell)
         _refuse_foreign(target, mark, force or shared)
-        if not force and not adds:
-            own = owned_files.listed(target).get(mark, {})
-            owned_files.refuse(target, mark, owned_files.changed(target, own))
-        scratch = _scratch(target)
+        if not (force or shared):
+            _refuse_before(target, mark)
+        scratch = _scratch(target, tell)
     except OSError as error:
         raise _refusal(target, error) from None
     with scratch as place:
@@ -135,10 +133,11 @@ def _refusal(target: Path, error: OSError) -> DataError:
     return DataError(f"'{target}' cannot be written: {error.strerror or error}")
 
 
-def _scratch(target: Path) -> Scratch:
+def _scratch(target: Path, tell: Callable[[str], None]) -> Scratch:
+    rescue = _rescue(target, tell)
     if target.is_dir():
-        return Scratch(target, INSIDE)
-    return Scratch(target.parent, f'.{_name(target)}-')
+        return Scratch(target, INSIDE, rescue)
+    return Scratch(target.parent, f'.{_name(target)}-', rescue)
 
 
 def _name(target: Path) -> str:
@@ -147,14 +146,20 @@ def _name(target: Path) -> str:
 
 def _finish(target: Path, tell: Callable[[str], None]) -> None:
     """Sweep what killed runs left, and end what they had decided."""
-    beside = f'.{_name(target)}-'
-    if not target.is_dir():
-        sweep(target.parent, beside)
-        return
-    with _alone(target):
-        rescue = partial(owned_files.carry_out, target, kept=_told(tell))
-        sweep(target, INSIDE, rescue)
-        sweep(target.parent, beside, rescue)
+    rescue = _rescue(target, tell)
+    sweep(target.parent, f'.{_name(target)}-', rescue)
+    sweep(target, INSIDE, rescue)
+
+
+def _rescue(target: Path, tell: Callable[[str], None]) -> Callable[[Path], None]:
+    """Return what ends a change that a killed run had decided, given its scratch directory."""
+
+    def rescue(scratch: Path) -> None:
+        if target.is_dir():
+            with _alone(target):
+                owned_files.carry_out(target, scratch, _told(tell))
+
+    return rescue
 
 
 def _told(tell: Callable[[str], None]) -> Callable[[str, str], None]:
@@ -195,6 +200,13 @@ def _install(
         except BaseException:
             scratch.leave()  # the next one ends what is begun
             raise
+
+
+def _refuse_before(target: Path, mark: str) -> None:
+    """Refuse what would be refused when all is computed, as far as it is known."""
+    own = owned_files.listed(target).get(mark, {})
+    unlisted = [mark] if mark not in own and os.path.lexists(target / mark) else []
+    owned_files.refuse(target, mark, owned_files.changed(target, own) + unlisted)
 
 
 def _refuse_foreign(target: Path, mark: str, any_folder: bool) -> None:

@@ -180,7 +180,7 @@ def _told(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
     if not mended:
         return f'as it is{_where(diagnosis)}'
     if len(mended) == len(labels) > 1:
-        return f'mended: all {len(labels)}'
+        return f'mended: all {len(labels)} causes'
     only = 'only ' if len(labels) > 1 else ''
     return f'mended: {only}{listed([f"{k + 1}. {labels[k]}" for k in mended])}'
 

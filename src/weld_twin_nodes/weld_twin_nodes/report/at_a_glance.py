@@ -30,7 +30,7 @@ from .quantities import (
 from .remainder import places
 from .seam_view import at_rest, instant, left_out
 from .switches import alternatives, as_it_is, cause_name, switches
-from .words import leading, likely, listed, not_to_be_tried, unnamed, untried_in_short
+from .words import leading, likely, listed, not_to_be_tried, passed, unnamed, untried_in_short
 
 _CAUSES = 4
 """Causes in the table; the cards have more."""
@@ -128,7 +128,7 @@ def _worst(diagnosis: Diagnosis) -> Figure | None:
         told = f'{diagnosis.recordings[k].name}, {told}'
     told += _place(diagnosis, k, sample)
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
-    if parts is not None:
+    if parts is not None and sides_words(parts[sample]):
         told += f': {sides_words(parts[sample])}'
     return 'At the worst spot', millimetres(largest(diagnosis)), told
 
@@ -136,7 +136,7 @@ def _worst(diagnosis: Diagnosis) -> Figure | None:
 def _place(diagnosis: Diagnosis, k: int, sample: int) -> str:
     """Return where in space a sample was measured."""
     x, y, z = (f'{1e3 * float(v):.0f}' for v in diagnosis.traces.measured[k][sample])
-    return f', at x {x}, y {y}, z {z} mm'
+    return f", at x {x}, y {y}, z {z} mm in the instrument's frame"
 
 
 def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
@@ -210,9 +210,7 @@ def _data(diagnosis: Diagnosis) -> Figure | None:
     told += _instrument(diagnosis)
     word = 'yes, see the notes' if told else 'yes'
     word = 'see the warnings' if counts['warning'] else word
-    words = (
-        f'{fine} of {len(checks)} checks found nothing{"; " if told else ""}{"; ".join(told)}. '
-    )
+    words = f'{passed(fine, len(checks))}{"; " if told else ""}{"; ".join(told)}. '
     return 'Were the data good', word, joined([words, tag('a', 'Which', href='#checks')])
 
 

@@ -22,7 +22,7 @@ from .html import Child, Html, joined, section, table, tag
 from .mending import against, curve_fault, left_without, look_at, taken_by_curve, warned, warning
 from .quantities import counted, ends_to, millimetres, percent
 from .remainder import places, remainder
-from .seam_view import seen_at
+from .seam_view import at_rest, seen_at
 from .switches import (
     MOST,
     along,
@@ -125,6 +125,10 @@ def _shares(diagnosis: Diagnosis, shown: list[int]) -> Html:
     return tag('ul', *items, class_='bars wide shares')
 
 
+_EFFECT = ('Effect on the seam', 'Effect at the stations')
+"""What a cause does, along a motion and at stations at rest."""
+
+
 def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule) -> Html:
     cause = diagnosis.causes[k]
     name = cause_name(diagnosis, cause)
@@ -133,7 +137,7 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
         ('Comes back', again_words(cause, many=bool(diagnosis.families))),
         ('By how much', _off_by(diagnosis, cause)),
         ('Stands on', _commanded(diagnosis, cause)),
-        ('Effect on the seam', _effect(diagnosis, k)),
+        (_EFFECT[at_rest(diagnosis)], _effect(diagnosis, k)),
         ('If only this is mended', _mended(diagnosis, k, rule)),
         ('What to do', _action(diagnosis, k)),
         *_at_the_controller(diagnosis, k, brand),
@@ -219,8 +223,11 @@ def _along(diagnosis: Diagnosis, k: int, run: int, good: np.ndarray, worst: int)
     parts = None if told is None else components(diagnosis, run, told.parts[run][k])
     if parts is None:
         return ['.']
-    sides = f' ({sides_words(parts[worst])}).'
-    return [sides, tag('span', f' RMS {rms_words(parts[good])}.', class_='detail')]
+    sides = sides_words(parts[worst])
+    return [
+        f' ({sides}).' if sides else '.',
+        tag('span', f' RMS {rms_words(parts[good])}.', class_='detail'),
+    ]
 
 
 def _mended(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:

@@ -46,11 +46,25 @@ def components(diagnosis: Diagnosis, k: int, vectors: Array) -> Array | None:
         return None
     robot = model.robot.with_frames(base=model.bases[k]) if k < len(model.bases) else model.robot
     tool = Twin(robot).poses(diagnosis.recordings[k], traces.t[k]).rotation[:, :, 2]
-    travel = np.gradient(traces.measured[k] - traces.before[k], axis=0)
-    along, out = _unit(travel), tool
+    along, out = _travel(traces.measured[k] - traces.before[k]), tool
+    if along is None:
+        return None
     out = _unit(out - along * (out * along).sum(axis=1, keepdims=True))
     axes = np.stack([along, np.cross(along, out), out], axis=1)
     return np.asarray(np.einsum('mij,mj->mi', axes, vectors))
+
+
+def _travel(position: Array) -> Array | None:
+    """Return the direction of travel; of samples at rest that of the nearest that moves."""
+    along = _unit(np.gradient(position, axis=0))
+    moves = np.flatnonzero(along.any(axis=1))
+    if not moves.size:
+        return None
+    samples = np.arange(len(along))
+    after = np.clip(np.searchsorted(moves, samples), 0, moves.size - 1)
+    before = np.maximum(after - 1, 0)
+    nearer = np.abs(moves[before] - samples) < np.abs(moves[after] - samples)
+    return np.asarray(along[moves[np.where(nearer, before, after)]])
 
 
 def _unit(vectors: Array) -> Array:

@@ -77,9 +77,16 @@ def _dependences(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
         return [(REGIMES.get(name, name), share, percent(share)) for name, share in regimes]
     words = {**DEPENDENCES, 'constant': 'constant'}
     return _summed(
-        [(c.dependence, c.share, lambda on: words.get(on, on)) for c in diagnosis.causes],
+        [(_on(diagnosis, c), c.share, lambda on: words.get(on, on)) for c in diagnosis.causes],
         diagnosis,
     )
+
+
+def _on(diagnosis: Diagnosis, cause: Cause) -> Sequence[tuple[str, float]]:
+    """Return what a cause depends on; where several causes fit alike, what each of them does."""
+    effects = [REGISTRY.get(site.effect) for site in alternatives(diagnosis, cause)]
+    on = list(dict.fromkeys(effect.depends_on for effect in effects if effect is not None))
+    return [(each, HALF / len(on)) for each in on] if len(on) > 1 else cause.dependence
 
 
 def _summed(
@@ -102,10 +109,11 @@ def _whole(diagnosis: Diagnosis) -> str:
         return 'All of it is at the level of the noise, so it lies nowhere in particular.'
     if not diagnosis.causes:
         return 'Nothing was named, so these are what each joint could explain by itself.'
-    told = sum(cause.share for cause in diagnosis.causes)
-    rest = [
-        f'{percent(share, places(diagnosis))} is {name}' for name, share in remainder(diagnosis)
-    ]
+    shares = [cause.share for cause in diagnosis.causes if not cause.rest]
+    left = [cause.share for cause in diagnosis.causes if cause.rest]
+    told, left = sum(shares or left), left if shares else []
+    rows = [*(('without a name', share) for share in left), *remainder(diagnosis)]
+    rest = [f'{percent(share, places(diagnosis))} is {name}' for name, share in rows]
     held = 'The causes explain' if diagnosis.effects else 'The places found hold'
     return (
         f'{held} {percent(told, places(diagnosis))} of the squared gap; '
@@ -210,7 +218,9 @@ def _worst(diagnosis: Diagnosis) -> Html | None:
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
     if parts is None:
         return None
-    told = f'RMS. The largest, {seen_at(diagnosis, k, sample, size)}: {sides_words(parts[sample])}'
+    told = f'RMS. The largest, {seen_at(diagnosis, k, sample, size)}'
+    if sides := sides_words(parts[sample]):
+        told += f': {sides}'
     keys = 'Left is as seen from the tool, looking along it; out is away from the flange.'
     return tag('p', f'{told}. {keys}', class_='note')
 

@@ -13,7 +13,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 
 from .footing import measured_next
 from .html import Child, Html, tag
-from .words import listed, open_sets, site_name, status_word
+from .words import listed, open_sets, passed, site_name, status_word
 
 _SHORT = 12
 """Digits of a hash that tell files apart on paper; the page has all."""
@@ -53,7 +53,7 @@ def _data(diagnosis: Diagnosis) -> str:
     told = [f'{check.level}: {check.sentence}' for check in open_ones[:_FINDINGS]]
     if len(open_ones) > _FINDINGS:
         told.append(f'{len(open_ones) - _FINDINGS} more are on the page.')
-    return ' '.join([f'{fine} of {len(diagnosis.checks)} checks found nothing.', *told])
+    return ' '.join([f'{passed(fine, len(diagnosis.checks)).capitalize()}.', *told])
 
 
 def _alike(diagnosis: Diagnosis) -> str | None:

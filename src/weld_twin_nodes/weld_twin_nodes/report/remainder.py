@@ -24,6 +24,9 @@ def remainder(diagnosis: Diagnosis) -> tuple[tuple[str, float], ...]:
     What is fitted but not sure enough to be named explains its part, and has no cause to stand on.
     """
     rest = diagnosis.shares
+    if any(cause.rest for cause in diagnosis.causes):
+        # What is left has a row of its own, with the place where most of it is.
+        return (('noise', rest.noise),)
     left = max(_left(diagnosis) - rest.noise, 0.0)
     unnamed = rest.unexplained - left
     # What has a place and no name is not explained by that.

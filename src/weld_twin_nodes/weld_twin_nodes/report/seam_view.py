@@ -13,6 +13,7 @@ from .html import Child, Html, joined, section, tag
 from .mending import left_with
 from .quantities import counted, millimetres, percent
 from .switches import along, as_it_is, drawn, parted, static, switches, trusted
+from .words import listed
 
 _LINE = (
     'The thin line is where the model of the robot has the tool, the coloured one where it was '
@@ -22,6 +23,8 @@ _STATIONS = (
     'Each line goes from where the model of the robot has the tool to a dot where it was measured, '
     'its deviation enlarged.'
 )
+_LISTED = 3
+"""Samples that are named where they are not drawn, the farthest off first chosen."""
 _TENTH = 0.1
 """Part of the gap below which what is left is told with a decimal."""
 _RECORDINGS = 6
@@ -177,10 +180,21 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     axes = (Axis('station') if dots else Axis('time', 's'), Axis('deviation', 'mm'))
     recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
     title = recording.name if recording is not None else f'recording {k + 1}'
-    outliers = int((~trusted(diagnosis, k)).sum())
-    if outliers:
-        title += f' ({counted(outliers, "sample")} left out: see the data)'
+    title += _left_out(diagnosis, k)
     return chart(title, along(diagnosis, k)[index], lines, axes, key=f'run{k}', from_zero=True)
+
+
+def _left_out(diagnosis: Diagnosis, k: int) -> str:
+    """Return which samples of a recording are not drawn, for they would hide all the others."""
+    out = np.flatnonzero(~trusted(diagnosis, k))
+    if not out.size:
+        return ''
+    size = np.linalg.norm(diagnosis.traces.before[k], axis=1)
+    worst = sorted(out[np.argsort(-size[out])][:_LISTED].tolist())
+    told = [seen_at(diagnosis, k, sample, float(size[sample])) for sample in worst]
+    if out.size > _LISTED:
+        told.append(f'{out.size - _LISTED} more')
+    return f' ({counted(out.size, "sample")} left out: {listed(told)})'
 
 
 def _after_words(diagnosis: Diagnosis) -> str:

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
 from .leading import in_order
 from .mending import advised, left_with
-from .quantities import STAYS, both_angles, millimetres, odds, turns_only
+from .quantities import STAYS, both_angles, millimetres, odds, percent, turns_only
 from .switches import switches
 from .words import (
     CAUSES,
@@ -29,6 +29,7 @@ from .words import (
     share_by_site,
     site_name,
     site_of,
+    someplace,
     untried_in_short,
 )
 
@@ -163,9 +164,9 @@ def _instead(diagnosis: Diagnosis) -> str:
     shrink = diagnosis.shrink
     before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)
     if shrink.ratio >= STAYS:
-        return f'Nothing that was tried in its place takes it off: {before} becomes {after}'
+        return f'Nothing can be corrected yet: even with what fits best, {before} becomes {after}'
     if not carries_curves(diagnosis):
-        return f'Nothing can be corrected yet: even what fits best leaves {after} of {before}'
+        return f'Programs corrected by what fits best, nameless, {before} shrinks to {after}'
     if every and not taken:
         return f'No curve is worth correcting programs by; all together leave {after} of {before}'
     return f'Programs corrected by what was measured in its place, {before} shrinks to {after}'
@@ -218,4 +219,13 @@ def _gain(diagnosis: Diagnosis, start: str = '') -> str:
     return (
         f'{opening}, {millimetres(shrink.rms_before_m)} shrinks to '
         f'{millimetres(shrink.rms_after_m)} on data not used for fitting; {_noise(diagnosis)}.'
+        f'{_beside(diagnosis)}'
     )
+
+
+def _beside(diagnosis: Diagnosis) -> str:
+    """Return what is left without a name beside what was found; nothing where nothing is."""
+    rest = next((cause for cause in diagnosis.causes if cause.rest), None)
+    if rest is None:
+        return ''
+    return f' Beside that, {percent(rest.share)} of the squared gap has no name yet: {someplace(rest)}.'

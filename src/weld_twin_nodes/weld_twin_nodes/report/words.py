@@ -206,6 +206,13 @@ def someplace(cause: Cause) -> str:
     return f'something at {where} that depends on {listed([DEPENDENCES.get(o, o) for o in on])}'
 
 
+def passed(fine: int, of: int) -> str:
+    """Return how many checks of the data found everything in order."""
+    if of == 1:
+        return 'the one check passed' if fine else 'the one check did not pass'
+    return f'all {of} checks passed' if fine == of else f'{fine} of {of} checks passed'
+
+
 def open_sets(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
     """
     Return the sets of which these data do not tell which it is.

@@ -131,7 +131,9 @@ class Job:
                 if value := getattr(self.asked, name):
                     words += [f'--{name.replace("_", "-")}', value]
             first, recording = [words], folder / IMPORTED / title(self.names)
-        words = ['diagnose', str(recording), '--robot', robot, '--out', str(folder / FOUND)]
+        # Nobody but the server writes there, and an earlier version kept no list.
+        words = ['diagnose', str(recording), '--robot', robot, '--force']
+        words += ['--out', str(folder / FOUND)]
         words += ['--align', self.asked.align] if self.asked.align else []
         return [*first, words + ['--apply'] * self.asked.apply]
 

@@ -10,6 +10,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Intake, Role, Taken
+from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.assembly.held_signal import HeldSignal
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
@@ -81,6 +82,11 @@ class JointStream:
     def remarks(self) -> list[str]:
         """Return what is to be told of names and frames that were taken for granted."""
         return self._intake.remarks
+
+    @property
+    def beside(self) -> Beside:
+        """Return the joints that come along and are none of the robot's."""
+        return self._intake.joints.beside
 
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""

@@ -81,7 +81,7 @@ def _of_the_base(step: Array) -> str:
 
 def _of_the_origin(step: Array, robot: Robot) -> Array:
     """Return the move of the base of the rows, (6,) [m, rad], as one of the controller's base."""
-    lever = robot.T_world_origin[:3, 3] - robot.T_world_base[:3, 3]
+    lever = robot.T_world_base[:3, :3] @ controller_frames(robot).base[:3, 3]
     swing = rotation_matrix(step[3:]) @ lever - lever
     return np.concatenate([step[:3] + swing, step[3:]])
 

@@ -27,9 +27,6 @@ from .next_touches import next_touches
 from .postures import Room
 from .without_names import without_names
 
-SURE = 0.9
-"""Confidence from which a verdict closes the question. Answers from recordings that show little earn
-less, however well they fit."""
 TOUCHED = 4
 """The same where contacts measured: every touch that could be made is tried with each."""
 NAMELESS = 0.5
@@ -95,11 +92,11 @@ def _parting(
     found: Search, verdict: Verdict, limits: Limits, rival: Curved | None
 ) -> dict[str, Any] | None:
     """Return the experiment that parts what is believed from what else it could be."""
-    if verdict.status in ('identified', 'none') and verdict.confidence >= SURE:
+    if verdict.status in ('identified', 'none') and verdict.sure:
         return None
     listed = [found.small.model.found, *_in_place(found, verdict, named=True)]
     named = len(listed)
-    closed = verdict.status == 'ambiguous' and verdict.confidence >= SURE and len(listed) > 1
+    closed = verdict.status == 'ambiguous' and verdict.sure and len(listed) > 1
     if not closed:
         room = Room(found.work.problem, found.small.model.robot, limits)
         shapes = without_names(found, rival, room.low, room.high)

@@ -159,6 +159,11 @@ class Problem:
         return tuple(tuple(group) for group in out.values())
 
     @property
+    def own_bases(self) -> bool:
+        """Return whether recordings of an instrument each have a base that is fitted."""
+        return 'base' in self.align and not self.touched and len(self.recordings) > 1
+
+    @property
     def frame_count(self) -> int:
         """Return the number of coordinates of the frames that are fitted along."""
         return 6 * (('base' in self.align) * len(self.stands) + ('tool' in self.align))
@@ -363,9 +368,14 @@ class Problem:
         """
         Return a block number for every row: contiguous stretches, at least one per recording.
 
-        Recordings count by their length; a stretch never spans two recordings. Of contacts each
-        place is a stretch, where there are at least `PLACES`.
+        Recordings count by their length; a stretch never spans two recordings. Where each has a
+        base of its own, block k is the k-th part of every one: left out whole, a short recording
+        would lose its base. Of contacts each place is a stretch, where there are at least
+        `PLACES`.
         """
+        if self.own_bases:
+            parts = [(np.arange(m) * blocks) // max(m, 1) for m in self.samples]
+            return np.concatenate([np.repeat(p, c) for p, c in zip(parts, self.rows, strict=True)])
         whole = self.places >= PLACES
         total = max(sum(self.samples), 1)
         out, start = [], 0

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from ...twin.posterior import Posterior
@@ -17,9 +18,9 @@ from ..levels.causes import causes
 from ..levels.contributions import contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
-from ..result import NAMING, Cause, Diagnosis, Shares, Shrink
+from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
-from ..stability.steadied import Stability, bounded, of_families
+from ..stability.steadied import Stability, of_families, told_back
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
 from ..trust.trusted import trusted
@@ -27,10 +28,12 @@ from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
+from ..verdict.weighing import Weighed
 from .changed import changed, untold_check
 from .contact_spreads import contact_spreads
 from .gap import gap, traces
 from .named_effects import named_effects
+from .settled import settled
 from .share_intervals import with_intervals
 from .weighed_candidates import unexplained, weighed_candidates
 
@@ -79,7 +82,7 @@ def answer(
     verdict, told, shares, own = _trusted(
         found, unseen, evidence, verdict, signs, rival, placing, stability
     )
-    effects = named_effects(found, unseen, verdict)
+    effects, verdict, told = named_effects(found, unseen, verdict, told)
     return Diagnosis(
         gap=gap(found, evidence.floor),
         where=locate(found, unseen, told),
@@ -97,7 +100,7 @@ def answer(
         families=verdict.families,
         evidence=evidence,
         posterior=posterior,
-        **_parted(unseen, told, shares, verdict, rival),
+        **_parted(unseen, told, shares, verdict),
         signs=own,
         contacts=contact_spreads(found, unseen),
         **_compared(found, examined, verdict),
@@ -109,16 +112,14 @@ def _parted(
     told: tuple[Cause, ...],
     shares: Shares,
     verdict: Verdict,
-    rival: Curved | None,
 ) -> dict[str, Any]:
     """Return what the levels of an answer say; what each cause adds, where the model stands for it."""
-    other = verdict.status == 'unknown' and rival is not None and rival.unseen is not unseen
-    added = None if other else contributions(unseen, told)
     return {
         'causes': told,
         'shares': shares,
-        'contributions': added,
-        'learned': verdict.learned,
+        'contributions': contributions(unseen, told),
+        'sure': verdict.sure,
+        'complete': verdict.complete,
     }
 
 
@@ -138,23 +139,28 @@ def _trusted(
     )
     sizes = (len(told), evidence.gap, evidence.floor)
     known = Signs(
-        {**signs.answer, 'top_share': told[0].share if told else 0.0},
+        {
+            **signs.answer,
+            'top_share': told[0].share if told else 0.0,
+            'partly': signs.answer.get('partly', 0.0) * bool(verdict.sets),
+        },
         tuple(
-            signs_of_cause(cause, k, *sizes, rival, _of_effect(cause, verdict, signs))
+            signs_of_cause(cause, k, *sizes, rival, _of_effect(cause, signs))
             for k, cause in enumerate(told)
         ),
     )
-    verdict, told = trusted(verdict, told, known, usual_trust())
-    verdict, told = bounded(verdict, told, stability, found.work.beliefs)
+    complete = Weighed(evidence, found.work.beliefs).complete
+    verdict, told = trusted(replace(verdict, complete=complete), told, known, usual_trust())
+    told = told_back(told, verdict, stability)
     if evidence.families is not None:
         told = of_families(told, evidence.families, found.work.beliefs)
+    verdict = settled(verdict, told)
     return verdict, with_intervals(told, found, unseen, verdict, evidence.floor), shares, known
 
 
-def _of_effect(cause: Cause, verdict: Verdict, signs: Signs) -> Mapping[str, float]:
+def _of_effect(cause: Cause, signs: Signs) -> Mapping[str, float]:
     """Return the signs of the effect that stands for a cause; none of curves and of many."""
-    named = verdict.status in NAMING and signs.causes and len(cause.members) == 1
-    return signs.causes[cause.members[0]] if named else {}
+    return signs.causes[cause.slot] if cause.slot is not None and signs.causes else {}
 
 
 def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, Any]:

@@ -58,10 +58,14 @@ def with_intervals(
         RMS of the noise alone [m].
 
     """
-    if verdict.status == 'unknown' or not any(found.slots) or not unseen.parts:
+    curved = len(found.slots) != len(unseen.parts)
+    if verdict.status == 'unknown' or curved or not any(found.slots) or not unseen.parts:
         return tuple(covering(cause) for cause in told)
     tries = _tries(found, unseen, floor)
-    return tuple(_held(cause, tries[:, list(cause.members)].sum(axis=1)) for cause in told)
+    return tuple(
+        covering(cause) if cause.rest else _held(cause, tries[:, list(cause.members)].sum(axis=1))
+        for cause in told
+    )
 
 
 def _held(cause: Cause, tries: Array) -> Cause:

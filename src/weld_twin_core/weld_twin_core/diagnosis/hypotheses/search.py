@@ -236,13 +236,13 @@ def _chosen(
 
         refused = []
         steps = forward(work, now, hopeful, beliefs.many, progress, refused.append)
-        crowded = small.at_rest and len(steps) >= beliefs.many
         if steps:
             now = steps[-1].fit
-        if steps and not crowded:
             now = backward(work, now, effective)
             now = without_negligible(work, consolidated(work, now, effective))
             now = without_misfit(work, now)
+        # Of what enters one by one, what came later may stand for some that came before.
+        crowded = small.at_rest and len(now.model.found) >= beliefs.many
         model = now.model
         if crowded or names(model) == before:
             break

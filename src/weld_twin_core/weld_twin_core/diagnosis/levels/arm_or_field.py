@@ -38,8 +38,6 @@ def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> Fre
     """
     Return a form whose field of the instrument is a set with the joints, where they are one.
 
-    Contacts have no instrument: what looks like a field is the arm's there.
-
     Parameters
     ----------
     found : Search
@@ -55,35 +53,30 @@ def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> Fre
     small = found.problem.thinned(rows)
     start = found.baseline.model
     bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
-    joints = _joints(small, bare, scale)
-    if not joints:
-        return form
-    bases = _bases(small, bare, scale)
-    arm = _gain(bases, [group for each in joints.values() for group in each])
-    touched = small.untracked
-    if not touched and arm < AS_GOOD * _gain(bases, [_field(small, bare, scale)]):
+    joints, bases = _joints(small, bare, scale), _bases(small, bare, scale)
+    every = [group for each in joints.values() for group in each]
+    arm = _gain(bases, every) if every else 0.0
+    if arm <= 0.0 or arm < AS_GOOD * _gain(bases, [_field(small, bare, scale)]):
         return form
     gains = {name: max(_gain(bases, groups), 0.0) for name, groups in joints.items()}
+    rest = tuple(part for part in form.parts if part not in fields)
     whole = sum(gains.values())
     if whole <= 0.0:
         return form
-    left = 0.0 if touched else FIELD
-    sizes = {name: (1.0 - left) * gain / whole for name, gain in gains.items()}
-    rest = tuple(part for part in form.parts if part not in fields)
-    part = _shared(fields, joints, sizes, left)
+    sizes = {name: (1.0 - FIELD) * gain / whole for name, gain in gains.items()}
+    part = _shared(fields, joints, sizes)
     return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
 
 
 def _shared(
-    fields: Sequence[Part], joints: dict[str, list[Group]], sizes: dict[str, float], left: float
+    fields: Sequence[Part], joints: dict[str, list[Group]], sizes: dict[str, float]
 ) -> Part:
-    """Return one part of all the joints and, where there is one, the instrument."""
+    """Return one part of all the joints and, last, the instrument."""
     ordered = sorted(sizes, key=lambda name: -sizes[name])
-    rivals = [(joints[name][0], sizes[name]) for name in ordered]
-    if left > 0.0:
-        rivals.append((fields[0].group, left))
+    rivals = ((joints[name][0], sizes[name]) for name in ordered)
     share = sum(part.share for part in fields)
-    return Part(joints[ordered[0]][0], fields[0].ridge, tuple(rivals), share)
+    every = (*rivals, (fields[0].group, FIELD))
+    return Part(joints[ordered[0]][0], fields[0].ridge, every, share)
 
 
 def _joints(problem: Problem, bare: Fit, scale: Scale) -> dict[str, list[Group]]:

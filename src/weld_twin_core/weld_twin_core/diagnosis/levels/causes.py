@@ -3,9 +3,10 @@
 """
 Each cause level by level, with its share of the squared gap.
 
-Shares are what every cause takes off the squared gap on stretches that were not fitted, in
-proportion to how far it moves the tool along with all of them together; with the noise and with
-what is left they add up to one.
+Every effect that was found stands by itself, whatever the status, and so does a place that curves
+stand for. What is left beside them is one entry more. Shares are what every cause takes off the
+squared gap on stretches that were not fitted, in proportion to how far it moves the tool along with
+all of them together; with the noise and with what is left they add up to one.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
-from ..result import Cause, Shares, Site
+from ..result import NAMING, Cause, Shares, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
@@ -45,7 +46,7 @@ Members = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class _Claim:
-    """One cause before its share: members of the model, and what is believed of it."""
+    """One cause before its share: members of the model, its slot, and what is believed of it."""
 
     members: tuple[int, ...]
     place: dict[str, float]
@@ -53,6 +54,8 @@ class _Claim:
     name: dict[Site, float]
     taken: float | None = None
     """Share of the squared gap that groups at this place take off unseen folds; None of a name."""
+    slot: int | None = None
+    group: int | None = None
 
 
 def causes(
@@ -74,7 +77,7 @@ def causes(
         Of its final model.
     verdict : Verdict
     rival : Curved or None
-        The free-form explanation; it is the model itself where the verdict is 'unknown'.
+        The free-form explanation; it is the model itself where ``unseen`` is its own.
     floor : float
         RMS of the noise alone [m].
     beliefs : Beliefs
@@ -82,10 +85,9 @@ def causes(
         What tells the places of an unknown gap; the curves carried, where left out.
 
     """
-    if rival is not None and verdict.status == 'unknown':
-        found, unseen = rival.found, rival.unseen
-        placing = placing or rival.form
-    claims = _claims(found, verdict, rival, placing, beliefs)
+    told = _told_claims(found, verdict, rival, beliefs)
+    curved = rival if rival is not None and rival.unseen is unseen else None
+    claims, rest = _nameless(found, told, verdict, curved, placing, beliefs)
     squares = (
         unseen.squares(unseen.predict([])),
         unseen.squares(unseen.predict(range(len(unseen.parts)))),
@@ -106,13 +108,20 @@ def causes(
                 float(min(share + STUDENT * error, 1.0)),
             ),
             members=claim.members,
+            slot=claim.slot,
+            effect=claim.group,
         )
         for claim, share, error in zip(claims, whole, spread, strict=True)
     ]
     out.sort(key=lambda cause: -cause.share)
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
-    rest = max(1.0 - float(whole.sum()) - noise, 0.0)
-    return tuple(out), Shares(unexplained=rest, noise=max(noise, 0.0))
+    left = max(1.0 - float(whole.sum()) - noise, 0.0)
+    if rest is not None and (left > beliefs.unexplained or not out):
+        error = STUDENT * float(np.sqrt((spread**2).sum()))
+        ends = max(left - error, 0.0), min(left + error, 1.0)
+        levels = _listed(rest.place), _listed(rest.dependence)
+        out.append(Cause(*levels, (), left, ends, rest=True))
+    return tuple(out), Shares(unexplained=left, noise=max(noise, 0.0))
 
 
 def covering(cause: Cause) -> Cause:
@@ -146,31 +155,101 @@ def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple((name, belief) for name, belief in ordered if belief >= LISTED)
 
 
-def _claims(
-    found: Search,
-    verdict: Verdict,
-    rival: Curved | None,
-    placing: FreeForm | None,
-    beliefs: Beliefs,
+def _told_claims(
+    found: Search, verdict: Verdict, rival: Curved | None, beliefs: Beliefs
 ) -> list[_Claim]:
+    """Return a claim for every effect that is told, or for every group of many small ones."""
     model = found.final.model.found
-    if verdict.status == 'unknown' and placing is not None and placing.parts:
-        return _curve_claims(model, rival, placing, beliefs)
-    named = {site for group in verdict.sets for site in group}
     if found.dense:
-        return _crowd_claims(model, named, verdict.confidence)
-    out = []
+        named = {site for group in verdict.sets for site in group}
+        return _claims_of_many(model, named, verdict.confidence)
     each = verdict.confidence ** (1.0 / max(len(verdict.sets), 1))
-    for k, (effect, slot) in enumerate(zip(model, found.slots, strict=False)):
-        # A member that was taken out of the library may lead its set; the model holds another.
-        sites = {Site(effect.name, effect.site), slot[0].site} if slot else set()
-        if sites & named:
-            out.append(_named_claim(k, slot, each, rival, beliefs))
+    belief = each if verdict.status in NAMING else beliefs.calibration
+    out: list[_Claim] = []
+    for at, group in enumerate(verdict.sets):
+        k = next(i for i, slot in enumerate(found.slots) if slot[0].site in group)
+        taken = {member for claim in out for member in claim.members}
+        member = _member(model, group, found.slots[k], taken)
+        if member is not None:
+            claim = _named_claim(member, k, found.slots[k], belief, rival, beliefs)
+            out.append(replace(claim, group=at))
     return out
 
 
+def _member(
+    model: Sequence[Effect], group: Sequence[Site], slot: tuple[Rival, ...], taken: set[int]
+) -> int | None:
+    """
+    Return which effect of the model stands for a set.
+
+    A member that was taken out of the library may lead its set; the model holds another.
+    """
+    sites = [Site(effect.name, effect.site) for effect in model]
+    for among in (group, [rival.site for rival in slot]):
+        for at, site in enumerate(sites):
+            if site in among and at not in taken:
+                return at
+    return None
+
+
+def _nameless(
+    found: Search,
+    told: list[_Claim],
+    verdict: Verdict,
+    curved: Curved | None,
+    placing: FreeForm | None,
+    beliefs: Beliefs,
+) -> tuple[list[_Claim], _Claim | None]:
+    """Return all claims with those of curves that the model holds, and what is left beside."""
+    if verdict.status != 'unknown':
+        return told, None
+    model = found.final.model.found
+    if placing is None and curved is not None:
+        placing = curved.form
+    parts = placing.parts if placing is not None else ()
+    places: dict[str, list[Part]] = {}
+    for part in parts:
+        places.setdefault(part.group.at, []).append(part)
+    places = _merged(places)
+    held = _carried_by(places, curved) if places else {}
+    claims, left = list(told), list[Part]()
+    taken = {at for claim in told for at in claim.members}
+    free = beliefs.level_free
+    for k, effect in enumerate(model if curved is not None else ()):
+        if k not in taken and not effect.bends:
+            levels = {effect.at: free}, {effect.on: free}
+            claims.append(_Claim((k,), *levels, {Site(effect.name, effect.site): free}))
+    for place, own in places.items():
+        if not held[place]:
+            left += own
+            continue
+        curves = {Site(model[k].name, model[k].site): free for k in held[place]}
+        levels = (_place_of(place, own, beliefs), _dependence_of(own, beliefs))
+        share = float(sum(part.share for part in own))
+        claims.append(_Claim(held[place], *levels, curves, share))
+    return claims, _rest(left, beliefs)
+
+
+def _rest(left: list[Part], beliefs: Beliefs) -> _Claim:
+    """Return what is left beside everything told, where the most of it is."""
+    if not left:
+        return _Claim((), {}, {}, {})
+    places: dict[str, list[Part]] = {}
+    for part in left:
+        places.setdefault(part.group.at, []).append(part)
+    places = _merged(places)
+    first = max(places, key=lambda at: sum(part.share for part in places[at]))
+    own = places[first]
+    return _Claim((), _place_of(first, own, beliefs), _dependence_of(own, beliefs), {})
+
+
 def _named_claim(
-    k: int, slot: tuple[Rival, ...], belief: float, rival: Curved | None, beliefs: Beliefs
+    member: int,
+    k: int,
+    slot: tuple[Rival, ...],
+    belief: float,
+    rival: Curved | None,
+    beliefs: Beliefs,
 ) -> _Claim:
     """Return what is believed of an effect found one by one, from its rivals."""
     place: dict[str, float] = {}
@@ -185,10 +264,11 @@ def _named_claim(
         name[other.site] = other.probability * belief
     seen = rival.form.parts if rival is not None else ()
     return _Claim(
-        (k,),
+        (member,),
         {at: p * _agreement(seen, 'at', at, beliefs) for at, p in place.items()},
         {on: p * _agreement(seen, 'on', on, beliefs) for on, p in dependence.items()},
         name,
+        slot=k,
     )
 
 
@@ -202,29 +282,6 @@ def _effect_of(rival: Rival) -> Effect | None:
         if (effect.name, effect.site) == (rival.site.effect, rival.site.joint):
             return effect
     return None
-
-
-def _curve_claims(
-    model: tuple[Effect, ...], rival: Curved | None, placing: FreeForm, beliefs: Beliefs
-) -> list[_Claim]:
-    """Return a claim for every effect that stayed, and for every place that the gap bends at."""
-    free = beliefs.level_free
-    kept = rival.kept if rival is not None else ()
-    out = [
-        _Claim((k,), {e.at: free}, {e.on: free}, {Site(e.name, e.site): free})
-        for k, e in enumerate(kept)
-    ]
-    places: dict[str, list[Part]] = {}
-    for part in placing.parts:
-        places.setdefault(part.group.at, []).append(part)
-    places = _merged(places)
-    held = _carried_by(places, rival)
-    for place, parts in places.items():
-        curves = {Site(model[k].name, model[k].site): free for k in held[place]}
-        taken = sum(part.share for part in parts)
-        levels = (_place_of(place, parts, beliefs), _dependence_of(parts, beliefs))
-        out.append(_Claim(held[place], *levels, curves, float(taken)))
-    return out
 
 
 def _carried_by(places: dict[str, list[Part]], rival: Curved | None) -> dict[str, Members]:
@@ -281,7 +338,9 @@ def _merged(places: dict[str, list[Part]]) -> dict[str, list[Part]]:
     return out
 
 
-def _crowd_claims(model: tuple[Effect, ...], named: set[Site], confidence: float) -> list[_Claim]:
+def _claims_of_many(
+    model: tuple[Effect, ...], named: set[Site], confidence: float
+) -> list[_Claim]:
     """Return a claim for every place and dependence of many small errors together."""
     groups: dict[tuple[str, str], list[int]] = {}
     for k, effect in enumerate(model):

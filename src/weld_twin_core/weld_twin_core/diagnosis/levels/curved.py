@@ -17,6 +17,7 @@ from ..result import Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .free_form import FreeForm, free_form
+from .sparse_groups import steadiness
 
 ROWS = 6000
 """Rows that groups are chosen on; the curves are fitted on all."""
@@ -50,32 +51,73 @@ class Curved:
         return self.unseen.rms(self.unseen.predict(range(len(self.unseen.parts))))
 
 
-def curved(found: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
+def curved(found: Search, beliefs: Beliefs) -> Curved | None:
     """
-    Return the free-form explanation of the gap; None where there is none, or nothing to explain.
+    Return the free-form explanation of the whole gap, without any name; None where there is none.
 
     Parameters
     ----------
     found : Search
-    verdict : Verdict
-        Effects that an 'unknown' names beyond doubt stay beside the curves, unless curves alone
-        predict better; the set-up's own motion always stays.
+        The set-up's own motion that it holds stays beside the curves.
     beliefs : Beliefs
 
     """
     if found.dense:
         return None
-    setup = [e for e in found.final.model.found if not e.cause]
-    alone = _beside(found, setup, beliefs)
-    sure = {site for group in verdict.sets for site in group}
-    named = [e for e in found.final.model.found if Site(e.name, e.site) in sure]
-    if verdict.status != 'unknown':
-        return alone
-    beside = _beside(found, [*setup, *named], beliefs) if named else None
-    tried = [way for way in (beside, alone) if way is not None]
-    if not tried:
-        return _beside(found, [*setup, *named], beliefs, wandering=True)
-    return min(tried, key=lambda way: way.rms_m)
+    return _beside(found, _setup(found), beliefs)
+
+
+def standing(
+    found: Search, verdict: Verdict, alone: Curved | None, beliefs: Beliefs
+) -> tuple[Verdict, Curved | None]:
+    """
+    Return an 'unknown' verdict with the names that stand, and curves for what is left beside them.
+
+    Names stand beside what has no name, unless curves alone predict unseen stretches clearly
+    better than names and curves together: then the names imitate.
+
+    Parameters
+    ----------
+    found : Search
+    verdict : Verdict
+        Of any other status, nothing changes.
+    alone : Curved or None
+        The free-form explanation without names.
+    beliefs : Beliefs
+
+    """
+    if verdict.status != 'unknown' or found.dense:
+        return verdict, alone
+    told = {site for group in verdict.sets for site in group}
+    named = [
+        effect
+        for effect, slot in zip(found.final.model.found, found.slots, strict=False)
+        if {Site(effect.name, effect.site), slot[0].site} & told
+    ]
+    if not named:
+        wandering = None if alone else _beside(found, _setup(found), beliefs, wandering=True)
+        return verdict, alone or wandering
+    kept = [*_setup(found), *named]
+    beside = _beside(found, kept, beliefs)
+    if alone is not None and _beaten(found, beside, alone, beliefs):
+        return replace(verdict, sets=()), alone
+    if beside is None and found.final.model.found != tuple(kept):
+        beside = _beside(found, kept, beliefs, wandering=True)
+    return verdict, beside
+
+
+def _setup(found: Search) -> list[Effect]:
+    return [effect for effect in found.final.model.found if not effect.cause]
+
+
+def _beaten(found: Search, beside: Curved | None, alone: Curved, beliefs: Beliefs) -> bool:
+    """Return whether curves alone predict clearly better than names, with curves or without."""
+    if beside is None:
+        named = Unseen.of(found.problem, found.scale, found.final, found.precision)
+    else:
+        named = beside.unseen
+    gain, steady = gain_of(named, alone.unseen)
+    return gain >= beliefs.beaten_share and steady >= beliefs.beaten_steady
 
 
 def _beside(
@@ -96,3 +138,23 @@ def _beside(
     changed = replace(found, final=final, scale=scale, precision=precision)
     unseen = Unseen.of(full, scale, final, precision)
     return Curved(form, bare.model.found, changed, unseen)
+
+
+def gain_of(named: Unseen, rival: Unseen) -> tuple[float, float]:
+    """
+    Return what a rival takes off the squared unseen error, as a share and in standard errors.
+
+    Parameters
+    ----------
+    named, rival : Unseen
+        The model held against the rival, and the rival, both whole.
+
+    """
+    before = named.squares(named.predict(range(len(named.parts))))
+    after = rival.squares(rival.predict(range(len(rival.parts))))
+    gain = 1.0 - float(after.mean() / max(float(before.mean()), 1e-300))
+    labels, others = named.trusted_labels(), rival.trusted_labels()
+    names = np.intersect1d(labels, others)
+    one = np.array([before[labels == n].mean() for n in names])
+    two = np.array([after[others == n].mean() for n in names])
+    return gain, steadiness(one, two)

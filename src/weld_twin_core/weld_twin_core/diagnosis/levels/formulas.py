@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import NamedTuple
 
 import numpy as np
 
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import NAMING
+from ..result import NAMING, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
@@ -79,8 +79,15 @@ def formulas(
     reasons += [_misses(one) for one in _clearest(missed)]
     if not reasons:
         return verdict, Missed()
-    unknown = Verdict('unknown', beliefs.beaten_belief, (), tuple(reasons))
+    doubted = {one.at for one in missed} | {one.joint for one in loose}
+    sets = () if 'instrument' in doubted else _but_at(verdict, doubted)
+    unknown = Verdict('unknown', beliefs.beaten_belief, sets, tuple(reasons))
     return unknown, Missed(tuple(loose), missed)
+
+
+def _but_at(verdict: Verdict, doubted: Set[str]) -> tuple[tuple[Site, ...], ...]:
+    """Return what is named but for the places where a formula does not hold."""
+    return tuple(group for group in verdict.sets if not {s.joint for s in group} & doubted)
 
 
 def _sizes(found: Search, unseen: Unseen) -> dict[str, float]:

@@ -229,7 +229,8 @@ def _plain(
             yield joint, 'acceleration', parts
     if moving:
         yield 'clock', 'speed', [_velocity(problem, k, m) for k, m in enumerate(features)]
-    yield 'instrument', 'place', [smooth_field(problem, k, m) for k, m in enumerate(features)]
+    if not problem.untracked:
+        yield 'instrument', 'place', [smooth_field(problem, k, m) for k, m in enumerate(features)]
     if all(m.view.wrench is not None for m in features):
         yield 'tool', 'load', [_yielding(problem, k, m) for k, m in enumerate(features)]
 

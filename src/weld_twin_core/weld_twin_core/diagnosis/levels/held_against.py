@@ -4,16 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
-
 from ..beliefs import Beliefs
-from ..result import Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
-from .curved import Curved
-from .sparse_groups import steadiness
+from .curved import Curved, gain_of
 
 
 def held_against(
@@ -22,9 +16,9 @@ def held_against(
     """
     Return the verdict, or 'unknown' where a free form predicts clearly better than the names.
 
-    What an 'unknown' names beside is withdrawn where curves alone predict better. There is no
-    'none' where a free form predicts what looks like noise, whether or not a curve can carry it to
-    another motion.
+    There is no 'none' where a free form predicts what looks like noise, whether or not a curve can
+    carry it to another motion. What is named stays told; `standing` says whether it holds beside
+    what is left.
 
     Parameters
     ----------
@@ -40,9 +34,7 @@ def held_against(
     if verdict.status == 'none':
         return _something(verdict, rival, beliefs)
     if verdict.status == 'unknown':
-        kept = {Site(effect.name, effect.site) for effect in rival.kept}
-        stays = all(group[0] in kept for group in verdict.sets)
-        return verdict if stays else replace(verdict, sets=())
+        return verdict
     gain, steady = gain_of(named, rival.unseen)
     if gain < beliefs.beaten_share or steady < beliefs.beaten_steady:
         return verdict
@@ -50,7 +42,7 @@ def held_against(
         f'a curve at {_places(rival)} predicts unseen stretches better than any effect in the library '
         f'({100.0 * gain:.0f} % less squared error)'
     )
-    return Verdict('unknown', beliefs.beaten_belief, (), (reason,))
+    return Verdict('unknown', beliefs.beaten_belief, verdict.sets, (reason,))
 
 
 def _something(verdict: Verdict, rival: Curved, beliefs: Beliefs) -> Verdict:
@@ -67,23 +59,3 @@ def _something(verdict: Verdict, rival: Curved, beliefs: Beliefs) -> Verdict:
 
 def _places(rival: Curved) -> str:
     return ' and '.join(str(part.group) for part in rival.form.parts)
-
-
-def gain_of(named: Unseen, rival: Unseen) -> tuple[float, float]:
-    """
-    Return what a rival takes off the squared unseen error, as a share and in standard errors.
-
-    Parameters
-    ----------
-    named, rival : Unseen
-        The model held against the rival, and the rival, both whole.
-
-    """
-    before = named.squares(named.predict(range(len(named.parts))))
-    after = rival.squares(rival.predict(range(len(rival.parts))))
-    gain = 1.0 - float(after.mean() / max(float(before.mean()), 1e-300))
-    labels, others = named.trusted_labels(), rival.trusted_labels()
-    names = np.intersect1d(labels, others)
-    one = np.array([before[labels == n].mean() for n in names])
-    two = np.array([after[others == n].mean() for n in names])
-    return gain, steadiness(one, two)

@@ -12,6 +12,7 @@ import numpy as np
 from ..algebra.fit import robust_fit, robust_scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
+from ..result import Site
 from ..verdict.decision import Verdict
 from .arm_or_field import arm_first
 from .curved import ROWS, Curved
@@ -35,8 +36,8 @@ def placed(
     """
     Return the groups that tell place and dependence of an unknown gap; None of any other.
 
-    Beside what curves can carry to another motion, causes are tried that act on the whole arm at
-    once.
+    They explain what is left beside everything that is told. Beside what curves can carry to another
+    motion, causes are tried that act on the whole arm at once.
 
     Parameters
     ----------
@@ -53,22 +54,26 @@ def placed(
     """
     if verdict.status != 'unknown':
         return None
-    form = _grouped(found, rival, beliefs)
+    form = _grouped(found, verdict, rival, beliefs)
     if any(one.on == 'place' for one in missed.forms):
         form = _with_field(form, beliefs)
     form = arm_first(found, form, ROWS, beliefs)
     return _with_scatter(form, missed.scattered)
 
 
-def _grouped(found: Search, rival: Curved | None, beliefs: Beliefs) -> FreeForm:
-    """Return the groups of columns that tell place and dependence."""
-    # Curves fitted along with many small errors are what is to be placed, not what stays beside.
-    setup = [e for e in found.final.model.found if not (e.cause or e.bends)]
-    kept = setup if rival is None else rival.kept
+def _grouped(found: Search, verdict: Verdict, rival: Curved | None, beliefs: Beliefs) -> FreeForm:
+    """Return the groups of columns that tell place and dependence of what no name stands for."""
+    none = np.zeros(0)
+    if found.dense:
+        # Beside many small errors it is what they leave that has no place yet.
+        bare = replace(found.final, model=found.final.model.with_found(()))
+        return free_form(found.problem, found.scale, bare, none, beliefs, whole_arm=True)
+    told = {site for group in verdict.sets for site in group}
+    own = [e for e in found.final.model.found if Site(e.name, e.site) in told or not e.cause]
+    kept = own if rival is None else rival.kept
     small = found.problem.thinned(ROWS)
     start = found.baseline.model.with_found(tuple(kept))
     bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
-    none = np.zeros(0)
     form = free_form(small, scale, bare, none, beliefs, whole_arm=True)
     if form.parts:
         return form

@@ -56,6 +56,7 @@ def whole_arm_groups(problem: Problem, model: Model, scale: Scale) -> list[Group
             problem, scale, at, on, (), [problem.seen(k, part) for k, part in enumerate(parts)]
         )
         for at, on, parts in _yielded(features)
+        if not (at == 'instrument' and problem.untracked)
     ]
     return [group for group in out if group.columns.size]
 

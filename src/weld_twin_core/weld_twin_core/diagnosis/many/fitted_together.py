@@ -148,11 +148,6 @@ def _without_creep(
     return (best, left) if grows > beliefs.family_worth else (trial, remains)
 
 
-def _crowd(found: Search) -> int:
-    """Return how many separate causes were found one by one: too many are no answer."""
-    return sum(effect.causes() for effect in found.final.model.found)
-
-
 def _one_and_crumbs(found: Search, beliefs: Beliefs) -> bool:
     """
     Return whether contacts show a large cause or two, and nothing else that counts.
@@ -164,9 +159,7 @@ def _one_and_crumbs(found: Search, beliefs: Beliefs) -> bool:
 
 
 def _many(found: Search, best: Search, beliefs: Beliefs) -> bool:
-    """Return whether there are many: too many one by one, or as many in sum and beside the few."""
-    if _crowd(found) > beliefs.crowd:
-        return True
+    """Return whether there are many, in sum and beside the few."""
     many = _members(best, beliefs) >= beliefs.many
     return many and members_beside(found, best, beliefs) >= beliefs.many
 

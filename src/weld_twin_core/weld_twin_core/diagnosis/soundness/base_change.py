@@ -39,8 +39,8 @@ LOOSE = (3e-3, 1e-2)
 """Prior spread of the arm's own errors [m, rad]."""
 LOOPS = (0.02, 0.1)
 """Travels [rad] over which loops of lost motion close, between a gap and a tenth of a turn."""
-GROWN = 3e-5
-"""Prior spread of a link's growth [1/K]: aluminium grows by 2.4e-5."""
+GROWN = 1e-4
+"""Prior spread of a link's growth [1/K], as loose as the others: aluminium grows by 2.4e-5."""
 UNIT_OFF = 1e-3
 """Prior spread of the instrument's unit of length: half of what is plausible at all."""
 

@@ -68,17 +68,25 @@ def _left(case: Case, k: int) -> float | None:
     """Return what a rigid arm leaves of a recording [m] where that is no more than rounding."""
     if case.gap > UNEXPLAINED:
         return None
-    bare = Model(
-        case.model.robot, (case.model.bases[k],), case.model.known + case.model.changed(k)
-    )
-    model = bare.with_found(constant_errors(bare.robot))
-    tried = [_stations(recording, k, model) for recording in _paired(case, k)]
-    near = [(one, started) for one in tried if one is not None and (started := _near(one, model))]
-    if not near:
-        return None
-    problem, (start, _) = min(near, key=lambda pair: pair[1][1])
-    left = _gap(problem, _fitted(problem, start, 12))
-    return left if left < max(COMPUTED, _rounding(problem, start)) else None
+    robot = case.model.robot
+    known = case.model.known + case.model.changed(k)
+    nominal = Model(robot, (case.model.bases[k],), known)
+    paired = list(_paired(case, k))
+    # Of few postures only the arm as it was given can be told from one bent to agree.
+    for model in (nominal, nominal.with_found(constant_errors(robot))):
+        tried = [_stations(recording, model) for recording in paired]
+        near = [
+            (one, started)
+            for one in tried
+            if one is not None and (started := _near(one, model)) is not None
+        ]
+        if not near:
+            continue
+        problem, (start, _) = min(near, key=lambda pair: pair[1][1])
+        left = _gap(problem, _fitted(problem, start, 12))
+        if left < max(COMPUTED, _rounding(problem, start)):
+            return left
+    return None
 
 
 def _paired(case: Case, k: int) -> Iterator[Recording]:
@@ -99,7 +107,7 @@ def _paired(case: Case, k: int) -> Iterator[Recording]:
         yield Recording(recording.name, JointMotion(seen.t, q, static=True), seen)
 
 
-def _stations(recording: Recording, k: int, model: Model) -> Problem | None:
+def _stations(recording: Recording, model: Model) -> Problem | None:
     """Return some postures that differ as a problem; None where they are too few."""
     seen, q = measured(recording), recording.joints.q
     _, first = np.unique(np.round(q / SAME_STATION), axis=0, return_index=True)
@@ -137,7 +145,7 @@ def _rounding(problem: Problem, model: Model) -> float:
     (recording,), (maker,) = problem.recordings, problem.features(model)
     turning = ~model.robot.prismatic
     step, angle = _grid(measured(recording).position, GRIDS), _grid(recording.joints.q, ANGLES)
-    reach = [maker.column(('q', i))[:3] for i in np.flatnonzero(turning)]
+    reach = [maker.column(('q', i))[:3] for i in np.flatnonzero(turning).tolist()]
     squares = np.sum([(column**2).sum(axis=0).mean() for column in reach])
     out = OVER * float(np.sqrt((3.0 * step**2 + squares * angle**2) / 12.0))
     return out if out < ROUNDED else 0.0

@@ -21,6 +21,7 @@ from ...arm import catalog
 from ...arm.robot import Robot
 from ...arm.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ...arrays import Array
+from ...bursts import evenly
 from ...errors import DataError, ModelError
 from ...recording import Measurements, Recording, Signal
 
@@ -125,8 +126,8 @@ def poses_inverted(given: Given) -> Given:
     """Return what was given with measured poses inverted; points stay as they are."""
     out = []
     for r in given.recordings:
-        turned = r.measured is not None and r.measured.rotation is not None
-        out.append(r.with_measured(measured(r).inverted()) if turned else r)
+        posed = r.measured is not None and r.measured.rotation is not None
+        out.append(r.with_measured(measured(r).inverted()) if posed else r)
     return replace(given, recordings=tuple(out))
 
 
@@ -194,13 +195,32 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     return replace(given, recordings=tuple(recordings))
 
 
-def stamped_evenly(given: Given, k: int, first: float, step: float) -> Given:
-    """Return what was given with measurements of recording k at first + step * 0, 1, 2, … [s]."""
+def stamped_evenly(
+    given: Given, k: int, first: float, step: float, lost: Sequence[int] | Array, count: int
+) -> Given:
+    """
+    Return what was given with measurements of recording k stamped by an even clock.
+
+    Parameters
+    ----------
+    given : Given
+        Recordings, robot and frames as they were given.
+    k : int
+        Which recording, counted from 0.
+    first, step : float [s]
+        The first stamp, and the time from one to the next.
+    lost : array of int
+        Samples before which one is missing.
+    count : int
+        How many measurements had these stamps; of as many in the same time as there are now, each
+        takes its share.
+
+    """
     recordings = list(given.recordings)
-    if recordings[k].measured is None:
+    seen = recordings[k].measured
+    if seen is None:
         return given
-    seen = measured(recordings[k])
-    even = first + step * np.arange(seen.t.size)
+    even = evenly(first, step, np.asarray(lost, dtype=int), seen.t.size, count)
     recordings[k] = recordings[k].with_measured(replace(seen, t=even))
     return replace(given, recordings=tuple(recordings))
 

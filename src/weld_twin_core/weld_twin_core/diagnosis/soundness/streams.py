@@ -11,14 +11,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bursts import Bursts, bursts
+from ...bursts import Bursts, bursts, evenly
 from ...recording import Recording
 from ...two_clocks import ONE_CLOCK
 from ..algebra.problem import FRAMES
 from ..frames.aligned import aligned
 from .evidence import Case, Mistake, length, listed
 from .limits import EVEN, EVEN_LEAST, LIKE_LENGTH, MOVED, STILL_SPEED
-from .mending import Given, measured, stamped_evenly, stamps_as, velocities_left_out
+from .mending import Given, Mend, measured, stamped_evenly, stamps_as, velocities_left_out
 
 ROUNDS = 2
 """Times that frames and delay are found in turn; a third changes nothing."""
@@ -100,16 +100,17 @@ def _in_bursts(given: Given, k: int) -> Iterator[Mistake]:
     if before < EVEN_LEAST or EVEN * after > before:
         return
     t = measured(recording).t
-    waited = float(np.median(t - even.first - even.step * np.arange(t.size)))
+    waited = float(np.median(t - evenly(even.first, even.step, even.lost, t.size, t.size)))
+    missing = f' ({even.lost.size} were lost on the way)' if even.lost.size else ''
     yield Mistake(
         'stamps_in_bursts',
         ('clock',),
-        f'The measurements of {recording.name} are {even.words}: they waited in a buffer, '
+        f'The measurements of {recording.name} are {even.words}: they waited in a buffer{missing}, '
         f'{waited * 1e3:.0f} ms in the middle. Stamped evenly and so much earlier, the gap falls '
         f'from {length(before)} to {length(after)}.',
         "Record the instrument's own time of each measurement, or send each at once; --apply "
         'stamps them anew',
-        partial(stamped_evenly, k=k, first=even.first, step=even.step),
+        _stamped(even, k, t.size),
         of_all=False,
     )
 
@@ -117,15 +118,23 @@ def _in_bursts(given: Given, k: int) -> Iterator[Mistake]:
 def _evenly(given: Given, k: int, found: Bursts) -> tuple[float, Bursts, float]:
     """Return the median gap [m] as stamped, the even stamps that explain most, and their gap."""
     alone = replace(given, recordings=(given.recordings[k],))
+    count = measured(given.recordings[k]).t.size
     even = found
     for _ in range(ROUNDS):
-        (late,) = _posed(stamped_evenly(alone, 0, even.first, even.step)).lags
+        (late,) = _posed(_stamped(even, 0, count)(alone)).lags
         if late is None:
             break
         # A delay that grows evenly is another first stamp and another step.
         first = even.first - (late.late + late.rate * (even.first - late.middle))
         even = even._replace(first=first, step=even.step * (1.0 - late.rate))
-    return _posed(alone).gap, even, _posed(stamped_evenly(alone, 0, even.first, even.step)).gap
+    after = _posed(_stamped(even, 0, count)(alone))
+    return _posed(alone).gap, even, after.gap
+
+
+def _stamped(even: Bursts, k: int, count: int) -> Mend:
+    """Return what stamps recording k by an even clock."""
+    values = {'first': even.first, 'step': even.step, 'lost': even.lost, 'count': count}
+    return partial(stamped_evenly, k=k, **values)
 
 
 def _posed(given: Given) -> Case:

@@ -225,7 +225,7 @@ def _on_the_arm() -> Suspicion:
         'looks at a board), not of the tool'
     )
     remedy = 'Give --measured-inverse, and have base and tool aligned (--align base,tool)'
-    return Suspicion('camera_inverted', ('instrument',), words, remedy, poses_inverted)
+    return Suspicion('camera_inverted', ('instrument',), words, remedy, partial(poses_inverted))
 
 
 def _signed(at: tuple[str, ...], words: str, sign: Array) -> Suspicion:

@@ -18,7 +18,7 @@ from ..hypotheses.rivals import Rival, nats_in_place
 from ..hypotheses.search import Search
 from ..hypotheses.selection import fitted_with, implausible
 from ..many.weighed_families import WeighedFamily
-from ..result import NAMING, CameBack, Cause, Site
+from ..result import CameBack, Cause, Site
 from ..verdict.decision import Verdict, leaders
 from .repeated import Repeated
 
@@ -128,47 +128,28 @@ def _fitted(found: Search, again: Repeated, site: Site, other: Site) -> Rival | 
     return Rival(other, nats_in_place(rest, tried, found.effective(found.small)), tried)
 
 
-def bounded(
-    verdict: Verdict, causes: Sequence[Cause], stability: Stability | None, beliefs: Beliefs
-) -> tuple[Verdict, tuple[Cause, ...]]:
+def told_back(
+    causes: Sequence[Cause], verdict: Verdict, stability: Stability | None
+) -> tuple[Cause, ...]:
     """
-    Return verdict and causes believed no further than they come back, and how often that is.
+    Return causes with how often each comes back.
 
     Parameters
     ----------
-    verdict : Verdict
     causes : sequence of Cause
+    verdict : Verdict
     stability : Stability or None
         None changes nothing.
-    beliefs : Beliefs
 
     """
     if stability is None:
-        return verdict, tuple(causes)
-    out, most = [], 1.0
+        return tuple(causes)
+    named = {site for group in verdict.sets for site in group}
+    out = []
     for cause in causes:
-        site = next((s for s, _ in cause.name if s in stability.came_back), None)
-        alike = [group for group in verdict.sets if site in group]
-        if site is None or not alike:
-            out.append(cause)
-            continue
-        name = cause.name
-        most_of_it = _most(stability.again.came_back(site, alike[0]), beliefs)
-        if most_of_it < 1.0:
-            less = min(1.0, most_of_it / max(sum(p for _, p in name), 1e-9))
-            name = tuple((s, p * less) for s, p in name)
-        most = min(most, most_of_it)
-        out.append(replace(cause, name=name, came_back=stability.came_back[site]))
-    if verdict.status in NAMING:
-        verdict = replace(verdict, confidence=min(verdict.confidence, most))
-    return verdict, tuple(out)
-
-
-def _most(told: CameBack | None, beliefs: Beliefs) -> float:
-    """Return how far to believe names at the most that come back so often."""
-    if told is None or told.times == told.of:
-        return 1.0
-    return told.bound if told.share < beliefs.returns else min(told.bound, beliefs.unsteady)
+        site = next((s for s, _ in cause.name if s in stability.came_back and s in named), None)
+        out.append(cause if site is None else replace(cause, came_back=stability.came_back[site]))
+    return tuple(out)
 
 
 def of_families(

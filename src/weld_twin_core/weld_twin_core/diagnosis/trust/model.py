@@ -213,7 +213,7 @@ class Trust:
         By level and group of status, as in 'answer named': the probability from which on it is
         told as sure.
     told_unsure : float
-        What an answer below is told as at the most.
+        What is believed at the most of what is larger than all that was learned from.
     levels : mapping from str to Learned
         By level and group of status, as in 'answer named'.
     card : mapping
@@ -255,27 +255,20 @@ class Trust:
             probability = max(probability, min(before, self.told_unsure))
         return probability
 
-    def told(self, level: str, group: str, signs: Mapping[str, float]) -> float | None:
+    def sure(self, level: str, group: str, signs: Mapping[str, float]) -> bool:
         """
-        Return how far to believe a level: not above ``told_unsure`` where it is not sure.
+        Return whether a level is told as sure: hardly ever were such levels wrong.
 
         Parameters
         ----------
         level, group, signs
             As `learned` takes them.
 
-        Returns
-        -------
-        float or None
-            None where nothing was learned of such answers.
-
         """
         probability = self.learned(level, group, signs)
-        if probability is None:
-            return None
-        sure = probability >= self.sure_from.get(f'{level} {group}', 1.0)
-        sure = sure and (level not in LEVELS_BACK or comes_back(signs))
-        return probability if sure else min(probability, self.told_unsure)
+        if probability is None or probability < self.sure_from.get(f'{level} {group}', 1.0):
+            return False
+        return level not in LEVELS_BACK or comes_back(signs)
 
 
 def trust_from(content: Mapping[str, Any]) -> Trust:

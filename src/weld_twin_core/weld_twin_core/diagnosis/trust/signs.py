@@ -20,8 +20,7 @@ from ..algebra.problem import Problem
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..hypotheses.still_joints import WIDE
-from ..levels.curved import Curved
-from ..levels.held_against import gain_of
+from ..levels.curved import Curved, gain_of
 from ..result import Cause, Check, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
@@ -207,6 +206,7 @@ def _of_names(found: Search, unseen: Unseen, evidence: Evidence, verdict: Verdic
     coordinates = [effect.coordinates().size for effect in model]
     return {
         'belief': verdict.confidence,
+        'partly': float(verdict.status == 'unknown' and bool(verdict.sets) and not found.dense),
         'slots': len(evidence.slots),
         'found': len(model),
         'separate': sum(evidence.causes),

@@ -14,14 +14,16 @@ from .model import Trust
 from .signs import Signs
 
 Key = TypeVar('Key')
+PARTLY = 'partly'
+"""Group of answers that name something beside what is left without a name."""
 
 
 def group_of(status: str, signs: Mapping[str, float]) -> str:
     """
     Return which answers are learned from together.
 
-    Those that name something are one group; many small errors are another, as nothing in them has
-    rivals.
+    Those that name something are one group, those that name something beside what has no name
+    another; many small errors are a third, as nothing in them has rivals.
 
     Parameters
     ----------
@@ -32,20 +34,26 @@ def group_of(status: str, signs: Mapping[str, float]) -> str:
     """
     if signs.get('families', 0.0) > 0.0:
         return 'families'
+    if signs.get('partly', 0.0) > 0.0:
+        return PARTLY
     return 'named' if status in NAMING else status
 
 
-def level_group_of(status: str, signs: Mapping[str, float]) -> str:
+def level_group_of(status: str, signs: Mapping[str, float], *, named: bool) -> str:
     """
-    Return which causes are learned from together: all of an unknown gap are placed by one means.
+    Return which causes are learned from together: all without a name are placed by one means.
 
     Parameters
     ----------
     status : str
     signs : mapping from str to float
         Of the answer.
+    named : bool
+        Whether the cause is an effect that was found.
 
     """
+    if signs.get('partly', 0.0) > 0.0:
+        return PARTLY if named else 'unknown'
     return status if status == 'unknown' else group_of(status, signs)
 
 
@@ -64,11 +72,22 @@ def trusted(
     trust : Trust
 
     """
+    verdict = trusted_verdict(verdict, signs.answer, trust)
     told = tuple(
         trusted_cause(cause, verdict.status, {**signs.answer, **own}, trust)
         for cause, own in zip(causes, signs.causes, strict=True)
     )
-    return trusted_verdict(verdict, signs.answer, trust), told
+    if verdict.status not in NAMING:
+        return verdict, told
+    # Who believes the whole answer believes each part of it.
+    return verdict, tuple(
+        replace(
+            cause,
+            probability=max(cause.probability, verdict.confidence),
+            sure=cause.sure or verdict.sure,
+        )
+        for cause in told
+    )
 
 
 def trusted_verdict(verdict: Verdict, signs: Mapping[str, float], trust: Trust) -> Verdict:
@@ -84,10 +103,10 @@ def trusted_verdict(verdict: Verdict, signs: Mapping[str, float], trust: Trust) 
 
     """
     of = 'answer', group_of(verdict.status, signs), signs
-    told = trust.told(*of)
-    return (
-        verdict if told is None else replace(verdict, confidence=told, learned=trust.learned(*of))
-    )
+    learned = trust.learned(*of)
+    if learned is None:
+        return verdict
+    return replace(verdict, confidence=learned, sure=trust.sure(*of))
 
 
 def trusted_cause(cause: Cause, status: str, signs: Mapping[str, float], trust: Trust) -> Cause:
@@ -104,20 +123,23 @@ def trusted_cause(cause: Cause, status: str, signs: Mapping[str, float], trust: 
     trust : Trust
 
     """
-
-    group = level_group_of(status, signs)
+    group = level_group_of(status, signs, named=cause.slot is not None)
     place, dependence, name = (
-        trust.told(level, group, signs) for level in ('place', 'dependence', 'name')
+        trust.learned(level, group, signs) for level in ('place', 'dependence', 'name')
     )
     if len(cause.name) == 1 and name is not None:
         # A name that is right is right about place and dependence as well.
         place, dependence = (None if p is None else max(p, name) for p in (place, dependence))
-    return replace(
+    out = replace(
         cause,
         place=_led(cause.place, place),
         dependence=_led(cause.dependence, dependence),
         name=_scaled(cause.name, name),
     )
+    named = cause.slot is not None or group == 'families'
+    told = sum(p for _, p in out.name) if named else max((p for _, p in out.place), default=0.0)
+    sure = trust.sure('name' if named else 'place', group, signs)
+    return replace(out, probability=float(min(told, 1.0)), sure=sure)
 
 
 def _led(

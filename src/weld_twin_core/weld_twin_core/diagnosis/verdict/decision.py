@@ -31,10 +31,11 @@ _NO_KIND = (
 @dataclass(frozen=True)
 class Verdict:
     """
-    Status, confidence, one set of sites per named effect, families of many small ones.
+    Status, confidence, one set of sites per effect told, families of many small ones.
 
-    ``learned`` is how often such answers were right, where that was learned; ``confidence`` tells less
-    where it is not sure.
+    An effect that was found is told whatever the status: 'unknown' says that beside it something
+    is left that has no name. ``sure`` says whether the answer keeps the promise of being wrong
+    hardly ever; ``complete`` is the probability that no cause of any size is missing.
     """
 
     status: str
@@ -42,7 +43,8 @@ class Verdict:
     sets: tuple[tuple[Site, ...], ...]
     reasons: tuple[str, ...]
     families: tuple[Family, ...] = ()
-    learned: float | None = None
+    sure: bool = False
+    complete: float = 0.0
 
 
 def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
@@ -71,9 +73,10 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
             case, open_ends = other, (_parts_elsewhere(evidence),)
     doubt = _doubt(case)
     if doubt is not None:
-        return Verdict('unknown', case.beliefs.doubted, (), (doubt,))
+        return Verdict('unknown', case.beliefs.doubted, _elsewhere(sets, evidence), (doubt,))
     if case.left > case.beliefs.unexplained:
-        return _incomplete(case, sets)
+        told = _elsewhere(sets, evidence)
+        return Verdict('unknown', _unknown_confidence(case), told, (_depends(evidence),))
     reasons = (*(_alike(chosen) for chosen in sets if len(chosen) > 1), *open_ends)
     status = 'ambiguous' if reasons else 'identified'
     return Verdict(status, _confidence(case, sets), sets, reasons)
@@ -129,21 +132,6 @@ def _of_families(case: Weighed) -> Verdict:
     return Verdict(status, sure, sets, (reason,), tuple(families))
 
 
-def _incomplete(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> Verdict:
-    """Return 'unknown' with the effects that stand out beside what is left and apart from it."""
-    told = case.evidence
-    # Of a rest that depends on nothing looked at, nobody knows what it touches.
-    solid = tuple(
-        chosen
-        for chosen, part in zip(sets, told.parts, strict=True)
-        if case.above_noise
-        and len(chosen) == 1
-        and part > case.left
-        and not _touched(chosen[0], told)
-    )
-    return Verdict('unknown', _unknown_confidence(case), solid, (_depends(told),))
-
-
 def _confidence(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> float:
     """Return the probability that the sets named are right, and all there is."""
     told, beliefs = case.evidence, case.beliefs
@@ -170,12 +158,6 @@ def _doubt(case: Weighed) -> str | None:
     if len(told.slots) > 1 and sum(told.parts) > beliefs.cancel:
         return (
             'the effects that fit best nearly cancel each other: together they imitate a cause '
-            'that is not in the library'
-        )
-    count = sum(told.causes)
-    if count > beliefs.crowd:
-        return (
-            f'{count} separate effects would be needed at once: together they imitate a cause '
             'that is not in the library'
         )
     bent = [joint for joint in told.glimpsed if _joints_at_rest(told).count(joint) > 1]
@@ -219,9 +201,20 @@ def _at_rest(sites: Iterable[Site]) -> list[str]:
     ]
 
 
-def _touched(site: Site, evidence: Evidence) -> bool:
-    """Return whether what remains depends on the joint that an effect sits on."""
-    return any(str(site.joint) in name for name in evidence.structure.depends_on)
+def _elsewhere(
+    sets: tuple[tuple[Site, ...], ...], evidence: Evidence
+) -> tuple[tuple[Site, ...], ...]:
+    """
+    Return the sets that sit where nothing is left.
+
+    What is left at the joint of an effect says that its formula is not the one at work there.
+    """
+    first = (*evidence.structure.depends_on[:1], *evidence.refused[:1], *evidence.lacking[:1])
+    return tuple(
+        group
+        for group in sets
+        if not any(s.joint is not None and s.joint in word for s in group[:1] for word in first)
+    )
 
 
 def _unknown_confidence(case: Weighed) -> float:

@@ -44,6 +44,8 @@ class Evidence:
     least : float, optional
         Least RMS [m] on held-out data over what could be in the model, one rival at a time; left
         out, it is ``after``.
+    chance : float
+        Ratio of ``after`` to ``fitted`` that chance alone reaches: few stations vary much.
 
     """
 
@@ -61,3 +63,4 @@ class Evidence:
     lacking: tuple[str, ...] = ()
     families: tuple[WeighedFamily, ...] | None = None
     least: float | None = None
+    chance: float = 1.0

@@ -27,6 +27,7 @@ def gathered(
     floor: NoiseFloor,
     beliefs: Beliefs,
     least: float | None = None,
+    chance: float = 1.0,
 ) -> Evidence:
     """
     Return the evidence for a verdict.
@@ -44,6 +45,8 @@ def gathered(
     beliefs : Beliefs
     least : float or None
         As `parted_elsewhere` gives it.
+    chance : float
+        As `reached_by_chance` gives it.
 
     """
     robot = found.final.model.robot
@@ -63,6 +66,7 @@ def gathered(
         lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
         families=weighed_families(found, unseen) if found.dense else None,
         least=least,
+        chance=chance,
     )
 
 

@@ -64,10 +64,11 @@ class Weighed:
     @property
     def carries(self) -> bool:
         """Return whether the model does on a held-out motion what it does on those fitted."""
+        # A ratio that chance reaches on so few readings says nothing.
         told = self.evidence
         return (
             told.after < self.beliefs.above * told.floor
-            or told.after < self.beliefs.carried * told.fitted
+            or told.after < max(self.beliefs.carried, told.chance) * told.fitted
             or self.share < self.beliefs.carried_share
         )
 

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-`tf2_msgs` and what is needed of `control_msgs`, for real messages where no wheels of them exist.
+`tf2_msgs` and what is needed of `control_msgs` and `mocap4r2_msgs`, which have no wheels.
 
 ROS's own generators and a C compiler make the Python package and the type supports of the
 middleware, as `rosidl_generate_interfaces` does in a workspace. The result is kept, and used again.
@@ -43,6 +43,12 @@ DEFINITIONS: Mapping[str, Mapping[str, str]] = {
             for part in ('reference', 'feedback', 'error', 'output')
         )
         + 'float64 speed_scaling_factor\n',
+    },
+    'mocap4r2_msgs': {
+        'Marker': 'int64 index\ngeometry_msgs/Point translation\n',
+        'RigidBody': 'std_msgs/Header header\nuint32 frame_number\nstring rigid_body_name\n'
+        'Marker[] markers\ngeometry_msgs/Pose pose\n',
+        'RigidBodies': 'std_msgs/Header header\nuint32 frame_number\nRigidBody[] rigidbodies\n',
     },
 }
 """Packages, their messages, and the definitions of these in Jazzy."""
@@ -111,7 +117,7 @@ def _refuse_unable() -> None:
     lacking += [] if find_spec('rosidl_generator_py') else ['rosidl_generator_py']
     if lacking:
         raise TwinError(
-            f'tf2_msgs and control_msgs are not installed and cannot be built: {lacking[0]} is '
+            f'{" and ".join(DEFINITIONS)} are not installed and cannot be built: {lacking[0]} is '
             'not here; install the packages, or a compiler and the headers of Python'
         )
 

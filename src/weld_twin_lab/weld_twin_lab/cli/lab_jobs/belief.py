@@ -29,6 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--held-out-seed', type=int, default=2, metavar='S', help='their seed')
     parser.add_argument(
+        '--mix',
+        choices=('usual', 'several'),
+        default='usual',
+        help='cases of the usual mix, or cells with one to six causes (default: usual)',
+    )
+    parser.add_argument(
         '--learn-from', nargs='*', default=[], metavar='TABLE', help='tables kept from other runs'
     )
     parser.add_argument(
@@ -63,8 +69,8 @@ def run(args: argparse.Namespace) -> int:
     taught = [row for table in args.learn_from for row in read_rows(Path(table))]
     tried = [row for table in args.judge_on for row in read_rows(Path(table))]
     with runner_of(args, out / STORE, 'diagnosing') as runner:
-        taught += study.rows_of(args.seed, args.cases, runner)
-        tried += study.rows_of(args.held_out_seed, args.held_out, runner)
+        taught += study.rows_of(args.seed, args.cases, runner, args.mix)
+        tried += study.rows_of(args.held_out_seed, args.held_out, runner, args.mix)
     _refuse_shared(taught, tried)
     write_rows(out / LEARNED, taught)
     write_rows(out / JUDGED, tried)

@@ -19,28 +19,30 @@ from ..open_form import Answer, Case
 def answer(case: Case) -> Answer:
     """Return the verdict: every name with its probability, and the prediction of the model."""
     twin = build_twin(case.robot, '' if case.known is None else case.known)
-    told = diagnose(
+    found = diagnose(
         [case.train],
         twin.robot,
         align=frozenset(case.align),
         known=twin.effects,
         exclude=case.exclude,
     )
-    text = diagnosis_text(told, ())
+    text = diagnosis_text(found, ())
     with TemporaryDirectory() as folder:
         file = Path(folder) / 'diagnosis.json'
         file.write_text(text, encoding='utf-8')
         model = read_model(twin.robot, file)
     verdict = json.loads(text)['verdict']
+    told = [cause for cause in verdict['causes'] if cause['effect'] is not None]
     causes = tuple(
         tuple((str(x['effect']), x['joint'], float(x['probability'])) for x in cause['name'])
-        for cause in verdict['causes']
+        for cause in told
     )
     sure = float(verdict['confidence'] or 0.0)
     status = verdict['status']
     return Answer(
         model.twin(0).poses(case.ask, case.times).position,
-        causes if status in ('identified', 'ambiguous') else (),
+        causes,
         unknown=sure if status == 'unknown' else 0.0,
         none=sure if status == 'none' else 0.0,
+        sure=(*(bool(cause['sure']) for cause in told), bool(verdict['sure'])),
     )

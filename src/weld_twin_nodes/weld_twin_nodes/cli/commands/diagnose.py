@@ -86,8 +86,8 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar=('BAG', 'WHAT'),
         help='what was changed in the cell for one of the bags: load=KG hung from the tool point '
-        '(load=KG,X,Y,Z: there in the tool frame [m]; below 0: taken off), another tool, or the instrument moved; may '
-        'be given again',
+        '(load=KG,X,Y,Z: there in the tool frame [m]; below 0: taken off), another tool, or the '
+        'instrument moved; may be given again',
     )
     parser.add_argument(
         '--apply',

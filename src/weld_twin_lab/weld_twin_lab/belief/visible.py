@@ -1,0 +1,112 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which causes of a case show at all, by the plant alone.
+
+A cause is taken out of the truth; all others and the frames may then change so that the
+recordings look as they did. What still differs, there and on another motion, shows. On the
+recordings too: a fit that has to reach far beyond them differs elsewhere for no cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+
+from ..blind.blind_cell import Cell, Take, deviation, exact, record
+from ..blind.cause_sizes import SIZES, Cause
+from ..blind.making import Case
+
+STEP = 0.1
+"""Share of a parameter by which it is changed for its column; angles by as much [rad]."""
+TURNING = {'transmission_ripple': ('phase',), 'bearing_tilt': ('phase',)}
+"""Parameters beside the sizes that bend a cause."""
+
+
+def shown(case: Case) -> list[float]:
+    """
+    Return for each cause by how much chi-square rises without it, the least of both kinds of motion.
+
+    Causes are taken as linear in their parameters about the truth.
+
+    Parameters
+    ----------
+    case : Case
+
+    """
+    cell = replace(case.cell, align=())
+    takes = (case.train, *case.also, case.test)
+    whole = _moved(cell, case.causes, takes)
+    frames = _frames(cell, takes, case.cell.align)
+    columns = [
+        [(_moved(cell, changed, takes) - whole) / STEP for changed in _changed(case.causes, k)]
+        for k in range(len(case.causes))
+    ]
+    unseen = np.arange(whole.size) >= whole.size - 3 * _samples(cell, case.test)
+    out = []
+    for k in range(len(case.causes)):
+        others = [own for j, part in enumerate(columns) if j != k for own in part]
+        design = np.array([*others, *frames]).T
+        gone = whole - _moved(cell, [*case.causes[:k], *case.causes[k + 1 :]], takes)
+        left = gone - design @ _fitted(design[~unseen], gone[~unseen]) if design.size else gone
+        rises = [float((left[part] ** 2).sum()) for part in (unseen, ~unseen)]
+        out.append(min(rises) / cell.tracker.sigma**2)
+    return out
+
+
+def _fitted(design: Array, target: Array) -> Array:
+    """Return least-squares coefficients; columns differ in size by orders of magnitude."""
+    size = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(design / size, target, rcond=1e-9)[0] / size)
+
+
+def _moved(cell: Cell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
+    """Return how far causes move the measured positions on all recordings, (rows,) [m]."""
+    return np.concatenate([deviation(cell, causes, taken).ravel() for taken in takes])
+
+
+def _samples(cell: Cell, taken: Take) -> int:
+    return len(record(cell, (), taken, exact(cell.tracker)).position)
+
+
+def _frames(cell: Cell, takes: Sequence[Take], align: Sequence[str]) -> list[Array]:
+    """Return the columns of the frames that are fitted; of the tool its shift alone."""
+    seen = [record(cell, (), taken, exact(cell.tracker)) for taken in takes]
+    out: list[Array] = []
+    for axis in np.eye(3):
+        if 'base' in align:
+            out.append(np.concatenate([np.cross(axis, own.position).ravel() for own in seen]))
+            out.append(np.concatenate([np.tile(axis, len(own.position)) for own in seen]))
+        if 'tool' in align:
+            out.append(np.concatenate([(_turned(own.quaternion) @ axis).ravel() for own in seen]))
+    return out
+
+
+def _turned(quaternion: Any) -> Array:
+    """Return rotations, shape (M, 3, 3), of quaternions x y z w."""
+    x, y, z, w = np.asarray(quaternion, dtype=float).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _changed(causes: Sequence[Cause], k: int) -> Iterator[list[Cause]]:
+    """Yield all causes with each number of one changed a little."""
+    own = causes[k]
+    for key in (*SIZES[own['effect']], *TURNING.get(own['effect'], ())):
+        if key not in own:
+            continue
+        value = np.asarray(own[key], dtype=float)
+        step = STEP if key in TURNING.get(own['effect'], ()) else STEP * np.abs(value).max()
+        for at in np.ndindex(value.shape):
+            other = value.copy()
+            other[at] += step
+            yield [*causes[:k], {**own, key: other.tolist()}, *causes[k + 1 :]]

@@ -1,0 +1,233 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tables as spreadsheets, instruments and controllers leave them, of one arm with known joints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.csv_text import csv_text
+from weld_twin_msgs_py.tables import TableOptions, read_table, read_two_tables
+
+ARM = catalog.load('kuka_kr6_r900')
+RNG = np.random.default_rng(31)
+Q = np.radians(RNG.uniform(-110.0, 110.0, (12, 6)).round(3))
+SEEN = forward(ARM, Q)[:, :3, 3] + RNG.normal(scale=1e-5, size=(12, 3))
+DEG, MM = np.degrees(Q), 1e3 * SEEN
+J, XYZ = [f'J{k}' for k in range(1, 7)], ['X', 'Y', 'Z']
+PLAIN = ','.join([*J, *XYZ])
+
+
+def rows(*blocks, sep=',', form='{:.6f}', comma=False):
+    """Return rows of text, blocks side by side."""
+    cells = [[form.format(v) for v in np.concatenate(row)] for row in zip(*blocks, strict=True)]
+    return [sep.join(c.replace('.', ',') if comma else c for c in row) for row in cells]
+
+
+def grouped(value):
+    """Return a number as a German spreadsheet shows it, thousands in groups."""
+    return f'{value:,.3f}'.translate(str.maketrans(',.', '.,'))
+
+
+def lines(*parts):
+    return '\n'.join(
+        line for part in parts for line in ([part] if isinstance(part, str) else part)
+    )
+
+
+TABLES = {
+    'two lines of names': lines('Joints,,,,,,Position,,', ','.join([*J, *XYZ]), rows(DEG, MM)),
+    'names, units': lines(
+        'Joints [deg],,,,,,Measured [mm],,', ','.join([*J, *XYZ]), rows(DEG, MM)
+    ),
+    'names, names, units': lines(
+        'Joints,,,,,,Nominal,,,Measured,,',
+        ','.join([*J, *XYZ, *XYZ]),
+        ','.join(['deg'] * 6 + ['mm'] * 6),
+        rows(DEG, MM + 3.0, MM),
+    ),
+    'titles filled up by Excel': lines(
+        'Messprotokoll' + ';' * 8,
+        'Datum;22.11.2026' + ';' * 7,
+        PLAIN.replace(',', ';'),
+        rows(DEG, MM, sep=';', comma=True),
+    ),
+    'groups of thousands': lines(
+        ';'.join([*(f'{j} [°]' for j in J), *(f'{a} [µm]' for a in XYZ)]),
+        [
+            ';'.join([*(f'{v:.6f}'.replace('.', ',') for v in d), *map(grouped, 1e3 * p)])
+            for d, p in zip(DEG, MM, strict=True)
+        ],
+    ),
+    'a unit for every column': lines(
+        'J1 [rad],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg],X [m],Y [mm],Z [cm]',
+        rows(Q[:, :1], DEG[:, 1:], SEEN[:, :1], MM[:, 1:2], 0.1 * MM[:, 2:]),
+    ),
+    'units in the cells': lines(
+        PLAIN,
+        [
+            ','.join([*(f'{v:.6f}°' for v in d), *(f'{v:.6f} mm' for v in p)])
+            for d, p in zip(DEG, MM, strict=True)
+        ],
+    ),
+    'target in mm, difference in µm': lines(
+        ','.join([*J, *(f'{a}_t [mm]' for a in 'xyz'), *(f'{a}_dif [µm]' for a in 'xyz')]),
+        rows(DEG, MM - 0.25, np.full((12, 3), 250.0)),
+    ),
+    'blanks between': lines('   '.join([*J, *XYZ]), rows(DEG, MM, sep='  ')),
+    'inches': lines(','.join([*J, *(f'{a} [in]' for a in XYZ)]), rows(DEG, MM / 25.4)),
+    'names over two lines in one cell': lines(
+        '"J1\n[deg]",J2,J3,J4,J5,J6,"X\n[mm]",Y,Z', rows(DEG, MM)
+    ),
+    'Measure X': lines(','.join([*J, *(f'Measure {a} [mm]' for a in XYZ)]), rows(DEG, MM)),
+    'nominal, measured and difference': lines(
+        ','.join([*J, *(f'{w} {a}' for w in ('Nom', 'Meas') for a in XYZ), 'dX', 'dY', 'dZ']),
+        rows(DEG, MM - 1.0, MM, np.ones((12, 3))),
+    ),
+    'speeds beside': lines(
+        ','.join([*(f'{j} [deg]' for j in J), *(f'{j} [deg/s]' for j in J), *XYZ]),
+        rows(DEG, 0.0 * DEG, MM),
+    ),
+    'a delimiter too many': lines(PLAIN, [f'{row},' for row in rows(DEG, MM)]),
+}
+
+
+def of(tmp_path, text, robot=ARM, options=None):
+    path = tmp_path / 'table.csv'
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_table(path, robot, options)
+
+
+@pytest.mark.parametrize('name', TABLES)
+def test_units_and_columns_are_those_of_the_header(tmp_path, name):
+    recording, said = of(tmp_path, TABLES[name])
+    np.testing.assert_allclose(recording.joints.q, Q, atol=2e-6, err_msg=str(said))
+    np.testing.assert_allclose(recording.measured.position, SEEN, atol=2e-6, err_msg=str(said))
+
+
+def test_unicode_text_of_excel_and_a_real_minus_are_read(tmp_path):
+    text = lines(PLAIN, rows(DEG, MM)).replace('-', '\N{MINUS SIGN}')
+    recording, _ = of(tmp_path, text.encode('utf-16'))
+    np.testing.assert_allclose(recording.joints.q, Q, atol=2e-6)
+
+
+@pytest.mark.parametrize('scale', [0.03, 1.0])
+def test_degrees_without_a_word_are_told_from_radians_by_the_arm(tmp_path, scale):
+    """Small angles in degrees, and angles beyond a turn in radians, look like the other unit."""
+    small = scale < 1.0
+    q = Q * scale if small else Q + 4.0 * np.pi * np.eye(6)[5]
+    seen = 1e3 * forward(ARM, q)[:, :3, 3] + RNG.normal(scale=0.02, size=(12, 3))
+    recording, said = of(tmp_path, lines(PLAIN, rows(np.degrees(q) if small else q, seen)))
+    np.testing.assert_allclose(recording.joints.q, q, atol=2e-6, err_msg=str(said))
+
+
+def test_temperatures_times_and_spreads_have_units_too(tmp_path):
+    head = f'Zeit [min],Temp (°F),{PLAIN},sigma_x [µm],sigma_y [µm],sigma_z [µm]'
+    clock = np.column_stack([np.arange(12.0), np.full(12, 77.0)])
+    recording, _ = of(tmp_path, lines(head, rows(clock, DEG, MM, np.full((12, 3), 30.0))))
+    np.testing.assert_allclose(np.diff(recording.joints.t), 60.0)
+    np.testing.assert_allclose(recording.temperature.value, 25.0)
+    np.testing.assert_allclose(recording.measured.sigma, 3e-5)
+
+
+@pytest.mark.parametrize('stamp', ['2041-03-01T08:00:{:02d}', '22400000{:02d}'])
+def test_stamps_that_no_bag_holds_are_told_and_counted_from_the_first(tmp_path, stamp):
+    body = [f'{stamp.format(k)},{row}' for k, row in enumerate(rows(DEG, MM))]
+    recording, said = of(tmp_path, lines(f'time,{PLAIN}', body))
+    assert 'beyond January 2038' in ' '.join(said)
+    assert recording.epoch_ns + 1e9 * recording.joints.t[-1] < 2**31 * 1e9
+    np.testing.assert_allclose(np.diff(recording.joints.t), 1.0)
+
+
+@pytest.mark.parametrize(
+    ('text', 'told'),
+    [
+        (lines(f'{PLAIN},note', [f'{r},"ok' if k == 5 else f'{r},ok'
+                                 for k, r in enumerate(rows(DEG, MM))]), 'line 7: a cell has no end'),
+        (lines(f'{PLAIN},note', [f'{r},"ok' if k == 5 else f'{r},ok'
+                                 for k, r in enumerate(rows(DEG, MM) * 300)]), 'line 7: a cell has no'),
+        (lines(','.join(f'c{k}' for k in range(30_000)), ",".join(["1"] * 30_000)), 'more; --joint'),
+        (lines(','.join([*J, *(f'{a} [deg]' for a in XYZ)]), rows(DEG, MM)), "unit 'deg' does not fit"),
+        (lines(','.join([*J, 'X [m]', 'X [mm]', 'Y', 'Z']), rows(DEG, MM[:, :1], MM)),
+         'X [m] and X [mm] mean the same; --position-columns decides'),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_meant_is_one_sentence(tmp_path, text, told):
+    with pytest.raises(DataError) as caught:
+        of(tmp_path, text)
+    assert told in str(caught.value) and len(str(caught.value).splitlines()) == 1
+    assert len(str(caught.value)) < 1000
+
+
+def with_slides(where):
+    """Return the arm with a slide in place of the joint at some place in the chain."""
+    prismatic = np.zeros(6, bool)
+    prismatic[where] = True
+    names = tuple(f'axis_{k}' if k != where else 'ram' for k in range(6))
+    limits = np.where(prismatic, 2.0, 6.0)
+    return replace(
+        ARM, name='odd', joint_names=names, prismatic=prismatic, lower=-limits, upper=limits
+    )
+
+
+@pytest.mark.parametrize('where', [0, 3, 5])
+@pytest.mark.parametrize('unit', ['m', 'mm', ''])
+def test_a_joint_that_slides_is_read_in_its_own_unit(tmp_path, where, unit):
+    robot: Robot = with_slides(where)
+    q = Q.copy()
+    q[:, where] = RNG.uniform(0.1, 1.6, 12)
+    seen = 1e3 * forward(robot, q)[:, :3, 3] + RNG.normal(scale=0.02, size=(12, 3))
+    shown = np.degrees(q)
+    shown[:, where] = q[:, where] * (1.0 if unit == 'm' else 1e3)
+    names = [f'{n} [deg]' for n in robot.joint_names]
+    names[where] = f'ram [{unit}]' if unit else 'ram'
+    recording, said = of(tmp_path, lines(','.join([*names, *XYZ]), rows(shown, seen)), robot)
+    np.testing.assert_allclose(recording.joints.q, q, atol=2e-6, err_msg=str(said))
+
+
+def test_an_axis_beside_the_arm_is_the_joint_that_slides(tmp_path):
+    robot = with_slides(0)
+    q = Q.copy()
+    q[:, 0] = RNG.uniform(0.1, 1.6, 12)
+    seen = 1e3 * forward(robot, q)[:, :3, 3]
+    head = ','.join([*(f'A{k} [deg]' for k in range(1, 6)), 'E1 [mm]', *XYZ])
+    shown = np.column_stack([np.degrees(q[:, 1:]), 1e3 * q[:, 0]])
+    recording, _ = of(tmp_path, lines(head, rows(shown, seen)), robot)
+    np.testing.assert_allclose(recording.joints.q, q, atol=2e-6)
+    with pytest.raises(DataError, match="which slides, and its unit 'deg' does not fit"):
+        of(tmp_path, lines(head.replace('mm', 'deg'), rows(shown, seen)), robot)
+    options = TableOptions(slide_unit='mm')
+    bare = lines(head.replace(' [mm]', ''), rows(shown, seen))
+    np.testing.assert_allclose(of(tmp_path, bare, robot, options)[0].joints.q, q, atol=2e-6)
+
+
+@pytest.mark.parametrize('form', ['pairs', 'with differences', 'measured first'])
+def test_a_list_of_nominal_and_measured_points_gives_the_measured(tmp_path, form):
+    off = np.array([1.0, -2.0, 0.5])
+    one, other = (MM, MM - off) if form == 'measured first' else (MM - off, MM)
+    more = (
+        [] if form == 'pairs' else [np.tile(off, (12, 1)), np.full((12, 1), np.linalg.norm(off))]
+    )
+    body = [f'Cell, Run, p{k}, {row}' for k, row in enumerate(rows(one, other, *more))]
+    (tmp_path / 'points.txt').write_text(lines('// frame: world', body))
+    targets = [f'CONST jointtarget p{k}:=[[{row}],[9E9,9E9,9E9,9E9,9E9,9E9]];'
+               for k, row in enumerate(rows(DEG))]  # fmt: skip
+    (tmp_path / 'joints.mod').write_text(lines('MODULE Points', targets, 'ENDMODULE'))
+    recording, said = read_two_tables(tmp_path / 'joints.mod', tmp_path / 'points.txt', ARM)
+    np.testing.assert_allclose(recording.joints.q, Q, atol=2e-6)
+    np.testing.assert_allclose(recording.measured.position, SEEN, atol=2e-6, err_msg=str(said))
+
+
+def test_a_name_is_no_formula_in_a_table_and_comes_back_as_it_was(tmp_path):
+    names = ('=cmd|x', '@SUM(A1)', '-j3', '+j4', 'j5', 'j6')
+    robot = replace(ARM, joint_names=names)
+    text = csv_text([*names, *XYZ], [[*d, *p] for d, p in zip(DEG, MM, strict=True)])
+    assert all(cell[0] not in '=@+' for cell in text.splitlines()[0].split(','))
+    np.testing.assert_allclose(of(tmp_path, text, robot)[0].joints.q, Q, atol=1e-9)

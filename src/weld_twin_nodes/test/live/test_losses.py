@@ -1,0 +1,129 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What goes missing between running nodes is counted and told, by processes that stand still."""
+
+from __future__ import annotations
+
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from weld_twin_msgs_py.messages.topics import JOINT_STATES
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.harness.health_listener import HealthListener
+
+pytestmark = pytest.mark.cells
+
+S = 1_000_000_000
+Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+STEP = 2_000_000
+"""Stamps of a controller at 500 Hz [ns]."""
+BURST = 12_000
+"""More than twice what a queue keeps."""
+TWIN, ANALYZER = 'forward_kinematics_twin', 'deviation_analyzer'
+
+
+class Bench:
+    """A twin and an analyzer in their own processes, and a controller that says what it sent."""
+
+    def __init__(self, cell, robot):
+        self.cell, self.robot = cell, robot
+        self.twin, self.analyzer = cell.start(TWIN), cell.start(ANALYZER)
+        self.health = HealthListener(cell.node)
+        self.poses = cell.collect('/twin/tool_pose')
+        self.out = cell.publisher(JOINT_STATES)
+        self.stamp, self.sent = S, 0
+
+    def send(self, count):
+        for _ in range(count):
+            self.stamp += STEP
+            self.sent += 1
+            names = self.robot.joint_names
+            self.out.publish(self.cell.messages.joint_state(self.stamp, names, Q))
+
+    def paced(self, count):
+        """Send as fast as the twin keeps up."""
+        for _ in range(count // 200):
+            done = len(self.poses) + 200
+            self.send(200)
+            self.cell.wait(lambda done=done: len(self.poses) >= done, 'the twin')
+
+    def values(self, node, topic):
+        return self.health.values.get(f'/{node}: {topic}', {})
+
+    def number(self, node, topic, key):
+        return int(self.values(node, topic).get(key, 0))
+
+    def wait_said(self, process, sentence):
+        self.cell.wait(lambda: sentence in process.log, sentence)
+
+    def steady(self, seconds):
+        """Send in real time for a while."""
+        end = time.monotonic() + seconds
+
+        def over():
+            self.send(10)
+            time.sleep(10 * STEP / S)
+            return time.monotonic() > end
+
+        self.cell.wait(over, 'some time')
+
+
+@pytest.fixture(scope='module')
+def bench(tmp_path_factory, robot):
+    with Cell(tmp_path_factory.mktemp('losses')) as cell:
+        yield Bench(cell, robot)
+
+
+def test_a_burst_that_overruns_a_node_is_told_with_the_number_and_its_end(bench):
+    bench.steady(1.5)
+    topic = JOINT_STATES.name
+    assert bench.number(TWIN, topic, 'lost') == 0
+    bench.twin.signal(signal.SIGSTOP)
+    bench.send(BURST)
+    bench.twin.signal(signal.SIGCONT)
+    bench.steady(1.0)
+    bench.wait_said(bench.twin, 'missing messages, by the gaps between its stamps')
+    told = [text for level, text in bench.health.told[f'/{TWIN}'] if level == 'warn']
+    assert any('one is due every 2 ms' in text for text in told)
+
+
+def test_what_one_node_of_the_project_sends_and_another_does_not_get_is_counted(bench):
+    topic = '/twin/tool_pose'
+    assert bench.number(ANALYZER, topic, 'lost') == 0
+    bench.analyzer.signal(signal.SIGSTOP)
+    bench.paced(BURST // 2)
+    bench.analyzer.signal(signal.SIGCONT)
+    bench.wait_said(bench.analyzer, f'messages that /{TWIN} sent did not arrive')
+
+    def counted():  # the tap of this process keeps up, and has all that was sent
+        lost = bench.number(ANALYZER, topic, 'lost')
+        return lost == len(bench.poses) - bench.number(ANALYZER, topic, 'received') > 0
+
+    bench.cell.wait(counted, 'the number')
+
+
+def test_the_end_of_a_loss_is_told_with_what_is_missing_in_all(bench):
+    topic = JOINT_STATES.name
+    bench.wait_said(bench.twin, f'{topic}: no more messages go missing')
+    lost = bench.number(TWIN, topic, 'lost')
+    early = (bench.poses.stamps[0] - S) // STEP - 1  # before the two had met
+    assert lost == bench.sent - early - bench.number(TWIN, topic, 'received')
+    assert lost > BURST // 4
+    assert f'no more messages go missing; {lost:,} are missing in all' in bench.twin.log
+    assert bench.twin.log.count('by the gaps') == 1
+
+
+def test_a_node_ends_soon_though_who_listens_to_it_stands_still(bench):
+    bench.analyzer.signal(signal.SIGSTOP)
+    bench.send(100)
+    begun = time.monotonic()
+    bench.twin.interrupt()
+    try:
+        assert bench.twin.end(timeout=10.0) == 0
+        assert time.monotonic() - begun < 3.0
+    finally:
+        bench.analyzer.signal(signal.SIGCONT)
+    assert 'without waiting for it any longer' in bench.twin.log

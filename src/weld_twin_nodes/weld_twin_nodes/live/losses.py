@@ -1,0 +1,156 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an input of a running node lacks: by the counts of those who tell them, else by its stamps.
+
+The middleware keeps the last messages for a reader that is late and drops the others without a
+word. Nodes of the project tell with their health how many they sent; what came is held against it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection
+
+from ..streams.stamp_watch import Seen
+from .health import Input
+from .outputs import Sent
+
+TELLS = 4
+"""
+Counts in a row that must all be short before messages are missing. They come once a second, and
+what was lost on the way to a reliable reader is sent again within 3 s (Fast DDS).
+"""
+OVER = 4.0
+"""Seconds without another missing message after which a loss is over."""
+
+
+SETTLES = 3.0
+"""Seconds within which a loss that still grows is told: a burst is over by then, and the number is
+that of all of it."""
+
+
+class Counted:
+    """What came of a topic, held against what its publishers told they sent."""
+
+    def __init__(self) -> None:
+        self._sent: dict[tuple[str, str], Sent] = {}
+        self._base = (0, 0)
+        self._short: deque[int] = deque(maxlen=TELLS)
+        self._told = False
+        self._before = self._now = 0
+
+    @property
+    def tellers(self) -> list[str]:
+        """Return the nodes that tell counts."""
+        return sorted({node for node, _ in self._sent})
+
+    @property
+    def sent(self) -> int:
+        """Return how many messages were sent since they are counted."""
+        return self._total() - self._base[0]
+
+    def tell(self, teller: tuple[str, str], sent: Sent, state: Input) -> None:
+        """Take what a node, in one of its runs, has sent by the time that this is heard."""
+        new = teller not in self._sent
+        alone = not self._sent
+        self._sent[teller] = sent
+        self._told = True
+        if new or not state.matched:  # what was sent before the two met is no loss
+            whole = alone and sent.first is not None and sent.first == state.first
+            self._base = (0, 0) if whole else (self._total(), state.received)
+            self._before, self._now = self._before + self._now, 0
+            self._short.clear()
+        self._short.append(self._lack(state))
+
+    def look(self, state: Input) -> int:
+        """Return how many messages are missing for good; to be called once a second."""
+        if not self._told and self._sent:
+            self._short.append(self._lack(state))
+        self._told = False
+        if len(self._short) == TELLS:
+            self._now = max(min(self._short), 0)  # what is sent again comes after all
+        return self._before + self._now
+
+    def _total(self) -> int:
+        return sum(sent.number for sent in self._sent.values())
+
+    def _lack(self, state: Input) -> int:
+        return self._total() - self._base[0] - (state.received - self._base[1])
+
+
+class Losses:
+    """
+    The losses of one input, and whether they are still going on.
+
+    Attributes
+    ----------
+    telling : str
+        What is to be told as long as messages go missing; empty where none do.
+
+    """
+
+    def __init__(self, state: Input) -> None:
+        self._state = state
+        self.counted = Counted()
+        self._by_stamps = 0
+        self._grew = self._since = 0.0
+        self._said = False
+        self.telling = ''
+
+    def look(self, senders: Collection[str], now: float) -> list[str]:
+        """
+        Return sentences on what went missing since the last look, and on the stamps.
+
+        Parameters
+        ----------
+        senders : collection of str
+            Nodes that publish the topic, by the graph.
+        now : float [s]
+
+        """
+        topic, seen, tellers = self._state.topic, self._state.stamps.look(), self.counted.tellers
+        out = [f'{topic}: {sentence}' for sentence in _of_clock(seen)]
+        if tellers and set(senders) <= set(tellers):
+            lost = self.counted.look(self._state)
+            said = (
+                f'{topic}: {lost:,} of {self.counted.sent:,} messages that '
+                f'{" and ".join(tellers)} sent did not arrive'
+            )
+        else:
+            self._by_stamps += seen.missing
+            lost = self._by_stamps
+            said = (
+                f'{topic}: {lost:,} missing messages, by the gaps between its stamps (one is '
+                f'due every {seen.step * 1e3:.3g} ms): they were lost on the way, or never sent'
+            )
+        grown = lost > self._state.lost
+        if grown:
+            self._since = self._since if self.telling else now
+            self._grew, self.telling = now, said
+        self._state.lost = lost
+        if self.telling and not self._said and (not grown or now - self._since > SETTLES):
+            self._said = True
+            out.append(self.telling)
+        if self.telling and now - self._grew > OVER:
+            self.telling, self._said = '', False
+            out.append(f'{topic}: no more messages go missing; {lost:,} are missing in all')
+        return out
+
+    def ended(self) -> list[str]:
+        """Return what is to be told of a loss that the end of the node cuts short."""
+        if not self.telling:
+            return []
+        return [f'{self._state.topic}: {self._state.lost:,} messages are missing in all']
+
+
+def _of_clock(seen: Seen) -> list[str]:
+    """Return what is to be told of stamps that jumped."""
+    if seen.back:
+        return [f'the stamps begin anew, {seen.back:,.1f} s behind the last one']
+    if seen.ahead:
+        return [
+            f'the stamps jumped forwards by {seen.ahead:,.1f} s: a clock was set, or another '
+            'recording is played'
+        ]
+    return []

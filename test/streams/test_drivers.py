@@ -1,0 +1,399 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What drivers publish, laid out as their sources have it, is taken with the options that are told.
+
+Each layout names the file that it was read from and the commit. Joints are published with the
+quality of service of the driver; the oracle is the kinematics of the robot at the joints by name.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='needs ROS 2')
+
+import rclpy
+from geometry_msgs.msg import PointStamped, PoseStamped, TransformStamped
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.errors import TwinError
+from weld_twin_lab.campaigns.building.message_packages import messages_importable
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
+from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+
+pytestmark = pytest.mark.cells
+
+S = 1_000_000_000
+GUIDE = Path(__file__).parents[2] / 'docs/cell.md'
+UR_ORDER = (1, 2, 3, 4, 5, 0)
+"""What a hardware interface lists is what joint_state_broadcaster publishes: in any order."""
+
+
+def numbered(name, count=6):
+    return tuple(name.format(k) for k in range(1, count + 1))
+
+
+@dataclass(frozen=True)
+class Driver:
+    """
+    Joints as a driver publishes them.
+
+    Attributes
+    ----------
+    source : str
+        Repository, file and commit that the layout was read from.
+    robot : str
+        The model that stands for the arm.
+    names : tuple of str
+        The arm's joints in the order of the robot.
+    order : tuple of int
+        Places of the published joints in that order.
+    beside : tuple of str
+        Other joints in the same message.
+    velocities : bool
+        Whether it has a velocity interface; the broadcaster gives NaN otherwise.
+    sensor : bool
+        Best effort, as sensor data.
+    options : dict
+        Parameters of the nodes.
+
+    """
+
+    source: str
+    robot: str
+    names: tuple
+    order: tuple = (0, 1, 2, 3, 4, 5)
+    beside: tuple = ()
+    velocities: bool = True
+    sensor: bool = False
+    options: dict = field(default_factory=dict)
+
+
+KUKA_MAP = '{' + ', '.join(f'joint_a{k}: joint_{k}' for k in range(1, 7)) + '}'
+YASKAWA = ('joint_1_s', 'joint_2_l', 'joint_3_u', 'joint_4_r', 'joint_5_b', 'joint_6_t')
+YASKAWA_MAP = '{' + ', '.join(f'{n}: joint_{k}' for k, n in enumerate(YASKAWA, 1)) + '}'
+DRIVERS = {
+    'ur_robot_driver': Driver(
+        'UniversalRobots/Universal_Robots_ROS2_Driver ur_robot_driver/config/ur_controllers.yaml '
+        '032aad68',
+        'ur5e',
+        tuple(load('ur5e').joint_names),
+        order=UR_ORDER,
+    ),
+    'ur_robot_driver, tf_prefix': Driver(
+        'UniversalRobots/Universal_Robots_ROS2_Driver ur_robot_driver/config/ur_controllers.yaml '
+        '032aad68',
+        'ur5e',
+        tuple(f'alice_{name}' for name in load('ur5e').joint_names),
+        order=UR_ORDER,
+    ),
+    'MotoROS2': Driver(
+        'Yaskawa-Global/motoros2 config/motoros2_config.yaml 045485df',
+        'yaskawa_ma2010',
+        numbered('group_1/joint_{}'),
+        sensor=True,
+        options={'joint_prefix': 'group_1/', 'joint_map': YASKAWA_MAP},
+    ),
+    'MotoROS2, R1+B1+S1': Driver(
+        'Yaskawa-Global/motoros2 config/motoros2_config.yaml 045485df',
+        'yaskawa_ma2010',
+        numbered('group_1/joint_{}'),
+        beside=('group_2/joint_1', 'group_3/joint_1', 'group_3/joint_2'),
+        sensor=True,
+        options={
+            'joint_prefix': 'group_1/',
+            'joint_map': YASKAWA_MAP,
+            'joints_beside': 'group_3/joint_1, group_3/joint_2',
+        },
+    ),
+    'fanuc_driver': Driver(
+        'FANUC-CORPORATION/fanuc_driver fanuc_hardware_interface/config/ros2_controllers.yaml '
+        '71c1ae47',
+        'fanuc_m10id12',
+        numbered('J{}'),
+        velocities=False,
+        options={
+            'joint_map': '{' + ', '.join(f'joint_{k}: J{k}' for k in range(1, 7)) + '}',
+        },
+    ),
+    'kuka_drivers': Driver(
+        'kroshu/kuka_drivers '
+        'kuka_rsi_driver/config/joint_trajectory_controller_config_6_axis_kl.yaml cca4b3b3',
+        'kuka_kr16_2',
+        numbered('joint_{}'),
+        velocities=False,
+        options={'joint_map': KUKA_MAP},
+    ),
+    'kuka_drivers, linear unit': Driver(
+        'kroshu/kuka_drivers '
+        'kuka_rsi_driver/config/joint_trajectory_controller_config_6_axis_kl.yaml cca4b3b3',
+        'kuka_kr16_2',
+        numbered('joint_{}'),
+        beside=('rail_joint_1',),
+        velocities=False,
+        options={'joint_map': KUKA_MAP},
+    ),
+    'kuka_drivers, two arms': Driver(
+        'kroshu/kuka_drivers '
+        'kuka_rsi_driver/config/dual_arm/joint_trajectory_controller_config_dual_arm.yaml eb24c5cb',
+        'kuka_kr16_2',
+        numbered('robot1_joint_{}'),
+        beside=numbered('robot2_joint_{}'),
+        velocities=False,
+        options={'joint_prefix': 'robot1_', 'joint_map': KUKA_MAP},
+    ),
+    'abb_ros2': Driver(
+        'PickNikRobotics/abb_ros2 abb_bringup/config/abb_controllers.yaml 713c4c22',
+        'abb_irb1600',
+        numbered('joint_{}'),
+    ),
+    'franka_ros2': Driver(
+        'frankaemika/franka_ros2 franka_bringup/config/controllers.yaml 07c6541f',
+        'franka_panda',
+        numbered('panda_joint{}', 7),
+        order=tuple(range(7)),
+        beside=('panda_finger_joint1', 'panda_finger_joint2'),
+        options={'joints_beside': 'panda_finger_joint1, panda_finger_joint2'},
+    ),
+    'doosan-robot2': Driver(
+        'DoosanRobotics/doosan-robot2 dsr_controller2/config/dsr_controller2.yaml 03ca15b9',
+        'abb_irb1600',  # no arm of this maker is bundled: names and order are what is taken
+        numbered('joint_{}'),
+        order=(0, 1, 3, 4, 2, 5),
+    ),
+    'xarm_ros2': Driver(
+        'xArm-Developer/xarm_ros2 xarm_controller/config/xarm6_controllers.yaml 08ca7e44',
+        'mecademic_meca500',  # likewise
+        numbered('joint{}'),
+    ),
+}
+CARRIED = {'MotoROS2, R1+B1+S1': 'group_2/joint_1', 'kuka_drivers, linear unit': 'rail_joint_1'}
+"""Layouts whose arm stands on an axis that the model lacks, which is told when it moves."""
+
+
+def posture(robot: Robot) -> np.ndarray:
+    low, high = np.maximum(robot.lower, -3.0), np.minimum(robot.upper, 3.0)
+    return low + (high - low) * np.linspace(0.3, 0.6, robot.n)
+
+
+def joint_state(driver, q, ns, travel):
+    """Return the message that the driver would send."""
+    out = JointState()
+    out.header.stamp.sec, out.header.stamp.nanosec = divmod(ns, S)
+    out.name = [*(driver.names[k] for k in driver.order), *driver.beside]
+    out.position = [*(q[k] for k in driver.order), *([travel] * len(driver.beside))]
+    count = len(out.name)
+    out.velocity = [0.0 if driver.velocities else np.nan] * count
+    out.effort = [np.nan] * count
+    return out
+
+
+@pytest.fixture(scope='module')
+def cell(tmp_path_factory):
+    with Cell(tmp_path_factory.mktemp('drivers')) as cell:
+        yield cell
+
+
+@pytest.fixture
+def node(cell):
+    """Put a node into the shared cell for one test."""
+    added = []
+
+    def add(make, **options):
+        added.append(cell.add(make, **options))
+        return added[-1]
+
+    yield add
+    for each in added:
+        cell.remove(each)
+
+
+@pytest.fixture(scope='module')
+def driver_node(cell):
+    """The node of all drivers, in a participant of its own."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=cell.domain)
+    node = Node('driver', context=context)
+    yield node
+    node.destroy_node()
+    context.try_shutdown()
+
+
+@pytest.mark.parametrize('which', DRIVERS)
+def test_the_joints_of_a_driver_move_the_twin(cell, node, driver_node, which):
+    driver, robot = DRIVERS[which], load(DRIVERS[which].robot)
+    reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+    qos = qos_profile_sensor_data if driver.sensor else reliable
+    twin = node(ForwardKinematicsTwin, robot=driver.robot, **driver.options)
+    sender = driver_node.create_publisher(JointState, '/joint_states', qos)
+    poses = cell.collect(TWIN_POSE.name)
+    q, stamp = posture(robot), [S]
+
+    def step(travel=0.0, since=S):
+        stamp[0] += S // 100
+        sender.publish(joint_state(driver, q, stamp[0], travel))
+        return len(poses) > 0 and poses.stamps[-1] > since
+
+    cell.wait(step, f'poses of {which}')
+    position, rotation = from_messages.pose(poses.last)
+    expected = forward(robot, q)
+    np.testing.assert_allclose(position, expected[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(rotation, expected[:3, :3], atol=1e-12)
+    moved = stamp[0] + S // 100
+    cell.wait(lambda: step(0.1, moved), 'poses while what stands beside the arm moves')
+    told = twin.health.lasting.get('joints beside', '')
+    assert told.partition(' moved')[0] == CARRIED.get(which, '')
+    driver_node.destroy_publisher(sender)
+
+
+def off(T):
+    """Return a measured pose: a millimetre aside."""
+    out = T.copy()
+    out[:3, 3] += [1e-3, -2e-3, 5e-4]
+    return out
+
+
+def fill(pose, T):
+    from scipy.spatial.transform import Rotation
+
+    at, turn = Rotation.from_matrix(T[:3, :3]).as_quat(), getattr(pose, 'orientation', None)
+    turn = pose.rotation if turn is None else turn
+    where = getattr(pose, 'position', None) or pose.translation
+    where.x, where.y, where.z = T[:3, 3].tolist()
+    turn.x, turn.y, turn.z, turn.w = at.tolist()
+    return pose
+
+
+def rigid_bodies(T, header):
+    """Return what vicon, optitrack and qualisys drivers of MOCAP4ROS2 send, the tool second."""
+    from mocap4r2_msgs.msg import RigidBodies, RigidBody
+
+    other, tool = RigidBody(rigid_body_name='table'), RigidBody(rigid_body_name='torch')
+    other.pose.orientation.w = 1.0
+    fill(tool.pose, T)
+    return RigidBodies(header=header, rigidbodies=[other, tool])
+
+
+def tag(T, header):
+    from tf2_msgs.msg import TFMessage
+
+    seen = TransformStamped(header=header, child_frame_id='36h11:5')
+    fill(seen.transform, T)
+    return TFMessage(transforms=[seen])
+
+
+def pose(T, header):
+    out = PoseStamped(header=header)
+    fill(out.pose, T)
+    return out
+
+
+def point(T, header):
+    out = PointStamped(header=header)
+    out.point.x, out.point.y, out.point.z = T[:3, 3].tolist()
+    return out
+
+
+INSTRUMENTS = {
+    'MOCAP4ROS2 (vicon, optitrack, qualisys)': (
+        'MOCAP4ROS2-Project/mocap4r2_msgs msg/RigidBodies.msg 58db978e',
+        rigid_bodies,
+        '/rigid_bodies',
+        {'measured_frame': 'torch'},
+    ),
+    'apriltag_ros': (
+        'christianrauch/apriltag_ros src/AprilTagNode.cpp 011db4ee',
+        tag,
+        '/tf',
+        {'measured_frame': '36h11:5'},
+    ),
+    'lasertracker_ros2_control': (
+        'christophfroehlich/lasertracker_ros2_control '
+        'lasertracker_ros2_control/bringup/config/lasertracker_controllers.yaml 7c56428d',
+        pose,
+        '/pose_broadcaster/pose',
+        {},
+    ),
+    'points in bursts': ('a tracker that hands on 20 points at once', point, '/points', {}),
+}
+
+
+@pytest.fixture
+def packages():
+    try:
+        with messages_importable():
+            yield
+    except TwinError as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize('which', INSTRUMENTS)
+def test_what_an_instrument_sends_is_compared(cell, node, driver_node, packages, which):
+    _, make, topic, options = INSTRUMENTS[which]
+    place = 'tool_point' if make is point else 'tool_pose'
+    names = ['--ros-args', '-r', f'measured/{place}:={topic}']
+    analyzer = node(DeviationAnalyzer, robot='ur5', cli_args=names, **options)
+    twin, base = cell.publisher(TWIN_POSE), cell.publisher(TWIN_BASE)
+    base.publish(cell.messages.pose(S, np.zeros(3), np.eye(3), 'world'))
+    T = forward(load('ur5'), posture(load('ur5')))
+    theirs = driver_node.create_publisher(
+        type(make(T, PoseStamped().header)), topic, qos_profile_sensor_data
+    )
+    deviations, stamp, held = cell.collect('/deviation'), [S], []
+    due = [0.0]
+
+    def step():
+        if time.monotonic() < due[0]:
+            return False
+        due[0] = time.monotonic() + 0.02
+        stamp[0] += S // 100
+        header = PoseStamped().header
+        header.frame_id = 'instrument'
+        header.stamp.sec, header.stamp.nanosec = divmod(stamp[0], S)
+        twin.publish(cell.messages.pose(stamp[0], T[:3, 3], T[:3, :3], 'world'))
+        held.append(make(off(T), header))
+        if make is not point or len(held) == 20:
+            for message in held:
+                theirs.publish(message)
+            held.clear()
+        return len(deviations) > 45
+
+    cell.wait(step, f'deviations by {which}')
+    np.testing.assert_allclose(
+        from_messages.vector3(deviations.last), [1e-3, -2e-3, 5e-4], atol=1e-9
+    )
+    assert analyzer.health.inputs[topic].lost == 0
+    for publisher in (twin, base):
+        cell.node.destroy_publisher(publisher)
+    driver_node.destroy_publisher(theirs)
+
+
+def test_the_guide_has_a_row_for_each_with_its_options_and_its_source():
+    text = GUIDE.read_text()
+    rows = [line for line in text.splitlines() if line.startswith('| ')]
+    given = {which: (driver.source, driver.options) for which, driver in DRIVERS.items()}
+    given |= {which: (row[0], row[3]) for which, row in INSTRUMENTS.items()}
+    for which, (source, options) in given.items():
+        row = next((row for row in rows if row.startswith(f'| {which} |')), '')
+        assert row, which
+        if 'the same' not in row:
+            assert all(name in row for name in options), row
+        commit = re.search(r' ([0-9a-f]{8})$', source)
+        if commit is not None:
+            repository, file = source.split()[:2]
+            assert f'`{repository}`, `{file}`, commit {commit[1]} |' in text, which

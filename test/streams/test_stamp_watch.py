@@ -1,0 +1,126 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What stamps tell: gaps of a beat are counted, what is no beat is let be, jumps are no gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_nodes.streams.stamp_watch import (
+    FEWEST,
+    GAP,
+    JUMPED,
+    JUMPED_ANYHOW,
+    ON_BEAT,
+    REGULAR,
+    RUSH,
+    SILENT,
+    StampWatch,
+)
+
+S = 1_000_000_000
+STEP = 2_000_000
+N = 4000
+STAMPS = S + np.arange(N) * STEP
+CAME = np.arange(N) * STEP / S
+RNG = np.random.default_rng(5)
+
+
+def seen(stamps, came):
+    """Return the sum of what is missing and the largest jumps, by a look a second."""
+    watch, looks, k = StampWatch(), [], 0
+    for end in np.arange(came[0] + 1.0, came[-1] + 4.0):
+        while k < len(stamps) and came[k] < end:
+            watch.add(int(stamps[k]), float(came[k]))
+            k += 1
+        looks.append(watch.look())
+    return sum(x.missing for x in looks), max(x.ahead for x in looks), max(x.back for x in looks)
+
+
+def without(*spans, share=0.0):
+    kept = RNG.random(N) >= share
+    for a, b in spans:
+        kept[a:b] = False
+    kept[[0, -1]] = True
+    return kept
+
+
+def jittered(share):
+    return STAMPS + (RNG.normal(0.0, share, N) * STEP).astype(np.int64)
+
+
+@pytest.mark.parametrize('kept', [without(share=0.03), without(share=0.3), without((100, 900))])
+@pytest.mark.parametrize('stamps', [STAMPS, jittered(0.08)])
+def test_what_is_missing_on_a_beat_is_counted(kept, stamps):
+    came = CAME if kept[500] else CAME * 0.02  # a queue that overran, played out at once
+    missing, ahead, back = seen(stamps[kept], came[kept])
+    assert missing == pytest.approx((~kept).sum(), rel=0.0 if stamps is STAMPS else 1e-2)
+    assert ahead == back == 0.0
+
+
+@pytest.mark.parametrize(
+    ('stamps', 'came'),
+    [
+        pytest.param(STAMPS, CAME, id='whole'),
+        pytest.param(jittered(0.1), CAME, id='stamped on arrival'),
+        pytest.param(np.repeat(STAMPS, 2), np.repeat(CAME, 2), id='two with the same stamps'),
+        pytest.param(STAMPS, np.repeat(CAME[::20], 20), id='in bursts'),
+        pytest.param(S + np.cumsum(RNG.exponential(STEP, N)).astype(int), CAME, id='as it likes'),
+        pytest.param(
+            np.concatenate([STAMPS[:2000], STAMPS[2000::2]]),
+            np.concatenate([CAME[:2000], CAME[2000::2]]),
+            id='half as often from now on',
+        ),
+        pytest.param(STAMPS[: FEWEST // 2], CAME[: FEWEST // 2], id='too few'),
+        pytest.param(
+            STAMPS + (np.arange(N) >= 2000) * 5 * S, CAME + (np.arange(N) >= 2000) * 5.0, id='rest'
+        ),
+    ],
+)
+def test_nothing_is_missing_where_nothing_is(stamps, came):
+    assert seen(stamps, came) == (0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize('by', [1.5 * JUMPED, 1000.0, 3600.0])
+def test_a_clock_that_jumps_is_no_loss(by):
+    after = (np.arange(N) >= 2000) * int(by * S)
+    missing, ahead, back = seen(STAMPS + after, CAME)
+    assert (missing, back) == (0, 0.0)
+    assert ahead == pytest.approx(by)
+    missing, ahead, back = seen(STAMPS - after, CAME)
+    assert (missing, ahead) == (0, 0.0)
+    assert back == pytest.approx(by, abs=2 * STEP / S)
+
+
+def gap_of(size, came_too=True, rush=1.0):
+    """Return what is seen of one gap of so many steps between beats that come so much quicker."""
+    stamps, came = STAMPS[:400].copy(), CAME[:400] * rush
+    stamps[200:] += round((size - 1.0) * STEP)
+    if came_too:
+        came[200:] += (size - 1.0) * STEP / S
+    return seen(stamps, came)
+
+
+def test_the_numbers_decide_where_they_say():
+    assert [gap_of(size)[0] for size in (GAP - 0.1, GAP + 0.1)] == [0, 1]
+    silent = SILENT / (STEP / S)
+    assert gap_of(silent - 5.0)[0] == pytest.approx(silent - 6.0, abs=1.0)
+    assert gap_of(silent + 5.0)[0] == 0
+    jump = JUMPED / (STEP / S)
+    assert [gap_of(jump + d, came_too=False)[1] > 0.0 for d in (-5.0, 5.0)] == [False, True]
+    assert gap_of(jump + 5.0, came_too=False, rush=RUSH * 0.9)[1] == 0.0
+    assert gap_of(jump + 5.0, came_too=False, rush=RUSH * 1.1)[1] > 0.0
+    anyhow = JUMPED_ANYHOW / (STEP / S)
+    assert [gap_of(anyhow + d, False, 0.01)[1] > 0.0 for d in (-9.0, 9.0)] == [False, True]
+
+
+def test_a_stream_off_the_beat_more_often_than_allowed_tells_nothing():
+    off = 0.5 * (ON_BEAT + 0.5)
+    for share, tells in ((1.0 - REGULAR - 0.04, True), (1.0 - REGULAR + 0.04, False)):
+        steps = np.ones(N)
+        steps[: round(share * N)] += off
+        steps = RNG.permutation(steps)
+        steps[2000] = 4.0
+        stamps = S + np.cumsum(steps * STEP).astype(np.int64)
+        assert (seen(stamps, stamps / S)[0] > 0) == tells

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,11 @@ TOOL_LEFT = (
 BASE_MOVED = (
     'the robot was found to stand elsewhere than its file says, and points are moved by that too; '
     'leave it out (diagnose with --align base) where the work frame was taught with this arm'
+)
+FRAMES_FITTED = (
+    'frames were fitted to the recording ({frames}), and take up there what is off in the arm: the '
+    'upper end of what is expected is for points that are given in the base of the robot; near the '
+    'lower end only come points that were taught with this arm, where it was recorded'
 )
 NOT_SURE = (
     'how sure the correction is is not known: the model has no posterior, only a diagnosis.json '
@@ -199,6 +204,23 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
         out.append(f'no program mends {", ".join(left)}')
     if model.posterior is None:
         out.append(NOT_SURE)
+    elif frames := model.posterior.directions.frames:
+        out.append(FRAMES_FITTED.format(frames=', '.join(frames)))
+    return out
+
+
+def not_told(content: Mapping[str, Any]) -> list[str]:
+    """Return that a promise holds for what a diagnosis names alone, where it could be another cause."""
+    verdict = content.get('verdict') or {}
+    same = verdict.get('same_on_any_motion') or []
+    out = []
+    for group in verdict.get('indistinguishable') or []:
+        if len(group) > 1 and not any(all(site in one for site in group) for one in same):
+            first, *others = (f'{s["effect"]} of {s["joint"] or "the robot"}' for s in group)
+            out.append(
+                f'what is expected holds if it is {first}; the recordings do not tell it from '
+                f'{", ".join(others)}'
+            )
     return out
 
 
@@ -296,4 +318,6 @@ def _accuracy(value: Accuracy | None) -> dict[str, Any] | None:
     if value is None:
         return None
     interval = None if value.low is None else [value.low, value.high]
-    return {'rms_m': value.rms, 'rms_ci90_m': interval, 'worst_m': value.worst}
+    same = None if value.same is None else list(value.same)
+    own = {'rms_m': value.rms, 'rms_ci90_m': interval, 'worst_m': value.worst}
+    return own | {'rms_ci90_same_setup_m': same}

@@ -229,7 +229,9 @@ def _of_program(correction: Mapping[str, Any]) -> Promise:
     expected = correction['expected']['after']
     if expected is None:
         raise DataError('correction.json promises nothing; correct the program again with --model')
-    low, high = expected['rms_ci90_m'] or (None, None)
+    # Frames are those of the recording, or fitted again: what they take up they take up here, too.
+    interval = expected.get('rms_ci90_same_setup_m') or expected['rms_ci90_m']
+    low, high = interval or (None, None)
     return Promise(float(expected['rms_m']), low, high)
 
 

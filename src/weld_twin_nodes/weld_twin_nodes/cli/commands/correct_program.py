@@ -86,6 +86,7 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
     from ...offline.correcting import (
         corrected_program,
         correction_entry,
+        not_told,
         program_model,
         way,
     )
@@ -104,6 +105,7 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
         program, context, model, caps, start_of(args, robot), other_readings(content)
     )
     entry = correction_entry(made, robot, caps) | {'way': way(made, model)}
+    entry['notes'] += not_told(content)
     inputs = [hashed('program', args.program), hashed('model', args.model)]
     entry['inputs'] = [item.as_dict() for item in inputs]
     with output(args, RESULT) as place:

@@ -163,3 +163,28 @@ def test_history_keeps_whether_the_promise_was_kept(cell, tmp_path):
     shown = weld_twin('history', 'show', *words).out
     row = next(line for line in shown.splitlines() if '2026-03-09' in line)
     assert 'not kept' in row and 'zero offset of joint_a4' in row
+
+
+def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
+    off = OFF + [1.5e-3, 0.0, 0.0, 0.0, 0.0, 0.0]
+    write_recording(tmp_path / 'rec', measured(stations(8), off, 8), ARM)
+    few = ('transmission_ripple', 'bearing_tilt', 'joint_coupling', 'hose_pull', 'loaded_play')
+    robot = ('--robot', cell / 'robot.yaml')
+    said = weld_twin(
+        *('diagnose', tmp_path / 'rec', *robot, '--align', 'base'),
+        *('--out', tmp_path / 'found', '--exclude-effect', *few),
+    )
+    assert said.code == 0, said.err
+    model = ('--model', tmp_path / 'found' / 'diagnosis.json')
+    said = weld_twin('correct-program', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
+    assert said.code == 0 and 'frames were fitted to the recording (base)' in said.out
+    texts = [
+        [(folder / name).read_bytes().decode('latin-1') for name in FILES]
+        for folder in (MADE, tmp_path / 'out')
+    ]
+    meant, run = (driven(ARM, readers.krl(text), NEAR, 0.05) for text in texts)
+    real = np.array([tool_pose(ROBOT, q, TOOL, off)[:3, 3] for q in run.joints[::5]])
+    apart = np.linalg.norm(real[:, None] - meant.tool[None], axis=2).min(axis=1)
+    true = np.sqrt((apart**2).mean())
+    after = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']['after']
+    assert after['rms_ci90_same_setup_m'][1] < true < after['rms_ci90_m'][1]

@@ -96,10 +96,12 @@ class Left(NamedTuple):
 
     @property
     def state(self) -> str:
-        """Return 'gone', 'stays', 'partly', 'grew' or 'open'."""
+        """Return 'gone', 'stays', 'partly', 'grew', 'over' (mended too far) or 'open'."""
         if self.std > OPEN:
             return 'open'
-        if self.share < -GONE or self.share > GREW:
+        if self.share < -GONE:
+            return 'over'
+        if self.share > GREW:
             return 'grew'
         return 'gone' if self.share < GONE else 'stays' if self.share > STAYS else 'partly'
 

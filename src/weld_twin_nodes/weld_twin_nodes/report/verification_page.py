@@ -22,6 +22,7 @@ _STATES = {
     'stays': 'did not go away',
     'partly': 'went away in part',
     'grew': 'is larger than before, or was corrected the wrong way round',
+    'over': 'was corrected too far, or has changed since',
     'open': 'cannot be told from this recording',
 }
 _SCALE = 1.15

@@ -56,7 +56,7 @@ def _verified(found: list[Verified]) -> Table:
         still = [
             cause(site['effect'], site['joint'])
             for item in content['causes']
-            if item['state'] in ('stays', 'partly', 'grew')
+            if item['state'] not in ('gone', 'open')
             for site in item['sites']
         ]
         table.add_row(

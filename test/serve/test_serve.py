@@ -5,53 +5,27 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
-import signal
-import subprocess
-import sys
 import time
-import urllib.error
-import urllib.request
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
+from served import Person, Server, drop, fill, form, small_disk, until
+
+from weld_twin_nodes.cli.in_process import weld_twin
+from weld_twin_nodes.history import Database
+from weld_twin_nodes.serve import Settings
+from weld_twin_nodes.serve.job import Asked, Job
+from weld_twin_nodes.serve.queue import Queue
 
 for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
     pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
 
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 BAG = Path(__file__).parents[2] / 'bags/elbow_play'
-
-
-class Server:
-    """A server in a process of its own."""
-
-    def __init__(self, folder, *words):
-        self.words = [sys.executable, '-m', 'weld_twin_nodes', 'serve', '--port', '0', *words]
-        self.words += ['--dir', str(folder)]
-        self.start()
-
-    def start(self):
-        self.process = subprocess.Popen(self.words, stdout=subprocess.PIPE, text=True)
-        self.address = self.process.stdout.readline().removeprefix('open ').strip()
-        assert self.address.startswith('http://'), self.process.wait()
-        self.root = re.match(r'http://[^/]+', self.address)[0]
-
-    def kill(self):
-        self.process.send_signal(signal.SIGKILL)
-        self.process.wait()
-        self.process.stdout.close()
-
-    def get(self, path='/', *, data=None, **headers):
-        """Return status and text of an answer."""
-        request = urllib.request.Request(self.root + path, data=data)
-        for name, value in headers.items():
-            request.add_header(name.replace('_', '-'), value)
-        try:
-            with urllib.request.urlopen(request, timeout=20) as answer:
-                return answer.status, answer.read().decode()
-        except urllib.error.HTTPError as error:
-            return error.code, error.read().decode()
 
 
 @pytest.fixture(scope='module')
@@ -61,30 +35,8 @@ def server(tmp_path_factory):
     made.kill()
 
 
-def form(robot='ur5', files=(('data.csv', b'a,b\n1,2\n'),), **fields):
-    """Return the body of a form and its type."""
-    parts = []
-    for name, value in {'robot': robot, **fields}.items():
-        parts.append(f'Content-Disposition: form-data; name="{name}"\r\n\r\n{value}'.encode())
-    for name, content in files:
-        head = f'Content-Disposition: form-data; name="files"; filename="{name}"\r\n'
-        parts.append((head + 'Content-Type: application/octet-stream\r\n\r\n').encode() + content)
-    body = b''.join(b'--edge\r\n' + part + b'\r\n' for part in parts) + b'--edge--\r\n'
-    return body, 'multipart/form-data; boundary=edge'
-
-
-def drop(server, **how):
-    body, kind = form(**how)
-    return server.get('/recordings', data=body, Content_Type=kind)
-
-
 def bag_files():
     return sorted(str(file) for file in BAG.iterdir())
-
-
-def until(page, selector, seconds=60):
-    page.wait_for_selector(selector, timeout=1000 * seconds)
-    return page.locator(selector)
 
 
 def drop_in(page, files, at):
@@ -110,38 +62,136 @@ def the_history_grows(page, server):
     assert page.locator('.chart canvas').count() == 2
 
 
-def test_from_drop_to_sheet_and_into_a_history_of_ones_own(server, chromium):
-    mine, other = chromium.new_context(), chromium.new_context()
-    page = mine.new_page()
+@pytest.fixture(scope='module')
+def week(tmp_path_factory):
+    """Return a server on a disk of its own, and why it has none."""
+    place = tmp_path_factory.mktemp('week') / 'disk'
+    with small_disk(place, 60) as why:
+        made = Server(place)
+        made.disk, made.no_disk = place, why
+        yield made
+        made.kill()
+
+
+@contextmanager
+def browser_of(chromium, folder):
+    """Yield a page of somebody's own browser; what it keeps when it is closed is in the folder."""
+    program = next(filter(None, map(shutil.which, BROWSERS)))
+    context = chromium.browser_type.launch_persistent_context(
+        str(folder), executable_path=program, args=['--no-sandbox']
+    )
+    yield context.pages[0]
+    context.close()
+
+
+def test_from_drop_to_sheet_and_into_a_history_of_ones_own(week, chromium, tmp_path):
+    """A week: dropped, closed, come back, compared; a full disk, a restart, two people."""
+    with browser_of(chromium, tmp_path / 'mine') as page:
+        address = monday(page, week)
+        assert page.evaluate('document.cookie') == ''  # no script reads a key
+        key = keys_page(page, week)
+    with browser_of(chromium, tmp_path / 'mine') as page:  # the next day, from the bookmark
+        the_history_grows(page, week)
+        page.goto(week.root + '/recordings')
+        assert page.locator('#mine tbody tr').count() == 2
+        if not week.no_disk:
+            wednesday(page, week)
+    other = chromium.new_context()
+    theirs = other.new_page()
+    # Nobody else sees any of it, with its address either.
+    theirs.goto(week.root)
+    for path in (address, f'{address}/report.html', f'{address}/diagnosis.json'):
+        assert theirs.goto(week.root + path).status == 404
+    theirs.goto(week.root + '/history')
+    assert 'Nothing yet' in theirs.locator('#message').inner_text()
+    friday(theirs, week, key)
+    other.close()
+
+
+def monday(page, week):
+    """Drop a recording, answer a question, read the sheet, fetch a file; return its address."""
     console = []
     page.on('console', lambda message: console.append(message.text))
-    page.goto(server.address)
-    drop_in(page, bag_files(), '2026-03-02')
+    page.goto(week.address)
+    drop_in(page, bag_files(), '2026-03-02T08:00+02:00')
     # The robot was forgotten: it is asked for, and the recording need not come again.
     assert 'Which robot is it?' in until(page, '#refused').inner_text()
     page.select_option('#robot', 'ur5')
+    page.locator('details summary').click()
+    page.fill('#tolerance', '0,3')
+    page.select_option('#controller', 'ur')
     page.get_by_role('button', name='Try again').click()
     until(page, 'iframe')
     assert 'elbow_play' in page.frame_locator('iframe').locator('.subject').inner_text()
     sheet = page.frame_locator('iframe').locator('h1')
     assert 'backlash of elbow_joint' in sheet.inner_text()
-    address = page.url
+    assert 'ISO 14253-1' in page.frame_locator('iframe').locator('main').inner_text()
     with page.expect_download() as fetched:
         page.get_by_text('the diagnosis as data').click()
-    assert '"status": "identified"' in fetched.value.path().read_text()
-    the_history_grows(page, server)
-    page.goto(server.root + '/recordings')
-    assert page.locator('#mine tbody tr').count() == 2
-    # Nobody else sees any of it, with its address either.
-    theirs = other.new_page()
-    theirs.goto(server.address)
-    for path in (address, f'{address}/report.html', f'{address}/diagnosis.json'):
-        assert theirs.goto(path).status == 404
-    theirs.goto(server.root + '/history')
-    assert 'Nothing yet' in theirs.locator('#message').inner_text()
+    told = fetched.value.path().read_text()
+    assert '"status": "identified"' in told and str(week.disk) not in told
     assert console == []
-    mine.close()
-    other.close()
+    return page.url.removeprefix(week.root)
+
+
+def keys_page(page, week):
+    page.goto(week.root + '/me')
+    return page.locator('#own').inner_text()
+
+
+def wednesday(page, week):
+    """The disk is full while a recording is in work, and when another one comes; then it is not."""
+    page.goto(week.root)
+    page.set_input_files('#files', bag_files())
+    page.select_option('#robot', 'ur5')
+    page.get_by_role('button', name='Diagnose').click()
+    page.wait_for_url('**/recordings/*')
+    ballast, failed = fill(week.disk), page.url.removeprefix(week.root)
+    assert 'disk of the server is full' in until(page, '#refused').inner_text()
+    page.goto(week.root)
+    page.set_input_files('#files', bag_files())
+    page.get_by_role('button', name='Diagnose').click()
+    assert 'disk of the server is full' in until(page, '#message').inner_text()
+    ballast.unlink()
+    week.kill()
+    week.start()
+    page.goto(week.root + failed)
+    # The restart took it up again by itself, unless its end was written in time.
+    if until(page, 'iframe, #refused').first.get_attribute('id') == 'refused':
+        page.get_by_role('button', name='Try again').click()
+    until(page, 'iframe')
+
+
+def friday(page, week, key):
+    """Who has the key goes on elsewhere, deletes one recording, logs out, comes back, deletes all."""
+    page.goto(week.root + '/me')
+    page.fill('input[name=key]', key)
+    page.get_by_role('button', name='Go on with it').click()
+    count = page.locator('#mine tbody tr').count()
+    assert count >= 2
+    page.get_by_role('button', name='Delete').first.click()
+    page.wait_for_load_state()
+    assert page.locator('#mine tbody tr').count() == count - 1
+    page.goto(week.root + '/history')
+    page.get_by_role('link', name='line <3>').first.click()
+    assert '2026-03-02' in page.locator('#diagnoses').inner_text()
+    database = Database(str(next((week.disk / 'users').glob('*/history.db'))), make=False)
+    monday = database.entries('line <3>')[0].at
+    assert monday == datetime(2026, 3, 2, 6, tzinfo=timezone.utc)  # 08:00+02:00
+    database.close()
+    page.goto(week.root + '/me')
+    page.get_by_role('button', name='Log out').click()
+    page.goto(week.root + '/recordings')
+    assert 'None yet' in page.locator('#mine').inner_text()
+    page.goto(week.root + '/me')
+    page.fill('input[name=key]', key)
+    page.get_by_role('button', name='Go on with it').click()
+    page.goto(week.root + '/me')
+    page.check('#sure')
+    page.get_by_role('button', name='Delete all that is mine').click()
+    until(page, '#message')
+    assert list((week.disk / 'jobs').iterdir()) == []
+    assert list((week.disk / 'users').iterdir()) == []
 
 
 def test_what_the_gate_asks_is_answered_in_the_browser(server, chromium, tmp_path):
@@ -178,6 +228,109 @@ def test_what_the_gate_asks_is_answered_in_the_browser(server, chromium, tmp_pat
     page.context.close()
 
 
+def stretch_of_the_recording(file):
+    """Write a program: the motion that was recorded, from one turn of the elbow to the next."""
+    import numpy as np
+
+    from weld_twin_core.arm import catalog
+    from weld_twin_msgs_py.bags import read_recording
+
+    robot = catalog.load('ur5')
+    joints = read_recording(BAG, robot).joints
+    rows = np.searchsorted(joints.t, joints.t[0] + np.linspace(1.66, 2.14, 8))
+    lines = [f'joint_names: [{", ".join(robot.joint_names)}]', 'points:']
+    for row in rows:
+        place = ', '.join(f'{angle:.6f}' for angle in joints.q[row])
+        after = round(1e9 * (joints.t[row] - joints.t[rows[0]]))
+        lines += [f'- positions: [{place}]', f'  time_from_start: {{sec: 0, nanosec: {after}}}']
+    file.write_text('\n'.join(lines) + '\n')
+
+
+def test_a_program_is_corrected_in_the_browser_as_on_the_command_line(server, tmp_path):
+    person, program = Person(server), tmp_path / 'seam.yaml'
+    stretch_of_the_recording(program)
+    person.get()
+    files = [(Path(name).name, Path(name).read_bytes()) for name in bag_files()]
+    _, address, _ = person.drop(files=files)
+    key = address.rpartition('/')[2]
+    assert '<iframe' in person.end_of(address)
+    assert f'value="{key}" selected' in person.get(f'/program?of={key}')[2]
+    told = {'robot': '', 'files': [(program.name, program.read_bytes())], 'of': key}
+    _, made, _ = person.drop('/program', **told, max_length='1,5')
+    assert '<iframe' in person.end_of(made)
+    corrected = person.get(f'{made}/{program.name}')[2]
+    model = tmp_path / 'diagnosis.json'
+    model.write_text(person.get(f'{address}/diagnosis.json')[2])
+    words = ('--model', model, '--max-correction', '1.5mm', '1deg', '--out', tmp_path / 'out')
+    said = weld_twin('correct-program', program, '--robot', 'ur5', *words)
+    assert said.code == 0, said.err
+    assert corrected == (tmp_path / 'out' / program.name).read_text() != program.read_text()
+    # What is wrong is told at once, or asked again, in the words of the fields.
+    status, _, text = person.drop('/program', **told, start='up')
+    assert status == 422 and '“Joints before the first move” cannot be' in text
+    _, made, _ = person.drop('/program', **told, start='0,0')
+    text = person.end_of(made)
+    assert 'It could not be corrected' in text and '“Joints before the first move” needs 6' in text
+    assert person.get(f'{made}/job.json')[0] == person.get(f'{made}/diagnosis.json')[0] == 404
+
+
+def test_what_is_asked_while_a_recording_is_in_work_is_done_afterwards(tmp_path):
+    queue = Queue(Settings(tmp_path))
+    job = replace(Job.new('a' * 64), names=('elbow_play.mcap',))
+    place = job.uploads(queue.folder(job))
+    place.mkdir(parents=True)
+    shutil.copy(BAG / 'elbow_play.mcap', place)
+    try:
+        queue.add(job.ask(Asked('ur5')))
+        after(lambda: queue.get(job.key, job.user).state == 'running')
+        queue.again(job, Asked('no_robot'))
+        after(lambda: queue.get(job.key, job.user).state not in ('waiting', 'running'))
+        now = queue.get(job.key, job.user)
+        assert (now.state, now.asked.robot) == ('refused', 'no_robot')
+        # What is deleted in work leaves nothing, and the worker goes on.
+        queue.again(job, Asked('ur5'))
+        after(lambda: queue.get(job.key, job.user).state == 'running')
+        queue.remove(job)
+        assert queue.of(job.user) == [] and list((tmp_path / 'jobs').iterdir()) == []
+    finally:
+        queue.stop()
+
+
+def test_who_has_most_gives_way_and_nobody_for_another_one(tmp_path):
+    """A disk of a hundred kilobytes: one user fills it, another one still has his recording."""
+    queue = Queue(Settings(tmp_path, disk=100_000, kept=6, own=99))
+    few, many = '1' * 64, '2' * 64
+
+    def keep(user):
+        job = replace(Job.new(user), names=('a.csv',))
+        place = job.uploads(queue.folder(job))
+        place.mkdir(parents=True)
+        (place / 'a.csv').write_bytes(bytes(9_000))
+        queue.add(job.ask(Asked('no_robot')))
+        after(lambda: queue.get(job.key, user).state == 'refused')
+        return job
+
+    try:
+        mine = keep(few)
+        theirs = [keep(many) for _ in range(8)]
+        assert queue.get(mine.key, few) is not None
+        assert [queue.get(job.key, many) is not None for job in theirs] == [False] + [True] * 7
+        assert len(list((tmp_path / 'jobs').iterdir())) == 8
+        others = [keep(f'{k:064d}') for k in range(6)]  # nobody else has more than his share
+        assert queue.get(mine.key, few) is not None
+        assert all(queue.get(job.key, job.user) is not None for job in others)
+        assert sum(queue.get(job.key, many) is not None for job in theirs) == 3
+    finally:
+        queue.stop()
+
+
+def after(true, seconds=60.0):
+    until = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
 def test_who_does_not_come_from_a_page_of_ours_changes_nothing(server):
     assert server.get('/')[0] == 200
     assert server.get('/', Host='evil.example')[0] == 403
@@ -202,7 +355,7 @@ def test_who_does_not_come_from_a_page_of_ours_changes_nothing(server):
         ({'files': [('metadata.yaml', b'')]}, 'No recording is among these'),
         ({'files': [(f'{k}.mcap', b'') for k in range(30)]}, ''),
         ({'robot': '/etc/passwd'}, 'is none of those bundled'),
-        ({'align': '--out'}, 'Align cannot be'),
+        ({'align': '--out'}, '“What is not known?” cannot be'),
         ({'at': 'Monday'}, 'is no date'),
     ],
 )

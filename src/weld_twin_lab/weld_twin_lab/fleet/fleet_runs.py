@@ -67,7 +67,7 @@ def rows(url: str, *, with_cost: bool = False) -> Rows:
     query = database.sql.select(runs, verdicts).outerjoin(
         verdicts, verdicts.c.id == runs.c.verdict_id
     )
-    with database.transaction() as connection:
+    with database.reading() as connection:
         found = connection.execute(query).all()
         count = connection.execute(database.sql.select(database.sql.func.count(verdicts.c.id)))
         diagnoses = int(count.scalar_one())
@@ -188,7 +188,7 @@ def costs(url: str) -> tuple[float, float, float]:
     database = Database(url)
     runs = database.table('runs')
     query = database.sql.select(runs.c.seconds, runs.c.memory).order_by(runs.c.id)
-    with database.transaction() as connection:
+    with database.reading() as connection:
         found = np.array(connection.execute(query).all(), float).reshape(-1, 2)
     database.close()
     third = max(len(found) // 3, 1)

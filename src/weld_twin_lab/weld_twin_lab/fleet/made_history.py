@@ -6,11 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta, timezone
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from weld_twin_core.arm import catalog
 from weld_twin_nodes.history import Database, Entry
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
 
 FAMILIES = (
     'joint_offset',
@@ -40,10 +44,13 @@ def fill(database: Database, cells: int, diagnoses: int, seed: int = 1) -> None:
     seed : int
 
     """
-    with database.transaction() as connection:
+
+    def work(connection: Connection) -> None:
         for number in range(cells):
             for entry in made(number, diagnoses, seed):
                 database.put(connection, f'line {number + 1:03d}', entry)
+
+    database.write(work)
 
 
 def made(number: int, diagnoses: int, seed: int = 1) -> Iterator[Entry]:

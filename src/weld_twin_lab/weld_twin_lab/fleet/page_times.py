@@ -52,9 +52,8 @@ def _on(name: str, url: str, cells: int, diagnoses: int) -> list[Row]:
     database = Database(url)
     runs = Runs(database)
     rows = [Row(name, 'fill', _longest(lambda: fill(database, cells, diagnoses), 1), False)]
-    with database.transaction() as connection:
-        for entry in made(cells, 2000):
-            database.put(connection, LONG, entry)
+    long = list(made(cells, 2000))
+    database.write(lambda connection: [database.put(connection, LONG, entry) for entry in long])
     looks = _longest(lambda: [runs.look(cell) for cell in database.cells()[: cells // 10]], 1)
     rows.append(
         Row(name, 'what changed on a cell, once a diagnosis', looks / (cells // 10), False)

@@ -72,17 +72,33 @@ def postgres() -> Iterator[str]:
             found / 'initdb',
             ('-D', data, '-U', 'weld', '-A', 'trust', '-E', 'UTF8', '--no-locale', '--no-sync'),
         )
-        control, log = found / 'pg_ctl', str(place / 'log')
-        settings = f'{SETTINGS} -k {place}'
-        _run(
-            owner, control, ('-D', data, '-l', log, '-w', '-t', PATIENCE, '-o', settings, 'start')
-        )
+        start(place)
         try:
             yield f'postgresql+psycopg://weld@/postgres?host={place}'
         finally:
-            _run(owner, control, ('-D', data, '-m', 'immediate', '-w', 'stop'))
+            stop(place)
     finally:
         shutil.rmtree(place, ignore_errors=True)
+
+
+def start(place: Path) -> None:
+    """Start the server of a folder, and wait until it answers."""
+    settings, log = f'{SETTINGS} -k {place}', str(place / 'log')
+    _control(place, '-l', log, '-w', '-t', PATIENCE, '-o', settings, 'start')
+
+
+def stop(place: Path, how: str = 'immediate') -> None:
+    """End the server of a folder: 'immediate' as a crash does, 'fast' as for a restart."""
+    _control(place, '-m', how, '-w', 'stop')
+
+
+def place_of(url: str) -> Path:
+    """Return the folder of the server of a URL."""
+    return Path(url.partition('?host=')[2])
+
+
+def _control(place: Path, *words: str) -> None:
+    _run(_owner(place), programs() / 'pg_ctl', ('-D', str(place / 'data'), *words))
 
 
 def _owner(place: Path) -> str | None:

@@ -67,6 +67,20 @@ def _kills(found: Mapping[str, Any]) -> list[Row]:
     ]
 
 
+def _hostile(found: Mapping[str, Any]) -> list[Row]:
+    beside, count = found['hostile'], found['users']
+    longest = max(beside['waits_s'])
+    return [
+        (
+            f'{count} users beside {beside["connections"]} hostile connections, longest wait',
+            '<= 2 times that in peace, as the median',
+            f'{longest:.0f} s, {beside["times"]:.2f} times (median {beside["times_median"]:.2f})',
+        ),
+        ('of them with a sheet', str(count), str(beside['sheets'])),
+        ('hostile connections opened in all', '', str(beside['opened'])),
+    ]
+
+
 def users_page(found: Mapping[str, Any]) -> str:
     """Return the page of `weld-twin lab users`."""
     refused = sum(said.startswith('refused') for said in found['malicious'].values())
@@ -85,6 +99,7 @@ def users_page(found: Mapping[str, Any]) -> str:
         ),
         ('of them with a sheet', str(count), str(found['sheets'])),
         ('of them saw their place in the queue', str(count - 1), str(found['saw_their_place'])),
+        *(_hostile(found) if 'hostile' in found else []),
         ('malicious files refused', str(len(found['malicious'])), str(refused)),
     ]
     lead = (
@@ -93,5 +108,12 @@ def users_page(found: Mapping[str, Any]) -> str:
         f'{found["browser"]}. The first in line has no place to see. Malicious files are those of '
         '`weld-twin campaign fuzz`.\n\n'
     )
+    if 'hostile' in found:
+        told = found['hostile']
+        lead += (
+            f'Hostile connections come from the same address as the users: {told["connections"]} at '
+            f'once, a sixth each that {", ".join(told["ways"][:-1])}, or {told["ways"][-1]}. Whoever is '
+            'closed comes back after 0.1 s.\n\n'
+        )
     harms = markdown.table(('malicious file', 'what became of it'), *found['malicious'].items())
     return f'{lead}{markdown.table(HEADS, *rows)}\n{harms}'

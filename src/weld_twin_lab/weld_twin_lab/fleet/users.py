@@ -13,6 +13,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from http.cookiejar import CookieJar
 from pathlib import Path
 from typing import Any, Protocol
@@ -109,12 +110,21 @@ class Visitor:
 
 def wait(visitor: Person, address: str) -> str:
     """Return the page of a recording that is finished."""
-    return wait_all([(visitor, address)])[0][1]
+    return wait_all([(visitor, address)])[0].text
 
 
-def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]]:
+@dataclass
+class Waited:
+    """Places in the queue that somebody was told, the page that came at last, and when [s]."""
+
+    places: set[int] = field(default_factory=set)
+    text: str = ''
+    until: float = 0.0
+
+
+def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[Waited]:
     """
-    Return, for each visitor, the places in the queue that were told, and the page that came at last.
+    Return what each visitor was told while he waited, and at last.
 
     Raises
     ------
@@ -122,7 +132,7 @@ def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]
         A visitor waited too long.
 
     """
-    found: list[tuple[set[int], str]] = [(set(), '') for _ in waiting]
+    found = [Waited() for _ in waiting]
     left = set(range(len(waiting)))
     until = time.perf_counter() + PATIENCE
     while left:
@@ -131,9 +141,9 @@ def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[tuple[set[int], str]
         for k in sorted(left):
             visitor, address = waiting[k]
             text = visitor.look(address)
-            found[k][0].update(_places(text))
+            found[k].places.update(_places(text))
             if text and 'http-equiv="refresh"' not in text:
-                found[k] = (found[k][0], text)
+                found[k].text, found[k].until = text, time.perf_counter()
                 left.remove(k)
         time.sleep(ASK_EVERY)
     return found
@@ -156,8 +166,9 @@ def at_once(visitors: Sequence[Person], files: Sequence[Path], **fields: str) ->
     return {
         'users': len(visitors),
         'seconds': time.perf_counter() - began,
-        'sheets': sum('<iframe' in text for _, text in found),
+        'waits_s': [waited.until - began for waited in found],
+        'sheets': sum('<iframe' in waited.text for waited in found),
         'saw_their_place': sum(
-            bool(told or places) for told, (places, _) in zip(first, found, strict=True)
+            bool(told or waited.places) for told, waited in zip(first, found, strict=True)
         ),
     }

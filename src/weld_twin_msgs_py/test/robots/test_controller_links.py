@@ -57,6 +57,11 @@ HANDS = {
         ('link_6', 'flange', '0.1 0 0', '0 0 0'),
         ('flange', 'tool0', '0 0 0', '0 1.5707963 0'),
     ),
+    'a tip called tool0': (
+        'flange',
+        ('link_6', 'flange', '0.1 0 0', '0 0 0'),
+        ('flange', 'tool0', '0.05 0 0.3', '0 0.6 0'),
+    ),
     'flange alone': ('flange', ('link_6', 'flange', '0.1 0 0', '0 0 0')),
     'a flange of another name': (
         'mounting_flange',

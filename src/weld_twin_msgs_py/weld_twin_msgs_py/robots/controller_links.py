@@ -37,6 +37,8 @@ _BASES = (BASE, 'base')
 """What the controller's base is called, the surest name first."""
 _WORLDS = ('world', 'map', 'odom', 'cell', 'ground')
 """Roots that are a place and no robot."""
+APART = 1e-3
+"""Distance [m] from which `tool0` is not in the flange, which is that of the maker's by definition."""
 _ENDS = re.compile(r'ee_link|link_ee|link_eef|end_effector(_link)?|tool_mount|mounting_plate')
 """What is a flange where a tool hangs on it, and may be the tool's tip where it is the last link."""
 
@@ -116,17 +118,21 @@ def flange_link_of(
             )
         chosen = wanted
     else:
-        on_way = [last, *(joint.child for joint in chain[chain.index(moving[-1]) + 1 :])]
-        ranked = sorted(
-            fixed.values(),
-            key=lambda at: (
-                _rank(at.link, len(moving), at.link in on_way[:-1]),
-                at.link not in on_way,
-                at.steps,
-            ),
-        )
-        chosen = ranked[0].link
+        behind = chain[chain.index(moving[-1]) + 1 :]
+        chosen = _likeliest(fixed, [last, *(joint.child for joint in behind)], len(moving))
     return chosen, inverse(fixed[tip].T) @ fixed[chosen].T
+
+
+def _likeliest(fixed: dict[str, Placed], way: list[str], joints: int) -> str:
+    """Return the link that is the flange by its name; ``way`` leads to the tip."""
+    ranks = {link: _rank(link, joints, link in way[:-1]) for link in fixed}
+    ordered = sorted(fixed, key=lambda link: (ranks[link], link not in way, fixed[link].steps))
+    first, named = ordered[0], [link for link in ordered if ranks[link] == 2]
+    if ranks[first] == 1 and named:
+        apart = fixed[first].T[:3, 3] - fixed[named[0]].T[:3, 3]
+        # Some files call the tip of the tool tool0; the maker's lies in the flange.
+        return named[0] if np.linalg.norm(apart) > APART else first
+    return first
 
 
 def _rank(link: str, joints: int, carries: bool) -> int:

@@ -58,6 +58,20 @@ def test_what_takes_too_much_is_ended_and_the_next_one_runs(limits, said, tmp_pa
             assert guarded.run(['info', '--robots']).code == 0
 
 
+def test_a_command_that_is_killed_from_outside_is_told_so(tmp_path):
+    with Guarded(Limits(cpu_s=180)) as guarded:
+        assert guarded.run(['info', '--robots']).code == 0
+
+        def kill(step):
+            (warm_pid,) = [str(guarded._process.pid)]
+            os.kill(int(children(warm_pid)[0]), signal.SIGKILL)
+
+        words = ['diagnose', BAG, '--robot', 'ur5', '--out', tmp_path / 'found']
+        done = guarded.run(words, kill)
+        assert 'killed from outside' in done.said and '180' not in done.said
+        assert guarded.run(['info', '--robots']).code == 0
+
+
 def test_a_process_that_is_killed_is_told_and_started_again(tmp_path):
     with Guarded() as guarded:
         assert guarded.run(['info', '--robots']).code == 0

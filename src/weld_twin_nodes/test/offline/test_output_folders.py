@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -141,6 +142,14 @@ def test_a_bag_and_a_file_go_where_a_link_leads(weld_twin, tmp_path):
     assert content(tmp_path / 'disk') == before
 
 
+def test_a_prediction_whose_table_is_in_the_way_leaves_no_bag(weld_twin, tmp_path):
+    bag, table = Path(__file__).parents[4] / 'bags/elbow_play', tmp_path / 'poses.csv'
+    table.write_text('mine')
+    words = ('predict', bag, '--robot', 'ur5', '--model', f'{bag}.yaml', '--table', table)
+    assert weld_twin(*words, '--out', tmp_path / 'predicted').code == 2
+    assert content(tmp_path) == {'poses.csv': b'mine'}
+
+
 def test_where_folders_of_ours_should_be_a_persons_file_is_kept(tmp_path):
     out = tmp_path / 'out'
     make(out)
@@ -170,6 +179,31 @@ def test_what_a_person_saves_while_the_command_runs_is_not_lost(tmp_path):
         (out / 'a.txt').write_text('mine')
     assert (out / 'a.txt').read_text() == '2' and (out / 'a.kept-1.txt').read_text() == 'mine'
     assert said == ["'a.txt' was not overwritten and is kept as 'a.kept-1.txt'"]
+
+
+def test_a_folder_of_a_persons_is_not_taken_for_ours_because_one_file_in_it_is(
+    weld_twin, program, tmp_path
+):
+    (tmp_path / 'thesis.tex').write_text('years of work')
+    assert weld_twin('schema', 'robot', '--out', tmp_path / 'robot.json').code == 0
+    refused = correct(weld_twin, program, tmp_path)
+    assert refused.code == 2 and 'holds something else already' in refused.err
+    assert correct(weld_twin, program, tmp_path, '--force').code == 0
+    assert correct(weld_twin, program, tmp_path).code == 0
+    assert (tmp_path / 'thesis.tex').read_text() == 'years of work'
+
+
+def test_two_runs_at_once_into_one_folder_leave_the_whole_result_of_the_last(tmp_path):
+    for out in (tmp_path / 'new', tmp_path / 'there'):
+        if out.name == 'there':
+            make(out, **{'a.txt': '0', 'b.txt': '0'})
+        with new_directory(out, mark='result.json') as first:
+            make(out, **{'a.txt': '1'})
+            for name in ('a.txt', 'c.txt', 'result.json'):
+                write_text(first / name, '2')
+        assert content(out) == {'a.txt': b'2', 'c.txt': b'2', 'result.json': b'2'}
+        make(out)
+    assert {path.name for path in tmp_path.iterdir()} == {'new', 'there'}
 
 
 def test_two_results_in_one_folder_do_not_take_each_others_files(weld_twin, program, tmp_path):

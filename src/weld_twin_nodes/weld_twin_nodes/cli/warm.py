@@ -66,10 +66,10 @@ def main() -> int:
                 return 0
             rest += got
         line, _, rest = rest.partition(b'\n')
-        status = _in_a_fork(json.loads(line), out)
-        if status is None:
+        ended = _in_a_fork(json.loads(line), out)
+        if ended is None:
             return 0
-        answer(out, {'end': status})
+        answer(out, ended)
 
 
 def _load() -> None:
@@ -83,8 +83,8 @@ def _load() -> None:
     gc.freeze()  # the forks share these pages
 
 
-def _in_a_fork(asked: dict[str, Any], out: int) -> int | None:
-    """Run a command; return how its process ended, None if nobody waits for it any more."""
+def _in_a_fork(asked: dict[str, Any], out: int) -> dict[str, Any] | None:
+    """Run a command; return how its process ended and what it cost, None if nobody waits for it."""
     here, there = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -97,8 +97,10 @@ def _in_a_fork(asked: dict[str, Any], out: int) -> int | None:
     if gone:
         os.kill(pid, signal.SIGKILL)
     os.close(here)
-    _, status = os.waitpid(pid, 0)
-    return None if gone else os.waitstatus_to_exitcode(status)
+    _, status, used = os.wait4(pid, 0)
+    if gone:
+        return None
+    return {'end': os.waitstatus_to_exitcode(status), 'cpu_s': used.ru_utime + used.ru_stime}
 
 
 _TOO_MUCH = 'it needs more memory than is allowed'
@@ -116,6 +118,8 @@ def _run(asked: dict[str, Any], out: int) -> NoReturn:
     told, printed = Telling(out), io.StringIO()
     code = 1
     try:
+        if asked.get('folder'):
+            os.chdir(asked['folder'])
         with contextlib.redirect_stderr(told), contextlib.redirect_stdout(printed):
             from .main import main as command
 

@@ -79,6 +79,14 @@ def cell_page(
     return document(f'{cell} · history', body, charts=True, style=STYLE)
 
 
+def damaged_page(cell: str, why: str, home: str | None = None, ways: Html | None = None) -> str:
+    """Return the page of a cell whose rows cannot be read: it says why, and the others have theirs."""
+    back = None if home is None else tag('p', tag('a', 'All cells', href=home))
+    head = tag('header', ways, tag('p', 'History of ', tag('b', cell), class_='kind'), back)
+    said = tag('section', tag('h1', 'This cell cannot be read.'), tag('p', why), id_='damaged')
+    return document(f'{cell} · history', tag('main', head, said), style=STYLE)
+
+
 def _span(entries: Sequence[Entry]) -> str:
     """Return how many diagnoses there are, and of when."""
     count = len(entries)

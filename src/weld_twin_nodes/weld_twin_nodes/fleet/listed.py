@@ -7,13 +7,14 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from datetime import datetime, timezone
+from datetime import datetime
 from pathlib import Path
 
 from weld_twin_core import __version__
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.files.input_files import hashed
 
+from ..history.entry import instant
 from ..offline.content_hash import digest
 
 LONGEST = 1_000_000
@@ -55,10 +56,7 @@ class Listed:
     @property
     def date(self) -> datetime | None:
         """Return the instant that `at` names, UTC where it does not say; None for none."""
-        if not self.at:
-            return None
-        at = datetime.fromisoformat(self.at)
-        return at if at.tzinfo else at.replace(tzinfo=timezone.utc)
+        return instant(self.at) if self.at else None
 
     def words(self, out: Path) -> list[str]:
         """Return the words of the command that diagnoses it."""
@@ -75,12 +73,17 @@ class Listed:
         A file that is not there is told by its name: once it is there, it is another request.
         """
         files = [self.recording, self.robot, self.effects_known, self.contacts]
-        told = [
-            hashed('recording', name).sha256 if name and Path(name).exists() else name
-            for name in files
-        ]
+        told = [_content(name) for name in files]
         rest = (self.cell, self.at, self.align, self.base_link, self.tip_link, str(self.apply))
         return digest(__version__, *told, *rest)
+
+
+def _content(name: str) -> str:
+    """Return what tells the content of a file; its name where there is none that can be read."""
+    try:
+        return hashed('recording', name).sha256 if name and Path(name).exists() else name
+    except (OSError, TwinError):
+        return name
 
 
 def read_list(path: Path | str) -> list[Listed]:
@@ -141,8 +144,6 @@ def _line(file: Path, number: int, row: Mapping[str | None, str | None]) -> List
     listed = Listed(**told, apply=apply)
     try:
         _ = listed.date
-    except ValueError:
-        raise DataError(
-            f"'{file}' line {number}: '{listed.at}' is no date; write 2026-03-31T14:05"
-        ) from None
+    except DataError as error:
+        raise DataError(f"'{file}' line {number}: {error}") from None
     return listed

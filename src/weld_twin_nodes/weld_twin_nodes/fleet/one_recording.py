@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core.errors import TwinError
+from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.files.scratch import Scratch
 
 from ..guarded import Guarded, Limits, Outcome
@@ -41,13 +41,21 @@ def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, 
         Directory for what the command wrote; empty to keep nothing.
 
     """
-    with Scratch(Path(tempfile.gettempdir()), 'weld_twin-fleet-') as place:
-        out = place / 'found'
-        done = _warm(limits).run(listed.words(out))
-        state, sentence, entry = _read(listed, done, out)
-        if keep and out.is_dir():
-            with new_directory(Path(keep) / key, mark=RESULT, force=True) as kept:
-                shutil.copytree(out, kept, dirs_exist_ok=True)
+    done, entry = Outcome(-1, '', 0.0), None
+    try:
+        with Scratch(Path(tempfile.gettempdir()), 'weld_twin-fleet-') as place:
+            out = place / 'found'
+            done = _warm(limits).run(listed.words(out))
+            state, sentence, entry = _read(listed, done, out)
+            if keep and out.is_dir():
+                with new_directory(Path(keep) / key, mark=RESULT, force=True) as kept:
+                    shutil.copytree(out, kept, dirs_exist_ok=True)
+    except (OSError, DataError) as error:  # the disk is full: this can run again, the others go on
+        said = str(error)
+        if isinstance(error, OSError):
+            where = f" '{error.filename}'" if error.filename else ''
+            said = f'{error.strerror or error}{where}'
+        state, sentence, entry = FAILED, said, None
     run = Run(key, listed.cell, listed.recording, state, sentence, done.seconds, done.memory)
     return {'run': asdict(run), 'entry': entry}
 

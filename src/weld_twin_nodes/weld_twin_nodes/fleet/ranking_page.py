@@ -33,7 +33,10 @@ def ranking_page(database: Database, link: Callable[[str], str], ways: Html | No
 
     """
     runs = Runs(database)
-    rows = sorted(runs.newest(), key=lambda row: -(row['gap_m'] or 0.0))
+    newest = runs.newest()
+    damaged = [row for row in newest if 'damaged' in row]
+    rows = [row for row in newest if 'damaged' not in row]
+    rows.sort(key=lambda row: -(row['gap_m'] or 0.0))
     troubles = runs.troubles()
     body = tag(
         'main',
@@ -45,9 +48,17 @@ def ranking_page(database: Database, link: Callable[[str], str], ways: Html | No
         ),
         tag('section', tag('h1', _headline(rows)), _figures(rows, troubles), id_='verdict'),
         _cells(rows, link),
+        _damaged(damaged),
         troubles_section(troubles[:TROUBLES]),
     )
     return document('All cells', body, style=STYLE)
+
+
+def _damaged(rows: Sequence[Mapping[str, Any]]) -> Html | None:
+    if not rows:
+        return None
+    said = table(('cell', 'why'), [(row['name'], row['damaged']) for row in rows])
+    return section('Cells that cannot be read', said, id_='damaged')
 
 
 def _span(rows: Sequence[Mapping[str, Any]]) -> str:

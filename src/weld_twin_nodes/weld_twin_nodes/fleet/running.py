@@ -5,21 +5,29 @@ A list of recordings diagnosed into a database: resumable, each written once.
 
 Workers diagnose and know nothing of the database. This process writes each result, verdict and
 record of the run, in one transaction, and what is written is not asked for again. So a kill at any
-instant costs what was running then, and nothing else.
+instant costs what was running then, and nothing else. What a database cannot take now is kept, and
+written as soon as it can.
 """
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
+
+from weld_twin_core.errors import DataError
 
 from ..guarded import Limits
+from ..history import Unavailable
 from ..history.database import Database
+from ..history.entry import Entry
 from ..history.plain_entry import entry
-from ..history.runs import Run, Runs
+from ..history.runs import DONE, FAILED, Run, Runs
 from ..offline.task_pool import Pool, Task
 from .listed import Listed
 from .one_recording import diagnosed
@@ -60,10 +68,15 @@ def run_fleet(
     tell : callable
 
     """
-    runs = Runs(database)
-    known = runs.finished(again)
+    writing = _Writing(Runs(database))
+    known = writing.runs.finished(again)
     tally: Counter[str] = Counter()
-    touched: set[str] = set()
+
+    def told(written: Iterable[Run | None]) -> None:
+        for run in written:
+            tally[THERE if run is None else run.state] += 1
+            tell(tally.total(), len(listed), run)
+
     lines = iter(listed)
     while batch := list(islice(lines, BATCH)):
         tasks = list(_tasks(batch, known, limits, keep))
@@ -71,18 +84,61 @@ def run_fleet(
             tally[THERE] += there
             tell(tally.total(), len(listed), None)
         for _, text in pool.run(tasks):
-            result = json.loads(text)
-            run = Run(**result['run'])
-            runs.write(run, entry(result['entry']) if result['entry'] else None)
-            tally[run.state] += 1
-            if result['entry']:
-                touched.add(run.cell)
-            tell(tally.total(), len(listed), run)
-    for cell in sorted(touched):
-        # All its diagnoses may have been refused, as those of another robot.
-        if cell in database.cells():
-            runs.look(cell)
+            told(writing.take(json.loads(text)))
+    told(writing.last())
+    for cell in sorted(writing.touched):
+        with suppress(DataError):  # pages work it out again, and tell what is wrong with a cell
+            writing.runs.look(cell)
     return dict(tally)
+
+
+class _Writing:
+    """
+    Writes results one by one; what the database cannot take now waits.
+
+    Attributes
+    ----------
+    runs : Runs
+    touched : set of str
+        Cells that have a new diagnosis.
+
+    """
+
+    def __init__(self, runs: Runs) -> None:
+        self.runs = runs
+        self.touched: set[str] = set()
+        self._waiting: list[tuple[Run, Entry | None]] = []
+
+    def take(self, result: Mapping[str, Any]) -> Iterator[Run | None]:
+        """Write a result, and those that wait; yield what was written, None for what was there."""
+        before = len(self._waiting)
+        told = entry(result['entry']) if result['entry'] else None
+        self._waiting.append((Run(**result['run']), told))
+        # Once patience was in vain, results do not each wait for it again.
+        yield from self._write(None if before == 0 else 0.0)
+
+    def last(self) -> Iterator[Run | None]:
+        """Write what still waits; what the database does not take now has failed, and can run again."""
+        try:
+            yield from self._write(None, quiet=False)
+        except Unavailable as error:
+            for run, _ in self._waiting:
+                said = f'diagnosed, but not written; run it again: {error}'
+                yield replace(run, state=FAILED, sentence=said)
+
+    def _write(self, patience: float | None, *, quiet: bool = True) -> Iterator[Run | None]:
+        while self._waiting:
+            run, told = self._waiting[0]
+            try:
+                written = self.runs.write(run, told, patience)
+            except Unavailable:
+                if quiet:
+                    return
+                raise
+            del self._waiting[0]
+            if written is not None and written.state == DONE:
+                self.touched.add(run.cell)
+            yield written
 
 
 def _tasks(

@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 from weakref import WeakSet
 
@@ -32,6 +33,8 @@ LONGEST = 1 << 20
 
 _CRASHES = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT)
 """How compiled code ends that was refused memory and did not look whether it got it."""
+_NO_SPACE = ('No space left on device', 'Disk quota exceeded', 'disk is full')
+"""What commands say of a full disk."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,11 @@ class Outcome:
     seconds: float
     memory: int = 0
 
+    @property
+    def disk_full(self) -> bool:
+        """Return whether it ended since nothing more could be written."""
+        return self.code != 0 and any(sign in self.said for sign in _NO_SPACE)
+
 
 class Guarded:
     """Runs commands one after the other, in forks of one warm process."""
@@ -100,7 +108,10 @@ class Guarded:
         self.close()
 
     def run(
-        self, words: Sequence[object], tell: Callable[[str], None] = lambda text: None
+        self,
+        words: Sequence[object],
+        tell: Callable[[str], None] = lambda text: None,
+        folder: Path | None = None,
     ) -> Outcome:
         """
         Run ``weld-twin`` with the words given.
@@ -111,6 +122,8 @@ class Guarded:
             The command's words.
         tell : callable
             Told every line that the command tells of its progress.
+        folder : Path, optional
+            Where it runs: paths relative to it keep the places of this machine out of results.
 
         """
         began = time.monotonic()
@@ -120,6 +133,7 @@ class Guarded:
             'memory': limits.memory,
             'cpu_s': limits.cpu_s,
             'file': limits.file,
+            'folder': None if folder is None else str(folder.absolute()),
         }
         found: dict[str, Any] = {}
         try:
@@ -168,8 +182,14 @@ class Guarded:
             )
         ended = int(found.get('end', -1))
         said = str(found.get('said', ''))
-        if ended == -signal.SIGXCPU or (ended == -signal.SIGKILL and not said):
+        computed = float(found.get('cpu_s', 0.0)) >= self._limits.cpu_s
+        if ended == -signal.SIGXCPU or (ended == -signal.SIGKILL and computed):
             said = f'it took more than {self._limits.cpu_s} s of computing'
+        if ended == -signal.SIGKILL and not said:
+            said = (
+                'its process was killed from outside, as the system does where memory runs out; '
+                'try it again'
+            )
         if -ended in _CRASHES and not said:
             said = (
                 f'its process crashed ({signal.Signals(-ended).name}), as when it needs more memory '

@@ -10,12 +10,13 @@ the same cell is not added twice.
 
 from __future__ import annotations
 
+import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -23,10 +24,26 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
 from .entry import Entry
+from .opening import WRITES, alone, bring_up, engine_of, refuse_missing, version_of
+from .passing import Unavailable, passes, unavailable, waits
 from .schema import ARRAYS, VERSION, schema, stored
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine, Row
+
+PATIENCE = 60.0
+"""Seconds for which a write is tried again where others hold the database, or its server restarts."""
+DAMAGED = (zlib.error, ValueError, TypeError, KeyError, AttributeError)
+"""What reading a row raises that somebody or something has changed."""
+T = TypeVar('T')
+
+
+class Refused(DataError):
+    """A diagnosis does not fit what the history holds; trying again would not help."""
+
+
+class Damaged(DataError):
+    """A row of the history cannot be read."""
 
 
 class Database:
@@ -37,6 +54,11 @@ class Database:
     ----------
     url : str
         Of SQLAlchemy (``postgresql+psycopg://...``), or the path of an SQLite file.
+    make : bool
+        Whether an empty database, or a file that is not there, becomes a history.
+    patience : float, optional
+        Seconds for which a write is tried again while the database cannot be used; a minute unless
+        told.
 
     Raises
     ------
@@ -45,22 +67,36 @@ class Database:
 
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, *, make: bool = True, patience: float | None = None) -> None:
         try:
             import sqlalchemy
         except ImportError:
             raise DataError(
                 "a history needs SQLAlchemy; install it with: pip install 'weld-twin[history]'"
             ) from None
-        self.sql = sqlalchemy
+        self.sql, self._tables = sqlalchemy, schema()
+        self._patience = PATIENCE if patience is None else patience
         self.url = url if '://' in url else f'sqlite:///{Path(url).absolute()}'
         with self._clear():
             address = sqlalchemy.make_url(self.url)
             self.url = address.render_as_string(hide_password=True)
-            self._engine: Engine = sqlalchemy.create_engine(address)
-            self._tables = schema()
-            self._tables.create_all(self._engine)
-            self._check_version()
+            if not make:
+                refuse_missing(address, self.url)
+            self._engine: Engine = engine_of(address)
+        if make or self._version() != VERSION:
+            self.write(self._brought_up, connecting=True)
+
+    def _version(self) -> int:
+        with self.reading() as connection:
+            return version_of(connection, self.url, make=False)
+
+    def _brought_up(self, connection: Connection) -> None:
+        if version_of(connection, self.url, make=True) == VERSION:
+            return
+        alone(connection)
+        version = version_of(connection, self.url, make=True)  # somebody may have been quicker
+        if version != VERSION:
+            bring_up(connection, self._tables, version)
 
     def close(self) -> None:
         """Let go of the connections."""
@@ -82,8 +118,7 @@ class Database:
             The cell has another robot, or a diagnosis of that instant already.
 
         """
-        with self.transaction() as connection:
-            return self.put(connection, cell, entry) is not None
+        return self.write(lambda connection: self.put(connection, cell, entry)) is not None
 
     def put(self, connection: Connection, cell: str, entry: Entry) -> int | None:
         """
@@ -91,44 +126,47 @@ class Database:
 
         Raises
         ------
-        DataError
-            As of `add`; nothing was written then.
+        Refused
+            As of `add`; nothing is written then, if the caller lets it through.
 
         """
         sql, verdicts = self.sql, self.table('verdicts')
         number = self._number(connection, cell, entry)
         mine = verdicts.c.cell_id == number
         query = sql.select(verdicts.c.id).where(mine, verdicts.c.recording == entry.recording)
-        if number is not None and connection.execute(query).first() is not None:
+        if connection.execute(query).first() is not None:
             return None
         query = sql.select(verdicts.c.id).where(mine, verdicts.c.at == stored(entry.at))
-        if number is not None and connection.execute(query).first() is not None:
-            raise DataError(
+        if connection.execute(query).first() is not None:
+            raise Refused(
                 f'cell {cell!r} has another recording of {entry.at.isoformat()}; give this one '
                 'its own date with --at'
             )
-        if number is None:
-            new = self.table('cells').insert()
-            made = connection.execute(
-                new.values(name=cell, robot=entry.robot, kinematics=entry.kinematics)
-            )
-            number = _key(made)
         made = connection.execute(verdicts.insert().values(cell_id=number, **_row(entry)))
         return _key(made)
 
-    def _number(self, connection: Connection, cell: str, entry: Entry) -> int | None:
-        """Return the number of a cell, None if there is none; refuse another robot."""
+    def _number(self, connection: Connection, cell: str, entry: Entry) -> int:
+        """Return the number of a cell, held until the transaction ends; refuse another robot."""
         cells = self.table('cells')
-        row = connection.execute(self.sql.select(cells).where(cells.c.name == cell)).first()
-        if row is None:
-            return None
+        new = {'name': cell, 'robot': entry.robot, 'kinematics': entry.kinematics}
+        connection.execute(self.insert(cells).values(new).on_conflict_do_nothing())
+        # Whoever writes to the same cell waits here, and then sees what was written.
+        query = self.sql.select(cells).where(cells.c.name == cell).with_for_update()
+        row = connection.execute(query).one()
         _same_robot(cell, row, entry)
         return int(row.id)
+
+    def insert(self, table: Any) -> Any:
+        """Return an insertion that can say what happens where the row is there already."""
+        from sqlalchemy.dialects import postgresql, sqlite
+
+        lite = self._engine.dialect.name == 'sqlite'
+        return sqlite.insert(table) if lite else postgresql.insert(table)
 
     def cells(self) -> list[str]:
         """Return the names of all cells."""
         cells = self.table('cells')
-        with self._clear(), self._engine.connect() as connection:
+        with self.reading() as connection:
             query = self.sql.select(cells.c.name).order_by(cells.c.name)
             return [row.name for row in connection.execute(query)]
 
@@ -146,6 +184,8 @@ class Database:
         ------
         DataError
             There is no such cell.
+        Damaged
+            One of them cannot be read.
 
         """
         cells, verdicts = self.table('cells'), self.table('verdicts')
@@ -160,30 +200,69 @@ class Database:
             .order_by(verdicts.c.at.desc())
             .limit(newest)
         )
-        with self._clear(), self._engine.connect() as connection:
+        with self.reading(f'a diagnosis of cell {cell!r}') as connection:
             return [_entry(row) for row in connection.execute(query)][::-1]
 
     def table(self, name: str) -> Any:
         """Return a table of the schema."""
         return self._tables.tables[name]
 
-    @contextmanager
-    def transaction(self) -> Iterator[Connection]:
-        """Yield a connection; what is written through it is written whole or not at all."""
-        with self._clear(), self._engine.begin() as connection:
-            yield connection
+    def write(
+        self,
+        work: Callable[[Connection], T],
+        *,
+        connecting: bool = False,
+        patience: float | None = None,
+    ) -> T:
+        """
+        Do some work in one transaction, and return what it returns.
 
-    def _check_version(self) -> None:
-        about = self.table('about')
-        with self._engine.begin() as connection:
-            row = connection.execute(self.sql.select(about)).first()
-            if row is None:
-                connection.execute(about.insert().values(version=VERSION))
-            elif row.version != VERSION:
-                raise DataError(
-                    f"'{self.url}' is a history of version {row.version}, this program writes "
-                    f'{VERSION}'
-                )
+        It is done again while others hold the database, or its server is being restarted; so it
+        must change nothing but the database.
+
+        Parameters
+        ----------
+        work : callable
+            Takes the connection.
+        connecting : bool
+            Whether a server that is not there is told at once.
+        patience : float, optional
+            Seconds; that of the database unless told.
+
+        Raises
+        ------
+        Unavailable
+            The database could not be used for as long as patience lasts.
+        DataError
+            It does not take what was written.
+
+        """
+        left = waits(self._patience if patience is None else patience)
+        while True:
+            try:
+                with self._engine.connect() as plain:
+                    connection = plain.execution_options(**{WRITES: True})
+                    with connection.begin():
+                        return work(connection)
+            except self.sql.exc.SQLAlchemyError as error:
+                wait = next(left, None) if passes(error, connecting=connecting) else None
+                if wait is None:
+                    with self._clear():
+                        raise
+            time.sleep(wait)
+
+    @contextmanager
+    def reading(self, what: str = 'a row') -> Iterator[Connection]:
+        """Yield a connection to read from; ``what`` is named where it is damaged."""
+        with self._clear():
+            try:
+                with self._engine.connect() as connection:
+                    yield connection
+            except DAMAGED as error:
+                raise Damaged(
+                    f"{what} in the history '{self.url}' is damaged ({error}); restore it from a "
+                    'copy, or delete that row'
+                ) from None
 
     @contextmanager
     def _clear(self) -> Iterator[None]:
@@ -197,7 +276,8 @@ class Database:
             ) from None
         except self.sql.exc.SQLAlchemyError as error:
             said = str(getattr(error, 'orig', None) or error).splitlines()[0]
-            raise DataError(f"the history '{self.url}' cannot be used: {said}") from None
+            kind = Unavailable if unavailable(error) else DataError
+            raise kind(f"the history '{self.url}' cannot be used: {said}") from None
 
 
 def _key(made: Any) -> int:
@@ -207,7 +287,7 @@ def _key(made: Any) -> int:
 
 def _same_robot(cell: str, row: Row[Any], entry: Entry) -> None:
     if row.kinematics != entry.kinematics:
-        raise DataError(
+        raise Refused(
             f'cell {cell!r} has the robot {row.robot!r}, and this diagnosis is of {entry.robot!r} with '
             'other kinematics; add it to a cell of its own'
         )

@@ -20,6 +20,9 @@ from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
 FIRST_YEAR = 2000
 """Stamps before it are counted from the start of a machine, not from a date."""
+ROUNDING = 1e-6
+"""By how much a covariance may miss being one, in units of its own standard deviations: digits of a
+file. What a wrong sign or a damaged number makes is far beyond it."""
 PASSING = ('base ', 'curve of ', 'transmission_ripple ')
 """Coordinates that are of one set-up or one diagnosis only: where the instrument stood, curves on the
 angles that were visited, and waves along a gear, whose orders differ from diagnosis to diagnosis."""
@@ -68,6 +71,24 @@ class Entry:
     tool: Array
 
 
+def instant(text: str) -> datetime:
+    """
+    Return the instant that a text names, UTC where it does not say.
+
+    Raises
+    ------
+    DataError
+        It is no date.
+
+    """
+    try:
+        # Python 3.10 does not read the Z that others write for UTC.
+        at = datetime.fromisoformat(f'{text[:-1]}+00:00' if text[-1:] in 'Zz' else text)
+        return (at if at.tzinfo else at.replace(tzinfo=timezone.utc)).astimezone(timezone.utc)
+    except (ValueError, OverflowError):
+        raise DataError(f"'{text}' is no date; write 2026-03-31 or 2026-03-31T14:05") from None
+
+
 def entry_of(path: Path | str, at: datetime | None = None) -> Entry:
     """
     Return the entry of a diagnosis.
@@ -92,7 +113,7 @@ def entry_of(path: Path | str, at: datetime | None = None) -> Entry:
     data = read_diagnosis(file)
     try:
         return _entry(data, file, at)
-    except (KeyError, TypeError, IndexError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise ModelError(f"diagnosis '{file}' lacks {error}; make it again") from None
 
 
@@ -106,6 +127,10 @@ def _entry(data: Mapping[str, Any], file: Path, at: datetime | None) -> Entry:
             f"the data of '{file}' were unsound, so it says nothing of the arm; mend them first"
         )
     names, value, prior, covariance = _coordinates(data.get('posterior'), file)
+    if impossible := _impossible(value, prior, covariance):
+        raise DataError(
+            f"the posterior of '{file}' cannot be right: {impossible}; diagnose the recording again"
+        )
     return Entry(
         at or date_of_stamp(model['epochs_ns'][0], file),
         str(model['robot']),
@@ -123,6 +148,20 @@ def _entry(data: Mapping[str, Any], file: Path, at: datetime | None) -> Entry:
         covariance,
         np.asarray(model['tool'], dtype=float),
     )
+
+
+def _impossible(value: Array, prior: Array, covariance: Array) -> str:
+    """Return why numbers are no values with standard deviations and correlations; empty if they are."""
+    if not all(np.isfinite(each).all() for each in (value, prior, covariance)):
+        return 'it has numbers that are not finite'
+    variance = np.diag(covariance)
+    if not ((prior > 0.0).all() and (variance >= 0.0).all()):
+        return 'it has variances below zero, or nothing was believed before the data'
+    sigma = np.sqrt(np.where(variance > 0.0, variance, 1.0))
+    lowest = np.linalg.eigvalsh(covariance / np.outer(sigma, sigma))[:1]
+    if (lowest < -ROUNDING * len(value)).any():
+        return 'its covariance is none, for it gives some sum of values a variance below zero'
+    return ''
 
 
 def date_of_stamp(epoch_ns: int, file: Path) -> datetime:

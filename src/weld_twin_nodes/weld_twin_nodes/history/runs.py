@@ -5,15 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from weld_twin_core.errors import DataError
 
 from .changed_words import as_dict
-from .database import Database
+from .database import Damaged, Database, Refused
 from .entry import Entry
+from .passing import Unavailable
 from .tracking import changed, observations
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
 
 DONE, UNSOUND, REFUSED, FAILED = 'done', 'unsound', 'refused', 'failed'
 """States of a recording: diagnosed; data or set-up wrong; not readable; ended by a limit or a crash."""
@@ -56,38 +61,60 @@ class Runs:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def write(self, run: Run, entry: Entry | None) -> bool:
+    def write(self, run: Run, entry: Entry | None, patience: float | None = None) -> Run | None:
         """
         Write how a recording went, and its diagnosis, in one transaction.
 
+        Parameters
+        ----------
+        run : Run
+        entry : Entry, optional
+        patience : float, optional
+            Seconds for which it is tried again; that of the database unless told.
+
         Returns
         -------
-        bool
-            Whether it was new; what was written before stays as it is.
+        Run or None
+            What was written: refused where the diagnosis does not fit its cell, failed where the
+            database does not take it. None where it was there; what was written before stays as it is.
+
+        Raises
+        ------
+        Unavailable
+            The database cannot be used now. Nothing was written; it may be tried again.
 
         """
         try:
-            return self._write(run, entry)
+            return run if self._write(run, entry, patience) else None
+        except Unavailable:
+            raise
         except DataError as error:
             if entry is None:
                 raise
-            refused = Run(**{**asdict(run), 'state': REFUSED, 'sentence': str(error)})
-            return self._write(refused, None)
+            state = REFUSED if isinstance(error, Refused) else FAILED
+            told = replace(run, state=state, sentence=str(error))
+            return told if self._write(told, None, patience) else None
 
-    def _write(self, run: Run, entry: Entry | None) -> bool:
+    def _write(self, run: Run, entry: Entry | None, patience: float | None) -> bool:
         sql, runs = self._database.sql, self._database.table('runs')
-        with self._database.transaction() as connection:
-            known = sql.select(runs.c.id, runs.c.state).where(runs.c.key == run.key)
+
+        def work(connection: Connection) -> bool:
+            known = sql.select(runs.c.state).where(runs.c.key == run.key)
             before = connection.execute(known).first()
             if before is not None and before.state != FAILED:
                 return False
             number = None
             if entry is not None:
                 number = self._database.put(connection, run.cell, entry)
-            if before is not None:
-                connection.execute(runs.delete().where(runs.c.id == before.id))
-            connection.execute(runs.insert().values(**asdict(run), verdict_id=number))
-        return True
+            told = {**asdict(run), 'verdict_id': number}
+            # Another program may have written it since; only a failure is written over.
+            new = self._database.insert(runs).values(told)
+            new = new.on_conflict_do_update(
+                index_elements=[runs.c.key], set_=told, where=runs.c.state == FAILED
+            )
+            return bool(connection.execute(new).rowcount == 1)
+
+        return self._database.write(work, patience=patience)
 
     def finished(self, again: bool = False) -> set[str]:
         """Return the keys of what need not run any more; with ``again``, failures run again."""
@@ -95,7 +122,7 @@ class Runs:
         query = sql.select(runs.c.key)
         if again:
             query = query.where(runs.c.state != FAILED)
-        with self._database.transaction() as connection:
+        with self._database.reading() as connection:
             return {row.key for row in connection.execute(query)}
 
     def troubles(self, cell: str | None = None) -> list[Run]:
@@ -105,12 +132,30 @@ class Runs:
         if cell is not None:
             query = query.where(runs.c.cell == cell)
         names = Run.__dataclass_fields__
-        with self._database.transaction() as connection:
+        with self._database.reading() as connection:
             rows = connection.execute(query).mappings()
             return [Run(**{name: row[name] for name in names}) for row in rows]
 
     def newest(self) -> list[dict[str, Any]]:
-        """Return of every cell its newest diagnosis, how many it has, and what changed on it."""
+        """
+        Return of every cell its newest diagnosis, how many it has, and what changed on it.
+
+        Of a cell whose rows are damaged, ``name`` and ``damaged``, a sentence, are all that is told.
+        """
+        try:
+            return self._newest()
+        except Damaged:
+            pass
+        rows: list[dict[str, Any]] = []
+        for cell in self._database.cells():
+            try:
+                rows += self._newest(cell)
+            except Damaged as error:
+                rows.append({'name': cell, 'damaged': str(error)})
+        return rows
+
+    def _newest(self, cell: str | None = None) -> list[dict[str, Any]]:
+        """Return the newest diagnosis of one cell, or of every cell."""
         sql = self._database.sql
         cells, verdicts = self._database.table('cells'), self._database.table('verdicts')
         findings = self._database.table('findings')
@@ -139,7 +184,10 @@ class Runs:
             )
             .outerjoin(findings, findings.c.cell_id == cells.c.id)
         )
-        with self._database.transaction() as connection:
+        if cell is not None:
+            query = query.where(cells.c.name == cell)
+        told = 'a row' if cell is None else f'the newest diagnosis of cell {cell!r}'
+        with self._database.reading(told) as connection:
             return [dict(row) for row in connection.execute(query).mappings()]
 
     def look(self, cell: str, entries: Sequence[Entry] | None = None) -> list[dict[str, Any]]:
@@ -155,7 +203,7 @@ class Runs:
         """
         sql, findings = self._database.sql, self._database.table('findings')
         number, newest, count = self._state(cell)
-        with self._database.transaction() as connection:
+        with self._database.reading(f'what changed on cell {cell!r}') as connection:
             query = sql.select(findings).where(findings.c.cell_id == number)
             row = connection.execute(query).first()
         if row is not None and (row.newest, row.diagnoses) == (newest, count):
@@ -163,13 +211,12 @@ class Runs:
         entries = self._database.entries(cell, NEWEST) if entries is None else entries
         seen = observations(entries)
         told = [as_dict(change) for change in changed(entries, seen)]
-        with self._database.transaction() as connection:
-            connection.execute(findings.delete().where(findings.c.cell_id == number))
-            connection.execute(
-                findings.insert().values(
-                    cell_id=number, newest=newest, diagnoses=count, changes=told
-                )
-            )
+        new_row = {'cell_id': number, 'newest': newest, 'diagnoses': count, 'changes': told}
+        new = self._database.insert(findings).values(new_row)
+        new = new.on_conflict_do_update(index_elements=[findings.c.cell_id], set_=new_row)
+        # Who may only read works it out anew.
+        with suppress(Unavailable):
+            self._database.write(lambda connection: connection.execute(new), patience=0.0)
         return told
 
     def _state(self, cell: str) -> tuple[int, int, int]:
@@ -182,7 +229,7 @@ class Runs:
             .where(cells.c.name == cell)
             .group_by(cells.c.id)
         )
-        with self._database.transaction() as connection:
+        with self._database.reading() as connection:
             row = connection.execute(query).first()
         if row is None:
             raise DataError(f'there is no cell {cell!r} in the history')

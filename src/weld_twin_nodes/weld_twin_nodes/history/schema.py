@@ -7,11 +7,13 @@ from __future__ import annotations
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
+from .migrations import STEPS
+
 if TYPE_CHECKING:
     from sqlalchemy import MetaData
 
-VERSION = 1
-"""Of the schema; a database of another one is refused."""
+VERSION = 1 + len(STEPS)
+"""Of the schema; an older database is brought to it, a newer one is refused."""
 ARRAYS = ('value', 'prior_std', 'covariance', 'tool')
 
 

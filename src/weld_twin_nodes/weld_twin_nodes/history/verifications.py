@@ -8,13 +8,16 @@ import json
 from collections.abc import Mapping
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from weld_twin_core.errors import DataError
 
 from .database import Database
 from .entry import date_of_stamp
 from .schema import stored
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
 
 FILE = 'verification.json'
 """What `weld-twin verify` leaves in its folder."""
@@ -38,6 +41,11 @@ class Verified(NamedTuple):
     at: datetime
     recording: str
     content: Mapping[str, Any]
+
+    @property
+    def status(self) -> str:
+        """Return whether the promise was kept, in words."""
+        return 'promise kept' if self.content['kept'] else 'promise not kept'
 
 
 def verified_of(path: Path | str, at: datetime | None = None) -> Verified | None:
@@ -64,9 +72,11 @@ def verified_of(path: Path | str, at: datetime | None = None) -> Verified | None
         ) from None
 
 
-def add_verified(database: Database, cell: str, found: Verified) -> bool:
+def put_verified(
+    database: Database, connection: Connection, cell: str, found: Verified
+) -> int | None:
     """
-    Add a verification to a cell; return whether it was new.
+    Add a verification within a transaction; return its number, None if it was there already.
 
     Raises
     ------
@@ -75,26 +85,22 @@ def add_verified(database: Database, cell: str, found: Verified) -> bool:
 
     """
     sql, cells, rows = database.sql, database.table('cells'), database.table('verifications')
-    with database.transaction() as connection:
-        own = connection.execute(sql.select(cells).where(cells.c.name == cell)).first()
-        if own is None:
-            raise DataError(
-                f'there is no cell {cell!r} yet; add the diagnosis that was verified first'
-            )
-        if own.kinematics != found.content.get('kinematics'):
-            raise DataError(f'cell {cell!r} has the robot {own.robot!r}, and this is of another')
-        query = sql.select(rows.c.id).where(
-            rows.c.cell_id == own.id, rows.c.recording == found.recording
+    own = connection.execute(sql.select(cells).where(cells.c.name == cell)).first()
+    if own is None:
+        raise DataError(
+            f'there is no cell {cell!r} yet; add the diagnosis that was verified first'
         )
-        if connection.execute(query).first() is not None:
-            return False
-        values = {
-            'at': stored(found.at),
-            'recording': found.recording,
-            'content': dict(found.content),
-        }
-        connection.execute(rows.insert().values(cell_id=own.id, **values))
-        return True
+    if own.kinematics != found.content.get('kinematics'):
+        raise DataError(f'cell {cell!r} has the robot {own.robot!r}, and this is of another')
+    query = sql.select(rows.c.id).where(
+        rows.c.cell_id == own.id, rows.c.recording == found.recording
+    )
+    if connection.execute(query).first() is not None:
+        return None
+    values = {'at': stored(found.at), 'recording': found.recording, 'content': dict(found.content)}
+    made = connection.execute(rows.insert().values(cell_id=own.id, **values))
+    assert made.inserted_primary_key is not None
+    return int(made.inserted_primary_key[0])
 
 
 def verifications(database: Database, cell: str) -> list[Verified]:
@@ -106,7 +112,7 @@ def verifications(database: Database, cell: str) -> list[Verified]:
         .where(cells.c.name == cell)
         .order_by(rows.c.at)
     )
-    with database.transaction() as connection:
+    with database.reading('a verification') as connection:
         return [
             Verified(row.at.replace(tzinfo=timezone.utc), row.recording, row.content)
             for row in connection.execute(query)

@@ -210,13 +210,15 @@ def _refuse_before(target: Path, mark: str) -> None:
 
 
 def _refuse_foreign(target: Path, mark: str, any_folder: bool) -> None:
-    """Refuse a file, and a folder in which other things lie and nothing of ours."""
+    """Refuse a file, and a folder in which other things lie, but not this result."""
     if os.path.lexists(target) and not target.is_dir():
         raise DataError(f"'{target}' is a file; give a folder")
     if any_folder or not target.is_dir() or (target / mark).is_file():
         return
-    names = [entry.name for entry in target.iterdir() if not entry.name.startswith(INSIDE)]
-    if names and LIST not in names:
+    results = owned_files.listed(target)
+    ours = {Path(name).parts[0] for files in results.values() for name in files} | {LIST}
+    names = {entry.name for entry in target.iterdir() if not entry.name.startswith(INSIDE)}
+    if mark not in results and names - ours:
         raise DataError(
             f"'{target}' holds something else already; choose another place, or write beside it "
             'with --force'

@@ -10,19 +10,23 @@ of ours.
 
 from __future__ import annotations
 
+import asyncio
 import hmac
-import secrets
 from collections.abc import Awaitable, Callable
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
+from .bodies import Bodies, Body, Receive, TooSlow
+from .connections import Doors
+from .people import People
+from .rates import Rates
 from .settings import LOOPBACK, Settings
 
 USER, TOKEN = 'weld_twin_user', 'weld_twin_token'
 """Cookies: who it is, and that the token was right."""
-KEY = 32
-"""Bytes of chance in the name of a user."""
+YEAR = 366 * 86_400
+"""Seconds for which a browser keeps them, counted anew with every visit."""
 HEADERS = (
     (b'content-security-policy', b"frame-ancestors 'self'; form-action 'self'; base-uri 'none'"),
     (b'x-content-type-options', b'nosniff'),
@@ -34,22 +38,19 @@ HEADERS = (
 """What every answer says besides: it stays in our own pages and in no cache."""
 Scope = dict[str, Any]
 Send = Callable[[dict[str, Any]], Awaitable[None]]
-Receive = Callable[[], Awaitable[dict[str, Any]]]
-
-
-class TooMuch(Exception):
-    """The body of a request is larger than is allowed."""
 
 
 class Access:
     """
     Lets requests through to an application, or refuses them.
 
-    The user's name comes to the application as ``scope['user']``.
+    The user's key comes to the application as ``scope['user']``, whether it is a key of this very
+    moment as ``scope['unknown']``, and where the request comes from as ``scope['address']``.
     """
 
-    def __init__(self, app: Any, settings: Settings) -> None:
-        self._app, self._settings = app, settings
+    def __init__(self, app: Any, settings: Settings, people: People, doors: Doors) -> None:
+        self._app, self._settings, self._people, self._doors = app, settings, people, doors
+        self._bodies, self._rates = Bodies(), Rates()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -57,27 +58,65 @@ class Access:
             if scope['type'] == 'lifespan':
                 await self._app(scope, receive, send)
             return
+        client = (str(scope['client'][0]), int(scope['client'][1])) if scope['client'] else ('', 0)
         headers = {
             name.decode('latin-1'): value.decode('latin-1') for name, value in scope['headers']
         }
         cookies = _cookies(headers.get('cookie', ''))
+        user = cookies.get(USER, '')
+        scope['address'] = self._address(client[0], headers)
+        scope['unknown'] = not self._people.knows(user)
+        scope['user'] = self._people.new() if scope['unknown'] else user
+        # Who has no key shares everything with the others of his address who have none.
+        party = scope['address'] if scope['unknown'] else user
+        length = headers.get('content-length', '0')
+        announced = int(length) if length.isdecimal() else None
+        body = Body(self._bodies, party, receive, self._settings.upload, announced)
+        self._doors.began(client)
+        try:
+            wait = self._rates.wait(party)
+            if wait is None:
+                await _refuse(send, 503, 'Too many requests come from here; try again soon.')
+                return
+            if wait:
+                await asyncio.sleep(wait)
+            await self._let_in(scope, headers, cookies, body, send)
+        finally:
+            self._bodies.leave(body)
+            self._doors.ended(client)
+
+    async def _let_in(
+        self,
+        scope: Scope,
+        headers: dict[str, str],
+        cookies: dict[str, str],
+        body: Body,
+        send: Send,
+    ) -> None:
+        """Answer a request, or refuse it."""
         why = self._foreign(scope, headers)
         if why:
             await _refuse(send, 403, why)
             return
-        told = parse_qs(scope.get('query_string', b'').decode('latin-1')).get('token', [''])[0]
-        if self._settings.token and not self._known(headers, cookies, told):
+        query = scope.get('query_string', b'').decode('latin-1')
+        told = [value for name, value in parse_qsl(query) if name == 'token']
+        right = [value for value in told if self._is_token(value)]
+        if self._settings.token and not (right or self._known(headers, cookies)):
             await _refuse(send, 401, 'This server needs its token: open the address it printed.')
             return
-        fresh = []
-        user = cookies.get(USER, '')
-        if not _is_key(user):
-            user = secrets.token_hex(KEY)
-            fresh.append(_cookie(USER, user))
-        if told:
-            fresh.append(_cookie(TOKEN, told))
-        scope['user'] = user
-        await self._app(scope, self._bounded(headers, receive), _with_headers(send, fresh))
+        kept = [_cookie(TOKEN, right[0])] if right and self._settings.token else []
+        if told and scope['method'] in ('GET', 'HEAD'):
+            # The token must not stay where others read it: in the address, and in the history.
+            await _send_on(send, _without_token(scope['path'], query), kept)
+            return
+        kept += [_cookie(USER, scope['user'])]
+        await self._app(scope, body.receive, _with_headers(send, kept, scope, body))
+
+    def _address(self, host: str, headers: dict[str, str]) -> str:
+        """Return where a request comes from; a proxy on this machine says for whom it asks."""
+        if self._settings.proxy and host in LOOPBACK:
+            return headers.get('x-forwarded-for', host).rpartition(',')[2].strip() or host
+        return host
 
     def _foreign(self, scope: Scope, headers: dict[str, str]) -> str:
         """Return why a request does not come from here; empty if it does."""
@@ -93,29 +132,12 @@ class Access:
             return 'That page may not change anything here.'
         return ''
 
-    def _known(self, headers: dict[str, str], cookies: dict[str, str], told: str) -> bool:
+    def _known(self, headers: dict[str, str], cookies: dict[str, str]) -> bool:
         bearer = headers.get('authorization', '').removeprefix('Bearer ')
-        token = self._settings.token.encode()
-        given = (told, bearer, cookies.get(TOKEN, ''))
-        return any(hmac.compare_digest(each.encode(), token) for each in given)
+        return self._is_token(bearer) or self._is_token(cookies.get(TOKEN, ''))
 
-    def _bounded(self, headers: dict[str, str], receive: Receive) -> Receive:
-        """Return a receiver that reads no more than is allowed."""
-        left = self._settings.upload
-        length = headers.get('content-length', '0')
-        too_long = not length.isdigit() or int(length) > left
-
-        async def counted() -> dict[str, Any]:
-            nonlocal left
-            if too_long:
-                raise TooMuch
-            message = await receive()
-            left -= len(message.get('body', b''))
-            if left < 0:
-                raise TooMuch
-            return message
-
-        return counted
+    def _is_token(self, told: str) -> bool:
+        return hmac.compare_digest(told.encode(), self._settings.token.encode())
 
 
 def _name(host: str) -> str:
@@ -125,8 +147,11 @@ def _name(host: str) -> str:
     return host.partition(':')[0].lower()
 
 
-def _is_key(text: str) -> bool:
-    return len(text) == 2 * KEY and all(c in '0123456789abcdef' for c in text)
+def _without_token(path: str, query: str) -> str:
+    """Return an address on this server, its token left out."""
+    rest = [pair for pair in parse_qsl(query, keep_blank_values=True) if pair[0] != 'token']
+    place = '/' + quote(path.lstrip('/'))  # two strokes would begin another server's name
+    return f'{place}?{urlencode(rest)}' if rest else place
 
 
 def _cookies(text: str) -> dict[str, str]:
@@ -136,25 +161,56 @@ def _cookies(text: str) -> dict[str, str]:
         return {}
 
 
-def _cookie(name: str, value: str) -> bytes:
+def _cookie(name: str, value: str, seconds: int = YEAR) -> bytes:
     jar: SimpleCookie = SimpleCookie()
     jar[name] = value
-    for key, told in (('path', '/'), ('httponly', 'yes'), ('samesite', 'Strict')):
-        jar[name][key] = told
+    # Lax: who follows a link from elsewhere is still himself. What changes something is checked.
+    told = {'path': '/', 'httponly': 'yes', 'samesite': 'Lax', 'max-age': str(seconds)}
+    for key, how in told.items():
+        jar[name][key] = how
     return jar[name].OutputString().encode('latin-1')
 
 
-def _with_headers(send: Send, cookies: list[bytes]) -> Send:
+def be(user: str) -> list[bytes]:
+    """Return the cookies of a browser that is this user from now on."""
+    return [_cookie(USER, user)]
+
+
+def be_nobody() -> list[bytes]:
+    """Return the cookies of a browser that is nobody from now on."""
+    return [_cookie(USER, '', 0), _cookie(TOKEN, '', 0)]
+
+
+def _with_headers(send: Send, cookies: list[bytes], scope: Scope, body: Body) -> Send:
+    """Return what sends answers: with cookies, and not before what was refused has been taken."""
+
     async def sent(message: dict[str, Any]) -> None:
         if message['type'] == 'http.response.start':
-            more = [*HEADERS, *((b'set-cookie', cookie) for cookie in cookies)]
+            if message['status'] >= 400 and scope['method'] == 'POST':
+                await _drained(body)
+            told = scope.get('cookies', cookies)  # an answer may say who the browser is
+            more = [*HEADERS, *((b'set-cookie', cookie) for cookie in told)]
             message = {**message, 'headers': [*message.get('headers', []), *more]}
         await send(message)
 
     return sent
 
 
+async def _drained(body: Body) -> None:
+    try:
+        await body.drain()
+    except TooSlow:
+        return
+
+
 async def _refuse(send: Send, status: int, why: str) -> None:
     headers = [(b'content-type', b'text/plain; charset=utf-8'), *HEADERS]
     await send({'type': 'http.response.start', 'status': status, 'headers': headers})
     await send({'type': 'http.response.body', 'body': why.encode() + b'\n'})
+
+
+async def _send_on(send: Send, address: str, cookies: list[bytes]) -> None:
+    headers = [(b'location', address.encode('latin-1')), *HEADERS]
+    headers += [(b'set-cookie', cookie) for cookie in cookies]
+    await send({'type': 'http.response.start', 'status': 303, 'headers': headers})
+    await send({'type': 'http.response.body', 'body': b''})

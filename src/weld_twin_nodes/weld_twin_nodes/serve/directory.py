@@ -22,7 +22,7 @@ from pathlib import Path
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import followed
 
-from .job import FILE, UPLOADS
+from .job import FILE, MODEL, UPLOADS
 
 MARK = '.weld_twin_server.json'
 """Tells that the directory is a server's; locked while one runs."""
@@ -79,7 +79,7 @@ class Directory:
                 continue  # a person's
             if (folder / FILE).is_file():
                 yield folder
-            elif all(entry.name == UPLOADS or FILE in entry.name for entry in folder.iterdir()):
+            elif all(_cut_off(entry.name) for entry in folder.iterdir()):
                 shutil.rmtree(folder, ignore_errors=True)
 
     def close(self) -> None:
@@ -126,6 +126,11 @@ class Directory:
         told = json.dumps({'schema': SCHEMA, 'process': os.getpid()}) + '\n'
         os.ftruncate(self._held, 0)
         os.pwrite(self._held, told.encode(), 0)
+
+
+def _cut_off(name: str) -> bool:
+    """Return whether a name is one of what an upload leaves that was cut off."""
+    return name in (UPLOADS, MODEL) or FILE in name
 
 
 def _of(held: int) -> str:

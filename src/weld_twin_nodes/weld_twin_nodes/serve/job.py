@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One recording that somebody dropped: its folder, what was asked, how far it is."""
+"""One recording or program that somebody dropped: its folder, what was asked, how far it is."""
 
 from __future__ import annotations
 
@@ -12,16 +12,25 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.programs.languages import LANGUAGES
+
+from .fields import CORRECT, DIAGNOSE, FIELDS, IMPORT, words
 
 FILE, UPLOADS, FOUND, IMPORTED = 'job.json', 'recording', 'found', 'imported'
 """In a job's folder: its state, what was dropped, what was found, and the bag of a table."""
+MODEL, DIAGNOSIS = 'model', 'diagnosis.json'
+"""In the folder of a program: the diagnosis that it is corrected by, with the file of its robot."""
+RECORDING, PROGRAM = 'recording', 'program'
+"""What may be dropped."""
 WAITING, RUNNING = 'waiting', 'running'
 DONE, UNSOUND, REFUSED, FAILED = 'done', 'unsound', 'refused', 'failed'
 NO_ROBOT = 'which robot is it? Choose it below, or drop its file with the recording.'
 """Asked where the robot was not chosen: what was dropped stays, and need not come again."""
 OPEN = (WAITING, RUNNING)
 """States of a job that is not finished; a server that starts again takes these up."""
+STATES = (*OPEN, DONE, UNSOUND, REFUSED, FAILED)
 TABLES = ('.csv', '.tsv', '.txt')
 OTHERS = ('.yaml', '.yml', '.urdf', '.xml')
 """Suffixes of tables, and of what may be dropped besides: a bag's description, and robot files."""
@@ -30,36 +39,42 @@ OTHERS = ('.yaml', '.yml', '.urdf', '.xml')
 @dataclass(frozen=True)
 class Asked:
     """
-    What was asked with a recording; every attribute is a field of the form.
+    What was asked with a recording or a program.
 
     Attributes
     ----------
     robot : str
         A bundled robot, or the name of a robot file among those dropped; empty until it is told.
-    align : str
-        Frames that are fitted: '', 'base', 'tool' or 'base,tool'.
-    length_unit, angle_unit : str
-        Of a table; empty to read them from it.
     apply : bool
         Whether a mistake in data or set-up is corrected.
     cell, at : str
         Into whose history it goes, and when it was recorded; empty for neither.
+    told : dict of str
+        The other fields of the form, by their names in `fields.FIELDS`; checked.
 
     """
 
     robot: str
-    align: str = ''
-    length_unit: str = ''
-    angle_unit: str = ''
     apply: bool = False
     cell: str = ''
     at: str = ''
+    told: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any]) -> Asked:
+        """Return what stands in a job's file, of an older version too."""
+        own = {name: data[name] for name in ('robot', 'apply', 'cell', 'at') if name in data}
+        older = {name: data[name] for name in data if name in FIELDS and data[name]}
+        unknown = data.keys() - own.keys() - FIELDS.keys() - {'told'}
+        if unknown:
+            raise DataError(f'it asks for {", ".join(sorted(unknown))}, which is not known')
+        return cls(**own, told={**older, **data.get('told', {})})
 
 
 @dataclass(frozen=True)
 class Job:
     """
-    One recording.
+    One recording or program.
 
     Attributes
     ----------
@@ -77,6 +92,12 @@ class Job:
         When it was dropped, seconds since 1970.
     seconds : float
         What the work took.
+    kind : str
+        'recording' or 'program'.
+    party : str
+        With whom it shares what may wait: its user, or other new ones of the same address.
+    later : Asked or None
+        What was asked while it was in work; it is taken up afterwards.
 
     """
 
@@ -88,67 +109,114 @@ class Job:
     said: str = ''
     since: float = field(default_factory=time.time)
     seconds: float = 0.0
+    kind: str = RECORDING
+    party: str = ''
+    later: Asked | None = None
 
     @classmethod
-    def new(cls, user: str, names: tuple[str, ...], asked: Asked) -> Job:
-        """Return a job that waits."""
-        return cls(secrets.token_hex(16), user, names, asked)
+    def new(cls, user: str, party: str = '', kind: str = RECORDING) -> Job:
+        """Return a job that waits for its files."""
+        return cls(secrets.token_hex(16), user, (), Asked(''), kind=kind, party=party or user)
 
     @classmethod
     def read(cls, folder: Path) -> Job:
-        """Return the job of a folder."""
-        data: Mapping[str, Any] = json.loads((folder / FILE).read_text(encoding='utf-8'))
-        asked = Asked(**data['asked'])
-        return cls(**{**data, 'names': tuple(data['names']), 'asked': asked})
+        """
+        Return the job of a folder.
+
+        Raises
+        ------
+        DataError
+            Its file is damaged, or a newer version wrote it.
+
+        """
+        try:
+            data: Mapping[str, Any] = json.loads((folder / FILE).read_text(encoding='utf-8'))
+            later = data.get('later')
+            told = {
+                **data,
+                'names': tuple(data['names']),
+                'asked': Asked.read(data['asked']),
+                'later': Asked.read(later) if later else None,
+                'party': data.get('party') or data['user'],
+            }
+            job = cls(**told)
+            plain = (job.user, job.said, job.party, *job.names)
+            if job.key != folder.name or job.state not in STATES or not job.names:
+                raise ValueError('it is of another job, or of a state that is not known')
+            if not all(isinstance(each, str) for each in plain) or job.since + job.seconds < 0.0:
+                raise ValueError('it has values of another kind')
+        except (ValueError, TypeError, KeyError, AttributeError, OSError, DataError) as error:
+            raise DataError(f"'{folder / FILE}' cannot be read: {error}") from None
+        return job
 
     def write(self, folder: Path) -> None:
-        """Write it into its folder, whole."""
-        write_text(folder / FILE, json.dumps(asdict(self)) + '\n', overwrite=True)
+        """
+        Write it into its folder, whole.
+
+        Raises
+        ------
+        OSError
+            The disk is full, or does not take it.
+
+        """
+        try:
+            write_text(folder / FILE, json.dumps(asdict(self)) + '\n', overwrite=True)
+        except DataError as error:
+            if isinstance(error.__context__, OSError):
+                raise error.__context__ from None
+            raise
 
     def ask(self, asked: Asked) -> Job:
-        """Return the same recording, asked for in another way: it waits, or a question does."""
+        """Return the same files, asked for in another way: they wait, or a question does."""
         state, said = (WAITING, '') if asked.robot else (REFUSED, NO_ROBOT)
-        return replace(self, asked=asked, state=state, said=said, since=time.time())
+        return replace(self, asked=asked, state=state, said=said, since=time.time(), later=None)
+
+    @property
+    def command(self) -> str:
+        """Return the command that says most of what is told."""
+        return CORRECT if self.kind == PROGRAM else DIAGNOSE
 
     def uploads(self, folder: Path) -> Path:
         """Return where the files lie that were dropped; pages call the recording by its name."""
         return folder / UPLOADS / title(self.names)
 
-    def commands(self, folder: Path) -> list[list[str]]:
-        """Return the words of the commands that do the work, one after the other."""
-        recording, robot = self._recording(folder), self._robot(folder)
+    def commands(self) -> list[list[str]]:
+        """Return the words of the commands that do the work, one after the other, in its folder."""
+        place = Path(UPLOADS) / title(self.names)
+        if self.kind == PROGRAM:
+            return [self._correct(place)]
+        robot = self.asked.robot
+        robot = str(place / robot) if robot in self.names else robot
+        rest = [name for name in self.names if name != self.asked.robot]
+        recording = place / rest[0] if len(rest) == 1 else place
         first = []
         if recording.suffix.lower() in TABLES:
-            words = [
-                'import',
-                str(recording),
-                '--robot',
-                robot,
-                '--out',
-                str(folder / IMPORTED / title(self.names)),
-            ]
-            for name in ('length_unit', 'angle_unit'):
-                if value := getattr(self.asked, name):
-                    words += [f'--{name.replace("_", "-")}', value]
-            first, recording = [words], folder / IMPORTED / title(self.names)
+            bag = Path(IMPORTED) / title(self.names)
+            more = words(self.asked.told, IMPORT)
+            first = [['import', str(recording), '--robot', robot, '--out', str(bag), *more]]
+            recording = bag
         # Nobody but the server writes there, and an earlier version kept no list.
-        words = ['diagnose', str(recording), '--robot', robot, '--force']
-        words += ['--out', str(folder / FOUND)]
-        words += ['--align', self.asked.align] if self.asked.align else []
-        return [*first, words + ['--apply'] * self.asked.apply]
+        last = ['diagnose', str(recording), '--robot', robot, '--out', FOUND, '--force']
+        last += words(self.asked.told, DIAGNOSE)
+        return [*first, last + ['--apply'] * self.asked.apply]
 
-    def _robot(self, folder: Path) -> str:
-        own = self.uploads(folder) / self.asked.robot
-        return str(own) if self.asked.robot in self.names else self.asked.robot
-
-    def _recording(self, folder: Path) -> Path:
-        """Return the bag's folder, or the single file, among what was dropped."""
-        uploads = self.uploads(folder)
-        rest = [name for name in self.names if name != self.asked.robot]
-        return uploads / rest[0] if len(rest) == 1 else uploads
+    def _correct(self, place: Path) -> list[str]:
+        """Return the words that correct a program."""
+        robot = self.asked.robot
+        robot = f'{MODEL}/{robot}' if robot.lower().endswith(OTHERS) else robot
+        out = ['correct-program', str(place / main_file(self.names)), '--robot', robot]
+        out += ['--model', f'{MODEL}/{DIAGNOSIS}', '--out', FOUND]
+        return out + words(self.asked.told, CORRECT)
 
 
 def title(names: Sequence[str]) -> str:
     """Return what a recording is called: its file of data without the suffix."""
     data = [name for name in names if not name.lower().endswith(OTHERS)]
     return Path((data or list(names))[0]).stem
+
+
+def main_file(names: Sequence[str]) -> str:
+    """Return which file of a program is given to the command; the others lie beside it."""
+    beside = {suffix for one in LANGUAGES.values() for suffix in one.beside}
+    main = [name for name in names if Path(name).suffix.lower() not in beside]
+    return (main or list(names))[0]

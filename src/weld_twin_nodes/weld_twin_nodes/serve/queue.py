@@ -1,18 +1,20 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The recordings that wait, in the order in which they came, and the workers that take them.
+What waits, whose turn it is, and the workers that take it.
 
 Everything is in the folders of the jobs: a server that was killed finds there what was finished and
-what was not, and goes on.
+what was not, and goes on. No job and no full disk ends a worker.
 """
 
 from __future__ import annotations
 
 import shutil
+import sys
 import threading
+from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
-from datetime import datetime, timezone
 from pathlib import Path
 
 from weld_twin_core.errors import DataError, TwinError
@@ -20,26 +22,38 @@ from weld_twin_core.errors import DataError, TwinError
 from ..guarded import Guarded, Outcome
 from ..history import entry_of
 from ..history.database import Database
+from ..history.entry import instant
 from ..history.runs import Runs
 from .directory import Directory
 from .job import (
     DONE,
     FAILED,
+    FILE,
     FOUND,
     IMPORTED,
     OPEN,
+    PROGRAM,
     REFUSED,
     RUNNING,
     UNSOUND,
-    UPLOADS,
     WAITING,
+    Asked,
     Job,
 )
+from .room import NO_ROOM, giving_way, is_full, size_of
 from .settings import Settings
 
 STATES = {0: DONE, 2: REFUSED, 3: UNSOUND}
-"""By the exit code of ``diagnose``; any other is a failure."""
+"""By the exit code of a command; any other is a failure."""
 HISTORY = 'history.db'
+NOT_ADDED = 'not in the history: '
+"""Begins what is told of a diagnosis that its history did not take."""
+UNKNOWN = 'unknown at '
+"""Begins the party of who comes without a key: all of an address are like one user."""
+LOOK = 5.0
+"""Seconds after which a worker that has nothing to do writes what a full disk did not take."""
+_NO_SPACE = ('No space left on device', 'Disk quota exceeded', 'disk is full')
+"""What commands say of a full disk."""
 
 
 class Full(DataError):
@@ -62,6 +76,8 @@ class Queue:
         self._news = threading.Condition()
         self._stopped = False
         self._jobs = {job.key: job for job in self._kept()}
+        self._sizes = {job.key: size_of(self.folder(job)) for job in self._jobs.values()}
+        self._unwritten: set[str] = set()
         self._workers = [
             threading.Thread(target=self._work, daemon=True) for _ in range(settings.workers)
         ]
@@ -72,7 +88,11 @@ class Queue:
         """Return the jobs of the folders; what was running waits again."""
         out = []
         for folder in self._directory.kept():
-            job = Job.read(folder)
+            try:
+                job = Job.read(folder)
+            except DataError as error:
+                print(f'weld-twin: {error}; it is left as it is', file=sys.stderr, flush=True)
+                continue
             if job.state in OPEN:
                 job = replace(job, state=WAITING, said='')
             out.append(job)
@@ -86,30 +106,95 @@ class Queue:
         """Return the folder of a user; it is there once something was kept in it."""
         return self._directory.users / user
 
-    def check_room(self, user: str) -> None:
+    def has(self, user: str) -> bool:
+        """Return whether something is kept of a user."""
+        with self._news:
+            mine = any(job.user == user for job in self._jobs.values())
+        return mine or self.user_folder(user).is_dir()
+
+    def check_room(self, job: Job) -> None:
         """
-        Refuse a recording more where too many wait.
+        Refuse a job more where too many wait.
 
         Raises
         ------
         Full
-            Too many of this user, or of all.
+            Too many of this user, of the new ones of his address, or of all.
 
         """
         with self._news:
-            waiting = [job for job in self._jobs.values() if job.state in OPEN]
-        if len(waiting) >= self._settings.waiting:
-            raise Full('too many recordings wait; try again later')
-        if sum(job.user == user for job in waiting) >= self._settings.own:
+            self._check_room(job)
+
+    def _check_room(self, job: Job) -> None:
+        waiting = [each for each in self._jobs.values() if each.state in OPEN]
+        if sum(each.user == job.user for each in waiting) >= self._settings.own:
             raise Full(
                 f'{self._settings.own} of your recordings wait already; let them finish first'
             )
+        stranger = job.party.startswith(UNKNOWN)
+        most = self._settings.own if stranger else self._settings.strangers
+        if sum(each.party == job.party for each in waiting) >= most:
+            raise Full(
+                'many recordings of new visitors from your address wait already; try again in a '
+                'few minutes'
+            )
+        if len(waiting) >= self._settings.waiting:
+            raise Full('too many recordings wait; try again later')
 
     def add(self, job: Job) -> None:
-        """Take a job whose files are in its folder; it waits from now on."""
-        self.check_room(job.user)
-        self._set(job)
-        self._forget(job.user)
+        """
+        Take a new job whose files are in its folder; it waits from now on.
+
+        Raises
+        ------
+        Full, NoRoom
+            Too many wait, or too much is kept.
+        OSError
+            It cannot be written.
+
+        """
+        size, allowed = size_of(self.folder(job)), self._settings.disk
+        with self._news:
+            self._check_room(job)
+            others = list(self._jobs.values())
+            going = giving_way(
+                others, {**self._sizes, job.key: size}, job, allowed, self._settings.kept_of_all
+            )
+            finished = [each for each in others if each.state not in OPEN]
+            mine = sorted((j for j in finished if j.user == job.user), key=lambda j: -j.since)
+            job.write(self.folder(job))
+            self._jobs[job.key], self._sizes[job.key] = job, size
+            self._news.notify()
+        for each in (*going, *mine[self._settings.kept :]):
+            self.remove(each)
+
+    def again(self, job: Job, asked: Asked) -> None:
+        """Ask for the same files in another way, now or after what is in work."""
+        with self._news:
+            job = self._jobs[job.key]
+            if job.state == RUNNING:
+                self._put(replace(job, later=asked))
+                return
+            if job.state != WAITING:
+                self._check_room(job)
+            self._put(job.ask(asked))
+            self._news.notify()
+
+    def remove(self, job: Job) -> None:
+        """Forget a job and delete its files; what it computes ends with nothing."""
+        with self._news:
+            self._jobs.pop(job.key, None)
+            self._sizes.pop(job.key, None)
+            self._unwritten.discard(job.key)
+        # Its state goes first: a folder without it is swept by the next start.
+        (self.folder(job) / FILE).unlink(missing_ok=True)
+        shutil.rmtree(self.folder(job), ignore_errors=True)
+
+    def remove_user(self, user: str) -> None:
+        """Forget a user: recordings, programs and history."""
+        for job in self.of(user):
+            self.remove(job)
+        shutil.rmtree(self.user_folder(user), ignore_errors=True)
 
     def of(self, user: str) -> list[Job]:
         """Return the jobs of a user, the newest first."""
@@ -126,9 +211,20 @@ class Queue:
     def place(self, job: Job) -> int:
         """Return how many come before a job that waits."""
         with self._news:
-            return sum(
-                other.state in OPEN and other.since < job.since for other in self._jobs.values()
-            )
+            running = sum(each.state == RUNNING for each in self._jobs.values())
+            order = [each.key for each in self._in_turn()]
+        return running + order.index(job.key) if job.key in order else 0
+
+    def _in_turn(self) -> list[Job]:
+        """Return what waits: first one of each party, then the next one of each."""
+        rank: Counter[str] = Counter()
+        order = []
+        for job in sorted(self._jobs.values(), key=lambda job: job.since):
+            if job.state in OPEN:
+                if job.state == WAITING:
+                    order.append((rank[job.party], job.since, job))
+                rank[job.party] += 1
+        return [job for _, _, job in sorted(order, key=lambda each: each[:2])]
 
     def stop(self) -> None:
         """End the workers and what they run; it waits for the next start."""
@@ -140,27 +236,22 @@ class Queue:
             worker.join(timeout=5.0)
         self._directory.close()
 
-    def _set(self, job: Job) -> None:
-        with self._news:
+    def _put(self, job: Job) -> None:
+        """Keep a job; where the disk is full it is kept here, and written as soon as that goes."""
+        self._jobs[job.key] = job
+        try:
             job.write(self.folder(job))
-            self._jobs[job.key] = job
-            self._news.notify()
-
-    def _forget(self, user: str) -> None:
-        """Take away the oldest finished jobs beyond what is kept, of a user and of all."""
-        with self._news:
-            every = sorted(self._jobs.values(), key=lambda job: -job.since)
-        finished = [job for job in every if job.state not in OPEN]
-        mine = [job for job in finished if job.user == user]
-        for job in {*mine[self._settings.kept :], *finished[self._settings.kept_of_all :]}:
-            with self._news:
-                del self._jobs[job.key]
-            shutil.rmtree(self.folder(job), ignore_errors=True)
+            self._unwritten.discard(job.key)
+        except OSError:
+            self._unwritten.add(job.key)
 
     def _work(self) -> None:
         with Guarded(self._settings.limits) as guarded:
             while (job := self._next()) is not None:
-                done = self._run(job, guarded)
+                try:
+                    done = self._run(job, guarded)
+                except Exception as error:  # of one job; the next one has its own
+                    done = Outcome(-1, _why(error), 0.0)
                 if self._stopped:
                     return  # what was ended with the server is not finished
                 self._finish(job, done)
@@ -169,62 +260,100 @@ class Queue:
         """Wait for a job and take it; None when the server stops."""
         with self._news:
             while not self._stopped:
-                waiting = [job for job in self._jobs.values() if job.state == WAITING]
-                if waiting:
-                    job = replace(min(waiting, key=lambda job: job.since), state=RUNNING)
+                if waiting := self._in_turn():
+                    job = replace(waiting[0], state=RUNNING, said='')
                     self._jobs[job.key] = job
                     return job
-                self._news.wait()
+                self._news.wait(LOOK)
+                for key in list(self._unwritten):
+                    self._put(self._jobs[key])
         return None
 
     def _run(self, job: Job, guarded: Guarded) -> Outcome:
         folder = self.folder(job)
         shutil.rmtree(folder / IMPORTED, ignore_errors=True)
+        if job.kind == PROGRAM:
+            shutil.rmtree(folder / FOUND, ignore_errors=True)
 
         def tell(text: str) -> None:
             with self._news:
-                self._jobs[job.key] = replace(self._jobs[job.key], said=_plain(text, job, folder))
+                if job.key in self._jobs:
+                    self._jobs[job.key] = replace(self._jobs[job.key], said=_plain(text, job))
 
         seconds = 0.0
-        for words in job.commands(folder):
-            done = guarded.run(words, tell)
+        for words in job.commands():
+            done = guarded.run(words, tell, folder)
             seconds += done.seconds
             if done.code:
                 break
         return replace(done, seconds=seconds)
 
     def _finish(self, job: Job, done: Outcome) -> None:
+        """Note how a job ended, and what comes of it."""
         state = STATES.get(done.code, FAILED)
-        said = _plain(done.said.removeprefix('weld-twin: '), job, self.folder(job))
+        said = _plain(done.said.removeprefix('weld-twin: '), job)
+        if any(sign in said for sign in _NO_SPACE):
+            state, said = FAILED, NO_ROOM
         if state == UNSOUND:
             said = 'data or set-up are wrong: it asks what to do'
         if state == DONE:
             said = self._into_history(job) if job.asked.cell else ''
-        self._set(replace(job, state=state, said=said, seconds=done.seconds))
+        size = size_of(self.folder(job))
+        with self._news:
+            now = self._jobs.get(job.key)
+            if now is None:  # it was deleted meanwhile
+                shutil.rmtree(self.folder(job), ignore_errors=True)
+                return
+            self._sizes[job.key] = size
+            ended = replace(now, state=state, said=said, seconds=done.seconds)
+            self._put(ended.ask(now.later) if now.later is not None else ended)
+
+    def into_history(self, job: Job) -> None:
+        """Add a diagnosis to its history once more, where it could not be added."""
+        said = self._into_history(job)
+        with self._news:
+            if job.key in self._jobs:
+                self._put(replace(self._jobs[job.key], said=said))
 
     def _into_history(self, job: Job) -> str:
         """Add a diagnosis to the history of its user; return what came of it."""
         asked = job.asked
         try:
-            at = (
-                datetime.fromisoformat(asked.at).replace(tzinfo=timezone.utc) if asked.at else None
-            )
-            entry = entry_of(self.folder(job) / FOUND, at)
+            entry = entry_of(self.folder(job) / FOUND, instant(asked.at) if asked.at else None)
             place = self.user_folder(job.user)
-            place.mkdir(parents=True, exist_ok=True)
-            database = Database(str(place / HISTORY))
+            with self._news:
+                if job.key not in self._jobs:
+                    return ''
+                place.mkdir(parents=True, exist_ok=True)
+            database = Database(str(place / HISTORY), patience=LOOK)
             try:
                 new = database.add(asked.cell, entry)
-                Runs(database).look(asked.cell)
+                with suppress(TwinError):  # only what pages would work out anew
+                    Runs(database).look(asked.cell)
             finally:
                 database.close()
-        except TwinError as error:
-            return f'not in the history: {_plain(str(error), job, self.folder(job))}'
+        except Exception as error:  # the diagnosis is there all the same
+            why = NO_ROOM if is_full(error) or 'is full' in str(error) else _why(error)
+            why = why.replace(str(self.folder(job) / FOUND), '').replace(
+                f'sqlite:///{self.user_folder(job.user).absolute()}/', ''
+            )
+            return f'{NOT_ADDED}{_plain(why, job)}'
         return 'added to the history' if new else 'it was in the history already'
 
 
-def _plain(text: str, job: Job, folder: Path) -> str:
-    """Return a sentence without the places of this machine."""
-    for place in (job.uploads(folder), folder / UPLOADS, folder / IMPORTED, folder):
+def _why(error: Exception) -> str:
+    """Return what went wrong, in a sentence without places of this machine."""
+    if is_full(error):
+        return NO_ROOM
+    if isinstance(error, TwinError):
+        return str(error)
+    if isinstance(error, OSError):
+        return f'the server could not do it: {error.strerror or error}'
+    return f'the server could not do it: {type(error).__name__}: {error}'
+
+
+def _plain(text: str, job: Job) -> str:
+    """Return a sentence without the places in a job's folder."""
+    for place in (job.uploads(Path()), *map(Path, ('recording', IMPORTED, FOUND, 'model'))):
         text = text.replace(f'{place}/', '')
-    return text.replace(str(folder), '')
+    return text

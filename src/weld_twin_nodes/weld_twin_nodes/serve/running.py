@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import socket
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,10 +16,12 @@ from weld_twin_core.errors import DataError
 from .queue import Queue
 from .settings import Settings
 
-CONNECTIONS = 128
-"""Requests at the same time; more are told that the server is busy."""
+BACKLOG = 1024
+"""Connections that the system holds until they are taken."""
 IDLE = 5
-"""Seconds after which a connection that says nothing is closed."""
+"""Seconds after which a connection is closed that says nothing after an answer."""
+SCRATCH = 'scratch'
+"""Folder in the server's own where uploads lie until they are whole: no other disk fills up."""
 
 
 def serve(settings: Settings, tell: Callable[[str], None]) -> None:
@@ -39,6 +44,7 @@ def serve(settings: Settings, tell: Callable[[str], None]) -> None:
         import uvicorn
 
         from .app import make_app
+        from .connections import Doors, protocol
     except ImportError as error:
         raise DataError(
             f"the server needs {error.name}; install it with: pip install 'weld-twin[serve]'"
@@ -48,13 +54,16 @@ def serve(settings: Settings, tell: Callable[[str], None]) -> None:
     settings = replace(settings, port=port)
     queue = Queue(settings)
     try:
-        app = make_app(settings, queue, _live(settings))
+        _scratch(settings)
+        doors = Doors()
+        app = make_app(settings, queue, doors, _live(settings))
         config = uvicorn.Config(
             app,
             log_level='warning',
             access_log=False,
             server_header=False,
-            limit_concurrency=CONNECTIONS,
+            proxy_headers=False,
+            http=protocol(doors),
             timeout_keep_alive=IDLE,
             timeout_graceful_shutdown=IDLE,
         )
@@ -67,6 +76,14 @@ def serve(settings: Settings, tell: Callable[[str], None]) -> None:
         listening.close()
 
 
+def _scratch(settings: Settings) -> None:
+    """Have what is written in passing lie in the server's own folder, for its commands too."""
+    place = (settings.directory / SCRATCH).absolute()
+    shutil.rmtree(place, ignore_errors=True)  # of a server that was killed
+    place.mkdir()
+    os.environ['TMPDIR'] = tempfile.tempdir = str(place)
+
+
 def _listening(settings: Settings) -> socket.socket:
     """Return a socket that listens where it should."""
     try:
@@ -76,7 +93,7 @@ def _listening(settings: Settings) -> socket.socket:
         made = socket.socket(family, kind, protocol)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind(address)
-        made.listen(CONNECTIONS)
+        made.listen(BACKLOG)
     except OSError as error:
         raise DataError(
             f'nothing can listen at {settings.host} port {settings.port}: {error.strerror}; '

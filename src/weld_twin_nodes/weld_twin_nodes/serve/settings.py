@@ -37,10 +37,15 @@ class Settings:
         Bytes of one upload, all its files together.
     files : int
         Files of one upload.
-    own, waiting : int
-        Recordings that may wait, of one user and of all.
+    own, strangers, waiting : int
+        Recordings that may wait: of one user, of the new visitors of one address together, of all.
     kept, kept_of_all : int
-        Recordings kept, of one user and of all; the oldest that are finished go first.
+        Recordings kept, of one user and of all; the oldest that are finished go first, of all those
+        of whoever has most.
+    disk : int
+        Bytes of everything that is kept.
+    proxy : bool
+        Whether a proxy on this machine says for whom it asks (``X-Forwarded-For``).
     database : str
         History of the plant that everybody may read; empty for none.
     live : bool
@@ -58,9 +63,12 @@ class Settings:
     upload: int = 1_000_000_000
     files: int = 24
     own: int = 10
+    strangers: int = 30
     waiting: int = 100
     kept: int = 50
     kept_of_all: int = 1000
+    disk: int = 20_000_000_000
+    proxy: bool = False
     database: str = ''
     live: bool = False
 

@@ -5,23 +5,27 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import Any, Protocol
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.programs.languages import LANGUAGES
 
-from .job import OTHERS, TABLES, Asked, title
+from ..history.entry import instant
+from .fields import CORRECT, DIAGNOSE, IMPORT, given
+from .job import DIAGNOSIS, OTHERS, TABLES, Asked, title
 
 BAGS = ('.mcap', '.db3', '.bag', '.zstd')
 """Suffixes of a bag's files."""
-PLAIN = re.compile(r'[A-Za-z0-9][A-Za-z0-9._ -]{0,120}')
+PROGRAMS = tuple(suffix for one in LANGUAGES.values() for suffix in (*one.extensions, *one.beside))
+"""Suffixes of programs."""
+NAME_BYTES = 200
+"""Bytes of a file's name; systems take 255, and some are added."""
 PIECE = 1 << 20
 """Bytes copied at once."""
-ALIGN = ('', 'base', 'tool', 'base,tool')
-UNITS = {'length_unit': ('', 'm', 'mm'), 'angle_unit': ('', 'rad', 'deg')}
 CELL = 80
 """Characters of a cell's name."""
 
@@ -37,7 +41,7 @@ class Upload(Protocol):
 
 async def save(uploads: Sequence[Upload], place: Path, most: int) -> tuple[str, ...]:
     """
-    Write files into a new folder of their title, and return their names.
+    Write the files of a recording into a new folder of their title, and return their names.
 
     Parameters
     ----------
@@ -52,41 +56,87 @@ async def save(uploads: Sequence[Upload], place: Path, most: int) -> tuple[str, 
         There are none, too many, or one is of no kind that is read.
 
     """
-    names = [_name(upload.filename) for upload in uploads if upload.filename]
+    names = _names(uploads, BAGS + TABLES + OTHERS, 'a bag, a table nor a robot file', most)
     if not names:
         raise DataError('choose a recording first: a bag, or a table of angles and positions')
-    if len(names) > most:
-        raise DataError(f'{len(names)} files are too many; a bag has at most {most}')
-    if len(set(names)) < len(names):
-        raise DataError('two files have the same name; drop one recording at a time')
     if not any(name.lower().endswith(BAGS + TABLES) for name in names):
         raise DataError(
             'no recording is among these: a bag ends in .mcap or .db3, a table in .csv'
         )
-    place = place / title(names)
+    await _write(uploads, names, place / title(names))
+    return names
+
+
+async def save_program(
+    uploads: Sequence[Upload], model: Sequence[Upload], place: Path, beside: Path
+) -> tuple[str, ...]:
+    """
+    Write a program, and what it is corrected by, and return the names of the program's files.
+
+    Parameters
+    ----------
+    uploads : sequence of Upload
+    model : sequence of Upload
+        A ``diagnosis.json``, and a robot file; none where a recording's are taken.
+    place, beside : Path
+        For the program, in a new folder of its title; for the model.
+
+    Raises
+    ------
+    DataError
+        There is no program, or a file is of no kind that is read.
+
+    """
+    names = _names(uploads, PROGRAMS, 'a program nor a file that belongs to one', 8)
+    if not names:
+        raise DataError('choose a program first')
+    models = _names(model, (*OTHERS, '.json'), 'a diagnosis nor a robot file', 2)
+    await _write(uploads, names, place / title(names))
+    told = [DIAGNOSIS if name.lower().endswith('.json') else name for name in models]
+    await _write(model, told, beside)
+    return names
+
+
+def _names(
+    uploads: Sequence[Upload], suffixes: tuple[str, ...], kind: str, most: int
+) -> tuple[str, ...]:
+    names = tuple(_name(upload.filename, suffixes, kind) for upload in _chosen(uploads))
+    if len(names) > most:
+        raise DataError(f'{len(names)} files are too many; {most} are taken')
+    if len({name.casefold() for name in names}) < len(names):
+        raise DataError('two files have the same name; drop one recording at a time')
+    return names
+
+
+def _chosen(uploads: Sequence[Upload]) -> list[Upload]:
+    return [upload for upload in uploads if upload.filename]
+
+
+async def _write(uploads: Sequence[Upload], names: Sequence[str], place: Path) -> None:
     place.mkdir(parents=True)
-    for name, upload in zip(names, (u for u in uploads if u.filename), strict=True):
+    for name, upload in zip(names, _chosen(uploads), strict=True):
         with (place / name).open('xb') as stream:
             while piece := await upload.read(PIECE):
                 stream.write(piece)
-    return tuple(names)
 
 
-def _name(given: str | None) -> str:
-    """Return the last part of a name, refused where it is none of a recording."""
-    name = re.split(r'[/\\]', given or '')[-1]
-    if not PLAIN.fullmatch(name):
+def _name(given: str | None, suffixes: tuple[str, ...], kind: str) -> str:
+    """Return the last part of a name, refused where it cannot be shown, or is of another kind."""
+    name = re.split(r'[/\\]', given or '')[-1].strip()
+    hidden = any(unicodedata.category(sign)[0] in 'CZ' and sign != ' ' for sign in name)
+    if hidden or name.startswith(('.', '-')) or len(name.encode()) > NAME_BYTES:
         raise DataError(
-            'a file has a name with signs that are not letters, digits, - or _; rename it'
+            'a file has a name that is too long, begins with a dot or a dash, or has signs that '
+            'cannot be seen; rename it'
         )
-    if not name.lower().endswith(BAGS + TABLES + OTHERS):
-        raise DataError(f'{name!r} is neither a bag, a table nor a robot file')
+    if not name.lower().endswith(suffixes):
+        raise DataError(f'{name!r} is neither {kind}')
     return name
 
 
 def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
     """
-    Return what a form asks for; its robot is empty where none was chosen.
+    Return what a form asks of a recording; its robot is empty where none was chosen.
 
     Parameters
     ----------
@@ -100,25 +150,48 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
         A field holds something that is no choice.
 
     """
-    robots = [n for n in names if n.lower().endswith(OTHERS) and n.lower() != 'metadata.yaml']
-    robot = _text(form, 'robot') or (robots[0] if robots else '')
-    if robot and robot not in robots and robot.lower() not in catalog.names():
-        raise DataError('the robot is none of those bundled; drop its file with the recording')
-    choices = {'align': ALIGN, **UNITS}
-    told = {name: _text(form, name) for name in choices}
-    for name, value in told.items():
-        if value not in choices[name]:
-            raise DataError(f'{name.replace("_", " ")} cannot be {value!r}')
-    at = _text(form, 'at')
-    try:
-        _ = at and datetime.fromisoformat(at)
-    except ValueError:
-        raise DataError(f'{at!r} is no date; write 2026-03-31T14:05') from None
-    cell = _text(form, 'cell')[:CELL]
+    told = given(_texts(form), (IMPORT, DIAGNOSE))
+    tables = [name for name in names if name.lower().endswith(TABLES)]
+    if 'joint_signs' in told and not tables:
+        raise DataError('signs are those of a table; the joints of a bag have their own')
+    at, cell = _text(form, 'at'), _text(form, 'cell')[:CELL]
+    if at:
+        instant(at)
     if not cell.isprintable():
         raise DataError("a cell's name has signs that cannot be shown")
-    apply = _text(form, 'apply') == 'yes'
-    return Asked(robot=robot, apply=apply, cell=cell, at=at, **told)
+    robot = _robot(form, [name for name in names if name.lower() != 'metadata.yaml'])
+    return Asked(robot, _text(form, 'apply') == 'yes', cell, at, told)
+
+
+def asked_of_program(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
+    """
+    Return what a form asks of a program.
+
+    Parameters
+    ----------
+    form : mapping
+    names : sequence of str
+        Of the files of its model.
+
+    Raises
+    ------
+    DataError
+        A field holds something that is no choice.
+
+    """
+    return Asked(_robot(form, names), told=given(_texts(form), (CORRECT,)))
+
+
+def _robot(form: Mapping[str, Any], names: Sequence[str]) -> str:
+    own = [name for name in names if name.lower().endswith(OTHERS)]
+    robot = _text(form, 'robot') or (own[0] if own else '')
+    if robot and robot not in own and robot.lower() not in catalog.names():
+        raise DataError('the robot is none of those bundled; drop its file with the recording')
+    return robot
+
+
+def _texts(form: Mapping[str, Any]) -> dict[str, str]:
+    return {name: _text(form, name) for name in form}
 
 
 def _text(form: Mapping[str, Any], name: str) -> str:

@@ -3,7 +3,9 @@
 """Let one user, and then many at once, drop a recording on a server; and drop every malicious file.
 
 The recording lasts 60 s and is made by the plant, if none is given. What one user waits is held
-against the command, what many wait against the same work done in turn. The machine must be quiet.
+against the command, what many wait against the same work done in turn. With --hostile, as many wait
+once more while somebody holds so many connections in bad faith, from the same address. The machine
+must be quiet.
 """
 
 from __future__ import annotations
@@ -32,6 +34,9 @@ LONGEST = 120
 """Signs of a refusal in the table."""
 ONE, MANY = 1.5, 1.2
 """Times the command that one user may wait, and times the serial work that many may."""
+BESIDE = 2.0
+"""Times what they wait in peace that users may wait beside hostile connections, in the median and the
+one who waits longest."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--robot', metavar='R', default='', help='its robot, a bundled one')
     parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
     parser.add_argument('--users', type=int, default=20, metavar='N')
+    parser.add_argument(
+        '--hostile', type=int, default=200, metavar='N', help='connections in bad faith; 0: none'
+    )
     parser.add_argument(
         '--chromium', action='store_true', help='users have Chromium, not a plain client'
     )
@@ -63,7 +71,9 @@ def run(args: argparse.Namespace) -> int:
     print(users_page(result))
     fine = result['one_user_times_command'] <= ONE and result['times_serial_work'] <= MANY
     refused = all(said.startswith('refused') for said in result['malicious'].values())
-    return 0 if fine and refused and result['sheets'] == args.users else MISSED
+    beside = result.get('hostile')
+    held = beside is None or (beside['times'] <= BESIDE and beside['sheets'] == args.users)
+    return 0 if fine and refused and held and result['sheets'] == args.users else MISSED
 
 
 def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:
@@ -82,6 +92,7 @@ def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:
         ones = [_one(somebody(), files, fields) for _ in range(3)]  # the first starts the worker
         one = sorted(ones)[1]
         many = at_once([somebody() for _ in range(args.users)], files, **fields)
+        beside = _beside(root, somebody, files, fields, args, many) if args.hostile else None
         malicious = _malicious(somebody, place)
     return {
         'options': ' --chromium' * args.chromium,
@@ -93,7 +104,38 @@ def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:
         'one_user_times_command': one / command,
         **many,
         'times_serial_work': many['seconds'] / (args.users * one),
+        **({'hostile': beside} if beside else {}),
         'malicious': malicious,
+    }
+
+
+def _beside(
+    root: str,
+    somebody: Callable[[], Person],
+    files: Sequence[Path],
+    fields: dict[str, str],
+    args: argparse.Namespace,
+    peace: dict[str, Any],
+) -> dict[str, Any]:
+    """Return how long users wait beside hostile connections, and how that compares."""
+    import numpy as np
+
+    from ...fleet.hostile import WAYS, hostile
+    from ...fleet.users import at_once
+
+    with hostile(root, args.hostile) as told:
+        found = at_once([somebody() for _ in range(args.users)], files, **fields)
+    times = [
+        float(measure(found['waits_s']) / measure(peace['waits_s']))
+        for measure in (np.median, np.max)
+    ]
+    return {
+        **found,
+        **told,
+        'connections': args.hostile,
+        'ways': list(WAYS),
+        'times': max(times),
+        'times_median': times[0],
     }
 
 

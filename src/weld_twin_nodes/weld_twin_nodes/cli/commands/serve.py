@@ -38,12 +38,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--token', default='', help='what visitors need (default: drawn anew)')
     parser.add_argument('--workers', type=int, default=1, metavar='N', help='side by side')
     parser.add_argument('--upload', type=float, default=1.0, metavar='GB', help='of one recording')
+    parser.add_argument(
+        '--disk', type=float, default=20.0, metavar='GB', help='of everything that is kept'
+    )
     parser.add_argument('--memory', type=float, default=6.0, metavar='GB', help='of one diagnosis')
     parser.add_argument(
         '--minutes', type=float, default=15.0, metavar='N', help='of one diagnosis'
     )
     parser.add_argument(
         '--db', default='', metavar='URL', help='history of the plant, shown to everybody'
+    )
+    parser.add_argument(
+        '--behind-proxy',
+        action='store_true',
+        help='a proxy on this machine tells in X-Forwarded-For whom it asks for',
     )
     parser.add_argument('--live', action='store_true', help='show the verdict of running nodes')
 
@@ -62,7 +70,8 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(
             f'--port takes 0 to {LAST_PORT}, got {args.port}; 0 takes any that is free'
         )
-    if args.workers < 1 or args.upload <= 0.0 or args.memory < 1.0 or args.minutes <= 0.0:
+    more = (args.upload, args.disk, args.minutes)
+    if args.workers < 1 or args.memory < 1.0 or not all(0.0 < each < 1e6 for each in more):
         raise DataError(
             '--workers takes 1 or more, --memory 1 GB or more, the others more than none'
         )
@@ -76,6 +85,8 @@ def run(args: argparse.Namespace) -> int:
         args.workers,
         Limits(memory=round(args.memory * GIGABYTE), cpu_s=wall, wall_s=wall),
         upload=round(args.upload * GIGABYTE),
+        disk=round(args.disk * GIGABYTE),
+        proxy=args.behind_proxy,
         database=args.db,
         live=args.live,
     )

@@ -23,8 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the pages."""
     from weld_twin_msgs_py.files.whole_files import write_text
-    from weld_twin_nodes.fleet.cell_page import cell_page
+    from weld_twin_nodes.fleet.cell_page import cell_page, damaged_page
     from weld_twin_nodes.fleet.ranking_page import ranking_page
+    from weld_twin_nodes.history.database import Damaged
     from weld_twin_nodes.offline.content_hash import digest
     from weld_twin_nodes.report.quantities import counted
 
@@ -34,7 +35,11 @@ def run(args: argparse.Namespace) -> int:
     with opened(args) as database, output(args, INDEX) as place:
         cells = database.cells()
         for cell in cells:
-            write_text(place / file(cell), cell_page(database, cell, INDEX))
+            try:
+                page = cell_page(database, cell, INDEX)
+            except Damaged as error:
+                page = damaged_page(cell, str(error), INDEX)
+            write_text(place / file(cell), page)
         write_text(place / INDEX, ranking_page(database, file))
     print(f'{args.out}/{INDEX}: {counted(len(cells), "cell")}')
     return 0

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     wall = max(round(60.0 * args.minutes), 1)
     limits = Limits(memory=round(args.memory * GIGABYTE), cpu_s=wall, wall_s=wall)
     keep = Path(args.keep) if args.keep else None
-    with opened(args) as database, _pool(args) as pool, _progress() as tell:
+    with opened(args, make=True) as database, _pool(args) as pool, _progress() as tell:
         tally = run_fleet(listed, database, pool, limits, keep=keep, again=args.again, tell=tell)
     said = ', '.join(f'{count} {state}' for state, count in sorted(tally.items()))
     print(f'{args.list}: {said}')

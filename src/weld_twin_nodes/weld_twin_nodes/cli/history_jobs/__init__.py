@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -28,31 +27,12 @@ def add_database(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def opened(args: argparse.Namespace) -> Iterator[Database]:
-    """Yield the database of the options."""
+def opened(args: argparse.Namespace, *, make: bool = False) -> Iterator[Database]:
+    """Yield the database of the options; ``make`` it where there is none yet."""
     from weld_twin_nodes.history import Database
 
-    database = Database(args.db)
+    database = Database(args.db, make=make)
     try:
         yield database
     finally:
         database.close()
-
-
-def date_of(text: str) -> datetime:
-    """
-    Return the instant that a text names, UTC where it does not say.
-
-    Raises
-    ------
-    DataError
-        It is no date.
-
-    """
-    from weld_twin_core.errors import DataError
-
-    try:
-        at = datetime.fromisoformat(text)
-    except ValueError:
-        raise DataError(f"'{text}' is no date; write 2026-03-31 or 2026-03-31T14:05") from None
-    return at if at.tzinfo else at.replace(tzinfo=timezone.utc)

@@ -5,8 +5,12 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
-from . import add_database, date_of, opened
+from . import add_database, opened
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,21 +33,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Add them in the order given."""
     from weld_twin_core.errors import DataError
-    from weld_twin_nodes.history import entry_of
-    from weld_twin_nodes.history.verifications import Verified, add_verified, verified_of
+    from weld_twin_nodes.history.entry import entry_of, instant
+    from weld_twin_nodes.history.verifications import Verified, put_verified, verified_of
 
     if args.at and len(args.diagnoses) > 1:
         raise DataError('--at is the date of one diagnosis; add them one by one')
-    at = date_of(args.at) if args.at else None
-    # All are read before the first is written, so that a bad one leaves nothing half done.
+    at = instant(args.at) if args.at else None
+    # All are read before the first is written, and all are written or none.
     entries = [verified_of(path, at) or entry_of(path, at) for path in args.diagnoses]
-    with opened(args) as database:
-        for path, entry in zip(args.diagnoses, entries, strict=True):
-            if isinstance(entry, Verified):
-                new = add_verified(database, args.cell, entry)
-                what = 'promise kept' if entry.content['kept'] else 'promise not kept'
-            else:
-                new, what = database.add(args.cell, entry), entry.status
-            said = 'added' if new else 'was there already'
-            print(f'{args.cell}: {path}, {entry.at.date()}, {what}: {said}')
+
+    def written(connection: Connection) -> list[int | None]:
+        return [
+            put_verified(database, connection, args.cell, entry)
+            if isinstance(entry, Verified)
+            else database.put(connection, args.cell, entry)
+            for entry in entries
+        ]
+
+    with opened(args, make=True) as database:
+        made = database.write(written)
+    for path, entry, number in zip(args.diagnoses, entries, made, strict=True):
+        said = 'was there already' if number is None else 'added'
+        print(f'{args.cell}: {path}, {entry.at.date()}, {entry.status}: {said}')
     return 0

@@ -11,7 +11,7 @@ import argparse
 import json
 from collections.abc import Sequence
 
-from . import add_database, date_of, opened
+from . import add_database, opened
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
         sentence,
         since,
     )
+    from weld_twin_nodes.history.entry import instant
     from weld_twin_nodes.history.tracking import DAY, changed
     from weld_twin_nodes.report.quantities import counted
 
@@ -46,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     with opened(args) as database:
         entries = database.entries(args.cell)
     seen = observations(entries)
-    day = date_of(args.since).timestamp() / DAY if args.since else None
+    day = instant(args.since).timestamp() / DAY if args.since else None
     everything = changed(entries, seen)
     found = since(everything, day)
     ahead = [forecast(change, seen, everything, limits) for change in found]

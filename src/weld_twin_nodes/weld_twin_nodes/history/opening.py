@@ -1,0 +1,143 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A database opened as a history: recognised, made where it is empty, brought to this version.
+
+Reading makes nothing anywhere. What belongs to another application is refused, whatever was asked.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from weld_twin_core.errors import DataError
+
+from .migrations import STEPS
+from .schema import VERSION
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection, Engine, MetaData
+
+BUSY = 5.0
+"""Seconds in which SQLite waits for another program that writes; then it is asked once more."""
+LOCK = 7_246_198_015
+"""Number of the lock on PostgreSQL under which tables are made and changed; any other would do."""
+FIRST = ('about', 'cells', 'verdicts', 'runs', 'findings')
+"""Tables of the first version; a history of any version has them."""
+WRITES = 'weld_twin_writes'
+"""Option of a connection that takes SQLite's lock at its beginning, not in its middle."""
+
+
+def engine_of(address: Any) -> Engine:
+    """Return the engine of an address; on SQLite, a transaction holds from its first word on."""
+    import sqlalchemy
+
+    lite = address.get_backend_name() == 'sqlite'
+    made = sqlalchemy.create_engine(
+        address, connect_args={'timeout': BUSY} if lite else {}, pool_pre_ping=not lite
+    )
+    if lite:
+        # Python's driver begins late and ends at a CREATE; both would let others in between.
+        @sqlalchemy.event.listens_for(made, 'connect')
+        def _plain(connection: Any, _: Any) -> None:
+            connection.isolation_level = None
+
+        @sqlalchemy.event.listens_for(made, 'begin')
+        def _begin(connection: Connection) -> None:
+            writes = connection.get_execution_options().get(WRITES)
+            connection.exec_driver_sql('BEGIN IMMEDIATE' if writes else 'BEGIN')
+
+    return made
+
+
+def refuse_missing(address: Any, shown: str) -> None:
+    """
+    Refuse to read an SQLite file that is not there, which opening would make.
+
+    Raises
+    ------
+    DataError
+        There is no such file.
+
+    """
+    if address.get_backend_name() == 'sqlite' and not Path(address.database or '').exists():
+        raise DataError(_nothing_yet(shown))
+
+
+def version_of(connection: Connection, shown: str, *, make: bool) -> int:
+    """
+    Return the version of a history; 0 where an empty database may become one.
+
+    Parameters
+    ----------
+    connection : Connection
+    shown : str
+        The database, as people may read it.
+    make : bool
+        Whether an empty database may become a history.
+
+    Raises
+    ------
+    DataError
+        It is empty and nothing may be made, it is of a newer version, or of another application.
+
+    """
+    import sqlalchemy
+
+    there = set(sqlalchemy.inspect(connection).get_table_names())
+    if not there:
+        if not make:
+            raise DataError(_nothing_yet(shown))
+        return 0
+    columns = sqlalchemy.inspect(connection).get_columns('about') if 'about' in there else []
+    if not there.issuperset(FIRST) or [column['name'] for column in columns] != ['version']:
+        others = ', '.join(sorted(there)[:3])
+        raise DataError(
+            f"'{shown}' is no history but belongs to another application (it has tables such as "
+            f'{others}); give the history a database of its own with --db'
+        )
+    row = connection.execute(sqlalchemy.text('SELECT version FROM about')).first()
+    if row is None or not 0 < int(row[0]) <= VERSION:
+        found = 'no version' if row is None else f'version {row[0]}'
+        raise DataError(
+            f"'{shown}' is a history of {found}, and this program knows versions up to {VERSION}; "
+            'install a newer weld-twin'
+        )
+    return int(row[0])
+
+
+def bring_up(connection: Connection, tables: MetaData, version: int) -> None:
+    """
+    Make the tables, or bring those of an older version to this one.
+
+    Parameters
+    ----------
+    connection : Connection
+        In a transaction that writes.
+    tables : MetaData
+    version : int
+        What `version_of` told.
+
+    """
+    import sqlalchemy
+
+    tables.create_all(connection)  # those that are not there yet
+    for step in STEPS[version - 1 :] if version else ():
+        step(connection)
+    about = tables.tables['about']
+    connection.execute(sqlalchemy.delete(about))
+    connection.execute(sqlalchemy.insert(about).values(version=VERSION))
+
+
+def alone(connection: Connection) -> None:
+    """Wait until nobody else makes or changes tables; SQLite's transaction does that already."""
+    if connection.dialect.name == 'postgresql':
+        connection.exec_driver_sql(f'SELECT pg_advisory_xact_lock({LOCK})')
+
+
+def _nothing_yet(shown: str) -> str:
+    return (
+        f"there is no history in '{shown}' yet; its first diagnosis makes one: "
+        'weld-twin history add DIAGNOSIS --cell NAME --db URL'
+    )

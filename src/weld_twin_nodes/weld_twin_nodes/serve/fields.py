@@ -1,0 +1,297 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The fields of the forms: each is an option of a command, under a title that somebody understands.
+
+One table says what a field is called, what it may hold, and which commands take it. The commands do
+the work; what they say of an option is told as the field's title.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.programs.languages import LANGUAGES
+
+from ..report.controllers import BRANDS
+
+IMPORT, DIAGNOSE, CORRECT = 'import', 'diagnose', 'correct-program'
+LONGEST = 2000
+"""Characters of a field."""
+Choices = tuple[tuple[str, str], ...]
+
+
+class Field(NamedTuple):
+    """
+    One field.
+
+    Attributes
+    ----------
+    title, hint : str
+    commands : tuple of str
+        Those that take it.
+    check : callable, optional
+        Returns what the command is given, or raises a ValueError; not needed for choices.
+    choices : tuple of pairs
+        Value and text; empty where anything may be written.
+    option : str
+        Of the commands; empty where it is called as the field.
+    lines : bool
+        Whether every line is given by itself.
+
+    """
+
+    title: str
+    hint: str
+    commands: tuple[str, ...]
+    check: Callable[[str], str] | None = None
+    choices: Choices = ()
+    option: str = ''
+    lines: bool = False
+
+
+def _millimetres(text: str) -> str:
+    value = float(text.replace(',', '.').removesuffix('mm'))
+    if not 0.0 < value < 1000.0:
+        raise ValueError
+    return f'{value:g}'
+
+
+def _degrees(text: str) -> str:
+    value = float(text.replace(',', '.').removesuffix('deg'))
+    if not 0.0 < value < 360.0:
+        raise ValueError
+    return f'{value:g}'
+
+
+def _celsius(text: str) -> str:
+    value = float(text.replace(',', '.'))
+    if not -100.0 < value < 200.0:
+        raise ValueError
+    return f'{value:g}'
+
+
+def _signs(text: str) -> str:
+    parts = re.split(r'[,;\s]+', text)
+    if not all(re.fullmatch(r'[+-]?1?', part) and part for part in parts):
+        raise ValueError
+    return ','.join('-1' if part.startswith('-') else '1' for part in parts)
+
+
+def _numbers(text: str) -> str:
+    return ','.join(f'{float(part):g}' for part in re.split(r'[,;\s]+', text))
+
+
+def _coupled(text: str) -> str:
+    if not re.fullmatch(r'\d+[+-]\d+', text):
+        raise ValueError
+    return text
+
+
+def _name(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError
+    return text
+
+
+def _frames(text: str) -> str:
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    if not all(line.isprintable() and '=' in line for line in lines):
+        raise ValueError
+    return '\n'.join(lines)
+
+
+_AS_TABLE = ('', 'as the table says')
+FIELDS: dict[str, Field] = {
+    'align': Field(
+        'What is not known?',
+        '',
+        (DIAGNOSE,),
+        choices=(
+            ('', 'nothing: base and tool are known'),
+            ('base', 'where the instrument stood (base)'),
+            ('tool', 'where the reflector sits (tool)'),
+            ('base,tool', 'neither of the two (base and tool)'),
+        ),
+    ),
+    'tolerance': Field(
+        'Tolerance', 'largest deviation allowed, in mm, such as 0.5', (DIAGNOSE,), _millimetres
+    ),
+    'uncertainty': Field(
+        'Uncertainty of the instrument',
+        'standard uncertainty in mm, from its certificate',
+        (DIAGNOSE,),
+        _millimetres,
+    ),
+    'controller': Field(
+        'Controller',
+        '',
+        (DIAGNOSE,),
+        choices=(('', 'as the name of the robot tells'), *BRANDS.items()),
+    ),
+    'length_unit': Field(
+        'Lengths of a table', '', (IMPORT,), choices=(_AS_TABLE, ('mm', 'mm'), ('m', 'm'))
+    ),
+    'angle_unit': Field(
+        'Angles of a table',
+        '',
+        (IMPORT,),
+        choices=(_AS_TABLE, ('deg', 'degrees'), ('rad', 'radians')),
+    ),
+    'joint_signs': Field(
+        'Signs of the joints of a table',
+        'such as 1,-1,-1,1,-1,1, where the controller counts the other way',
+        (IMPORT,),
+        _signs,
+    ),
+    'joint_offsets': Field(
+        'Offsets of the joints of a table',
+        'added to each, in degrees, such as 0,-90,90,0,0,0',
+        (IMPORT,),
+        _numbers,
+    ),
+    'coupled': Field(
+        'Coupled joints of a table',
+        '3+2 where joint 3 counts from the ground',
+        (IMPORT,),
+        _coupled,
+    ),
+    'base_link': Field(
+        'First link', "of the arm's chain in a URDF", (IMPORT, DIAGNOSE, CORRECT), _name
+    ),
+    'tip_link': Field('Last link', 'of it', (IMPORT, DIAGNOSE, CORRECT), _name),
+    'language': Field(
+        'Language of the program',
+        '',
+        (CORRECT,),
+        choices=(
+            ('', 'as the file tells'),
+            *((name, f'{one.maker} ({name})') for name, one in LANGUAGES.items()),
+        ),
+        option='controller',
+    ),
+    'tool': Field(
+        'Tools that the program only names',
+        'one a line: NAME=X,Y,Z,... as the controller shows them',
+        (CORRECT,),
+        _frames,
+        lines=True,
+    ),
+    'base': Field(
+        'Bases that the program only names', 'the same', (CORRECT,), _frames, lines=True
+    ),
+    'start': Field(
+        'Joints before the first move', 'in degrees, such as 0,-90,90,0,90,0', (CORRECT,), _numbers
+    ),
+    'temperature': Field(
+        'Temperature of the arm', 'in degrees Celsius, when the program runs', (CORRECT,), _celsius
+    ),
+    'pulses_per_degree': Field(
+        'Pulses per degree', 'of every axis of a Yaskawa arm', (CORRECT,), _numbers
+    ),
+    'max_length': Field(
+        'Farthest that a point may be moved', 'in mm; empty: 2 mm', (CORRECT,), _millimetres
+    ),
+    'max_angle': Field(
+        'Most that a point may be turned', 'in degrees; empty: 1 degree', (CORRECT,), _degrees
+    ),
+}
+"""In the order in which they are shown."""
+LARGEST = {'max_length': ('2', 'mm'), 'max_angle': ('1', 'deg')}
+"""The two fields that are one option, `--max-correction`, and what they are unless told."""
+ELSEWHERE = {
+    'robot': 'Robot',
+    'out': 'the place of results',
+    'at': 'Recorded',
+    'cell': 'Cell',
+    'apply': 'Correct it and go on',
+    'model': 'Diagnosis',
+    'max-correction': f'{FIELDS["max_length"].title} / {FIELDS["max_angle"].title}',
+}
+"""Options that are fields of another kind, or buttons, and how they are called here."""
+COLUMNS = 'the first line of the table'
+"""What stands in the place of options that name columns."""
+
+
+def given(form: Mapping[str, str], commands: Iterable[str]) -> dict[str, str]:
+    """
+    Return the fields of a form that some commands take, checked.
+
+    Parameters
+    ----------
+    form : mapping
+    commands : iterable of str
+
+    Raises
+    ------
+    DataError
+        A field holds what it cannot.
+
+    """
+    wanted, out = set(commands), {}
+    for name, field in FIELDS.items():
+        text = form.get(name, '').strip()
+        if not text or not wanted.intersection(field.commands):
+            continue
+        try:
+            if len(text) > LONGEST:
+                raise ValueError
+            out[name] = _chosen(field, text) if field.check is None else field.check(text)
+        except ValueError:
+            hint = f'; it is {field.hint}' if field.hint else ''
+            raise DataError(f'“{field.title}” cannot be {text[:60]!r}{hint}') from None
+    return out
+
+
+def _chosen(field: Field, text: str) -> str:
+    if text not in dict(field.choices):
+        raise ValueError
+    return text
+
+
+def words(told: Mapping[str, str], command: str) -> list[str]:
+    """Return the words of a command for the fields that it takes."""
+    out = []
+    for name, field in FIELDS.items():
+        if name in told and command in field.commands and name not in LARGEST:
+            option = (field.option or name).replace('_', '-')
+            values = told[name].splitlines() if field.lines else [told[name]]
+            out += [f'--{option}={value}' for value in values]
+    if command == CORRECT and told.keys() & LARGEST.keys():
+        sizes = [told.get(name, size) + unit for name, (size, unit) in LARGEST.items()]
+        out += ['--max-correction', *sizes]
+    return out
+
+
+def sentence(text: str, command: str = '') -> str:
+    """
+    Return what a command says as somebody without a command line reads it.
+
+    Parameters
+    ----------
+    text : str
+    command : str
+        The one that says it, where two fields are called alike; empty for those of a recording.
+
+    """
+    titles = {
+        (field.option or name).replace('_', '-'): field.title
+        for name, field in FIELDS.items()
+        if (CORRECT in field.commands if command == CORRECT else field.commands != (CORRECT,))
+    }
+    titles = {**titles, **ELSEWHERE}
+
+    def title(found: re.Match[str]) -> str:
+        name = found[1]
+        if name.endswith(('-columns', '-column')):
+            return COLUMNS
+        return f'“{titles[name]}”' if name in titles else 'a setting of the command line'
+
+    # What is quoted is a whole command line; it can only be typed where the server is.
+    text = re.sub(r"'weld-twin ([a-z-]+)[^']*'", r'the command “\1” where the server runs', text)
+    text = re.sub(r'\bweld-twin ([a-z-]+)', r'“\1”', text)
+    text = re.sub(r'(?<![\w-])--([a-z]+(?:-[a-z]+)*)', title, text)
+    return text[:1].upper() + text[1:]

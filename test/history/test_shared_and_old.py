@@ -1,0 +1,299 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A history that many write to, that an older version made, that is damaged, or is none."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import shutil
+import sqlite3
+import threading
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from weld_twin_core.errors import DataError
+from weld_twin_lab.fleet.made_history import fill, made
+from weld_twin_lab.fleet.postgres import NoServer, place_of, postgres, start, stop
+from weld_twin_nodes.cli.in_process import weld_twin
+from weld_twin_nodes.history import Database, Unavailable
+
+pytest.importorskip('sqlalchemy', reason='the history is an extra')
+
+BAG = Path(__file__).parents[2] / 'bags/elbow_play'
+WRITERS = 6
+
+
+@pytest.fixture(scope='module')
+def postgresql():
+    pytest.importorskip('psycopg', reason='PostgreSQL needs its driver')
+    try:
+        with postgres() as url:
+            yield url
+    except NoServer as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(params=['sqlite', 'postgresql'])
+def url(request, tmp_path):
+    if request.param == 'sqlite':
+        return str(tmp_path / 'history.db')
+    return request.getfixturevalue('postgresql')
+
+
+@pytest.fixture(scope='module')
+def diagnosed(tmp_path_factory):
+    out = tmp_path_factory.mktemp('shared') / 'found'
+    assert weld_twin('diagnose', BAG, '--robot', 'ur5', '--out', out).code == 0
+    return out
+
+
+def copies(diagnosed, place, count):
+    """Return the diagnosis as that of other recordings."""
+    out = []
+    for k in range(count):
+        data = json.loads((diagnosed / 'diagnosis.json').read_text())
+        data['inputs'][0]['sha256'] = f'{k:064d}'
+        file = place / f'diagnosis{k}.json'
+        file.write_text(json.dumps(data))
+        out.append(file)
+    return out
+
+
+def at_once(work, count):
+    """Run a function of a number in processes of their own that begin together; return what they say."""
+    context = multiprocessing.get_context('fork')
+    barrier, answers = context.Barrier(count), context.Queue()
+
+    def one(k):
+        barrier.wait()
+        answers.put((k, work(k)))
+
+    processes = [context.Process(target=one, args=(k,)) for k in range(count)]
+    for process in processes:
+        process.start()
+    out = dict(answers.get(timeout=60) for _ in processes)
+    for process in processes:
+        process.join()
+    return [out[k] for k in range(count)]
+
+
+def tables(file):
+    with sqlite3.connect(file) as connection:
+        return [row[0] for row in connection.execute('select name from sqlite_master order by 1')]
+
+
+def test_all_who_add_at_once_to_a_database_that_is_new_are_heard(url, diagnosed, tmp_path):
+    files = copies(diagnosed, tmp_path, WRITERS)
+
+    def add(k):
+        words = ['--cell', 'line 1', '--at', f'2026-03-{k + 1:02d}', '--db', url]
+        return tuple(weld_twin('history', 'add', files[k], *words))
+
+    said = at_once(add, WRITERS)
+    assert [code for code, _, _ in said] == [0] * WRITERS, said
+    database = Database(url, make=False)
+    assert [entry.at.day for entry in database.entries('line 1')] == list(range(1, WRITERS + 1))
+    database.close()
+    # The same recording once more, by all of them: it is there once.
+    said = at_once(lambda k: weld_twin(*_add(files[0], url)).out, WRITERS)
+    assert all('was there already' in out for out in said)
+
+
+def _add(file, url):
+    return 'history', 'add', file, '--cell', 'line 1', '--at', '2026-04-01', '--db', url
+
+
+def test_of_two_robots_that_come_to_a_new_cell_at_once_one_stays(url):
+    first, second = (list(made(k, 1)) for k in (1, 2))
+    other = replace(second[0], robot='ur10', kinematics='other', at=datetime.now(timezone.utc))
+
+    def add(k):
+        database = Database(url)
+        try:
+            return database.add('line 2', (first[0], other)[k])
+        except DataError as error:
+            return str(error)
+        finally:
+            database.close()
+
+    said = at_once(add, 2)
+    assert sorted(isinstance(each, str) for each in said) == [False, True]
+    assert any('with other kinematics' in str(each) for each in said)
+
+
+@contextmanager
+def locked(file, seconds):
+    """Hold an SQLite file for a while, as another program that writes does."""
+    connection = sqlite3.connect(file, check_same_thread=False, isolation_level=None)
+    connection.execute('BEGIN EXCLUSIVE')
+    free = threading.Timer(seconds, connection.execute, ('ROLLBACK',))
+    free.start()
+    yield
+    free.join()
+    connection.close()
+
+
+@pytest.fixture
+def listed(tmp_path):
+    file = tmp_path / 'list.csv'
+    file.write_text(f'cell,recording,robot,at\nline 1,{BAG},ur5,2026-03-02\n')
+    Database(str(tmp_path / 'fleet.db')).close()
+    return file, tmp_path / 'fleet.db'
+
+
+def states(db):
+    with sqlite3.connect(db) as connection:
+        return [row[0] for row in connection.execute('select state from runs')]
+
+
+def test_a_lock_that_passes_costs_a_fleet_nothing_and_one_that_stays_is_no_refusal(
+    listed, monkeypatch
+):
+    file, db = listed
+    monkeypatch.setattr('weld_twin_nodes.history.opening.BUSY', 0.1)
+    words = ('fleet', 'run', file, '--db', db, '--workers', '1')
+    real = Database.write
+
+    def held(self, work, **how):
+        """Lock the database while the recording is diagnosed, for as long as is asked."""
+        if how.get('connecting'):
+            return real(self, work, **how)
+        with locked(db, hold):
+            return real(self, work, **how)
+
+    monkeypatch.setattr(Database, 'write', held)
+    monkeypatch.setattr('weld_twin_nodes.history.database.PATIENCE', 0.3)
+    hold = 1.0
+    said = weld_twin(*words)
+    assert (said.code, said.out) == (1, f'{file}: 1 failed\n')
+    assert 'not written; run it again' in said.err and 'locked' in said.err
+    assert states(db) == []
+    monkeypatch.setattr('weld_twin_nodes.history.database.PATIENCE', 20.0)
+    said = weld_twin(*words, '--again')
+    assert (said.code, said.out) == (0, f'{file}: 1 done\n')
+    assert states(db) == ['done']
+
+
+def test_a_server_that_restarts_loses_nothing(postgresql):
+    database = Database(postgresql)
+    one, other = list(made(3, 2))
+    assert database.add('line 3', one)
+    place = place_of(postgresql)
+    stop(place, 'fast')
+    back = threading.Timer(1.0, start, (place,))
+    back.start()
+    try:
+        hasty = replace(other, at=other.at + timedelta(days=1))
+        with pytest.raises(Unavailable, match='cannot be used'):
+            database.write(lambda c: database.put(c, 'line 3', hasty), patience=0.0)
+        assert database.add('line 3', other)
+    finally:
+        back.join()
+    assert len(database.entries('line 3')) == 2
+    database.close()
+
+
+def test_a_history_of_the_first_version_opens_and_its_lock_can_run_again(tmp_path):
+    db = tmp_path / 'old.db'
+    with sqlite3.connect(db) as connection:
+        connection.executescript((Path(__file__).parent / 'version_1.sql').read_text())
+    said = weld_twin('history', 'changed', '--cell', 'line 3', '--db', db, '--json')
+    assert said.code == 0, said.err
+    (change,) = json.loads(said.out)['changes']
+    assert (change['coordinate'], change['date']) == ('joint_offset elbow_joint 0', '2026-03-30')
+    with sqlite3.connect(db) as connection:
+        rows = dict(connection.execute('select key, state from runs'))
+        assert rows == {'k1': 'done', 'k2': 'failed', 'k3': 'refused'}
+        assert connection.execute('select count(*) from verdicts').fetchone() == (9,)
+        connection.execute('update about set version = 99')
+    said = weld_twin('history', 'show', '--db', db)
+    assert said.code == 2 and 'version 99' in said.err and 'install a newer' in said.err
+
+
+def test_reading_makes_nothing_and_another_application_is_left_alone(tmp_path):
+    for job in (('history', 'show'), ('history', 'changed', '--cell', 'a')):
+        said = weld_twin(*job, '--db', tmp_path / 'none.db')
+        assert said.code == 2 and 'there is no history' in said.err
+    assert list(tmp_path.iterdir()) == []
+    db = tmp_path / 'shop.db'
+    with sqlite3.connect(db) as connection:
+        connection.execute('create table runs (id integer, distance real)')
+        connection.execute('create table about (author text)')
+    before = db.read_bytes()
+    (tmp_path / 'list.csv').write_text(f'cell,recording,robot\na,{BAG},ur5\n')
+    for job in (
+        ('history', 'show'),
+        ('fleet', 'run', tmp_path / 'list.csv'),
+        ('fleet', 'page', '--out', tmp_path / 'pages'),
+    ):
+        said = weld_twin(*job, '--db', db)
+        assert said.code == 2 and 'belongs to another application' in said.err
+    assert db.read_bytes() == before and not (tmp_path / 'pages').exists()
+
+
+def test_a_damaged_row_ends_one_cell_and_not_the_page_of_all(tmp_path):
+    db = tmp_path / 'fleet.db'
+    database = Database(str(db))
+    fill(database, 3, 4)
+    database.close()
+    with sqlite3.connect(db) as connection:
+        connection.execute("update verdicts set covariance = x'00' where cell_id = 1 and id = 2")
+        connection.execute("update verdicts set effects = '[{' where cell_id = 3")
+    said = weld_twin('fleet', 'page', '--db', db, '--out', tmp_path / 'pages')
+    assert said.code == 0, said.err
+    index = (tmp_path / 'pages/index.html').read_text()
+    assert 'line 002' in index and 'line 001' in index
+    assert 'Cells that cannot be read' in index and 'line 003' in index
+    pages = [file.read_text() for file in (tmp_path / 'pages').glob('cell_*.html')]
+    assert len(pages) == 3
+    assert sum('This cell cannot be read' in page for page in pages) == 2
+    said = weld_twin('history', 'show', '--cell', 'line 001', '--db', db)
+    assert said.code == 2 and "of cell 'line 001'" in said.err and 'damaged' in said.err
+    assert weld_twin('history', 'show', '--cell', 'line 002', '--db', db).code == 0
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'said'),
+    [
+        (lambda row, k: row.__setitem__(k, -abs(row[k])), 'variances below zero'),
+        (lambda row, k: row.__setitem__(0, 1e3), 'a variance below zero'),
+        (lambda row, k: row.__setitem__(k, 1e999), 'not finite'),
+    ],
+)
+def test_an_impossible_covariance_is_refused_at_the_door(diagnosed, tmp_path, spoil, said):
+    out = tmp_path / 'spoilt'
+    shutil.copytree(diagnosed, out)
+    data = json.loads((out / 'diagnosis.json').read_text())
+    named = [each['name'] for each in data['posterior']['coordinates']]
+    place = named.index('backlash elbow_joint 0')
+    spoil(data['posterior']['covariance'][place], place)
+    (out / 'diagnosis.json').write_text(json.dumps(data))
+    db = tmp_path / 'history.db'
+    told = weld_twin('history', 'add', out, '--cell', 'a', '--at', '2026-03-02', '--db', db)
+    assert told.code == 2 and 'cannot be right' in told.err and said in told.err
+    assert not db.exists()
+    whole = weld_twin('history', 'add', diagnosed, '--cell', 'a', '--at', '2026-03-02', '--db', db)
+    assert whole.code == 0, whole.err
+
+
+def test_what_is_written_waits_for_a_slow_writer_and_readers_for_nobody(tmp_path):
+    """A reader sees the last state while somebody writes for seconds."""
+    db = tmp_path / 'history.db'
+    database = Database(str(db))
+    fill(database, 1, 3)
+    connection = sqlite3.connect(db, isolation_level=None)
+    connection.execute('BEGIN IMMEDIATE')
+    connection.execute("insert into cells (name, robot, kinematics) values ('b', 'c', 'd')")
+    began = time.monotonic()
+    assert np.size(database.entries('line 001')[0].value) > 0
+    assert time.monotonic() - began < 2.0
+    connection.execute('ROLLBACK')
+    connection.close()
+    database.close()

@@ -1,0 +1,75 @@
+-- A history as version 1 of the schema wrote it: two cells, three runs, one of which met a lock.
+BEGIN TRANSACTION;
+CREATE TABLE about (
+	version INTEGER NOT NULL, 
+	PRIMARY KEY (version)
+);
+INSERT INTO "about" VALUES(1);
+CREATE TABLE cells (
+	id INTEGER NOT NULL, 
+	name VARCHAR(200) NOT NULL, 
+	robot VARCHAR(200) NOT NULL, 
+	kinematics VARCHAR(64) NOT NULL, 
+	PRIMARY KEY (id), 
+	UNIQUE (name)
+);
+INSERT INTO "cells" VALUES(1,'line 3','ur5','abc');
+INSERT INTO "cells" VALUES(2,'line 4','ur5','abc');
+CREATE TABLE findings (
+	cell_id INTEGER NOT NULL, 
+	newest INTEGER NOT NULL, 
+	diagnoses INTEGER NOT NULL, 
+	changes JSON NOT NULL, 
+	PRIMARY KEY (cell_id), 
+	FOREIGN KEY(cell_id) REFERENCES cells (id)
+);
+INSERT INTO "findings" VALUES(1,8,8,'[{"effect": "joint_offset", "joint": "elbow_joint", "coordinate": "joint_offset elbow_joint 0", "kind": "step", "date": "2026-03-30", "between": ["2026-03-23", "2026-03-30"], "slowly_since": "2026-03-02", "size": 9.510389189970702e-05, "std": 2.5489492376199674e-05, "nats": 6.960560469377057, "alike": [], "sentence": "zero offset of elbow_joint: changed by 0.095 \u00b1 0.025 mrad, at once between 2026-03-23 and 2026-03-30 or slowly since 2026-03-02."}]');
+CREATE TABLE runs (
+	id INTEGER NOT NULL, 
+	"key" VARCHAR(64) NOT NULL, 
+	cell VARCHAR(200) NOT NULL, 
+	recording TEXT NOT NULL, 
+	state VARCHAR(40) NOT NULL, 
+	sentence TEXT NOT NULL, 
+	verdict_id INTEGER, 
+	seconds FLOAT NOT NULL, 
+	memory BIGINT NOT NULL, 
+	PRIMARY KEY (id), 
+	UNIQUE ("key"), 
+	FOREIGN KEY(verdict_id) REFERENCES verdicts (id)
+);
+INSERT INTO "runs" VALUES(1,'k1','line 4','/data/a','done','identified',9,3.0,100000000);
+INSERT INTO "runs" VALUES(2,'k2','line 4','/data/b','refused','the history ''sqlite:////data/fleet.db'' cannot be used: database is locked',NULL,3.0,100);
+INSERT INTO "runs" VALUES(3,'k3','line 5','/data/c','refused','''noise.mcap'' is damaged',NULL,3.0,100);
+CREATE TABLE verdicts (
+	id INTEGER NOT NULL, 
+	cell_id INTEGER NOT NULL, 
+	at DATETIME NOT NULL, 
+	recording TEXT NOT NULL, 
+	status VARCHAR(40) NOT NULL, 
+	confidence FLOAT, 
+	gap_m FLOAT, 
+	floor_m FLOAT, 
+	unexplained_m FLOAT, 
+	effects JSON NOT NULL, 
+	names JSON NOT NULL, 
+	value BLOB NOT NULL, 
+	prior_std BLOB NOT NULL, 
+	covariance BLOB NOT NULL, 
+	tool BLOB NOT NULL, 
+	PRIMARY KEY (id), 
+	UNIQUE (cell_id, at), 
+	FOREIGN KEY(cell_id) REFERENCES cells (id)
+);
+INSERT INTO "verdicts" VALUES(1,1,'2026-03-02 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000000','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789C7BB2E8E6879EB4AF762B3E346F14CCB6B507005B230939',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+INSERT INTO "verdicts" VALUES(2,1,'2026-03-09 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000001','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789C7BB6EB4EB46FE745BB29DCD27E3CCC0EF60045E10653',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+INSERT INTO "verdicts" VALUES(3,1,'2026-03-16 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000002','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789CFB2D9FFCCCE3CFA57D958282FF15ED1CEC014B5C07B0',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+INSERT INTO "verdicts" VALUES(4,1,'2026-03-23 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000003','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789C93307BF9345AEFEBBEF95BAAD353AC1DEC01456007AC',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+INSERT INTO "verdicts" VALUES(5,1,'2026-03-30 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000004','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789C93AD9B51E8F049DCDED98675E2F97E277B00342D0621',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+INSERT INTO "verdicts" VALUES(6,1,'2026-04-06 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000005','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789CB3724A389C714ECA7E665674918ABA833D00357805C9',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+INSERT INTO "verdicts" VALUES(7,1,'2026-04-13 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000006','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789C930A5B282D572569AF239CF8BCE889BD3D00289D0578',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+INSERT INTO "verdicts" VALUES(8,1,'2026-04-20 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000007','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789C3B6D289D7FB248DCFE37E3219EBD0A0EF60038E5063E',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+INSERT INTO "verdicts" VALUES(9,2,'2026-03-02 08:00:00.000000','0000000000000000000000000000000000000000000000000000000000000000','identified',0.9,0.0001,NULL,2.0e-05,'[{"effect": "backlash", "joint": "elbow_joint", "parameters": {"width": 0.0005}, "std": {"width": 1e-06}}]','["joint_offset elbow_joint 0", "backlash elbow_joint 0"]',X'789C6358DF9C7AD3EC8A5DB39C2F9B8795833D0036F305AE',X'789CFBB3F2E325DFA400FB3F501A005830094D',X'789CDBB3F7FACDFB35B76D19D0C01EB0F86F5B00BD6A0B59',X'789C636000810FF60C4401EAAB0300251B04BD');
+CREATE INDEX verdicts_of_a_cell ON verdicts (cell_id, at);
+CREATE INDEX ix_runs_cell ON runs (cell);
+COMMIT;

@@ -1,0 +1,216 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The server under people who mean it ill, on a disk that fills up, with files that are not its own."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from served import Person, Server, drop, fill, small_disk
+
+from weld_twin_nodes.cli.main import _parser
+from weld_twin_nodes.serve.access import _without_token
+from weld_twin_nodes.serve.fields import CORRECT, sentence
+
+for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
+    pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
+
+TABLE = b'J1,J2,J3,J4,J5,J6,X,Y,Z\n' + b'0,-90,90,0,90,0,500,0,600\n' * 30
+"""Thirty times the same station: read, and refused."""
+HEAD = b'POST /recordings HTTP/1.1\r\nHost: localhost\r\nContent-Length: 900000\r\n'
+HEAD += b'Content-Type: multipart/form-data; boundary=edge\r\n\r\n--edge\r\n'
+
+
+@pytest.fixture(scope='module')
+def server(tmp_path_factory):
+    made = Server(tmp_path_factory.mktemp('served'))
+    yield made
+    made.kill()
+
+
+def connections(server, count, said=b''):
+    """Return connections that say so much and no more."""
+    port = int(server.root.rpartition(':')[2])
+    out = []
+    for _ in range(count):
+        out.append(socket.create_connection(('localhost', port)))
+        if said:
+            out[-1].sendall(said)
+    return out
+
+
+def is_closed(connection):
+    connection.setblocking(False)
+    try:
+        return connection.recv(100).startswith((b'', b'HTTP/1.1 408'))
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+def test_who_says_nothing_or_half_or_stalls_keeps_nobody_out(server):
+    held = connections(server, 130)
+    held += connections(server, 130, b'GET / HTTP/1.1\r\nHost: localhost\r\nX-Slow: ')
+    stalled = connections(server, 24, HEAD)
+    began = time.monotonic()
+    assert server.get('/')[0] == 200
+    assert time.monotonic() - began < 2.0
+    person = Person(server)
+    person.get()
+    status, address, _ = person.drop(files=[('a.csv', TABLE)])
+    assert status == 200 and address.startswith('/recordings/')
+    assert time.monotonic() - began < 10.0
+    assert person.get(address)[0] == 200
+    # Those who say nothing are closed after ten seconds, whoever else comes.
+    until = time.monotonic() + 15.0
+    left = held
+    while left and time.monotonic() < until:
+        time.sleep(0.2)
+        left = [each for each in left if not is_closed(each)]
+    assert left == []
+    for each in (*held, *stalled):
+        each.close()
+
+
+def test_many_uploads_of_nobody_leave_room_for_a_user(server):
+    """Who comes without a key is one user, however often he comes."""
+    returning = Person(server)
+    returning.get()
+    with ThreadPoolExecutor(8) as pool:
+        codes = list(pool.map(lambda k: drop(server, files=[('a.csv', TABLE)])[0], range(60)))
+    refused = sum(code == 422 for code in codes)
+    assert refused > 0  # else they were done as fast as they came, and the test shows nothing
+    status, address, _ = returning.drop(files=[('b.csv', TABLE)])
+    assert status == 200 and address.startswith('/recordings/')
+    returning.end_of(address)
+
+
+@pytest.mark.parametrize('name', ['Müller.csv', 'Messung (1).csv', '測定 #2 & co.csv'])
+def test_names_as_people_give_them_are_taken_and_no_place_of_the_server_is_told(server, name):
+    person = Person(server)
+    person.get()
+    _, address, _ = person.drop(files=[(name, TABLE)])
+    text = person.end_of(address)
+    assert 'It could not be diagnosed' in text
+    assert '/tmp' not in text and 'jobs' not in text and '--' not in text.split('</style>')[1]
+
+
+@pytest.mark.parametrize(
+    'name', ['.csv', '-o.csv', 'a\u202egnp.csv', 'a\nb.csv', f'{"x" * 250}.csv']
+)
+def test_names_that_hide_something_are_not(server, name):
+    assert drop(server, files=[(name, TABLE)])[0] in (400, 422)
+
+
+def test_a_key_lasts_a_year_and_leads_to_ones_own_from_elsewhere(server):
+    first, second = Person(server), Person(server)
+    first.get()
+    (cookie,) = first.jar
+    assert 360 * 86_400 < cookie.expires - time.time() < 370 * 86_400
+    _, address, _ = first.drop(files=[('a.csv', TABLE)])
+    first.end_of(address)
+    second.get()
+    assert second.get(address)[0] == 404
+    assert second.drop('/me', key='0' * 64, files=())[0] == 422
+    assert second.drop('/me', key=f' {cookie.value} ', files=())[1] == '/recordings'
+    assert second.get(address)[0] == 200
+    # Nobody makes up a key: another one than those given out is none.
+    made_up = Person(server)
+    made_up.jar.set_cookie(cookie)
+    next(iter(made_up.jar)).value = cookie.value[:-1] + ('0' if cookie.value[-1] != '0' else '1')
+    made_up.get()
+    assert next(iter(made_up.jar)).value[:8] != cookie.value[:8] or made_up.get(address)[0] == 404
+
+
+def test_a_token_does_not_stay_in_the_address_and_a_wrong_one_harms_nobody(tmp_path):
+    made = Server(tmp_path, '--host', '127.0.0.2')
+    try:
+        person = Person(made)
+        assert person.get('/recordings?token=wrong')[0] == 401
+        token = made.address.partition('token=')[2]
+        assert person.get(f'/recordings?token={token}&x=1')[:2] == (200, '/recordings?x=1')
+        assert person.get('/recordings?token=wrong')[:2] == (200, '/recordings')
+        assert person.get('/')[0] == 200
+        assert _without_token('//evil.example/', f'token={token}') == '/evil.example/'
+    finally:
+        made.kill()
+
+
+def test_a_full_disk_and_damaged_jobs_cost_nothing_that_was_there(tmp_path):
+    with small_disk(tmp_path / 'disk', 24) as why:
+        if why:
+            pytest.skip(f'a small disk cannot be mounted here: {why}')
+        made = Server(tmp_path / 'disk')
+        try:
+            person = Person(made)
+            person.get()
+            _, kept, _ = person.drop(files=[('a.csv', TABLE)])
+            person.end_of(kept)
+            ballast = fill(tmp_path / 'disk')
+            for files in ([('b.csv', TABLE)], [('b.mcap', bytes(4_000_000))]):
+                status, _, text = person.drop(files=files)
+                assert (status, 'disk of the server is full' in text) == (507, True)
+            assert 'It could not be diagnosed' in person.get(kept)[2]
+            # What is asked for while nothing can be written is done all the same.
+            assert person.drop(f'{kept}/again', files=())[0] == 200
+            assert 'alert' in person.end_of(kept)
+            ballast.unlink()
+            _, later, _ = person.drop(files=[('c.csv', TABLE)])
+            assert 'It could not be diagnosed' in person.end_of(later)
+            assert not list((tmp_path / 'disk/scratch').iterdir())
+            made.kill()
+            bad = spoilt_jobs(tmp_path / 'disk/jobs', kept)
+            made.start()
+            person.root = made.root
+            assert 'alert' in person.get(kept)[2] and 'alert' in person.get(later)[2]
+            said = made.log.read_text()
+            for file, text in bad.items():
+                assert file.read_text() == text and f"'{file}' cannot be read" in said
+        finally:
+            made.kill()
+
+
+def spoilt_jobs(jobs, address):
+    """Write jobs that are damaged, or newer than this server; return their texts."""
+    told = json.loads((jobs / address.rpartition('/')[2] / 'job.json').read_text())
+    texts = {
+        'cut': '{"key": "cut", "us',
+        'newer': json.dumps({**told, 'key': 'newer', 'colour': 'red'}),
+        'state': json.dumps({**told, 'key': 'state', 'state': 'asleep'}),
+    }
+    for name, text in texts.items():
+        (jobs / name).mkdir()
+        (jobs / name / 'job.json').write_text(text)
+    return {jobs / name / 'job.json': text for name, text in texts.items()}
+
+
+def test_what_commands_say_names_fields_of_the_browser():
+    """Of every option of the commands behind the forms, in their own words."""
+    for command in ('import', 'diagnose', 'correct-program'):
+        parser = _parser([command])
+        (sub,) = (each for each in parser._actions if each.dest == '==SUPPRESS==' or each.choices)
+        for action in sub.choices[command]._actions:
+            for option in action.option_strings:
+                text = f'give {option} in metres, or {option}'
+                said = sentence(text, command)
+                if option.startswith('--'):
+                    assert '--' not in said, said
+    assert (
+        sentence('name it with --controller', CORRECT) == 'Name it with “Language of the program”'
+    )
+    assert sentence('name it with --controller') == 'Name it with “Controller”'
+    assert 'weld-twin' not in sentence("it becomes a bag with 'weld-twin recover x'")
+
+
+def test_a_port_that_is_none_is_refused(tmp_path, capsys):
+    from weld_twin_nodes.cli import main
+
+    assert main(['serve', '--port', '99999', '--dir', str(tmp_path / 'x')]) == 2
+    assert '--port 99999' in capsys.readouterr().err
+    assert not Path(tmp_path / 'x').exists()

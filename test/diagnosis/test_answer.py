@@ -35,7 +35,23 @@ SCHEMA = {
         'status': TEXT,
         'effects': [{'effect': TEXT, 'joint': JOINT, 'parameters': dict, 'std': dict}],
         'confidence': NUMBER,
+        'learned': NUMBER,
+        'sure': FLAG,
+        'complete': NUMBER,
         'indistinguishable': [[{'effect': TEXT, 'joint': JOINT}]],
+        'causes': [
+            {
+                'probability': NUMBER,
+                'sure': FLAG,
+                'effect': (int, type(None)),
+                'rest': FLAG,
+                'place': [{'at': TEXT, 'probability': NUMBER}],
+                'dependence': [{'on': TEXT, 'probability': NUMBER}],
+                'name': [{'effect': TEXT, 'joint': JOINT, 'probability': NUMBER}],
+                'share': NUMBER,
+                'share_ci90': [NUMBER],
+            }
+        ],
     },
     'candidates': [
         {
@@ -101,7 +117,7 @@ def faults(value, schema, path='diagnosis'):
 def test_the_answer_has_every_key_of_the_public_schema_in_its_type(answer):
     data = answer.as_dict()
     assert faults(data, SCHEMA) == []
-    assert data['schema'] == 'weld_twin/diagnosis/1'
+    assert data['schema'] == 'weld_twin/diagnosis/2'
     assert data['verdict']['status'] in ('identified', 'ambiguous', 'unknown', 'none')
 
 

@@ -124,11 +124,11 @@ def test_structure_on_its_own_joint_takes_the_name_off_an_effect():
     assert 'elbow_joint' in verdict.reasons[0]
 
 
-def test_an_effect_smaller_than_what_remains_is_not_named():
+def test_an_effect_smaller_than_what_remains_is_told_beside_it():
     slots = (slot((PLAY, 1.0)), slot((OFFSET, 1.0)))
     verdict = decide(evidence(slots, after=1e-4, parts=(0.9, 0.1)))
     assert verdict.status == 'unknown'
-    assert verdict.sets == ((PLAY,),)
+    assert verdict.sets == ((PLAY,), (OFFSET,))
 
 
 def test_effects_that_cancel_each_other_are_not_named():

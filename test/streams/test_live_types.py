@@ -8,6 +8,7 @@ The others live in a participant of their own: real messages of `tf2_msgs` and `
 
 from __future__ import annotations
 
+import json
 import time
 from importlib import import_module
 
@@ -25,6 +26,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import TwinError
 from weld_twin_lab.campaigns.building.message_packages import messages_importable
+from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE
 from weld_twin_nodes.harness import Cell
@@ -400,3 +402,33 @@ def test_running_nodes_follow_publishers_of_one_type_after_the_other(cell, other
         for publisher, _ in theirs:
             other.destroy_publisher(publisher)
     assert [node.stop() for node in nodes] == [0, 0]
+
+
+def test_a_recorder_takes_the_type_of_a_publisher_that_comes_after_it(cell, other, tmp_path):
+    out, topic = tmp_path / 'bag', '/measured/tool_pose'
+    process = cell.start('recorder', out=str(out), topics=[topic])
+    cell.wait(lambda: cell.node.count_subscribers(topic) == 1, 'the recorder')
+    theirs = other.create_publisher(kind('geometry_msgs/TransformStamped'), topic, 10)
+    stamp = [S]
+
+    def step():
+        stamp[0] += S // 100
+        theirs.publish(placed(shifted(), stamp[0], 'world', 'probe'))
+        return json.loads(cell.trigger('/recorder/counts').message)[topic] > 3
+
+    cell.wait(step, 'some to be recorded')
+    assert process.stop() == 0
+    with BagReader(out) as bag:
+        found = [each.message for each in bag.messages([topic])]
+    assert len(found) > 3
+    assert {each.child_frame_id for each in found} == {'probe'}
+
+
+def test_measurements_beyond_those_that_may_wait_are_refused_and_counted(cell, other, monkeypatch):
+    monkeypatch.setattr('weld_twin_nodes.live.tf_frames.MOST', 5)
+    tracked = TrackedCell(cell, other)
+    moving = tf(placed(T_WORLD_TRACKER, S, 'world', 'tracker'))
+    tracked.wait_told(
+        '5 measurements wait already for the transforms of their time',
+        also=lambda: tracked.moving.publish(moving),
+    )

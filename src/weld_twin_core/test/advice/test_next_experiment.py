@@ -293,7 +293,7 @@ def test_what_is_sure_while_a_joint_hardly_moved_is_confirmed_where_that_is_aske
     position = seen.position + noise.normal(scale=2e-5, size=seen.position.shape)
     recording = run.with_measured(wt.Measurements(t, position))
     sure = wt.diagnose(recording, robot, limits=Limits(confirm=True))
-    assert sure.status == 'identified' and sure.learned == sure.confidence > 0.9
+    assert sure.status == 'identified' and sure.sure and sure.confidence > 0.9
     asked = sure.next_experiment
     assert asked['confirms'] == ['wrist_3_joint'] and 'wrist_3_joint' in asked['reason']
     assert np.ptp(np.array(asked['motion']['q'])[:, 5]) > 0.5

@@ -34,6 +34,7 @@ from .stability.repeated import repeated
 from .stability.steadied import came_back, steadied
 from .trust.signs import Signs, signs_of_answer
 from .trust.signs_of_found import signs_of_found
+from .unseen.cancelling import uncancelled
 from .unseen.carrying import carrying
 from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
@@ -174,9 +175,8 @@ def _explained(
     unseen.forget_other_parts()
     places = placed(found, verdict, rival, missed, beliefs)
     progress('held against curves without a formula')
-    found, unseen, shrink, verdict = carried(
-        found, unseen, shrink, verdict, rival, holdout, beliefs
-    )
+    which = verdict, rival, holdout, beliefs
+    found, unseen, shrink, verdict = carried(found, unseen, shrink, *which)
     found = _held(found, examined.given.robot)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
@@ -190,6 +190,7 @@ def _searched(
     """Return what was found, few effects or many, each with what could take its place."""
     assert examined.posed is not None
     found = search(*examined.posed, exclude, beliefs, progress)
+    found = uncancelled(found, examined.posed, exclude, beliefs, progress)
     found = fitted_together(found, exclude, beliefs, progress)
     found = settled_between(found, examined.given.may_change, beliefs)
     return with_structural_aliases(found, exclude, beliefs)

@@ -35,6 +35,7 @@ COMMON = (
 )
 """Families that most arms have something of; each comes `OFTEN` times as often as any other."""
 OFTEN = 5
+"""Cards of a common family in the deck for one of any other. A judgement: most cells have some."""
 MOTIONS = ('stations', 'stations', 'seams', 'both')
 CROWDED = ('stations', 'both')
 """Motions of cases with five and six causes: stations, 40 at least, that could tell them."""

@@ -253,7 +253,10 @@ def _urdf(
         parent, at = child, frame
     for link in fixed:
         frame = flange if link == named else flange @ about(1, -0.5 * np.pi)
-        out += [f'<link name="{link}"/>', _joint(link, parent, link, np.linalg.inv(at) @ frame)]
+        out += [
+            f'<link name="{link}"/>',
+            _joint(f'{link}_fixed', parent, link, np.linalg.inv(at) @ frame),
+        ]
         parent, at = link, frame
     out += ['<link name="tcp"/>', _joint('torch', parent, 'tcp', torch), '</robot>']
     return '\n'.join(out) + '\n'

@@ -30,7 +30,9 @@ HEADS = (
     'before, mm',
     'after',
     'best',
-    'after over best, median',
+    'corrected: after over best, median',
+    '95 of 100',
+    'the same above 0.01 mm, median',
     '95 of 100',
 )
 
@@ -67,9 +69,9 @@ def counted(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
             key: float(np.median([case['worst_m'][key] for case in able]))
             for key in ('before', 'after', 'best')
         }
-        ratios = [case['worst_m']['after'] / max(_best(case), 1e-9) for case in able]
-        fine = [max(c['worst_m']['after'], FINE) / max(_best(c), FINE) for c in able]
-        out['ratio'], out['ratio_above_fine'] = _spread(ratios), _spread(fine)
+        out['ratio'] = _spread([ratio(case) for case in able])
+        out['ratio_of_corrected'] = _spread([ratio(case) for case in mended])
+        out['ratio_above_fine'] = _spread([ratio(case, FINE) for case in mended])
     return out
 
 
@@ -78,11 +80,18 @@ def worse(case: dict[str, Any]) -> bool:
     return bool(case['worst_m']['after'] > case['worst_m']['before'] + NOTHING)
 
 
+def ratio(case: dict[str, Any], least: float = 1e-9) -> float:
+    """Return what is left over the best possible, each at least so much [m]."""
+    return float(max(case['worst_m']['after'], least) / max(_best(case), least))
+
+
 def _best(case: dict[str, Any]) -> float:
     return float(case['worst_m']['best'])
 
 
 def _spread(values: Sequence[float]) -> dict[str, float]:
+    if not values:
+        return {'median': float('nan'), 'p95': float('nan')}
     return {'median': float(np.median(values)), 'p95': float(np.percentile(values, 95.0))}
 
 
@@ -99,21 +108,28 @@ def page(result: dict[str, Any]) -> str:
     """Return the results as tables in Markdown."""
     rows = [_row(name, total) for name, total in result['totals'].items()]
     odd = [
-        (str(case['number']), case['kind'], case['maker'], case.get('failed') or case['undrawn'])
+        (str(case['number']), case['kind'], case['maker'], _why(case))
         for case in result['cases']
-        if 'worst_m' not in case
+        if case.get('outcome') != 'corrected'
     ]
     parts = ['## Arms given as URDFs', '', f'Seed {result["seed"]}.', '']
     parts += [markdown.table(HEADS, *rows), '']
     if odd:
-        parts += ['## Not carried through', '']
+        parts += ['## Not corrected', '']
         parts += [markdown.table(('arm', 'first axis', 'maker', 'why'), *odd), '']
     return '\n'.join(parts)
 
 
+def _why(case: dict[str, Any]) -> str:
+    """Return why an arm's program was not corrected, without the line of the program."""
+    said = str(case.get('failed') or case.get('undrawn') or case.get('why') or 'nothing was found')
+    return said.rpartition('corrected: ')[2]
+
+
 def _row(name: str, total: dict[str, Any]) -> tuple[str, ...]:
     worst = total.get('worst_m', dict.fromkeys(('before', 'after', 'best'), float('nan')))
-    ratio = total.get('ratio_above_fine', {'median': float('nan'), 'p95': float('nan')})
+    none = _spread([])
+    left = [total.get(key, none) for key in ('ratio_of_corrected', 'ratio_above_fine')]
     return (
         name,
         str(total['arms']),
@@ -124,6 +140,5 @@ def _row(name: str, total: dict[str, Any]) -> tuple[str, ...]:
         str(total['able']),
         str(total['corrected']),
         *(f'{1e3 * worst[key]:.3f}' for key in ('before', 'after', 'best')),
-        f'{ratio["median"]:.2f}',
-        f'{ratio["p95"]:.2f}',
+        *(f'{spread[key]:.2f}' for spread in left for key in ('median', 'p95')),
     )

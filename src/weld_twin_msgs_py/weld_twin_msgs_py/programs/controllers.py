@@ -150,6 +150,11 @@ def controller_of(
         if language == COUPLED:
             mix[2, 1] = 1.0
             notes.append('J3 counts from the ground, as the teach pendant shows it')
+    elif language == COUPLED and robot.controller is not None:
+        notes.append(
+            'J3 is taken as the joint of the robot file; if the teach pendant counts it from the '
+            'ground, points in joints are read wrongly'
+        )
     own = np.array(robot.T_flange_tool)
     return Controller(
         origin, np.array(frames.flange), mix, own, _lower(tools), _lower(bases), notes

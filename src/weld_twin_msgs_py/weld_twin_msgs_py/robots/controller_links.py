@@ -5,7 +5,7 @@ Which links of a URDF are the controller's base and its flange.
 
 Packages of ROS-Industrial end in `tool0`, the controller's flange with z out of it, and hang `base`,
 the controller's own base, beside `base_link`; REP 199 adds `flange`. Franka numbers its flange as
-one link more than the arm has joints, and arms without any such link end in their last one.
+one link more, and arms without any such link end in their last one.
 
 References
 ----------
@@ -37,7 +37,12 @@ _BASES = (BASE, 'base')
 """What the controller's base is called, the surest name first."""
 _WORLDS = ('world', 'map', 'odom', 'cell', 'ground')
 """Roots that are a place and no robot."""
-_ENDS = re.compile(r'ee_link|link_ee|link_eef|end_effector(_link)?|tool_mount|mounting_plate')
+APART = 1e-3
+"""Distance [m] from which `tool0` is not in the flange, which is that of the maker's by definition."""
+_ENDS = re.compile(
+    r'ee_link|link_eef?|eef(_link)?|end_effector(_link)?|tool_mount|mounting_plate|faceplate'
+    r'|mechanical_interface'
+)
 """What is a flange where a tool hangs on it, and may be the tool's tip where it is the last link."""
 
 
@@ -116,21 +121,36 @@ def flange_link_of(
             )
         chosen = wanted
     else:
-        on_way = [last, *(joint.child for joint in chain[chain.index(moving[-1]) + 1 :])]
-        ranked = sorted(
-            fixed.values(),
-            key=lambda at: (
-                _rank(at.link, len(moving), at.link in on_way[:-1]),
-                at.link not in on_way,
-                at.steps,
-            ),
-        )
-        chosen = ranked[0].link
+        behind = chain[chain.index(moving[-1]) + 1 :]
+        chosen = _likeliest(fixed, [last, *(joint.child for joint in behind)])
     return chosen, inverse(fixed[tip].T) @ fixed[chosen].T
 
 
-def _rank(link: str, joints: int, carries: bool) -> int:
-    """Return how surely a link is the flange, 0 most; ``carries`` that the tip hangs on it."""
+def _likeliest(fixed: dict[str, Placed], way: list[str]) -> str:
+    """Return the link that is the flange by its name; ``way`` leads to the tip."""
+    ranks = {link: _rank(link, link != way[0], link in way[:-1]) for link in fixed}
+    ordered = sorted(fixed, key=lambda link: (ranks[link], link not in way, fixed[link].steps))
+    first, named = ordered[0], [link for link in ordered if ranks[link] == 2]
+    if ranks[first] == 1 and named:
+        apart = fixed[first].T[:3, 3] - fixed[named[0]].T[:3, 3]
+        # Some files call the tip of the tool tool0; the maker's lies in the flange.
+        return named[0] if np.linalg.norm(apart) > APART else first
+    return first
+
+
+def _rank(link: str, fixed: bool, carries: bool) -> int:
+    """
+    Return how surely a link is the flange, 0 most.
+
+    Parameters
+    ----------
+    link : str
+    fixed : bool
+        It hangs on the last link that moves, and is not that.
+    carries : bool
+        The tip hangs on it.
+
+    """
     name = link.lower()
     words = f'_{name}'
     if words.endswith(f'_{FLANGE}'):
@@ -139,9 +159,9 @@ def _rank(link: str, joints: int, carries: bool) -> int:
         return 1
     if 'flange' in name:
         return 2
-    if re.search(rf'(^|_)link_?{joints + 1}$', name):
+    if fixed and re.search(r'(^|_)link_?\d+$', name):  # a number is of the arm, not of a tool
         return 3
-    return 4 if carries and re.search(rf'(^|_)({_ENDS.pattern})$', name) else 5
+    return 4 if fixed and carries and re.search(rf'(^|_)({_ENDS.pattern})$', name) else 5
 
 
 def _fixed_to(tree: Tree, link: str, *, down_only: bool = False) -> dict[str, Placed]:

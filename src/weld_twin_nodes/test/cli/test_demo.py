@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from weld_twin_msgs_py.bags import provenance, read_recording
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
+ROOT = Path(__file__).parents[4]
 pytestmark = pytest.mark.cells
 
 
@@ -49,6 +52,19 @@ def test_the_demo_leaves_bag_table_and_picture_that_agree(tmp_path):
     rms = np.sqrt((off**2).sum(axis=1).mean()) * 1e3
     assert f'{rms:8.4f} mm' in (out / 'summary.txt').read_text()
     assert (out / 'seam.png').read_bytes().startswith(b'\x89PNG')
+    clear, unclear = (
+        json.loads((out / name / 'diagnosis.json').read_text())['verdict']
+        for name in ('diagnosis', 'open')
+    )
+    assert clear['status'] == 'identified' and clear['sure']
+    assert unclear['status'] == 'ambiguous'
+    said = (out / 'summary.txt').read_text().replace('\N{NO-BREAK SPACE}', ' ').splitlines()
+    told = [line for line in said if line.startswith(('The gap', 'With', 'Either'))]
+    assert len(told) == 4
+    for page in ('README.md', 'docs/index.md', 'docs/tutorial.md'):
+        text = (ROOT / page).read_text()
+        missing = [line for line in told if line not in text]
+        assert not missing, f'{page}: run tools/in_env python tools/demo_page.py'
 
 
 def test_the_demo_does_not_replace_what_it_did_not_make(tmp_path):

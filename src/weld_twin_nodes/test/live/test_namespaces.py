@@ -197,6 +197,9 @@ def test_a_quality_of_service_that_does_not_match_is_told_of_under_the_remapped_
 def test_joint_states_in_another_namespace_are_told_with_what_to_do(cell, tracker):
     cell.add(ForwardKinematicsTwin)
     health = HealthListener(cell.node)
+    tracker.create_publisher(
+        JointState, '/actual/joint_states', 10
+    )  # an injector's, and no namespace
     astray = tracker.create_publisher(JointState, '/left/joint_states', 10)
     sentence = (
         '/joint_states has no publisher, but /cell/tracker publishes /left/joint_states: start '

@@ -115,6 +115,17 @@ def test_a_job_that_cannot_be_done_answers_with_a_sentence():
     assert 'holds no measured poses' in worker.take()
 
 
+def test_what_the_other_process_says_of_its_end_is_told():
+    said = []
+    worker = Worker(said.append)
+    worker.start(Job('no recording', load('ur5')))
+    while worker.busy:
+        time.sleep(0.05)
+    assert worker.take() == 'the diagnosis ended with code 1'
+    assert said[0].startswith('the diagnosis says: Traceback')
+    assert "'str' object has no attribute" in said[0]
+
+
 def test_a_job_under_way_can_be_ended():
     worker = Worker()
     worker.start(Job(filled().recording(least=3.0), load('ur5')))

@@ -19,7 +19,6 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
-from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import (
     BY_NAME,
@@ -30,11 +29,13 @@ from weld_twin_msgs_py.messages.topics import (
     Topic,
 )
 
+from ..streams.stamp_watch import StampWatch
 from . import qos_events
 from .all_nodes import refuse_unknown
 from .health import Health, Input
 from .losses import Losses
-from .outputs import NODE, REACHED, RUN, Output, read_told
+from .neighbour_health import ALIVE, NeighbourHealth, Statuses
+from .outputs import NODE, RUN, Output, read_told
 from .partners import readers, senders, unreached_subscribers
 from .qos_overrides import QosOverrides
 from .settings import SHARED, Setting
@@ -50,12 +51,8 @@ LAST_WORDS = 8.0
 """
 Seconds an ending node waits in all until its subscribers have everything. Acknowledgements take
 milliseconds; what was lost on the way is sent again with Fast DDS's heartbeat, every 3 s, and on a
-busy machine the first of them may be lost too.
-"""
-STANDS_STILL = 2.0
-"""
-Seconds it waits where a subscriber does not tell of itself, as the nodes of the project do once a
-second: one that stands still would keep it, and `ros2 launch` ends by force what takes 5 s.
+busy machine the first of them may be lost too. Where a subscriber does not tell of itself it is
+`ALIVE` alone: one that stands still would keep the node, and `ros2 launch` ends by force what takes 5 s.
 """
 ACKNOWLEDGED = 0.2
 """Seconds between two looks at who still tells of itself."""
@@ -70,8 +67,6 @@ Seconds for the middleware to match the subscriptions that the graph tells of. D
 
 BESIDE = 'joints beside'
 """Under which a node keeps what it says of joints that are none of the robot's."""
-Statuses = dict[str, dict[str, str]]
-"""Names of statuses on `/diagnostics`, and what each tells by its keys."""
 
 
 class CellNode(Node):
@@ -95,29 +90,13 @@ class CellNode(Node):
         self._sources: list[TypedInput] = []
         self._losses: dict[str, Losses] = {}
         self._held: list[Input] = []
-        self._hearers: list[Callable[[Statuses], None]] = [self._hear_counts]
         self._unmatched: list[str] = []
-        for item in self.every_setting():
-            self.declare_parameter(item.name, item.default, item.descriptor())
-        refuse_unknown(self._parameter_overrides, [item.name for item in self.every_setting()])
-        named = {*(topic.relative for topic in (*BY_NAME.values(), *FRAMES)), *self.own_topics()}
-        self.overrides = QosOverrides(
-            self, self._parameter_overrides, {self.resolve_topic_name(name) for name in named}
-        )
-        beside = self.setting('joints_beside') if self.has_parameter('joints_beside') else ''
-        self._carrying_nothing = tuple(name.strip() for name in beside.split(','))
+        self._declare_settings()
         self.health = Health(self.get_fully_qualified_name(), self.setting('stale_after'))
         self.take_robot(None)
         self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
-        self._read_health = reader(DIAGNOSTICS.type)
-        self._told_at: dict[str, float] = {}
-        self._diagnosed: Any = self.create_subscription(
-            DIAGNOSTICS.message_class(),
-            DIAGNOSTICS.name,
-            self._hear,
-            DIAGNOSTICS.requested.to_rclpy(),
-            raw=True,
-        )
+        self.neighbours = NeighbourHealth(self)
+        self.neighbours.hear(self._hear_counts)
         self.every(HEALTH_EVERY, self._tell_health)
         self._jumps = self.get_clock().create_jump_callback(
             JumpThreshold(
@@ -127,6 +106,19 @@ class CellNode(Node):
             ),
             post_callback=self._jumped,
         )
+
+    def _declare_settings(self) -> None:
+        """Declare the parameters; refuse those that nobody has."""
+        every = self.every_setting()
+        for item in every:
+            self.declare_parameter(item.name, item.default, item.descriptor())
+        refuse_unknown(self._parameter_overrides, [item.name for item in every])
+        named = {*(topic.relative for topic in (*BY_NAME.values(), *FRAMES)), *self.own_topics()}
+        self.overrides = QosOverrides(
+            self, self._parameter_overrides, {self.resolve_topic_name(name) for name in named}
+        )
+        beside = self.setting('joints_beside') if self.has_parameter('joints_beside') else ''
+        self._carrying_nothing = tuple(name.strip() for name in beside.split(','))
 
     @classmethod
     def every_setting(cls) -> tuple[Setting, ...]:
@@ -159,8 +151,8 @@ class CellNode(Node):
     def _wait_for_readers(self, output: Output, begun: float) -> None:
         """Wait until all who take an output have all of it, or stand still; and say so."""
         while True:
-            live = readers(self, output.topic) <= self._live()
-            left = begun + (LAST_WORDS if live else STANDS_STILL) - time.monotonic()
+            live = readers(self, output.topic) <= self.neighbours.alive()
+            left = begun + (LAST_WORDS if live else ALIVE) - time.monotonic()
             slice_s = min(max(left, READY_EVERY), ACKNOWLEDGED)
             if output.wait_for_all_acked(Duration(seconds=slice_s)):
                 return
@@ -170,16 +162,6 @@ class CellNode(Node):
             f'{output.topic}: a subscriber has not taken in all that was sent to it; this node ends '
             'without waiting for it any longer'
         )
-
-    def _live(self) -> set[str]:
-        """Return the nodes that have told of themselves just now; none is served at the end."""
-        with self._diagnosed.handle:
-            while (
-                taken := self._diagnosed.handle.take_message(self._diagnosed.msg_type, True)
-            ) is not None:
-                self._hear(taken[0])
-        now = time.monotonic()
-        return {node for node, told in self._told_at.items() if now - told < STANDS_STILL}
 
     def take_robot(self, robot: Robot | None, joint_names: tuple[str, ...] | None = None) -> None:
         """
@@ -266,11 +248,22 @@ class CellNode(Node):
         if held:
             self._held.append(state)
         kinds = ACCEPTED.get(topic.name, (topic.type,))
-        usual, read = kinds[0], {kinds[0]: reader(kinds[0])}
-        turn = self._plain_turn(topic)
+        take = self._taker(topic, kinds[0], state, callback)
+        subscribe = partial(self._subscribe_to, topic, kinds, take, required=required)
+        if at_once:
+            subscribe()
+        else:
+            self.when_ready(subscribe)
+        return state
+
+    def _taker(
+        self, topic: Topic, usual: str, state: Input, callback: Callable[[Any], None]
+    ) -> Callable[[str, bytes], None]:
+        """Return what takes the type and the bytes of a message, whatever they are."""
+        read, turn = {usual: reader(usual)}, self._plain_turn(topic)
 
         def use(message: Any) -> None:
-            if topic.stamped:
+            if topic.stamped and topic.steady:
                 at = message.header.stamp
                 state.stamped(at.sec * 1_000_000_000 + at.nanosec)
             callback(message)
@@ -286,16 +279,11 @@ class CellNode(Node):
                 for message in turn(kind, read[kind](data)):
                     use(message)
             except TwinError as error:
-                self.refuse(name, str(error))
+                self.refuse(state.topic, str(error))
             except Exception:
                 self._raise_unless_over()
 
-        subscribe = partial(self._subscribe_to, topic, kinds, guarded, required=required)
-        if at_once:
-            subscribe()
-        else:
-            self.when_ready(subscribe)
-        return state
+        return guarded
 
     def watch(self, name: str, *, required: bool, steady: bool) -> Input:
         """Return a new input, whose rate, age and losses are told from now on."""
@@ -308,14 +296,6 @@ class CellNode(Node):
         self.health.inputs.pop(name, None)
         self._losses.pop(name, None)
         self.health.lasting.pop(_loss_of(name), None)
-
-    def hear(self, hearer: Callable[[Statuses], None]) -> None:
-        """Hand on, from now on, what the nodes of the project tell of their health."""
-        self._hearers.append(hearer)
-
-    def hear_no_more(self, hearer: Callable[[Statuses], None]) -> None:
-        """End what `hear` began."""
-        self._hearers.remove(hearer)
 
     def stop_listening(self) -> None:
         """Take no input any more, until somebody listens again."""
@@ -457,6 +437,8 @@ class CellNode(Node):
 
     def _jumped(self, jump: TimeJump) -> None:
         by = jump.delta.nanoseconds * 1e-9
+        for state in self.health.inputs.values():
+            state.stamps = StampWatch()  # that they jump along is no news
         if by > 0.0:
             if self.get_clock().now().nanoseconds > jump.delta.nanoseconds:  # it had a time before
                 self._tell_once(f'the clock jumped forwards by {by:,.3f} s')
@@ -482,21 +464,9 @@ class CellNode(Node):
             self.messages.statuses(self.get_clock().now().nanoseconds, self.health.statuses())
         )
 
-    def _hear(self, data: bytes) -> None:
-        """Hand on what nodes of the project tell; statuses of others are not even read."""
-        if REACHED.encode() in data:
-            try:
-                statuses = from_messages.diagnostics(self._read_health(data))
-            except TwinError:  # somebody else's, and none of the inputs
-                return
-            for hearer in [*self._hearers]:
-                hearer(statuses)
-
     def _hear_counts(self, statuses: Statuses) -> None:
         """Hold what a node tells it has sent against what has come of it."""
         for values in statuses.values():
-            if NODE in values:
-                self._told_at[values[NODE]] = time.monotonic()
             for topic, sent in read_told(values).items():
                 if topic in self._losses:
                     teller = values.get(NODE, ''), values.get(RUN, '')

@@ -9,7 +9,8 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from .all_nodes import MODULES
-from .cell_node import CellNode, Statuses
+from .cell_node import CellNode
+from .neighbour_health import Statuses
 from .outputs import NODE, Heard, read_heard, read_reached
 
 QUIET = 1.0
@@ -112,7 +113,7 @@ class Meeting:
         self._begun = self._changed = time.monotonic()
         self._seen: Any = None
         self._neighbours = Neighbours()
-        node.hear(self._neighbours.take)
+        node.neighbours.hear(self._neighbours.take)
         self._timer = node.every(LOOK_EVERY, self._look)
         self._told = False
 
@@ -132,7 +133,7 @@ class Meeting:
             self._node.health.say(sentence)
         self._node.health.lasting.pop('waiting', None)
         self._timer.cancel()
-        self._node.hear_no_more(self._neighbours.take)
+        self._node.neighbours.hear_no_more(self._neighbours.take)
         self._action()
 
     def _missing(self, now: float) -> str:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from weld_twin_core.errors import TwinError
@@ -70,15 +71,14 @@ class RecordedTopic:
         row: Topic | None,
         write: Callable[[RecordedTopic, bytes], None],
     ) -> None:
-        self.name, self.kind = name, kind
+        self.name = name
         self._node, self._write = node, write
-        self._class = message_class(kind)
-        self._check = checked(kind)
-        self._stamped = has_header(kind)
+        self._take_kind(kind)
         self._state = node.watch(
             name, required=False, steady=row.steady if row is not None else False
         )
         self.announced = False
+        self._unknown: set[str] = set()
         self._first: bytes | None = None
         self._last: bytes | None = None
         latched = row is not None and row.requested.durability == LATCHED
@@ -87,7 +87,7 @@ class RecordedTopic:
             name, 'subscription', Qos(RELIABLE, DEEP, LATCHED if latched else VOLATILE)
         )
         self._qos = self.suited(wanted)
-        self._subscription = self._subscribe()
+        self._subscription: Any = self._subscribe()
 
     @property
     def taken(self) -> Sent:
@@ -115,6 +115,19 @@ class RecordedTopic:
         infos = self._node.get_publishers_info_by_topic(self.name)
         return [info for info in infos if info.topic_type == self.kind]
 
+    def _take_kind(self, kind: str) -> None:
+        """Be ready for a message type."""
+        self._class = message_class(kind)
+        self.kind = kind
+        self._check = checked(kind)
+        self._stamped = has_header(kind)
+
+    def _other_kind(self) -> str:
+        """Return the type that all publishers have, where that is another one; else nothing."""
+        infos = self._node.get_publishers_info_by_topic(self.name)
+        kinds = {info.topic_type for info in infos} - self._unknown
+        return '' if len(kinds) != 1 else next(iter(kinds - {self.kind}), '')
+
     def publishing_nodes(self) -> set[str]:
         """Return the full names of the nodes that publish it."""
         return {
@@ -123,7 +136,14 @@ class RecordedTopic:
 
     def adapt(self) -> None:
         """Subscribe anew where a publisher has come that the subscription does not suit."""
+        if self._subscription is None:
+            self._try_to_subscribe()
+            return
         self._state.matched = self._subscription.get_publisher_count()
+        other = self._other_kind()
+        if other:
+            self._change_to(other)
+            return
         qos = self.suited(self._qos)
         if qos == self._qos:
             return
@@ -135,8 +155,30 @@ class RecordedTopic:
         self._qos = qos
         self._subscription = self._subscribe()
 
+    def _change_to(self, kind: str) -> None:
+        """Take another type from the next look on: a process knows one type of a topic at a time."""
+        self.take_waiting()
+        try:
+            self._take_kind(kind)
+        except ImportError as error:
+            self._unknown.add(kind)
+            self._node.mismatch(self.name, f'{self.name} carries what cannot be recorded: {error}')
+            return
+        self._node.destroy_subscription(self._subscription)
+        self._subscription, self.announced = None, False
+        self._node.get_logger().info(f'{self.name} is recorded as {kind} from now on')
+
+    def _try_to_subscribe(self) -> None:
+        with suppress(
+            RuntimeError
+        ):  # the executor still holds the one before; again at the next look
+            self._qos = self.suited(self._qos)
+            self._subscription = self._subscribe()
+
     def take_waiting(self) -> int:
         """Take what has reached this process and waits for its turn; return how many there were."""
+        if self._subscription is None:
+            return 0
         handle, count = self._subscription.handle, 0
         with handle:
             while count < DEEP:
@@ -149,7 +191,8 @@ class RecordedTopic:
 
     def close(self) -> None:
         """Take nothing more."""
-        self._node.destroy_subscription(self._subscription)
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
         self._node.unwatch(self.name)
 
     def _subscribe(self) -> Any:

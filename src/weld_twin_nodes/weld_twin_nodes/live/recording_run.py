@@ -15,8 +15,9 @@ from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import BY_NAME, ROBOT_DESCRIPTION, Topic
 
 from .asked_nodes import AskedNodes
-from .cell_node import CellNode, Statuses
+from .cell_node import CellNode
 from .completeness import AT_START, SentBook, Shortfall, shortfall
+from .neighbour_health import Statuses
 from .offered_channel import offered_channel
 from .outputs import Sent
 from .recorded_topic import RecordedTopic
@@ -81,7 +82,7 @@ class RecordingRun:
             node.resolve_topic_name(name): _row(name) for name in node.setting('topics')
         }
         self._subscribe()
-        node.hear(self._hear)
+        node.neighbours.hear(self._hear)
         self._timers = [node.every(LOOK_EVERY, self._look)]
         names = ', '.join([*self._topics, *(f'{name} when it appears' for name in self._untyped)])
         node.get_logger().info(f'recording into {self.out}: {names}')
@@ -235,7 +236,7 @@ class RecordingRun:
                 topic.take_waiting()
             self._conclude()
         self._asked.close()
-        self._node.hear_no_more(self._hear)
+        self._node.neighbours.hear_no_more(self._hear)
         for topic in self._topics.values():
             topic.close()
         self._bag.close()

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import re
 import signal
@@ -74,6 +75,8 @@ class Stop:
         self.node: CellNode | None = None
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._take)
+            # An ending interpreter takes its handlers back, and a second wish would kill it.
+            atexit.register(signal.signal, number, signal.SIG_IGN)
 
     def _take(self, *_: object) -> None:
         first, self.wished = not self.wished, True

@@ -64,10 +64,15 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
         )
         return first, _gain(diagnosis)
     if len(names) <= _NAMED:
+        if diagnosis.confidence < HALF:
+            # One figure for all of it would hide that some of it may be sure.
+            first = f'The {size} is explained best by {listed(names)}'
+            return f'{first}; each is as sure as its card says.', _gain(diagnosis)
         return f'The {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
+    told = f'({sure} sure)' if diagnosis.confidence >= HALF else '(each as sure as its card says)'
     first = (
         f'The {size} comes from {len(names)} errors together, mostly '
-        f'{_families(diagnosis)}; the largest is {names[0]} ({sure} sure).'
+        f'{_families(diagnosis)}; the largest is {names[0]} {told}.'
     )
     return first, _gain(diagnosis)
 

@@ -28,6 +28,7 @@ from .directory import Directory
 from .job import (
     DONE,
     FAILED,
+    FILE,
     FOUND,
     IMPORTED,
     MODEL,

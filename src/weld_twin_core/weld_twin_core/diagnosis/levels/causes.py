@@ -98,30 +98,33 @@ def causes(
     spread = _spread(squares, parts, claims, labels)
     whole, spread = _as_placed(whole, spread, claims, placing)
     out = [
-        Cause(
-            place=_listed(claim.place),
-            dependence=_listed(claim.dependence),
-            name=tuple((s, p) for s, p in claim.name.items() if p >= LISTED),
-            share=float(share),
-            share_ci90=(
-                float(max(share - STUDENT * error, 0.0)),
-                float(min(share + STUDENT * error, 1.0)),
-            ),
-            members=claim.members,
-            slot=claim.slot,
-            effect=claim.group,
-        )
+        _cause(claim, float(share), float(error))
         for claim, share, error in zip(claims, whole, spread, strict=True)
     ]
     out.sort(key=lambda cause: -cause.share)
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
     left = max(1.0 - float(whole.sum()) - noise, 0.0)
     if rest is not None and (left > beliefs.unexplained or not out):
-        error = STUDENT * float(np.sqrt((spread**2).sum()))
-        ends = max(left - error, 0.0), min(left + error, 1.0)
-        levels = _listed(rest.place), _listed(rest.dependence)
-        out.append(Cause(*levels, (), left, ends, rest=True))
+        error = float(np.sqrt((spread**2).sum()))
+        out.append(replace(_cause(rest, left, error), rest=True))
     return tuple(out), Shares(unexplained=left, noise=max(noise, 0.0))
+
+
+def _cause(claim: _Claim, share: float, error: float) -> Cause:
+    """Return a claim with its share."""
+    return Cause(
+        place=_listed(claim.place),
+        dependence=_listed(claim.dependence),
+        name=tuple((s, p) for s, p in claim.name.items() if p >= LISTED),
+        share=share,
+        share_ci90=(
+            float(max(share - STUDENT * error, 0.0)),
+            float(min(share + STUDENT * error, 1.0)),
+        ),
+        members=claim.members,
+        slot=claim.slot,
+        effect=claim.group,
+    )
 
 
 def covering(cause: Cause) -> Cause:

@@ -60,4 +60,4 @@ def _keeping_bases(labels: Array, samples: Sequence[int]) -> Array:
         if np.bincount(own).max() > MOST * m:
             out[at : at + m] = np.arange(m) * count // m
         at += m
-    return out
+    return np.asarray(out)

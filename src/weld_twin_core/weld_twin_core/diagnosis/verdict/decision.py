@@ -20,6 +20,10 @@ _MANY_IMITATE = (
     'many small errors together fit best, but leave so much that they rather imitate a cause that '
     'is not in the library'
 )
+_CANCEL = (
+    'the effects that fit best nearly cancel each other: together they imitate a cause that is '
+    'not in the library'
+)
 AT_REST = ('constant', 'angle', 'place', 'load')
 """Dependences that show without any motion."""
 _NO_KIND = (
@@ -71,6 +75,8 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
         other = Weighed(replace(evidence, after=evidence.least), case.beliefs)
         if other.carries:
             case, open_ends = other, (_parts_elsewhere(evidence),)
+    if len(sets) > 1 and sum(evidence.parts) > case.beliefs.cancel:
+        return Verdict('unknown', case.beliefs.doubted, (), (_CANCEL,))
     doubt = _doubt(case)
     if doubt is not None:
         return Verdict('unknown', case.beliefs.doubted, _elsewhere(sets, evidence), (doubt,))
@@ -155,11 +161,6 @@ def _doubt(case: Weighed) -> str | None:
     remains = case.above_noise or told.structure.gain > beliefs.structure_gain
     if told.lacking or (told.refused and remains):
         return _absurd(told)
-    if len(told.slots) > 1 and sum(told.parts) > beliefs.cancel:
-        return (
-            'the effects that fit best nearly cancel each other: together they imitate a cause '
-            'that is not in the library'
-        )
     bent = [joint for joint in told.glimpsed if _joints_at_rest(told).count(joint) > 1]
     if bent:
         return (

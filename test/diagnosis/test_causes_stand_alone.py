@@ -1,0 +1,116 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Cells of the plant with several causes at once: each is told by itself, and nobody else is."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from diagnosis_cells import SIGMA, recorded, sites
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.result import NAMING
+from weld_twin_core.diagnosis.unseen.regions import posture_regions
+from weld_twin_nodes.report.diagnosis_files import diagnosis_text
+
+ARM = 'kuka_kr6_r900'
+TRUE = (
+    {'effect': 'backlash', 'joint': 'joint_a1', 'width': 7e-4},
+    {'effect': 'link_length', 'joint': 'joint_a2', 'da': -5e-4},
+    {'effect': 'link_twist', 'joint': 'joint_a3', 'dalpha': 9e-4},
+    {'effect': 'joint_compliance', 'joint': 'joint_a2', 'compliance': 1.2e-5},
+    {'effect': 'gear_ratio', 'joint': 'joint_a5', 'scale': 6e-4},
+)
+NOISE = float(np.sqrt(3.0)) * SIGMA
+
+
+def cell(causes=TRUE, **options):
+    """Return 60 stations all over the workspace, or what the options say."""
+    return recorded(load(ARM), list(causes), **{'static': 60, **options})
+
+
+@cache
+def found(exclude=()):
+    return diagnose([cell()], load(ARM), align='base,tool', exclude=exclude, experiment=False)
+
+
+def holding(diagnosis):
+    """Return which of the true causes are told, alone or in a set."""
+    told = sites(diagnosis)
+    return [any((c['effect'], c['joint']) in group for group in told) for c in TRUE]
+
+
+def test_five_causes_at_once_are_all_named_and_nobody_else_is():
+    told = found()
+    assert told.status in NAMING and all(holding(told)), told.reasons
+    assert len(told.effects) == len(TRUE)
+    assert told.shrink.rms_after_m < 1.7 * NOISE
+    guilty = {c['joint'] for c in TRUE}
+    assert {cause.place[0][0] for cause in told.causes} <= guilty
+
+
+def test_each_cause_says_which_effect_it_is_and_the_shares_make_a_whole():
+    verdict = json.loads(diagnosis_text(found(), ()))
+    told, left = verdict['verdict'], verdict['unexplained']
+    causes = [cause for cause in told['causes'] if not cause['rest']]
+    assert sorted(cause['effect'] for cause in causes) == list(range(len(TRUE)))
+    for cause in causes:
+        effect = told['effects'][cause['effect']]
+        names = [(name['effect'], name['joint']) for name in cause['name']]
+        assert (effect['effect'], effect['joint']) in names
+        group = told['indistinguishable'][cause['effect']]
+        assert (effect['effect'], effect['joint']) in [(s['effect'], s['joint']) for s in group]
+        named = sum(name['probability'] for name in cause['name'])
+        assert named <= cause['probability'] + 1e-9
+    shares = sum(cause['share'] for cause in causes)
+    assert shares + left['share'] + left['noise_share'] == pytest.approx(1.0)
+    assert told['learned'] == told['confidence'] and told['sure'] in (True, False)
+
+
+@pytest.mark.parametrize('back', [0])
+def test_what_is_found_given_back_as_known_leaves_the_rest_as_told_as_before(back):
+    whole = found()
+    known = whole.effects[back].effect
+    rest = diagnose([cell()], load(ARM), align='base,tool', known=[known], experiment=False)
+    before = [group for group in sites(whole) if (known.name, known.site) not in group]
+    assert rest.status in NAMING
+    for group in before:
+        assert any(group & other for other in sites(rest)), (group, sites(rest))
+
+
+def test_with_a_family_taken_out_the_others_are_told_and_that_something_is_left():
+    told = found(exclude=('link_twist',))
+    held = [own for own, c in zip(holding(told), TRUE, strict=True) if c['effect'] != 'link_twist']
+    assert sum(held) >= 3, sites(told)
+    whole = told.as_dict()
+    (rest,) = [c for c in whole['verdict']['causes'] if c['rest']] or [None]
+    assert rest is None or rest['share'] == pytest.approx(whole['unexplained']['share'])
+    assert told.status == 'unknown' or rest is not None or not told.sure
+
+
+def test_short_recordings_with_bases_of_their_own_predict_each_other():
+    few = (TRUE[0], TRUE[3])
+    parts = [
+        cell(few, static=count, seed=seed, name=f'part {seed}')
+        for seed, count in ((1, 16), (2, 5), (3, 20))
+    ]
+    told = diagnose(parts, load(ARM), align='base,tool', experiment=False)
+    assert told.status in NAMING
+    assert told.shrink.rms_after_m < 1.7 * NOISE
+
+
+def test_no_part_left_out_takes_a_recording_with_it():
+    parts = tuple(cell((), static=count, seed=count) for count in (16, 5, 20))
+    problem = Problem(parts, frozenset({'base'}))
+    starts = np.cumsum([0, *(r * m for r, m in zip(problem.rows, problem.samples, strict=True))])
+    for labels in (problem.block_labels(8), posture_regions(problem)):
+        for low, high in pairwise(starts):
+            own = labels[low:high]
+            assert np.bincount(own.astype(int)).max() <= 0.5 * own.size + problem.rows[0]
+    alone = replace(problem, align=frozenset())
+    assert len(set(alone.block_labels(8))) == 8

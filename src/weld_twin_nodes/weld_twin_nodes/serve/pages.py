@@ -125,7 +125,7 @@ def _details(asked: Asked) -> Html:
     hint = 'such as 2026-03-31T14:05 (UTC unless it says +02:00); empty: as its stamps say'
     return tag(
         'details',
-        tag('summary', 'Table units, and history'),
+        tag('summary', 'Tolerance, controller, signs; table units, and history'),
         tag(
             'div',
             *_fields(MORE, asked.told),

@@ -28,7 +28,6 @@ from .directory import Directory
 from .job import (
     DONE,
     FAILED,
-    FILE,
     FOUND,
     IMPORTED,
     MODEL,

@@ -144,7 +144,9 @@ def folder_case(
         (old / file).parent.mkdir(parents=True, exist_ok=True)
         (old / file).write_bytes(what)
     shutil.copytree(old, place / 'again/out')
-    took = measured(words(1, place / 'again/out'))  # where files are in the way there is more to do
+    took = measured(
+        words(1, place / 'again/out')
+    )  # where files are in the way there is more to do
     return partial(_kill_folder, name, place / 'out', words, old, before, after, took)
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A fleet run and a server, killed: what was finished stays as it was, what waited is done afterwards."""
+"""A fleet run and a server, killed: what was finished stays, what waited is done afterwards."""
 
 from __future__ import annotations
 

@@ -65,7 +65,11 @@ def whole(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> Whole:
     small = [group for group in groups if len(group) <= WIDEST]
     named = tuple(any(own & group for group in small) for own in asked)
     every = frozenset[Site]().union(*at_work)
-    foreign = any(gone and shows for gone, shows in zip(out, seen, strict=True))
+    # A set that holds what was taken out tells it, by what no motion tells from it.
+    foreign = any(
+        gone and shows and not any(own & group for group in groups)
+        for own, gone, shows in zip(at_work, out, seen, strict=True)
+    )
     nothing = 'none' if not any(seen) else ''
     said = _left(verdict) if foreign else verdict['status'] in (*NAMING, nothing)
     return Whole(asked, named, all(named) and said and all(group & every for group in groups))

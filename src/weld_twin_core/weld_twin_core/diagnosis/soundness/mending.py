@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm import catalog
 from ...arm.robot import Robot
@@ -196,7 +197,12 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
 
 
 def stamped_evenly(
-    given: Given, k: int, first: float, step: float, lost: Sequence[int] | Array, count: int
+    given: Given,
+    k: int,
+    first: float,
+    step: float,
+    lost: Sequence[int] | NDArray[np.int_],
+    count: int,
 ) -> Given:
     """
     Return what was given with measurements of recording k stamped by an even clock.

@@ -110,6 +110,21 @@ def test_apply_mends_it_and_every_output_says_so(bags, found, tmp_path, capsys):
     assert 'swapped' in again.read_text()
 
 
+def test_a_zero_of_a_joint_that_was_recorded_the_other_way_says_whose_sign_it_has(found, tmp_path):
+    sound = measured(1)
+    turned = sound.joints.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]
+    away = replace(sound, joints=replace(sound.joints, q=turned))
+    write_recording(tmp_path / 'bag', away, load('ur5'))
+    out = tmp_path / 'd'
+    assert run('diagnose', tmp_path / 'bag', '--robot', 'ur5', '--apply', '--out', out) == 0
+    (action,) = content(out)['verdict']['actions']
+    assert 'elbow_joint stands at X + 0.11' in action
+    needed = 'as it was recorded needs the opposite sign'
+    for told in (action, *((out / name).read_text() for name in ('joint_offsets.csv', 'report.html'))):
+        assert needed in told
+    assert needed not in (found / 'joint_offsets.csv').read_text() + str(content(found))
+
+
 def test_a_sound_recording_says_that_nothing_is_wrong(found):
     assert content(found)['unsound'] == []
 

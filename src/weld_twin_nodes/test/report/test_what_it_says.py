@@ -350,11 +350,11 @@ def test_samples_left_out_are_told_as_that_beside_an_instrument_without_outliers
 @pytest.mark.parametrize(
     ('brand', 'told'),
     [
-        ('fanuc', 'enter what it reads now plus 0.0687 deg'),
-        ('abb', '0.001198 rad at the joint times the ratio of its gear'),
-        ('yaskawa', 'by 0.0687 deg. It counts pulses'),
-        ('ur', '0.001198 rad here'),
-        ('kuka', '$MAMES, in degrees'),
+        ('fanuc', 'new value = what it reads now + 0.0687; then EXEC'),
+        ('abb', 'new value = old value - 0.001198 * G'),
+        ('yaskawa', 'in pulses: new value = old value - 0.0687 * P'),
+        ('ur', 'in radians: new value = old value + 0.001198;'),
+        ('kuka', '$MAMES of the axis, in degrees: new value = old value + 0.0687;'),
     ],
 )
 def test_what_a_controller_asks_for_is_told_in_its_unit(brand, told):

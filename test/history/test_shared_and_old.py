@@ -259,6 +259,37 @@ def test_a_damaged_row_ends_one_cell_and_not_the_page_of_all(tmp_path):
     assert weld_twin('history', 'show', '--cell', 'line 002', '--db', db).code == 0
 
 
+def test_a_history_that_may_only_be_read_is_read_and_says_so_to_who_writes(diagnosed, tmp_path):
+    db = tmp_path / 'fleet.db'
+    database = Database(str(db))
+    fill(database, 2, 4)
+    database.close()
+    before = db.read_bytes()
+    url = f'sqlite:///file:{db}?mode=ro&uri=true'
+    said = weld_twin('fleet', 'page', '--db', url, '--out', tmp_path / 'pages')
+    assert said.code == 0, said.err
+    words = ('--cell', 'a', '--at', '2026-03-02', '--db', url)
+    said = weld_twin('history', 'add', diagnosed, *words)
+    assert said.code == 2 and 'readonly' in said.err and len(said.err.splitlines()) == 1
+    assert db.read_bytes() == before
+
+
+def test_who_writes_waits_for_a_lock_on_a_server_no_longer_than_his_patience(postgresql):
+    database = Database(postgresql, patience=1.0)
+    one, other = list(made(5, 2))
+    assert database.add('line 5', one)
+    cells = database.table('cells')
+    with database._engine.begin() as held:
+        held.execute(database.sql.text("SET lock_timeout = '200ms'"))
+        held.execute(database.sql.select(cells).with_for_update())
+        hasty = Database(f'{postgresql}&options=-c%20lock_timeout%3D200', patience=1.0)
+        with pytest.raises(Unavailable, match='lock timeout'):
+            hasty.add('line 5', other)
+    assert hasty.add('line 5', other)
+    for each in (hasty, database):
+        each.close()
+
+
 @pytest.mark.parametrize(
     ('spoil', 'said'),
     [

@@ -108,3 +108,10 @@ def test_a_place_that_cannot_be_a_directory_is_a_sentence(tmp_path):
     for place in (tmp_path / 'file', tmp_path / 'file/below'):
         said = served(place)
         assert said.code == 2 and said.err.count('\n') == 1
+
+
+@pytest.mark.parametrize('port', [99_999, 65_536, -1])
+def test_a_port_that_is_none_is_refused(tmp_path, port):
+    result = weld_twin('serve', f'--port={port}', '--dir', tmp_path / 'served')
+    assert result.code == 2 and f'--port takes 0 to 65535, got {port}' in result.err
+    assert not (tmp_path / 'served').exists()

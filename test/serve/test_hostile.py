@@ -8,7 +8,6 @@ import json
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 from served import Person, Server, drop, fill, small_disk
@@ -179,10 +178,11 @@ def test_a_full_disk_and_damaged_jobs_cost_nothing_that_was_there(tmp_path):
 def spoilt_jobs(jobs, address):
     """Write jobs that are damaged, or newer than this server; return their texts."""
     told = json.loads((jobs / address.rpartition('/')[2] / 'job.json').read_text())
+    cut, newer, asleep = (letter * 32 for letter in 'abc')
     texts = {
-        'cut': '{"key": "cut", "us',
-        'newer': json.dumps({**told, 'key': 'newer', 'colour': 'red'}),
-        'state': json.dumps({**told, 'key': 'state', 'state': 'asleep'}),
+        cut: '{"key": "cut", "us',
+        newer: json.dumps({**told, 'key': newer, 'colour': 'red'}),
+        asleep: json.dumps({**told, 'key': asleep, 'state': 'asleep'}),
     }
     for name, text in texts.items():
         (jobs / name).mkdir()
@@ -206,11 +206,3 @@ def test_what_commands_say_names_fields_of_the_browser():
     )
     assert sentence('name it with --controller') == 'Name it with “Controller”'
     assert 'weld-twin' not in sentence("it becomes a bag with 'weld-twin recover x'")
-
-
-def test_a_port_that_is_none_is_refused(tmp_path, capsys):
-    from weld_twin_nodes.cli import main
-
-    assert main(['serve', '--port', '99999', '--dir', str(tmp_path / 'x')]) == 2
-    assert '--port 99999' in capsys.readouterr().err
-    assert not Path(tmp_path / 'x').exists()

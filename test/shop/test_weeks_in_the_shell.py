@@ -7,11 +7,14 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
+from weld_twin_lab.fleet.postgres import NoServer, postgres
 from weld_twin_nodes.cli.in_process import weld_twin
 
 ROBOT = 'kuka_kr6_r900'
@@ -137,3 +140,27 @@ def test_what_was_filled_in_and_put_beside_outlives_the_second_week(weeks):
         'found',
         'laptop',
     }
+
+
+def test_two_machines_keep_their_diagnoses_in_one_new_database_at_once(weeks):
+    pytest.importorskip('sqlalchemy', reason='the history is an extra')
+    pytest.importorskip('psycopg', reason='PostgreSQL needs its driver')
+    place, _ = weeks
+    try:
+        with postgres() as url:
+            machines = [
+                subprocess.Popen(
+                    [sys.executable, '-m', 'weld_twin_nodes', 'history', 'add', str(place / folder),
+                     '--cell', 'line 3', '--at', at, '--db', url],
+                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                )
+                for folder, at in (('laptop', '2026-03-02'), ('found', '2026-03-09'))
+            ]  # fmt: skip
+            for machine in machines:
+                out, err = machine.communicate(timeout=120.0)
+                assert machine.returncode == 0, err
+                assert out.endswith('added\n')
+            shown = done('history', 'show', '--cell', 'line 3', '--db', url).out
+    except NoServer as error:
+        pytest.skip(str(error))
+    assert shown.count('2026-03-02') == shown.count('2026-03-09') == 1

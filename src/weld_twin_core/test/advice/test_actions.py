@@ -18,7 +18,10 @@ def said(robot, **entry):
     [
         (
             {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 4.2e-4},
-            ['Re-master elbow_joint by -0.0241 deg: it stands +0.0241 deg from'],
+            [
+                'At reading X elbow_joint stands at X + 0.0241 deg. To mend: ',
+                'the reading X becomes X + 0.0241 deg.',
+            ],
         ),
         (
             {'effect': 'link_length', 'joint': 'shoulder_lift_joint', 'da': 6e-4},

@@ -28,7 +28,8 @@ from .levels.formulas import formulas
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
 from .predicting.allowed import allowed
-from .result import Diagnosis
+from .predicting.alone import alone
+from .result import Diagnosis, Shrink
 from .soundness import Examined, Given, examine, refuse_reused
 from .stability.repeated import repeated
 from .stability.steadied import came_back, steadied
@@ -177,11 +178,18 @@ def _explained(
     progress('held against curves without a formula')
     which = verdict, rival, holdout, beliefs
     found, unseen, shrink, verdict = carried(found, unseen, shrink, *which)
-    found = _held(found, examined.given.robot)
+    found = _by_itself(_held(found, examined.given.robot), shrink)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
     told = (Signs(own, each), rival, places, limits, stability)
     return answer(found, unseen, evidence, verdict, shrink, examined, posterior, *told)
+
+
+def _by_itself(found: Search, shrink: Shrink) -> Search:
+    """Return what was found with what a robot file of it does by itself."""
+    model = found.final.model
+    own = replace(model, alone=alone(found.problem, model, shrink, many=found.dense))
+    return replace(found, final=replace(found.final, model=own))
 
 
 def _searched(

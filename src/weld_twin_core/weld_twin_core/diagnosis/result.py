@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -80,6 +81,9 @@ class Unsound:
         Whether the remedy was made and the diagnosis went on with mended data.
     alike : tuple of (str, tuple of str)
         Kinds and places of other mistakes that would explain the data as well.
+    mend : mapping, optional
+        The correction as plain values, to be made again on the same source; None where nothing
+        can undo it.
 
     """
 
@@ -89,6 +93,7 @@ class Unsound:
     remedy: str
     applied: bool = False
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    mend: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``unsound``."""
@@ -547,6 +552,8 @@ class Diagnosis:
     """What was said to be able to differ."""
     contacts: ContactResult | None = None
     """How well contacts agree, where contacts took the place of an instrument."""
+    same: tuple[tuple[Site, ...], ...] = ()
+    """Those of ``indistinguishable`` that are the same error on any motion, the one to set first."""
     sure: bool = False
     """Whether the answer keeps the promise of being wrong hardly ever; docs/trust.md has it."""
     complete: float = 0.0
@@ -585,6 +592,9 @@ class Diagnosis:
             'indistinguishable': [
                 [{'effect': s.effect, 'joint': s.joint} for s in group]
                 for group in self.indistinguishable
+            ],
+            'same_on_any_motion': [
+                [{'effect': s.effect, 'joint': s.joint} for s in group] for group in self.same
             ],
             'reasons': list(self.reasons),
             'families': [family.as_dict() for family in self.families],
@@ -626,6 +636,7 @@ class Diagnosis:
             'spans_ns': [list(r.span_ns) for r in self.recordings],
             'known': [effect.to_mapping() for effect in self.model.known],
             'found': [effect.to_mapping() for effect in self.model.found],
+            'alone': None if self.model.alone is None else self.model.alone.as_dict(),
         }
 
     def _where(self) -> dict[str, Any]:

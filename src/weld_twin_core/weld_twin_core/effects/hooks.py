@@ -54,6 +54,8 @@ class Hooks(Parametric, ABC):
     """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
     cause: ClassVar[bool] = True
     """Whether a diagnosis may name it; noise and the set-up's own motion are nuisance."""
+    set_at_controller: ClassVar[bool] = False
+    """Whether a person can set it first: told before others that are the same on any motion."""
     depends_on: ClassVar[str] = 'constant'
     """What it depends on: 'constant', 'angle', 'direction', 'speed', 'acceleration', 'load',
     'temperature', 'time' or 'place' (in the workspace)."""

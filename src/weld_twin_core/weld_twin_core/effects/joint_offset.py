@@ -19,6 +19,7 @@ class JointOffset(ChannelError):
 
     name = 'joint_offset'
     everywhere = True
+    set_at_controller = True
     depends_on = 'constant'
     of = 'joint'
     stage = Stage.JOINT

@@ -104,20 +104,21 @@ class Directions:
         own = [effect.coordinates() for effect in self.effects]
         return np.concatenate([np.zeros(self.frame_count), *own, np.zeros(curves)])
 
-    def columns(self, features: Features, setup: int) -> Array:
+    def columns(self, features: Features, setup: int, *, framed: bool = True) -> Array:
         """
         Return d pose / d coordinate, shape (P, 6, M), linear part first [m, rad].
 
-        Effects that the recording cannot show (no load, no temperature) have columns of zero.
+        Without frames the arm alone counts: between its own base and its own flange. Effects that
+        the recording cannot show (no load, no temperature) have columns of zero.
         """
         out = np.zeros((self.count, 6, features.at.size))
         at = 0
         if 'base' in self.frames:
-            for k in range(6):
+            for k in range(6 * framed):
                 out[6 * setup + k] = features.column(('base', k))
             at += 6 * self.setups
         if 'tool' in self.frames:
-            for k in range(6):
+            for k in range(6 * framed):
                 out[at + k] = features.column(('tool', k))
             at += 6
         for effect, size in zip(self.effects, self.sizes, strict=True):
@@ -259,7 +260,7 @@ class Posterior:
         factor = size[:, None] * vectors[:, live] * np.sqrt(values[live])
         return np.column_stack([factor, self.mean])
 
-    def pose_covariance(self, features: Features, setup: int = 0) -> Array:
+    def pose_covariance(self, features: Features, setup: int = 0, *, framed: bool = True) -> Array:
         """
         Return the covariance of the true pose about the twin's, shape (M, 6, 6).
 
@@ -274,7 +275,7 @@ class Posterior:
         """
         if 'base' in self.directions.frames and not 0 <= setup < self.directions.setups:
             raise ModelError(f'the posterior has no base frame {setup}')
-        columns = self.directions.columns(features, setup)
+        columns = self.directions.columns(features, setup, framed=framed)
         moved = np.tensordot(self.spread, columns, axes=(0, 0))
         out = np.einsum('rim,rjm->mij', moved, moved, optimize=True)
         joints = [features.column(('q', i)) for i in range(features.twin.robot.n)]
@@ -285,7 +286,13 @@ class Posterior:
 
 
 def pose_covariances(
-    posterior: Posterior, twin: Twin, recording: Recording, at: Array, setup: int = 0
+    posterior: Posterior,
+    twin: Twin,
+    recording: Recording,
+    at: Array,
+    setup: int = 0,
+    *,
+    framed: bool = True,
 ) -> Array:
     """
     Return `Posterior.pose_covariance` of a long motion, shape (M, 6, 6), in pieces.
@@ -299,10 +306,14 @@ def pose_covariances(
     at : array, shape (M,) [s]
     setup : int
         Which base frame of the posterior.
+    framed : bool
+        Of what was measured, with the frames that were fitted to it; else of the arm between its
+        own base and flange, which such frames hide.
 
     """
     parts = [
-        posterior.pose_covariance(Features(twin, recording, piece), setup) for piece in _pieces(at)
+        posterior.pose_covariance(Features(twin, recording, piece), setup, framed=framed)
+        for piece in _pieces(at)
     ]
     return np.concatenate([np.zeros((0, 6, 6)), *parts])
 

@@ -31,6 +31,9 @@ class Accuracy(NamedTuple):
     low, high : float or None
         Nine of ten models that the recordings allow have their RMS between these; None where the
         model says nothing of how sure it is.
+    same : (float, float) or None
+        The same in the set-up that was recorded. Frames that were fitted to a recording take up
+        much of an arm's errors there, which are seen again where the robot's own base counts.
 
     """
 
@@ -38,6 +41,7 @@ class Accuracy(NamedTuple):
     worst: float
     low: float | None = None
     high: float | None = None
+    same: tuple[float, float] | None = None
 
 
 def accuracy(gaps: Sequence[Array], covariances: Sequence[Array | None]) -> Accuracy | None:
@@ -78,14 +82,29 @@ def along_seams(found: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | N
     ]
     if not any(keep.any() for keep in chosen):
         chosen = [_ends(piece.motion.t.size, piece.ends) for piece in found.travel.pieces]
-    sure = [
-        None if c is None else c[keep] for c, keep in zip(found.covariances, chosen, strict=True)
-    ]
+    sure, own = (
+        [None if c is None else c[keep] for c, keep in zip(each, chosen, strict=True)]
+        for each in (found.covariances, found.of_the_arm)
+    )
     before, after = (
-        accuracy([g[keep] for g, keep in zip(gaps, chosen, strict=True)], sure)
+        _widened(
+            *(
+                accuracy([g[keep] for g, keep in zip(gaps, chosen, strict=True)], each)
+                for each in (sure, own)
+            )
+        )
         for gaps in (found.before, found.after)
     )
     return before, after
+
+
+def _widened(same: Accuracy | None, own: Accuracy | None) -> Accuracy | None:
+    """Return an accuracy whose interval holds in the set-up recorded and in the robot's own base."""
+    if same is None or own is None or same.low is None or same.high is None:
+        return same
+    assert own.low is not None and own.high is not None
+    low, high = min(same.low, own.low), max(same.high, own.high)
+    return same._replace(low=low, high=high, same=(same.low, same.high))
 
 
 def _ends(count: int, ends: np.ndarray) -> np.ndarray:

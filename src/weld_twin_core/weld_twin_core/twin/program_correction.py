@@ -106,6 +106,9 @@ class ProgramCorrection:
     before, after : tuple of array, each of shape (N, 6) [m, rad]
         What is missing to the real tool at every sample of every piece.
     covariances : tuple of array or None, each of shape (N, 6, 6)
+        In the set-up that was recorded.
+    of_the_arm : tuple of array or None, each of shape (N, 6, 6)
+        Between the robot's own base and flange; the same where no frames were fitted.
     results : tuple of MoveResult
         One for every move, in the order of the program.
 
@@ -119,6 +122,7 @@ class ProgramCorrection:
     before: tuple[Array, ...]
     after: tuple[Array, ...]
     covariances: tuple[Array | None, ...]
+    of_the_arm: tuple[Array | None, ...]
     results: tuple[MoveResult, ...]
 
 
@@ -319,13 +323,14 @@ class _Work(NamedTuple):
         self, moved: MoveProgram, left: dict[int, str], calm: dict[int, str]
     ) -> ProgramCorrection:
         """Return everything that is told of the correction."""
-        before, after, sure = [], [], []
+        before, after, sure, own = [], [], [], []
         for piece in self.travel.pieces:
             aim = self.model.wanted(piece)
             motion = repeated(self.model.robot, moved, piece)
             before.append(missing(aim, self.model.real(piece, piece.motion)))
             after.append(missing(aim, self.model.real(piece, motion)))
             sure.append(self.model.covariances(piece, piece.motion))
+            own.append(self.model.covariances(piece, piece.motion, framed=False))
         return ProgramCorrection(
             moved,
             self.travel,
@@ -335,6 +340,7 @@ class _Work(NamedTuple):
             tuple(before),
             tuple(after),
             tuple(sure),
+            tuple(own),
             self._results(moved, before, after, sure),
         )
 

@@ -96,15 +96,24 @@ class ProgramModel:
 
         return self._by_tool(piece, poses)
 
-    def covariances(self, piece: Piece, motion: JointMotion) -> Array | None:
-        """Return how sure the real poses are, shape (N, 6, 6), turned into the robot's base."""
+    def covariances(
+        self, piece: Piece, motion: JointMotion, *, framed: bool = True
+    ) -> Array | None:
+        """
+        Return how sure the real poses are, shape (N, 6, 6), turned into the robot's base.
+
+        With the frames that were fitted, that is where the recording was made; without, it is where
+        the robot's own base counts.
+        """
         if self.posterior is None:
             return None
         posterior, recording = self.posterior, self.recording(motion)
         turn = np.kron(np.eye(2), self.robot.T_world_base[:3, :3].T)
 
         def sureness(tool: Array) -> Array:
-            found = pose_covariances(posterior, self.twin(tool), recording, motion.t, self.setup)
+            found = pose_covariances(
+                posterior, self.twin(tool), recording, motion.t, self.setup, framed=framed
+            )
             return np.asarray(turn @ found @ turn.T)
 
         return self._by_tool(piece, sureness)

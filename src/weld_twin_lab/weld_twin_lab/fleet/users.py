@@ -26,10 +26,17 @@ PATIENCE = 1800.0
 """Seconds after which somebody gives up."""
 
 
-@contextmanager
-def server(place: Path, *words: str) -> Iterator[str]:
-    """Yield the address of a server that ends with the block."""
-    with subprocess.Popen(
+def started(place: Path, *words: str) -> tuple[subprocess.Popen[str], str]:
+    """
+    Start a server; return it and its address.
+
+    Raises
+    ------
+    DataError
+        It does not start.
+
+    """
+    process = subprocess.Popen(
         [
             sys.executable,
             '-m',
@@ -43,13 +50,22 @@ def server(place: Path, *words: str) -> Iterator[str]:
         ],
         stdout=subprocess.PIPE,
         text=True,
-    ) as process:
-        assert process.stdout is not None
-        said = process.stdout.readline()
-        if not said.startswith('open '):
-            raise DataError('the server does not start')
+    )
+    assert process.stdout is not None
+    said = process.stdout.readline()
+    if not said.startswith('open '):
+        process.kill()
+        raise DataError('the server does not start')
+    return process, said.removeprefix('open ').strip().rstrip('/')
+
+
+@contextmanager
+def server(place: Path, *words: str) -> Iterator[str]:
+    """Yield the address of a server that ends with the block."""
+    process, address = started(place, *words)
+    with process:
         try:
-            yield said.removeprefix('open ').strip().rstrip('/')
+            yield address
         finally:
             process.terminate()
 
@@ -70,7 +86,7 @@ class Visitor:
     """Somebody with a plain client: it keeps cookies and follows what the server says."""
 
     def __init__(self, root: str) -> None:
-        self._root = root
+        self.root = root
         self._open = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
         self.page()
 
@@ -78,12 +94,12 @@ class Visitor:
         self, path: str = '/', data: bytes | None = None, kind: str = ''
     ) -> tuple[int, str, str]:
         """Return status, address and text of a page."""
-        request = urllib.request.Request(self._root + path, data=data)
+        request = urllib.request.Request(self.root + path, data=data)
         if kind:
             request.add_header('Content-Type', kind)
         try:
             with self._open.open(request, timeout=60) as answer:
-                return answer.status, answer.url.removeprefix(self._root), answer.read().decode()
+                return answer.status, answer.url.removeprefix(self.root), answer.read().decode()
         except urllib.error.HTTPError as error:
             return error.code, path, error.read().decode()
 

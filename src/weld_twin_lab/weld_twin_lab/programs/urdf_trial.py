@@ -27,6 +27,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_msgs_py.programs import Context, controller_of
 from weld_twin_msgs_py.programs.writing import Exported, ExportMove, written
 from weld_twin_msgs_py.robots import load_robot
+from weld_twin_msgs_py.robots.axes_to_dh import inverse
 from weld_twin_nodes.cli.in_process import weld_twin
 
 from ..plant.plant import run
@@ -408,7 +409,7 @@ def _files(cell: Cell, seam: np.ndarray) -> dict[str, Any]:
     places = []
     for robot in arms:
         assert robot.controller is not None
-        base = np.linalg.inv(robot.controller.base)
+        base = inverse(robot.controller.base)
         bare = replace(robot, T_world_base=base, T_flange_tool=robot.controller.flange)
         places.append(forward(bare, seam)[:, :3, 3])
     bare_arm = cell.arm.controller

@@ -15,7 +15,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.errors import DataError, ModelError
-from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.bags import bag_info, read_recording
 from weld_twin_msgs_py.messages.topics import TopicNames
 
 ROBOT = load('ur5')
@@ -44,6 +44,22 @@ MSG: control_msgs/InterfaceValue
 string[] interface_names
 float64[] values
 """
+BODIES = """\
+std_msgs/Header header
+uint32 frame_number
+mocap4r2_msgs/RigidBody[] rigidbodies
+================================================================================
+MSG: mocap4r2_msgs/RigidBody
+std_msgs/Header header
+uint32 frame_number
+string rigid_body_name
+mocap4r2_msgs/Marker[] markers
+geometry_msgs/Pose pose
+================================================================================
+MSG: mocap4r2_msgs/Marker
+int64 index
+geometry_msgs/Point translation
+"""
 
 
 class Cell:
@@ -54,6 +70,7 @@ class Cell:
         for name, text in (
             ('control_msgs/msg/JointTrajectoryControllerState', STATE),
             ('control_msgs/msg/DynamicJointState', DYNAMIC),
+            ('mocap4r2_msgs/msg/RigidBodies', BODIES),
         ):
             types = get_types_from_msg(text, name)
             self.store.register({k: v for k, v in types.items() if k not in self.store.types})
@@ -140,6 +157,40 @@ def test_one_frame_of_tf_is_the_measured_pose(cell, tmp_path):
     assert_read(read_recording(bag, ROBOT, TopicNames(pose='/tf:probe')))
     with pytest.raises(DataError, match='holds the frames camera, probe; say which'):
         read_recording(bag, ROBOT, TopicNames(pose='/tf'))
+
+
+def test_one_rigid_body_of_a_motion_capture_system_is_the_measured_pose(cell, tmp_path):
+    def body(k, name, pose):
+        x, y, z, w = quaternion_from_matrix(pose[:3, :3])
+        return cell.make(
+            'mocap4r2_msgs/msg/RigidBody',
+            header=cell.header(k),
+            frame_number=k,
+            rigid_body_name=name,
+            markers=[],
+            pose=cell.make(
+                'geometry_msgs/msg/Pose',
+                position=cell.make(
+                    'geometry_msgs/msg/Point', **dict(zip('xyz', pose[:3, 3], strict=True))
+                ),
+                orientation=cell.make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w),
+            ),
+        )
+
+    for k in range(N):
+        cell.joints(k)
+        seen = [body(k, 'table', np.eye(4)), body(k, 'torch', forward(ROBOT, Q[k]))]
+        message = {'header': cell.header(k, 'mocap'), 'frame_number': k, 'rigidbodies': seen}
+        cell.add('/rigid_bodies', 'mocap4r2_msgs/msg/RigidBodies', k, **message)
+    bag = cell.write(tmp_path)
+    names = TopicNames(pose='/rigid_bodies:torch')
+    assert_read(read_recording(bag, ROBOT, names))
+    assert {topic.name: topic.use for topic in bag_info(bag, names).topics} == {
+        '/joint_states': 'joints',
+        '/rigid_bodies': 'pose',
+    }
+    with pytest.raises(DataError, match='holds the bodies table, torch; say which'):
+        read_recording(bag, ROBOT, TopicNames(pose='/rigid_bodies'))
 
 
 def point(cell, q):

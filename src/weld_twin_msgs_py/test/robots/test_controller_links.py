@@ -68,7 +68,10 @@ HANDS = {
         ('link_6', 'mounting_flange', '0.1 0 0', '0 0 0'),
     ),
     'one link more than joints': ('link7', ('link_6', 'link7', '0.1 0 0', '0 0 0')),
+    'a flange with a number': ('fr3_link8', ('link_6', 'fr3_link8', '0.1 0 0', '0 0 0')),
+    'an end that carries the tool': ('ee_link', ('link_6', 'ee_link', '0.1 0 0', '0 0 1')),
     'the last link': ('link_6',),
+    'a tool of two parts': ('link_6', ('link_6', 'cable_box', '0 0 0.1', '0 0 0')),
 }
 
 

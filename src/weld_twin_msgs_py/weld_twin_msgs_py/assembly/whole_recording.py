@@ -83,7 +83,7 @@ def assembled(
         motion = JointMotion(motion.t, motion.q, static=True)
         notes += (f'{motion.t.size} static stations: the motion between them is not known',)
     elif measured is not None and one_clock:
-        _refuse_apart(motion, measured)
+        refuse_apart(motion, measured)
     wrench = streams.get(Role.WRENCH)
     if wrench is not None and not static:
         wrench, measured, said = _unloaded_before(wrench, epoch, measured)
@@ -145,7 +145,7 @@ def _matched_sigma(ns: np.ndarray, given: Samples, sigma: Array) -> Array:
     return np.where(same, np.sqrt((given.rows[at] ** 2).mean(axis=1)), sigma)
 
 
-def _refuse_apart(motion: JointMotion, measured: Measurements) -> None:
+def refuse_apart(motion: JointMotion, measured: Measurements) -> None:
     """Two clocks with nothing in common would silently pair everything with one joint state."""
     spans = [(float(t[0]), float(t[-1])) for t in (motion.t, measured.t)]
     sentence = apart(*spans)

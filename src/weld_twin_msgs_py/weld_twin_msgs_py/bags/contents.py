@@ -14,6 +14,7 @@ import numpy as np
 from weld_twin_core.bursts import Bursts, bursts
 from weld_twin_core.two_clocks import ONE_CLOCK, apart
 
+from ..assembly.foreign_types import split_topic
 from ..messages.topics import (
     BY_NAME,
     CONTACT,
@@ -179,7 +180,7 @@ def _uses(names: TopicNames) -> dict[str, tuple[str, tuple[str, ...]]]:
     """Return use and acceptable types by topic name."""
     return {
         names.joints: ('joints', (JOINT_STATES.type,)),
-        names.pose: ('pose', POSE_TYPES),
+        split_topic(names.pose)[0]: ('pose', POSE_TYPES),
         names.point: ('point', (MEASURED_POINT.type,)),
         names.contact: ('contact', (CONTACT.type,)),
         names.sigma: ('sigma', (MEASURED_SIGMA.type,)),

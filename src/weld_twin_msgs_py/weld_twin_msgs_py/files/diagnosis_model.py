@@ -13,7 +13,9 @@ import numpy as np
 from weld_twin_core.arm.fingerprint import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
+from weld_twin_core.diagnosis.algebra.model import Alone
 from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.diagnosis.soundness.mending import Given, replayed
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.setup_motion import of_the_robot, seen_from
 from weld_twin_core.errors import DataError, ModelError
@@ -70,19 +72,31 @@ def read_model(robot: Robot, path: Path | str) -> Model:
     model = content.get('model')
     if not isinstance(model, dict):
         raise ModelError(_without_model(path, content))
+    mends = _mends(content)
+    robot = replayed(mends, Given((), robot)).robot
     _refuse_other_robot(robot, path, model)
     try:
         tool = _frame(model['tool'], 'model.tool')
         bases = tuple(_frame(base, 'model.bases') for base in model['bases'])
         known = effects_from_list(model.get('known', []), robot)
         found = effects_from_list(model.get('found', []), robot)
+        alone = _alone(model.get('alone'), robot)
     except (KeyError, TypeError) as error:
         raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
     except (ModelError, DataError) as error:
         raise ModelError(f"diagnosis '{path}': {error}") from None
     if not bases:
         raise ModelError(f"the model of diagnosis '{path}' has no base frame")
-    return Model(robot.with_frames(tool=tool), bases, known, found, _mended(content))
+    placed = robot.with_frames(tool=tool)
+    return Model(placed, bases, known, found, _mended(content), mends=mends, alone=alone)
+
+
+def _alone(entry: Any, robot: Robot) -> Alone | None:
+    """Return what the robot file of a model does by itself; older files say nothing of it."""
+    if not isinstance(entry, dict):
+        return None
+    sizes = {key: float(entry[key]) for key in Alone._fields if key != 'changes'}
+    return Alone(effects_from_list(entry['changes'], robot), **sizes)
 
 
 def _without_model(path: Path | str, content: dict[str, Any]) -> str:
@@ -116,6 +130,70 @@ def _mended(content: dict[str, Any]) -> tuple[str, ...]:
         for item in items
         if isinstance(item, dict) and item.get('applied')
     )
+
+
+def _mends(content: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+    """Return how that was undone, in its order."""
+    items = content.get('unsound') or []
+    if not isinstance(items, list):
+        return ()
+    own = [item for item in items if isinstance(item, dict) and item.get('applied')]
+    return tuple(mend for item in own if isinstance(mend := item.get('mend'), dict))
+
+
+def mended_source(
+    model: Model, nominal: Robot, recording: Recording, setup: int = 0
+) -> tuple[Recording, str]:
+    """
+    Return a recording mended as the diagnosis of a model mended its own, and what is told of it.
+
+    Where something was measured, the measurements tell whether it needs that: a source that was
+    put right meanwhile is left as it is.
+
+    Parameters
+    ----------
+    model : Model
+        As `read_model` returns it.
+    nominal : Robot
+        The robot that was given.
+    recording : Recording
+    setup : int
+        Which recording of the diagnosis it is, counted from 0.
+
+    Returns
+    -------
+    recording : Recording
+    told : str
+        A sentence; empty where nothing had to be mended.
+
+    Raises
+    ------
+    ModelError
+        The file's corrections do not fit the recording.
+
+    """
+    if not model.mends:
+        return recording, ''
+    out = replayed(model.mends, Given((recording,), nominal), setup).recordings[0]
+    if out is recording:
+        return recording, ''
+    twin = model.twin(setup)
+    if recording.measured is not None and _gap(twin, recording) < _gap(twin, out):
+        return recording, f'{recording.name} needs no mending any more, and was left as it is'
+    return out, f'{recording.name} was mended as the diagnosis did: {" ".join(model.mended)}'
+
+
+def _gap(twin: Twin, recording: Recording) -> float:
+    """Return the median distance between measured and twin [m], beyond any where none pairs."""
+    seen = recording.measured
+    assert seen is not None
+    t = recording.joints.t
+    inside = (seen.t >= t[0]) & (seen.t <= t[-1])
+    if not inside.any():
+        return float('inf')
+    part = seen.take(inside)
+    away = part.position - twin.poses(recording, part.t).position
+    return float(np.median(np.linalg.norm(away, axis=1)))
 
 
 def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:

@@ -72,7 +72,9 @@ def _robot() -> Schema:
         {
             'name': TEXT,
             'convention': {'enum': ['standard', 'modified'], 'description': 'kind of DH rows'},
-            'gravity': _vector(3, 'in the world frame [m/s^2]'),
+            'gravity': _vector(
+                3, 'in the base frame [m/s^2]: (0, 0, 9.80665) for an arm on a ceiling'
+            ),
             'base': _said(frame, 'the base in the world'),
             'tool': _said(frame, 'the tool at the flange'),
             'joints': {'type': 'array', 'items': _joint(), 'minItems': 1},

@@ -5,7 +5,7 @@ Which links of a URDF are the controller's base and its flange.
 
 Packages of ROS-Industrial end in `tool0`, the controller's flange with z out of it, and hang `base`,
 the controller's own base, beside `base_link`; REP 199 adds `flange`. Franka numbers its flange as
-one link more than the arm has joints, and arms without any such link end in their last one.
+one link more, and arms without any such link end in their last one.
 
 References
 ----------
@@ -39,7 +39,10 @@ _WORLDS = ('world', 'map', 'odom', 'cell', 'ground')
 """Roots that are a place and no robot."""
 APART = 1e-3
 """Distance [m] from which `tool0` is not in the flange, which is that of the maker's by definition."""
-_ENDS = re.compile(r'ee_link|link_ee|link_eef|end_effector(_link)?|tool_mount|mounting_plate')
+_ENDS = re.compile(
+    r'ee_link|link_eef?|eef(_link)?|end_effector(_link)?|tool_mount|mounting_plate|faceplate'
+    r'|mechanical_interface'
+)
 """What is a flange where a tool hangs on it, and may be the tool's tip where it is the last link."""
 
 
@@ -119,13 +122,13 @@ def flange_link_of(
         chosen = wanted
     else:
         behind = chain[chain.index(moving[-1]) + 1 :]
-        chosen = _likeliest(fixed, [last, *(joint.child for joint in behind)], len(moving))
+        chosen = _likeliest(fixed, [last, *(joint.child for joint in behind)])
     return chosen, inverse(fixed[tip].T) @ fixed[chosen].T
 
 
-def _likeliest(fixed: dict[str, Placed], way: list[str], joints: int) -> str:
+def _likeliest(fixed: dict[str, Placed], way: list[str]) -> str:
     """Return the link that is the flange by its name; ``way`` leads to the tip."""
-    ranks = {link: _rank(link, joints, link in way[:-1]) for link in fixed}
+    ranks = {link: _rank(link, link != way[0], link in way[:-1]) for link in fixed}
     ordered = sorted(fixed, key=lambda link: (ranks[link], link not in way, fixed[link].steps))
     first, named = ordered[0], [link for link in ordered if ranks[link] == 2]
     if ranks[first] == 1 and named:
@@ -135,8 +138,19 @@ def _likeliest(fixed: dict[str, Placed], way: list[str], joints: int) -> str:
     return first
 
 
-def _rank(link: str, joints: int, carries: bool) -> int:
-    """Return how surely a link is the flange, 0 most; ``carries`` that the tip hangs on it."""
+def _rank(link: str, fixed: bool, carries: bool) -> int:
+    """
+    Return how surely a link is the flange, 0 most.
+
+    Parameters
+    ----------
+    link : str
+    fixed : bool
+        It hangs on the last link that moves, and is not that.
+    carries : bool
+        The tip hangs on it.
+
+    """
     name = link.lower()
     words = f'_{name}'
     if words.endswith(f'_{FLANGE}'):
@@ -145,9 +159,9 @@ def _rank(link: str, joints: int, carries: bool) -> int:
         return 1
     if 'flange' in name:
         return 2
-    if re.search(rf'(^|_)link_?{joints + 1}$', name):
+    if fixed and re.search(r'(^|_)link_?\d+$', name):  # a number is of the arm, not of a tool
         return 3
-    return 4 if carries and re.search(rf'(^|_)({_ENDS.pattern})$', name) else 5
+    return 4 if fixed and carries and re.search(rf'(^|_)({_ENDS.pattern})$', name) else 5
 
 
 def _fixed_to(tree: Tree, link: str, *, down_only: bool = False) -> dict[str, Placed]:

@@ -9,6 +9,7 @@ from datetime import datetime, timezone
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
@@ -22,6 +23,8 @@ _LARGEST = (('s', 1e11), ('ms', 1e14), ('us', 1e17), ('ns', np.inf))
 """Beyond these, stamps since 1970 must be in the next finer unit."""
 
 
+_MOSTLY = 0.9
+"""Share of the rows that are in order at least, for the others to be repeats and no other order."""
 _DATES = ('%d.%m.%Y', '%Y/%m/%d', '%d-%b-%Y', '%Y-%m-%d', '%m/%d/%Y', '%d/%m/%Y', '')
 """Dates as instruments and spreadsheets write them, American before British; or none."""
 _CLOCKS = ('%H:%M:%S.%f', '%H:%M:%S', '%H:%M', '%I:%M:%S.%f %p', '%I:%M:%S %p', '%I.%M.%S.%f %p')
@@ -48,6 +51,22 @@ def stamps(
     chosen = unit or next(name for name, top in _LARGEST if abs(values).max() < top)
     scale = factor(_SECONDS, chosen, column, 'the time')
     return values * scale, f'stamps in {column!r} are in {chosen}'
+
+
+def later_rows(
+    cells: Cells, column: str | None, date: str | None = None
+) -> NDArray[np.intp] | None:
+    """
+    Return the rows whose stamp is later than all before; None where the stamps are no use.
+
+    A stream whose stamps are rounded repeats some of them, and says no less for it.
+    """
+    values = None if column is None else _parsed(cells, column, date)
+    if values is None or np.isnan(values).any():
+        return None
+    before = np.concatenate([[-np.inf], np.maximum.accumulate(values)[:-1]])
+    later = np.flatnonzero(values > before)
+    return later if later.size >= _MOSTLY * values.size else None
 
 
 def _parsed(cells: Cells, column: str, date: str | None) -> Array | None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -102,12 +101,12 @@ def joint_units(
     usual = Units(told[0] or _usual_angle(q[:, turning]), told[1] or _usual_slide(q, robot))
     chosen = usual
     if judge is not None and len(q) >= ENOUGH:
+        open_angle = told[0] is None and bool(turning.any())
+        open_slide = told[1] is None and bool(sliding.any())
         others = [
-            Units(*pair)
-            for pair in product(
-                (told[0],) if told[0] or not turning.any() else ('rad', 'deg'),
-                (told[1],) if told[1] or not sliding.any() else ('m', 'mm'),
-            )
+            Units(angle, slide)
+            for angle in (('rad', 'deg') if open_angle else (usual.angle,))
+            for slide in (('m', 'mm') if open_slide else (usual.slide,))
         ]
         chosen = _fitting(q, usual, others, robot, names, options, judge)
     fitted = ' (the measured positions fit no other unit)' if chosen != usual else ''

@@ -23,13 +23,17 @@ _LOOK = 40
 """Lines at the top in which a list is told."""
 _NAMES = (1, 2, 3)
 """Names before the numbers: collection, group, point."""
-_POINT, _PAIR = 3, 6
+_POINT = 3
+"""Numbers of a point."""
+_PAIR = 6
+"""Numbers of a nominal and a measured point."""
 _WITH_DIFFERENCE = (9, 10)
-"""Numbers of a point, of nominal and measured, and of these with their difference and its size."""
+"""Numbers of both with what they differ by, and with its size."""
 _ROUNDED = 2e-3
 """Points and their difference are rounded; in millimetres, to a micrometre and coarser."""
 _JOINT_TARGET = re.compile(r'\[\s*\[([^\[\]]*)\]\s*,\s*\[([^\[\]]*)\]\s*\]')
 _AXES = 6
+"""Axes of an arm, and axes beside it, in a target of RAPID."""
 _NO_AXIS = 1e8
 """9E9 stands for an external axis that is not there."""
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
@@ -16,7 +17,7 @@ from weld_twin_core.recording import JointMotion
 
 from .build import BEYOND, LAST_STAMP, Table, own_epoch, stations, table_of
 from .cells import Cells, read_cells
-from .clock_column import stamps
+from .clock_column import later_rows, stamps
 from .header import joint_columns, time_columns, unit_of
 from .joint_readings import joint_angles
 from .table_options import TableOptions
@@ -57,18 +58,13 @@ def read_two_tables(
     seen = read_cells(measured, options.delimiter, options.decimal, options.marker)
     said = [f'{c.path.name}: {text}' for c in (log, seen) for text in c.said]
     names = joint_columns(log.header, robot, options)
-    q = log.stack(names)
-    times, own = _stamps(log, options, said), _stamps(seen, options, said)
+    found = list[str]()
+    stream = _later(_whole(log, names, found), options, found)
+    points = _later(seen, options, found)
+    times, own = _stamps(stream, options, found), _stamps(points, options, found)
     if times is None or own is None or not _stream(times):
-        if len(log.rows) != len(seen.rows):
-            raise DataError(
-                f"'{log.path}' has {len(log.rows)} rows and '{seen.path}' {len(seen.rows)}, and "
-                'nothing says which belong together; give both files stamps of a motion, or a row '
-                'for each station'
-            )
-        said.append('rows of both files are paired in their order')
-        joined = _joined(log, seen, names, q, own)
-        return table_of(joined, robot, replace(options, time_column=None), said)
+        return _paired(log, seen, names, robot, options, said)
+    said += found
     dated = bool(min(times[0], own[0]) > SINCE_1970)
     if dated and max(times[-1], own[-1]) >= LAST_STAMP:
         times, own, dated = times - times[0], own - times[0], False
@@ -79,7 +75,29 @@ def read_two_tables(
             'both clocks are taken to begin with the first row of their file; --clock-offset '
             "shifts the instrument's"
         )
-    return _moving(log, seen, robot, options, said, (names, q, times, own + offset, dated))
+    q = stream.stack(names)
+    return _moving(stream, points, robot, options, said, (names, q, times, own + offset, dated))
+
+
+def _paired(
+    log: Cells,
+    seen: Cells,
+    names: tuple[str, ...],
+    robot: Robot,
+    options: TableOptions,
+    said: list[str],
+) -> Table:
+    """Return stations: row belongs to row."""
+    if len(log.rows) != len(seen.rows):
+        raise DataError(
+            f"'{log.path}' has {len(log.rows)} rows and '{seen.path}' {len(seen.rows)}, and "
+            'nothing says which belong together; give both files stamps of a motion, or a row '
+            'for each station'
+        )
+    own = _stamps(seen, options, said)
+    said.append('rows of both files are paired in their order')
+    joined = _joined(log, seen, names, log.stack(names), own)
+    return table_of(joined, robot, replace(options, time_column=None), said)
 
 
 def _moving(
@@ -130,14 +148,46 @@ def _joined(log: Cells, seen: Cells, names: tuple[str, ...], q: Array, t: Array 
     return Cells(log.path, header, rows, seen.lines, '.', [])
 
 
+def _whole(log: Cells, names: tuple[str, ...], said: list[str]) -> Cells:
+    """Return a log without rows in which a joint is missing."""
+    gaps = ~np.isfinite(log.stack(names)).all(axis=1)
+    return _kept(log, np.flatnonzero(~gaps), said, 'in which a joint is missing')
+
+
+def _later(cells: Cells, options: TableOptions, said: list[str]) -> Cells:
+    """Return a table without rows whose stamp is not later than those before."""
+    found = later_rows(cells, *_clock(cells, options))
+    if found is None:
+        return cells
+    return _kept(cells, found, said, 'whose stamp repeats one before')
+
+
+def _kept(cells: Cells, keep: NDArray[np.intp], said: list[str], why: str) -> Cells:
+    out = len(cells.rows) - keep.size
+    if not out:
+        return cells
+    if not keep.size:
+        raise DataError(f"table '{cells.path}' has no complete row")
+    said.append(f'{cells.path.name}: {out} rows are left out {why}')
+    rows, lines = [cells.rows[k] for k in keep], [cells.lines[k] for k in keep]
+    return replace(cells, rows=rows, lines=lines)
+
+
+def _clock(cells: Cells, options: TableOptions) -> tuple[str | None, str | None]:
+    """Return the columns of the time and of the date."""
+    if options.time_column in cells.header:
+        return options.time_column, None
+    date, clock = time_columns(cells.header)
+    return clock, date
+
+
 def _stream(times: Array) -> bool:
     return times.size > 2 and float(np.median(np.diff(times))) < STREAM
 
 
 def _stamps(cells: Cells, options: TableOptions, said: list[str]) -> Array | None:
     """Return the stamps of a file, None where it has none that are good for anything."""
-    given = options.time_column if options.time_column in cells.header else None
-    date, clock = (None, given) if given else time_columns(cells.header)
+    clock, date = _clock(cells, options)
     t, sentence = stamps(cells, clock, None if clock is None else unit_of(clock), date)
     said.append(f'{cells.path.name}: {sentence}')
     return t

@@ -79,7 +79,7 @@ IN_BRACKETS = {
 """What is a unit between brackets alone, and may be a word of its own elsewhere."""
 TEMPERATURE = re.compile(r'temp')
 DATE = re.compile(r'^(date|datum)\b')
-CLOCK = re.compile(r'time|stamp|zeit|^t$')
+CLOCK = re.compile(r'time|stamp|zeit|^t$|^t\s*[\[(](?:s|ms|us|µs|ns|sec|min|h)[\])]$')
 """With a column of dates beside it: the time of day."""
 _LISTED = 40
 """Names that fit into a message."""

@@ -110,3 +110,26 @@ def test_a_motion_of_two_files_becomes_a_bag_with_two_clocks(weld_twin, tmp_path
     assert not back.joints.static and back.joints.t.size == t.size
     late = forward(ROBOT, back.joints.at(back.measured.t - 0.02)[0])[:, :3, 3]
     assert np.linalg.norm(back.measured.position - late, axis=1).max() < 2e-5
+
+
+def test_a_log_with_gaps_and_repeated_stamps_is_a_motion_all_the_same(weld_twin, tmp_path):
+    t = np.arange(0.0, 4.0, 0.01)
+    q = np.array([0.2, -1.3, 1.4, -1.5, -1.4, 0.3]) + 0.5 * np.sin(t[:, None] + np.arange(6.0))
+    lines = [','.join([f'{a:.3f}', *(f'{v:.7f}' for v in b)]) for a, b in zip(t, q, strict=True)]
+    lines[40] = lines[40].split(',')[0] + ',' * 6
+    lines.insert(90, lines[89])
+    head = ','.join(['time', *(f'J{k}' for k in range(1, 7))])
+    (tmp_path / 'log.csv').write_text('\n'.join([head, *lines]))
+    point = 1e3 * forward(ROBOT, q[::3])[:, :3, 3]
+    seen = [','.join([f'{1e3 * a:.0f}', *(f'{v:.5f}' for v in p)])
+            for a, p in zip(t[::3], point, strict=True)]  # fmt: skip
+    (tmp_path / 'track.csv').write_text('\n'.join(['t [ms],X [mm],Y [mm],Z [mm]', *seen]))
+    result = weld_twin('import', tmp_path / 'log.csv', '--measured', tmp_path / 'track.csv',
+                       '--robot', 'ur5', '--out', tmp_path / 'bag')  # fmt: skip
+    assert result.code == 0, result.err
+    assert '1 rows are left out in which a joint is missing' in result.out
+    assert '1 rows are left out whose stamp repeats one before' in result.out
+    back = read_recording(tmp_path / 'bag', ROBOT)
+    np.testing.assert_allclose(back.measured.t[:-1], t[::3][:-1], atol=1e-6)
+    there = forward(ROBOT, back.joints.at(back.measured.t)[0])[:, :3, 3]
+    assert np.linalg.norm(back.measured.position - there, axis=1).max() < 2e-5

@@ -85,6 +85,20 @@ def test_an_input_nobody_needs_may_be_missing_and_slow_ones_are_waited_for(clock
         assert rare.second()[0] == OK
 
 
+def test_a_thermometer_read_every_ten_seconds_is_silent_when_it_misses_one(clock):
+    watched = Watched(clock, required=False)
+    told = []
+    for _ in range(4):
+        watched.input.arrived()
+        told.append([watched.second()[0] for _ in range(10)])
+    assert STALE in told[0]  # nobody knows yet that it is slow
+    assert set(told[3]) == {OK}
+    for _ in range(9):
+        assert watched.second()[0] == OK
+    assert watched.second()[0] == OK
+    assert watched.second()[0] == STALE
+
+
 def test_the_node_itself_tells_what_lasts_each_time_and_what_happened_once():
     health = Health('twin', 1.0)
     health.lasting['/x'] = 'nobody hears'

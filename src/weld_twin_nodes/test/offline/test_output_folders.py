@@ -9,8 +9,10 @@ import os
 import signal
 import subprocess
 import sys
+from datetime import datetime, timezone
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from weld_twin_msgs_py.files.whole_files import write_text
@@ -50,18 +52,32 @@ def correct(weld_twin, program, out, *more):
     return weld_twin('correct-program', program, '--robot', 'kuka_kr6_r900', '--out', out, *more)
 
 
+def kept_history(path):
+    """Make a history that holds one diagnosis."""
+    from weld_twin_nodes.history import Database, Entry
+
+    at = datetime(2026, 3, 2, 8, 30, tzinfo=timezone.utc)
+    one = np.ones(1)
+    values = (('joint_offset elbow_joint 0',), 1e-4 * one, 1e-3 * one, 1e-10 * np.eye(1))
+    database = Database(str(path))
+    head = (at, 'ur5', 'abc', '0' * 64, 'identified', 0.9, 1e-4, 1e-5, 1e-5)
+    database.add('line 3', Entry(*head, [], *values, np.eye(4)))
+    database.close()
+    return path
+
+
 def test_a_web_site_is_not_taken_for_pages_of_a_fleet(weld_twin, tmp_path):
     pytest.importorskip('sqlalchemy', reason='the history is an extra')
-    site = tmp_path / 'site'
+    site, history = tmp_path / 'site', kept_history(tmp_path / 'fleet.db')
     site.mkdir()
     (site / 'index.html').write_text('<h1>Welders of Ghent</h1>')
     (site / 'style.css').write_text('h1 {}')
     before = content(site)
-    refused = weld_twin('fleet', 'page', '--db', tmp_path / 'fleet.db', '--out', site)
+    refused = weld_twin('fleet', 'page', '--db', history, '--out', site)
     assert refused.code == 2 and 'no list says that weld-twin wrote it' in refused.err
     assert content(site) == before
-    forced = weld_twin('fleet', 'page', '--db', tmp_path / 'fleet.db', '--out', site, '--force')
-    assert forced.code == 0
+    forced = weld_twin('fleet', 'page', '--db', history, '--out', site, '--force')
+    assert forced.code == 0, forced.err
     assert (site / 'index.kept-1.html').read_text() == before['index.html'].decode()
     assert (site / 'style.css').read_bytes() == before['style.css']
 

@@ -22,6 +22,7 @@ from weld_twin_nodes.report.belief import belief_of
 from weld_twin_nodes.report.controllers import correction
 from weld_twin_nodes.report.diagnosis_files import diagnosis_text
 from weld_twin_nodes.report.diagnosis_page import Sheet
+from weld_twin_nodes.report.directions import components, sides_words
 from weld_twin_nodes.report.mending import left_without
 from weld_twin_nodes.report.quantities import counted
 from weld_twin_nodes.report.to_do import worth_doing
@@ -349,11 +350,11 @@ def test_samples_left_out_are_told_as_that_beside_an_instrument_without_outliers
 @pytest.mark.parametrize(
     ('brand', 'told'),
     [
-        ('fanuc', 'enter what it reads now plus 0.0687 deg'),
-        ('abb', '0.001198 rad at the joint times the ratio of its gear'),
-        ('yaskawa', 'by 0.0687 deg. It counts pulses'),
-        ('ur', '0.001198 rad here'),
-        ('kuka', '$MAMES, in degrees'),
+        ('fanuc', 'new value = what it reads now + 0.0687; then EXEC'),
+        ('abb', 'new value = old value - 0.001198 * G'),
+        ('yaskawa', 'in pulses: new value = old value - 0.0687 * P'),
+        ('ur', 'in radians: new value = old value + 0.001198;'),
+        ('kuka', '$MAMES of the axis, in degrees: new value = old value + 0.0687;'),
     ],
 )
 def test_what_a_controller_asks_for_is_told_in_its_unit(brand, told):
@@ -393,3 +394,40 @@ def test_one_is_no_plural():
 def test_the_first_screen_has_degrees_and_no_milliradians():
     page = report_page(replace(CIRCLE, actions=()), sheet=Sheet())
     assert 'mrad' not in part(page, 'id="verdict"', 'id="acceptance"')
+
+
+def test_where_the_arm_stands_along_is_where_it_goes_next():
+    traces = PLAY.traces
+    path = traces.measured[0] - traces.before[0]
+    path[:12] = path[12]
+    still = replace(traces, measured=(path + traces.before[0], *traces.measured[1:]))
+    way = (path[13] - path[12]) / np.linalg.norm(path[13] - path[12])
+    parts = components(replace(PLAY, traces=still), 0, np.tile(2e-4 * way, (len(path), 1)))
+    assert plain(sides_words(parts[3])).startswith('0.200 mm ahead')
+
+
+def test_checks_that_are_in_order_passed():
+    checks = tuple(Check(name, 'ok', 'fine') for name in ('clocks', 'outliers', 'units'))
+    page = plain(report_page(replace(PLAY, checks=checks)))
+    assert 'all 3 checks passed' in page and 'All 3 checks passed.' in page
+    one = replace(checks[0], level='note')
+    page = plain(report_page(replace(PLAY, checks=(one, *checks[1:]))))
+    assert '2 of 3 checks passed; 1 note' in page and 'found nothing' not in page
+
+
+def test_what_is_open_is_open_in_what_it_depends_on_too():
+    case = diagnoses.ambiguous()
+    sites = (Site('joint_offset', 'joint_a1'), Site('backlash', 'joint_a1'))
+    cause = replace(case.causes[0], name=tuple((site, 0.4) for site in sites))
+    case = replace(case, indistinguishable=(sites,), causes=(cause,))
+    told = part(report_page(case), 'By what it depends on', 'By direction')
+    assert 'constant or the direction of motion' in told
+
+
+def test_what_a_cause_does_is_told_at_the_stations_where_there_is_no_seam():
+    still = diagnoses.calibration()
+    assert all(recording.joints.static for recording in still.recordings)
+    page = report_page(replace(still, families=()))
+    assert 'Effect at the stations' in page and 'Effect on the seam' not in page
+    moving = report_page(PLAY)
+    assert 'Effect on the seam' in moving and 'Effect at the stations' not in moving

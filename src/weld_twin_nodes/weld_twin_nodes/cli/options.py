@@ -70,7 +70,8 @@ def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
     """Return the robot with the effects of a file; say which values no machine has."""
     from ..offline.told_twin import build_twin
 
-    twin = build_twin(robot, path, implausible=implausible)
+    # Recordings that it is for are checked, and mended, by themselves.
+    twin = build_twin(robot, path, implausible=implausible, mended=True)
     say_doubts(twin, path)
     return twin
 

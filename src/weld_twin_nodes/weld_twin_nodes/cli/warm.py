@@ -145,4 +145,7 @@ def _run(asked: dict[str, Any], out: int) -> NoReturn:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except BrokenPipeError:  # who asked was killed
+        os._exit(0)

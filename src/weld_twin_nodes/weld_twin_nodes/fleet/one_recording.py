@@ -63,6 +63,8 @@ def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, 
 def _read(listed: Listed, done: Outcome, out: Path) -> tuple[str, str, dict[str, Any] | None]:
     """Return state, sentence and entry of what the command left."""
     state = STATES.get(done.code, FAILED)
+    if done.disk_full:
+        state = FAILED
     if state == UNSOUND:
         return state, _unsound(out), None
     if state != DONE:

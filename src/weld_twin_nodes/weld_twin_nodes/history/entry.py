@@ -132,7 +132,7 @@ def _entry(data: Mapping[str, Any], file: Path, at: datetime | None) -> Entry:
             f"the posterior of '{file}' cannot be right: {impossible}; diagnose the recording again"
         )
     return Entry(
-        at or _date(model['epochs_ns'][0], file),
+        at or date_of_stamp(model['epochs_ns'][0], file),
         str(model['robot']),
         str(model['kinematics']),
         '+'.join(recordings),
@@ -164,7 +164,16 @@ def _impossible(value: Array, prior: Array, covariance: Array) -> str:
     return ''
 
 
-def _date(epoch_ns: int, file: Path) -> datetime:
+def date_of_stamp(epoch_ns: int, file: Path) -> datetime:
+    """
+    Return the date of a stamp [ns].
+
+    Raises
+    ------
+    DataError
+        It is counted from the start of a machine.
+
+    """
     at = datetime.fromtimestamp(epoch_ns // NANOSECONDS, timezone.utc)
     if at.year < FIRST_YEAR:
         raise DataError(

@@ -31,5 +31,9 @@ def _locks_are_no_refusals(connection: Connection) -> None:
     )
 
 
-STEPS: tuple[Callable[[Connection], None], ...] = (_locks_are_no_refusals,)
+def _promises_are_kept(connection: Connection) -> None:
+    """Version 3: what was measured after corrections has a table, which `schema` makes."""
+
+
+STEPS: tuple[Callable[[Connection], None], ...] = (_locks_are_no_refusals, _promises_are_kept)
 """The step at place k makes version k + 2 of version k + 1."""

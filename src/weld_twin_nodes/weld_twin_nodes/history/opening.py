@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 BUSY = 5.0
 """Seconds in which SQLite waits for another program that writes; then it is asked once more."""
+CONNECT = 10
+"""Seconds in which a server must answer."""
+LOCKED = 10
+"""Seconds after which PostgreSQL says that somebody holds a lock; then it is asked once more."""
 LOCK = 7_246_198_015
 """Number of the lock on PostgreSQL under which tables are made and changed; any other would do."""
 FIRST = ('about', 'cells', 'verdicts', 'runs', 'findings')
@@ -34,9 +38,12 @@ def engine_of(address: Any) -> Engine:
     import sqlalchemy
 
     lite = address.get_backend_name() == 'sqlite'
-    made = sqlalchemy.create_engine(
-        address, connect_args={'timeout': BUSY} if lite else {}, pool_pre_ping=not lite
-    )
+    patience: dict[str, Any] = {'timeout': BUSY} if lite else {}
+    if address.drivername.startswith('postgresql+psycopg'):
+        # Neither a server that does not answer nor somebody's forgotten lock is waited for in vain.
+        patience = {'connect_timeout': CONNECT, 'options': f'-c lock_timeout={LOCKED}s'}
+        patience = {key: told for key, told in patience.items() if key not in address.query}
+    made = sqlalchemy.create_engine(address, connect_args=patience, pool_pre_ping=not lite)
     if lite:
         # Python's driver begins late and ends at a CREATE; both would let others in between.
         @sqlalchemy.event.listens_for(made, 'connect')
@@ -61,7 +68,9 @@ def refuse_missing(address: Any, shown: str) -> None:
         There is no such file.
 
     """
-    if address.get_backend_name() == 'sqlite' and not Path(address.database or '').exists():
+    name = address.database or ''
+    plain = address.get_backend_name() == 'sqlite' and not name.startswith('file:')
+    if plain and not Path(name).exists():
         raise DataError(_nothing_yet(shown))
 
 

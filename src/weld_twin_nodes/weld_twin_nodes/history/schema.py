@@ -55,7 +55,24 @@ def schema() -> MetaData:
         sql.Index('verdicts_of_a_cell', 'cell_id', 'at'),
     )
     _fleet(tables)
+    _verifications(tables)
     return tables
+
+
+def _verifications(tables: MetaData) -> None:
+    """Add what was measured after corrections."""
+    import sqlalchemy as sql
+
+    sql.Table(
+        'verifications',
+        tables,
+        sql.Column('id', sql.Integer, primary_key=True),
+        sql.Column('cell_id', sql.ForeignKey('cells.id'), nullable=False, index=True),
+        sql.Column('at', sql.DateTime, nullable=False),
+        sql.Column('recording', sql.String(64), nullable=False),
+        sql.Column('content', sql.JSON, nullable=False),
+        sql.UniqueConstraint('cell_id', 'recording'),
+    )
 
 
 def _fleet(tables: MetaData) -> None:

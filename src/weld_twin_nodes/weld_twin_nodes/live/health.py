@@ -21,6 +21,9 @@ RATE_CHANGE = 3.0
 """Ratio to the usual rate from which on a rate is told as changed."""
 USUAL = 15
 """Looks over which the usual rate is taken."""
+SLOW = 2
+"""Pauses in a row, with no quicker message between, that make an input a slow one, such as a
+thermometer that is read every ten seconds: it is silent when it misses one."""
 
 
 class Input:
@@ -54,12 +57,18 @@ class Input:
         self._required = required
         self._patience = patience
         self._rates: deque[float] = deque(maxlen=USUAL)
+        self._pauses: deque[float] = deque(maxlen=SLOW)
         self._before = (time.monotonic(), 0, 0, 0)
 
     def arrived(self) -> None:
         """Count a message."""
+        now = time.monotonic()
+        if now - self.last <= self._patience:
+            self._pauses.clear()
+        elif self.received:
+            self._pauses.append(now - self.last)
         self.received += 1
-        self.last = time.monotonic()
+        self.last = now
 
     def stamped(self, stamp: int) -> None:
         """Take the stamp of the message that has just arrived [ns]; one that is not set is none."""
@@ -92,7 +101,8 @@ class Input:
         """Return for how long an input has been silent that was not before [s]; 0 where it is not."""
         usual = sorted(self._rates)[len(self._rates) // 2] if self._rates else 0.0
         silent = now - self.last
-        most = max(self._patience, 5.0 / usual if usual else 0.0)
+        slow = 2.0 * min(self._pauses) if len(self._pauses) == SLOW else 0.0
+        most = max(self._patience, 5.0 / usual if usual else 0.0, slow)
         return silent if self.received and silent > most else 0.0
 
     def _judge(self, now: float, n: int, bad: int, rate: float, others: int) -> tuple[int, str]:

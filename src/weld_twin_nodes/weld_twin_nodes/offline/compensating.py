@@ -9,13 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.recording import Recording
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.diagnosis.soundness.mending import reading_map
+from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.compensation import Compensation, compensate
 from weld_twin_core.twin.posterior import Posterior
 from weld_twin_core.twin.trust import trust
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
+from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
 from .prediction import Predictor, Stretch, beside_bag
@@ -37,6 +42,11 @@ class Compensated(NamedTuple):
         Of the nominal commands: where they leave what was recorded.
     least : float
         Smallest share of the correction that was applied anywhere, 1 for all of it everywhere.
+    motion : JointMotion
+        The new commands, counted as the nominal ones came.
+    told : str
+        That the commands were read as the diagnosis mended its recordings, and are written as they
+        came; empty where they are not.
 
     """
 
@@ -44,6 +54,8 @@ class Compensated(NamedTuple):
     model: Predictor
     outside: Sequence[Stretch]
     least: float
+    motion: JointMotion
+    told: str = ''
 
 
 def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compensated:
@@ -56,8 +68,12 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
         The file is of no use.
 
     """
-    twin = build_twin(robot, path)
+    twin = build_twin(robot, path, mended=True)
     model = Predictor(twin, _posterior(robot, path))
+    stored, given, told = _model(robot, path), recording, ''
+    if stored is not None:
+        # Its clocks are its own, and commands need none.
+        recording, told = mended_source(stored, robot, given, -1)
     nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
     covariances = model.covariances(recording)
     share = None
@@ -70,7 +86,25 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
         )
     result = compensate(twin.robot, twin.effects, recording, trust=share)
     least = 1.0 if share is None else float(share.min())
-    return Compensated(result, model, model.outside(recording), least)
+    motion = result.motion
+    if stored is not None and recording is not given:
+        motion = _as_given(motion, stored)
+    return Compensated(result, model, model.outside(recording), least, motion, told)
+
+
+def _as_given(motion: JointMotion, stored: Model) -> JointMotion:
+    """Return mended joint positions counted as they came: they go to the same controller."""
+    matrix, offset = reading_map(stored.mends, stored.robot.n)
+    back = np.linalg.inv(matrix).T
+    qd = None if motion.qd is None else motion.qd @ back
+    return replace(motion, q=(motion.q - offset) @ back, qd=qd)
+
+
+def _model(robot: Robot, path: Path | str) -> Model | None:
+    """Return what a diagnosis holds; None for an effects file or a diagnosis without a model."""
+    if Path(path).suffix.lower() != '.json' or 'model' not in read_diagnosis(path):
+        return None
+    return read_model(robot, path)
 
 
 def write_compensated(
@@ -90,7 +124,7 @@ def write_compensated(
     poses = twin.poses(commands, commands.joints.t)
     write_recording(
         path,
-        commands,
+        replace(commands, joints=made.motion),
         twin.robot,
         twin=(poses.position, poses.rotation),
         covariance=made.model.covariances(commands),

@@ -4,16 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from weld_twin_core import __version__
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs.repeated import repeated
 from weld_twin_core.twin.program_accuracy import Accuracy, along_seams
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
@@ -39,6 +43,11 @@ TOOL_LEFT = (
 BASE_MOVED = (
     'the robot was found to stand elsewhere than its file says, and points are moved by that too; '
     'leave it out (diagnose with --align base) where the work frame was taught with this arm'
+)
+FRAMES_FITTED = (
+    'frames were fitted to the recording ({frames}), and take up there what is off in the arm: the '
+    'upper end of what is expected is for points that are given in the base of the robot; near the '
+    'lower end only come points that were taught with this arm, where it was recorded'
 )
 NOT_SURE = (
     'how sure the correction is is not known: the model has no posterior, only a diagnosis.json '
@@ -101,7 +110,7 @@ def program_model(
         effects = of_the_robot(twin.effects)
         posterior = read_posterior(robot, path)
         return ProgramModel(twin.robot, tuple(effects), posterior, temperature, setup)
-    twin = build_twin(robot, path)
+    twin = build_twin(robot, path, mended=True)
     return ProgramModel(twin.robot, tuple(twin.effects), None, temperature)
 
 
@@ -111,6 +120,7 @@ def corrected_program(
     model: ProgramModel,
     caps: Caps | None = None,
     start: Array | None = None,
+    readings: str = '',
 ) -> CorrectedProgram:
     """
     Return a program corrected so that the real tool goes where it means.
@@ -123,6 +133,9 @@ def corrected_program(
     caps : Caps, optional
     start : array, shape (n,), optional
         Joint positions before the first move.
+    readings : str
+        Why the model counts joints otherwise than they are read, see `other_readings`; whether a
+        program does, too, nobody knows.
 
     Raises
     ------
@@ -131,6 +144,13 @@ def corrected_program(
 
     """
     name = program.sources[0].name
+    if readings:
+        joints = next((point for point in program.points if point.value.ndim == 1), None)
+        if joints is not None:
+            raise DataError(
+                f'{joints.where}: {joints.name} holds joint values, and the model takes them mended: '
+                f'{readings}'
+            )
     if not program.steps:
         raise DataError(f"no move was found in '{name}'; is its language {program.language}?")
     moves = to_moves(program, context.robot, context.controller)
@@ -184,6 +204,23 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
         out.append(f'no program mends {", ".join(left)}')
     if model.posterior is None:
         out.append(NOT_SURE)
+    elif frames := model.posterior.directions.frames:
+        out.append(FRAMES_FITTED.format(frames=', '.join(frames)))
+    return out
+
+
+def not_told(content: Mapping[str, Any]) -> list[str]:
+    """Return that a promise holds for what a diagnosis names alone, where it could be another cause."""
+    verdict = content.get('verdict') or {}
+    same = verdict.get('same_on_any_motion') or []
+    out = []
+    for group in verdict.get('indistinguishable') or []:
+        if len(group) > 1 and not any(all(site in one for site in group) for one in same):
+            first, *others = (f'{s["effect"]} of {s["joint"] or "the robot"}' for s in group)
+            out.append(
+                f'what is expected holds if it is {first}; the recordings do not tell it from '
+                f'{", ".join(others)}'
+            )
     return out
 
 
@@ -237,8 +274,50 @@ def correction_entry(made: CorrectedProgram, robot: Robot, caps: Caps) -> dict[s
     }
 
 
+def way(made: CorrectedProgram, model: ProgramModel) -> list[dict[str, Any]]:
+    """
+    Return where the tool was meant to go and where it is commanded to instead, for `verifying`.
+
+    Returns
+    -------
+    list of mapping
+        For each stretch ``tool`` (``T_flange_tool``), and ``meant`` and ``commanded``: poses in the base
+        frame of the model by position [m] and rotation vector [rad], one for one. Along corrected
+        linear and circular moves; at the ends of all moves where there are none.
+
+    """
+    out = []
+    seams = any(
+        move.kind != 'joint' and move.seam not in made.found.left
+        for piece in made.found.travel.pieces
+        for move in piece.moves
+    )
+    for piece in made.found.travel.pieces:
+        motion = repeated(model.robot, made.found.program, piece)
+        meant, commanded = model.wanted(piece), model.wanted(piece._replace(motion=motion))
+        for k, move in enumerate(piece.moves):
+            chosen = piece.move == k
+            if not seams:
+                chosen = np.zeros(chosen.size, dtype=bool)
+                chosen[piece.ends[k]] = True
+            if move.seam in made.found.left or (seams and move.kind == 'joint'):
+                continue
+            poses = {'meant': _six(meant[chosen]), 'commanded': _six(commanded[chosen])}
+            out.append({'tool': move.tool.tolist(), **poses})
+    return out
+
+
+def _six(poses: Array) -> list[list[float]]:
+    """Return poses (N, 4, 4) as positions and rotation vectors, to a nanometre."""
+    turns = [rotation_vector(pose[:3, :3]) for pose in poses]
+    both = np.concatenate([poses[:, :3, 3], np.array(turns).reshape(-1, 3)], axis=1)
+    return [[float(value) for value in row] for row in np.round(both, 9)]
+
+
 def _accuracy(value: Accuracy | None) -> dict[str, Any] | None:
     if value is None:
         return None
     interval = None if value.low is None else [value.low, value.high]
-    return {'rms_m': value.rms, 'rms_ci90_m': interval, 'worst_m': value.worst}
+    same = None if value.same is None else list(value.same)
+    own = {'rms_m': value.rms, 'rms_ci90_m': interval, 'worst_m': value.worst}
+    return own | {'rms_ci90_same_setup_m': same}

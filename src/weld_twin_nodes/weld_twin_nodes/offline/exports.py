@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.diagnosis.advice.zeros import stands, to_mend
 from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.diagnosis.soundness.mending import reading_map
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.twin.corrected import corrected, joint_offsets
@@ -21,18 +23,21 @@ from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
 from weld_twin_msgs_py.robots.urdf_like import GivenUrdf, write_urdf_like
 
+from .where_it_holds import file_alone
+
 _EVERYTHING = 'Every effect of the twin; goes with the nominal robot.'
 _LEFT_OVER = 'What the corrected robot.yaml cannot hold; goes with that, not with the nominal.'
 
 
 def write_yaml(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the corrected robot as a robot file."""
-    write_robot_yaml(path, _corrected(model)[0], notes=[*_mended(model), *notes], overwrite=True)
+    said = _of_the_robot(model, notes)
+    write_robot_yaml(path, _corrected(model)[0], notes=said, overwrite=True)
 
 
 def write_model_urdf(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the corrected robot as a URDF."""
-    write_urdf(path, _corrected(model)[0], overwrite=True, notes=[*_mended(model), *notes])
+    write_urdf(path, _corrected(model)[0], overwrite=True, notes=_of_the_robot(model, notes))
 
 
 def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
@@ -43,14 +48,16 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     """
     del notes
     robot = model.robot
-    offsets = joint_offsets(robot, _causes(model))
+    offsets = joint_offsets(robot, _causes(model)) + _zeros(model)
     rows = []
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
         units = ('m', 'mm') if slides else ('rad', 'deg')
-        rows.append((name, float(offset), units[0], f'{shown:.6f}', units[1]))
-    remarks = ''.join(f'# {line}\n' for line in _mended(model))
-    table = csv_text(('joint', 'offset', 'unit', 'shown', 'shown_unit'), rows)
+        told = f'{stands(name, offset, sliding=slides)} {to_mend(offset, sliding=slides)}'
+        meaning = told if offset else ''
+        rows.append((name, float(offset), units[0], f'{shown:.6f}', units[1], meaning))
+    remarks = ''.join(f'# {line}\n' for line in _readings(model))
+    table = csv_text(('joint', 'offset', 'unit', 'shown', 'shown_unit', 'meaning'), rows)
     write_text(path, remarks + table, overwrite=True)
 
 
@@ -61,7 +68,7 @@ def write_effects(path: Path, model: Model, notes: Sequence[str]) -> None:
 
 def write_left_over(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the effects that the corrected robot cannot hold."""
-    _write_effects(path, [_LEFT_OVER, *_mended(model), *notes], _corrected(model)[1])
+    _write_effects(path, [_LEFT_OVER, *_readings(model), *notes], _corrected(model)[1])
 
 
 FORMATS: dict[str, tuple[str, Callable[[Path, Model, Sequence[str]], None]]] = {
@@ -98,17 +105,65 @@ def write_all(
 
 def write_given_urdf(path: Path, model: Model, notes: Sequence[str], given: GivenUrdf) -> None:
     """Write the corrected robot as the URDF that it was read from, its names kept."""
-    robot, said = _corrected(model)[0], [*_mended(model), *notes]
+    robot, said = _corrected(model)[0], _of_the_robot(model, notes)
     write_urdf_like(path, given, robot, overwrite=True, notes=said)
+
+
+def _of_the_robot(model: Model, notes: Sequence[str]) -> list[str]:
+    """Return the head of a robot file: what it leaves by itself, and where the model holds."""
+    own = [] if model.alone is None else file_alone(model.alone, left=bool(_corrected(model)[1]))
+    return [*own, *_readings(model), *notes]
 
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     based = model.robot.with_frames(base=model.bases[0])
-    robot, left = corrected(based, _causes(model))
+    robot, left = corrected(based, (*_causes(model), *_changes(model)))
+    # What the file has for use by itself, the effects that go with it take back.
+    left = (*left, *(effect.with_vector(-effect.vector()) for effect in _changes(model)))
+    zeros = _zeros(model)
+    if zeros.any():
+        key = np.where(robot.prismatic, 0.0, zeros), np.where(robot.prismatic, zeros, 0.0)
+        robot = replace(
+            robot,
+            theta=robot.theta + key[0],
+            d=robot.d + key[1],
+            lower=robot.lower - zeros,
+            upper=robot.upper - zeros,
+        )
     source = f'{robot.source}; corrected by a diagnosis' if robot.source else 'diagnosis'
     if model.mended:
         source += f' of mended data: {" ".join(model.mended)}'
     return replace(robot, source=source), left
+
+
+def _changes(model: Model) -> tuple[Effect, ...]:
+    """Return what the robot file has beside the constants found, to do well by itself."""
+    return () if model.alone is None else model.alone.changes
+
+
+def _zeros(model: Model) -> np.ndarray:
+    """
+    Return what was added to the readings before the diagnosis, shape (n,) [rad or m].
+
+    A zero is the arm's or its controller's, and belongs into the files, so that they take the
+    readings as they were recorded. Columns, signs and units that were mixed up belong to the
+    recording alone: a file that repeated them would be wrong at the robot.
+    """
+    matrix, offset = reading_map(model.mends, model.robot.n)
+    return offset if np.array_equal(matrix, np.eye(model.robot.n)) else np.zeros(model.robot.n)
+
+
+def _readings(model: Model) -> list[str]:
+    """Return what was mended, and which readings the files take."""
+    told = _mended(model)
+    if not any(mend.get('do') == 'joints' for mend in model.mends):
+        return told
+    if _zeros(model).any():
+        return [
+            *told,
+            'That is in the numbers below: they take the readings as they were recorded.',
+        ]
+    return [*told, 'The numbers below take readings in which that is mended.']
 
 
 def _causes(model: Model) -> tuple[Effect, ...]:

@@ -18,9 +18,11 @@ from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
 from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly.whole_recording import refuse_apart
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import (
     load_model,
+    mended_source,
     one_base,
     read_diagnosis,
     read_model,
@@ -58,12 +60,19 @@ class Predictor(NamedTuple):
         None for an effects file, or a diagnosis written without one.
     setup : int
         Which base frame of the posterior, counted from 0.
+    source : Recording or None
+        The recording that it is for, mended as the diagnosis mended its own; None where nothing
+        had to be.
+    told : str
+        What is to be said of that.
 
     """
 
     twin: Twin
     posterior: Posterior | None = None
     setup: int = 0
+    source: Recording | None = None
+    told: str = ''
 
     def covariances(self, recording: Recording) -> Array | None:
         """Return the covariance of the true pose at every joint state, shape (N, 6, 6)."""
@@ -146,17 +155,33 @@ def predictor(
         chosen = 0
     else:
         chosen = _setup_of(path, model, bag)
-    twin = timed(path, model, chosen, recording)
-    return Predictor(twin, read_posterior(robot, path), chosen)
+    source, told = mended_source(model, robot, recording, _fitted(path, bag, recording, chosen))
+    twin = timed(path, model, chosen, source)
+    return Predictor(twin, read_posterior(robot, path), chosen, source, told)
+
+
+def _fitted(path: Path | str, bag: Path | str, recording: Recording, chosen: int) -> int:
+    """
+    Return which recording of a diagnosis has the clocks of this one, -1 for none.
+
+    Clocks are apart by another time in every run. Where something was measured, that tells.
+    """
+    known = _recorded(path)
+    own = hashed('recording', bag).sha256
+    if own in known:
+        return known.index(own)
+    return -1 if recording.measured is None else chosen
+
+
+def _recorded(path: Path | str) -> list[str]:
+    """Return the hashes of the recordings that a diagnosis was made from."""
+    inputs = read_diagnosis(path).get('inputs', [])
+    return [item['sha256'] for item in inputs if item['use'] == 'recording']
 
 
 def _setup_of(path: Path | str, model: Model, bag: Path | str) -> int:
     """Return which recording of a diagnosis with several base frames a bag is."""
-    known = [
-        item['sha256']
-        for item in read_diagnosis(path).get('inputs', [])
-        if item['use'] == 'recording'
-    ]
+    known = _recorded(path)
     own = hashed('recording', bag).sha256
     if own in known:
         return known.index(own)
@@ -166,6 +191,21 @@ def _setup_of(path: Path | str, model: Model, bag: Path | str) -> int:
         f"diagnosis '{path}' has a base frame for each of its {len(model.bases)} recordings "
         f"and '{bag}' is none of them; choose one with --setup 1 to {len(model.bases)}"
     )
+
+
+def on_one_clock(recording: Recording) -> Recording:
+    """
+    Return a recording whose measurements have some time in common with the joint states.
+
+    Raises
+    ------
+    DataError
+        They have none.
+
+    """
+    if recording.measured is not None and not recording.joints.static:
+        refuse_apart(recording.joints, recording.measured)
+    return recording
 
 
 def write_prediction(

@@ -24,7 +24,12 @@ for radians are 57 times, millimetres taken for metres a thousand times too larg
 
 
 def build_twin(
-    robot: Robot, model: Path | str = '', effects: str = '', *, implausible: bool = False
+    robot: Robot,
+    model: Path | str = '',
+    effects: str = '',
+    *,
+    implausible: bool = False,
+    mended: bool = False,
 ) -> Twin:
     """
     Return a robot with the effects of a file and those of a text.
@@ -39,12 +44,14 @@ def build_twin(
         More effects, in the form of an effects file.
     implausible : bool
         Take values that no machine comes near, too.
+    mended : bool
+        The caller mends joint positions as the diagnosis did; see `mended_source`.
 
     Raises
     ------
     ModelError
         A file or the text cannot be read, or names an effect the robot cannot have, or a value
-        that no machine comes near.
+        that no machine comes near; or the model counts joints otherwise than they are read.
 
     """
     more = effects_from_list(parse_yaml(effects, 'effects'), robot)
@@ -57,8 +64,23 @@ def build_twin(
         if not implausible:
             _possible(robot, read, f"effects file '{model}'")
         return Twin(robot, read + more)
+    why = '' if mended else other_readings(read_diagnosis(model))
+    if why:
+        raise ModelError(
+            f"the model of '{model}' takes mended joint positions, and here they come as they are: "
+            f'{why}'
+        )
     known = _diagnosed(robot, model)
     return Twin(known.robot, of_the_robot(known.effects) + more)
+
+
+def other_readings(content: Mapping[str, Any]) -> str:
+    """Return why a diagnosis counts joints otherwise than they are read; nothing where it does not."""
+    for item in content.get('unsound') or ():
+        mend = item.get('mend') if isinstance(item, dict) and item.get('applied') else None
+        if isinstance(mend, dict) and mend.get('do') == 'joints':
+            return f'{item.get("sentence")} {item.get("remedy")}, then diagnose again'
+    return ''
 
 
 def doubts(twin: Twin) -> list[str]:

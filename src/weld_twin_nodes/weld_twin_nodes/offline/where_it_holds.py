@@ -4,8 +4,12 @@
 
 from __future__ import annotations
 
+from weld_twin_core.diagnosis.algebra.model import Alone
 from weld_twin_core.twin.posterior import Posterior
 
+AS_GOOD = 1.1
+"""Ratio of what a robot file leaves to what the whole model leaves up to which either may be taken: less
+is a matter of the stretches left out."""
 NOTHING_KNOWN = 3e-3
 """Spread [m] from which a model knows nothing of a place: an arm as delivered is off by no more."""
 _BESIDES = 'noise and what no parameter explains come on top'
@@ -17,13 +21,13 @@ def where_it_holds(posterior: Posterior) -> list[str]:
         f'{v * 1e3:.2g} mm' for v in (posterior.recorded_m, posterior.anywhere_m)
     )
     out = [
-        f'The model is known to {recorded} where it was measured (one standard deviation), and '
+        f'The whole model is known to {recorded} where it was measured (one standard deviation), and '
         f'nothing is known of elsewhere in its reach: the postures are too alike; {_BESIDES}.'
         if posterior.anywhere_m > NOTHING_KNOWN
-        else f'The model is known to {recorded} where it was measured, but only to {anywhere} '
+        else f'The whole model is known to {recorded} where it was measured, but only to {anywhere} '
         f'elsewhere in its reach (one standard deviation each); {_BESIDES}.'
         if anywhere != recorded
-        else f'The model is known to {recorded} (one standard deviation); {_BESIDES}.'
+        else f'The whole model is known to {recorded} (one standard deviation); {_BESIDES}.'
     ]
     out += left_open(posterior)
     return [*out, 'Measured at ' + '; '.join(posterior.domain.sentences()) + '.']
@@ -48,6 +52,51 @@ def elsewhere(posterior: Posterior, corrected: bool) -> str:
         f'be off by {posterior.anywhere_m * 1e3:.2g} mm (one standard deviation): measure there '
         'before you weld there.'
     )
+
+
+def file_alone(alone: Alone, *, left: bool) -> list[str]:
+    """
+    Return what a robot file leaves by itself, beside the whole model, in sentences for its head.
+
+    Parameters
+    ----------
+    alone : Alone
+    left : bool
+        Whether the model has effects that the file cannot hold.
+
+    """
+    by_itself = (
+        f'{_mm(alone.recorded_m)} where it was recorded and {_mm(alone.unseen_m)} on data that were '
+        'not fitted'
+    )
+    if not left:
+        return [f'This file holds all that was found, and leaves {by_itself} (RMS).']
+    out = [
+        f'This file alone leaves {by_itself} (RMS). The whole model (diagnosis.json, or this file '
+        f'with robot_effects.yaml) leaves {_mm(alone.whole_recorded_m)} and '
+        f'{_mm(alone.whole_unseen_m)}.'
+    ]
+    if alone.changes:
+        out.append(
+            'Its constants were fitted once more for use without the effects that it cannot hold, '
+            'and are not those of the page; robot_effects.yaml takes the difference back.'
+        )
+    return out
+
+
+def which_file(alone: Alone | None) -> str:
+    """Return which file to take, in a sentence; nothing where all do as well, or it is not known."""
+    if alone is None or alone.unseen_m < AS_GOOD * alone.whole_unseen_m:
+        return ''
+    return (
+        'Take diagnosis.json (weld-twin correct-program or compensate): it leaves '
+        f'{_mm(alone.whole_unseen_m)} on data that were not fitted. robot.yaml and robot.urdf '
+        f'cannot hold all that was found, and leave {_mm(alone.unseen_m)} by themselves.'
+    )
+
+
+def _mm(length: float) -> str:
+    return f'{length * 1e3:.3f} mm'
 
 
 def left_open(posterior: Posterior) -> list[str]:

@@ -9,7 +9,7 @@ import re
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
 
-from ..offline.where_it_holds import elsewhere, left_open
+from ..offline.where_it_holds import elsewhere, left_open, which_file
 from .acceptance import largest, mark
 from .belief import belief_lines, together
 from .cause_values import effects_of, one_of, values
@@ -288,7 +288,7 @@ def _enter(diagnosis: Diagnosis, k: int, brand: str | None) -> str:
         return 'nothing yet'
     if alternatives(diagnosis, cause):
         return 'nothing before it is known which it is'
-    told = UNNAMED if unnamed(cause) else correction(found[0], brand)
+    told = UNNAMED if unnamed(cause) else correction(found[0], brand, diagnosis.model.robot)
     return _SENTENCE.split(told.removesuffix(UNCHECKED).rstrip())[0]
 
 
@@ -324,7 +324,8 @@ def holds(diagnosis: Diagnosis) -> Html | None:
         return None
     rest = left_open(posterior)
     wide = rest or posterior.anywhere_m > _WIDER * posterior.recorded_m
-    sentences = [elsewhere(posterior, correctable(diagnosis)), *rest]
+    file = which_file(diagnosis.model.alone)
+    sentences = [elsewhere(posterior, correctable(diagnosis)), *([file] if file else []), *rest]
     return tag('p', ' '.join(sentences), class_='warn' if wide else 'note')
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from weld_twin_core.diagnosis.advice import actions
-from weld_twin_core.diagnosis.result import Cause, Diagnosis
+from weld_twin_core.diagnosis.result import Cause, Diagnosis, Site
 from weld_twin_core.metrics.conformity import Rule
 
 from .acceptance import mark
@@ -35,7 +35,7 @@ from .switches import (
     trusted,
 )
 from .to_do import TOGETHER
-from .words import again_words, unnamed
+from .words import again_words, same_words, unnamed
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
@@ -259,7 +259,9 @@ def _action(diagnosis: Diagnosis, k: int) -> Html | str | None:
     else:
         told = dict.fromkeys(actions(effects, diagnosis.model.robot))
         ways = dict.fromkeys(map(gearing, effects))
-        sentences = [*told, *filter(None, [*ways, warning(diagnosis, k)])]
+        sites = [Site(effect.name, effect.site) for effect in effects]
+        twins = same_words(diagnosis, *sites)
+        sentences = [*told, *twins, *filter(None, [*ways, warning(diagnosis, k)])]
     if effects and alternatives(diagnosis, cause):
         sentences = [
             'Which of them it is must be measured first. Should it be '
@@ -280,7 +282,12 @@ def _at_the_controller(
     fault = curve_fault(diagnosis, k)
     if fault:
         return [(head, f'Nothing is to be entered: the curve {fault}.')]
-    told = f'{UNNAMED}{_taken_out(diagnosis)}' if unnamed(cause) else correction(effects[0], brand)
+    robot = diagnosis.model.robot
+    told = (
+        f'{UNNAMED}{_taken_out(diagnosis)}'
+        if unnamed(cause)
+        else correction(effects[0], brand, robot)
+    )
     if alternatives(diagnosis, cause):
         which = one_of(diagnosis, cause)
         told = f'Nothing before it is known which it is. Should it be {which}: {told}'

@@ -21,6 +21,7 @@ from .words import (
     listed,
     open_sets,
     parameter_word,
+    same_words,
     site_name,
 )
 
@@ -147,6 +148,9 @@ def _sets(diagnosis: Diagnosis) -> Html | None:
     if not sets and diagnosis.families:
         shared = [tag('li', in_words(reason, ())) for reason in diagnosis.reasons]
         return joined([title, tag('ul', *shared, class_='sentences')])
+    if not sets and diagnosis.same:
+        told = [tag('li', text) for text in same_words(diagnosis)]
+        return joined([title, tag('ul', *told, class_='sentences')])
     if not sets:
         return joined(
             [

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.diagnosis.advice.zeros import further
 from weld_twin_core.effects.effect import Effect
 
 BRANDS = {
@@ -40,33 +40,37 @@ UNNAMED = (
 )
 """Of a curve: a joint that is off alike everywhere need not be so for its zero."""
 _PLACES = {
-    ('kuka', 'zero'): 'Start-up > Master: master the axis again; its zero lies in $MAMES, in '
-    'degrees.',
+    ('kuka', 'zero'): 'Start-up > Master: $MAMES of the axis, in degrees: new value = old value '
+    '{degrees}; then master the axis at its notch.',
     ('kuka', 'base'): 'Start-up > Calibrate > Base: change BASE_DATA[n], or $ROBROOT of the cell.',
     ('kuka', 'tool'): 'Start-up > Calibrate > Tool: change TOOL_DATA[n].',
     ('kuka', 'load'): 'Start-up > Calibrate > Tool > Payload data: change LOAD_DATA[n].',
-    ('abb', 'zero'): 'Calibration > Calib. parameters: fine-calibrate the axis, or edit its motor '
-    'calibration offset. That counts radians of the motor: {radians} rad at the joint times the '
-    'ratio of its gear.',
+    ('abb', 'zero'): 'Calibration > Calib. parameters: motor calibration offset of the axis, in '
+    'radians of the motor: new value = old value {radians_back} * G, where G is radians of the '
+    'motor per radian of the joint, with its sign.',
     ('abb', 'base'): 'Change wobj.uframe of the work object, or Base Frame in the topic Motion.',
     ('abb', 'tool'): 'Change tframe of the tooldata.',
     ('abb', 'load'): 'Change the loaddata, or run LoadIdentify.',
-    ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master: as MSTR POS of the axis '
-    'enter what it reads now {degrees} deg, then EXEC. That is in degrees; the controller counts '
-    'pulses from it by itself.',
+    ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master: MSTR POS of the axis, in '
+    'degrees: new value = what it reads now {degrees}; then EXEC, without moving it before.',
     ('fanuc', 'base'): 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
     ('fanuc', 'tool'): 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
     ('fanuc', 'load'): 'MENU > SYSTEM > Motion: change the payload schedule.',
-    ('yaskawa', 'zero'): 'ROBOT > HOME POSITION: change the absolute data of the axis by {size} '
-    'deg. It counts pulses: turn the axis by 10 deg, read how many pulses that was, and divide.',
+    (
+        'yaskawa',
+        'zero',
+    ): 'ROBOT > HOME POSITION: absolute data of the axis, in pulses: new value = '
+    'old value {degrees_back} * P, where P is pulses per degree, with its sign: turn the axis by '
+    '+10 deg, read by how many pulses its position grows, and divide.',
     ('yaskawa', 'base'): 'ROBOT > USER COORDINATE: teach or change the user frame.',
     ('yaskawa', 'tool'): 'ROBOT > TOOL: change X, Y, Z, Rx, Ry, Rz of the tool file.',
     ('yaskawa', 'load'): 'ROBOT > TOOL: change weight and centre of gravity of the tool file.',
     (
         'ur',
         'zero',
-    ): 'By a new kinematic calibration, which a service engineer makes. Zeros stand as '
-    'delta_theta, in radians ({radians} rad here), in calibration.conf of the controller.',
+    ): 'By a new kinematic calibration, which a service engineer makes. delta_theta of the joint '
+    'in calibration.conf, in radians: new value = old value {radians}; the readings stay, and the '
+    'pose that is shown moves.',
     (
         'ur',
         'model',
@@ -77,6 +81,8 @@ _PLACES = {
     ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',
 }
 """Menus as they are usually called. docs/sheet.md tells which names were found where."""
+_BY_MODEL = ('ur',)
+"""Makers whose controllers keep an error of a zero in their model: the readings stay as they are."""
 _GEARED = ('gear_ratio', 'joint_coupling')
 """Errors that some controllers have a field for."""
 _RATIO = (
@@ -84,7 +90,8 @@ _RATIO = (
     '(weld-twin correct-program).'
 )
 _ANYWHERE = {
-    'zero': 'As the zero of this axis, by mastering it anew',
+    'zero': 'As the zero of this axis, by mastering it anew: new reading = old reading {far}, with '
+    'the joint left where it is',
     'base': 'As the frame of the base or of the work object',
     'tool': 'As the tool centre point',
     'load': 'As the payload',
@@ -92,6 +99,11 @@ _ANYWHERE = {
     'the points of the program (weld-twin correct-program)',
 }
 """What takes a correction at any controller, by the kind of the error."""
+_CHECK = (
+    'It was right if the reading where the joint stands went from X to X {far}, and the wrong way '
+    'round if to X {back}.'
+)
+"""What shows that a zero was entered the right way, wherever the readings change by it."""
 UNCHECKED = (
     'The way through the menus was not checked against a manual; names differ by version of the '
     'controller.'
@@ -105,19 +117,41 @@ def brand_of(robot: str) -> str | None:
     return next((brand for brand in BRANDS if name.startswith(brand)), None)
 
 
-def correction(effect: Effect, brand: str | None) -> str:
-    """Return where this maker's controller takes the correction, or why there is nothing to enter."""
+def correction(effect: Effect, brand: str | None, robot: Robot | None = None) -> str:
+    """
+    Return where this maker's controller takes the correction, or why there is nothing to enter.
+
+    Parameters
+    ----------
+    effect : Effect
+    brand : str or None
+        One of `BRANDS`; None where the maker is not known.
+    robot : Robot, optional
+        Tells which joints slide; left out, all turn.
+
+    """
     kind = _KINDS.get(effect.name)
     if kind is None and effect.name not in _BY_PROGRAM:
         return f'Nothing to enter: {_MATTERS.get(effect.name, _OWN)}.'
     if effect.name in _GEARED:
         return _RATIO
-    if brand is None and kind is not None:
-        return f'{_ANYWHERE[kind]}; --controller with the name of its maker tells the menu.'
+    sliding = (
+        robot is not None
+        and effect.site in robot.joint_names
+        and bool(robot.prismatic[robot.index(str(effect.site))])
+    )
+    off = _off(effect, sliding)
+    # The makers' fields of a zero are angles; what a slide's count is not known.
+    if kind is not None and (brand is None or (sliding and kind == 'zero')):
+        told = _ANYWHERE[kind].format(**off)
+        return told + (
+            '.' if brand else '; --controller with the name of its maker tells the menu.'
+        )
     place = _PLACES.get((str(brand), str(kind)))
     if place is None:
         return _PROGRAM
-    place = place.format(**_off(effect))
+    check = _CHECK if kind == 'zero' and brand not in _BY_MODEL else ''
+    place = f'{place} {check}'.format(**off).rstrip()
     return f'{place} {UNCHECKED}' if ' > ' in place else place
 
 
@@ -128,15 +162,20 @@ def gearing(effect: Effect) -> str:
     return 'Measure again: the wrong way round doubles the error.'
 
 
-def _off(effect: Effect) -> dict[str, str]:
-    """Return how far a joint stands off, in the units that controllers ask for."""
-    angle = float(getattr(effect, 'offset', 0.0))
-    degrees = np.degrees(angle)
-    sign = 'plus' if angle >= 0.0 else 'minus'
+def _off(effect: Effect, sliding: bool) -> dict[str, str]:
+    """Return how much further than its reading a joint stands, in what controllers count in."""
+    offset = float(getattr(effect, 'offset', 0.0))
+    far, back = (further(value, sliding=sliding) for value in (offset, -offset))
+    radians, radians_back = (
+        f'{"-" if value < 0.0 else "+"} {abs(value):.6f}' for value in (offset, -offset)
+    )
     return {
-        'degrees': f'{sign} {abs(degrees):.4f}',
-        'size': f'{abs(degrees):.4f}',
-        'radians': f'{abs(angle):.6f}',
+        'far': far,
+        'back': back,
+        'degrees': far.removesuffix(' deg'),
+        'degrees_back': back.removesuffix(' deg'),
+        'radians': radians,
+        'radians_back': radians_back,
     }
 
 

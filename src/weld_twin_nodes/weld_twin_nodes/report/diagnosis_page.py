@@ -38,7 +38,7 @@ from .quantities import counted
 from .seam_view import left_out, seam_section
 from .shrinking import shrink_section
 from .switches import page_data
-from .words import STATUS
+from .words import status_word
 
 SCRIPTS = ('sheet.js', 'seam.js', 'polar.js')
 
@@ -93,7 +93,7 @@ def report_page(
             printed_section(diagnosis, inputs, judged),
         ]
     )
-    title = f'{STATUS[diagnosis.status]} · {diagnosis.model.robot.name} · diagnosis'
+    title = f'{status_word(diagnosis)} · {diagnosis.model.robot.name} · diagnosis'
     foot = tag('div', inputs_section(inputs), class_='detail')
     main = tag('main', Html(renamed(body, sheet.joints)), foot)
     if not sound:

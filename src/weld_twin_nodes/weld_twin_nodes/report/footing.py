@@ -51,7 +51,7 @@ def next_section(diagnosis: Diagnosis) -> Html:
             _wanted(wanted, _sites(diagnosis)),
             *_left_open(diagnosis, wanted),
         ])  # fmt: skip
-    elif diagnosis.status in ('ambiguous', 'unknown'):
+    elif diagnosis.status == 'unknown' or open_sets(diagnosis):
         content = tag('p', 'No measurement that would decide has been found.')
     else:
         text = f'{_ENOUGH[bool(untried(diagnosis))]} {untried(diagnosis)}'.rstrip()

@@ -16,7 +16,7 @@ from .html import Html, tag
 from .mending import warned
 from .to_do import worth_doing
 from .verdict import verdict
-from .words import STATUS, mended
+from .words import mended, status_word
 
 _FIRST_REAL_STAMP = 10**18
 """Stamps [ns] before 2001 count from something else than the epoch."""
@@ -54,7 +54,7 @@ def opening(
     sound = diagnosis.status != 'unsound'
     return tag(
         'section',
-        tag('p', STATUS[diagnosis.status], class_=f'status {diagnosis.status}'),
+        tag('p', status_word(diagnosis), class_=f'status {diagnosis.status}'),
         judged,
         tag('h1', first),
         tag('p', second, class_='second'),

@@ -13,7 +13,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 
 from .footing import measured_next
 from .html import Child, Html, tag
-from .words import STATUS, listed, open_sets, passed, site_name
+from .words import listed, open_sets, passed, site_name, status_word
 
 _SHORT = 12
 """Digits of a hash that tell files apart on paper; the page has all."""
@@ -35,7 +35,7 @@ def printed_section(
     ]
     pairs = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
     lines = [tag('span', text) for text in ('Checked by', 'Date', 'Signature')]
-    status = tag('span', STATUS[diagnosis.status], class_=f'status {diagnosis.status}')
+    status = tag('span', status_word(diagnosis), class_=f'status {diagnosis.status}')
     return tag(
         'section',
         tag('dl', *pairs, class_='pairs'),

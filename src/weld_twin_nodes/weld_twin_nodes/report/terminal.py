@@ -13,7 +13,7 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from ..offline.where_it_holds import elsewhere, left_open
+from ..offline.where_it_holds import elsewhere, left_open, which_file
 from .acceptance import Demand, rule_of
 from .cause_levels import LEVEL_HEADS, level_row
 from .cause_list import rivalry, slots
@@ -25,7 +25,7 @@ from .quantities import change, millimetres, parameter_rows
 from .to_do import worth_doing
 from .untried import weighed
 from .verdict import verdict
-from .words import STATUS, found_name, listed, mended, open_sets, site_name
+from .words import found_name, listed, mended, open_sets, site_name, status_word
 
 _COLOURS = {
     'identified': 'green',
@@ -44,7 +44,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, demand: Demand | None 
     """Print the verdict in two sentences, then tables as far as there is something in them."""
     first, second = verdict(diagnosis)
     colour = _COLOURS[diagnosis.status]
-    console.print(f'[bold {colour}]{STATUS[diagnosis.status]}[/]  {escape(first)}')
+    console.print(f'[bold {colour}]{status_word(diagnosis)}[/]  {escape(first)}')
     console.print(Padding(escape(second), (0, 0, 1, 0)))
     for sentence in mended(diagnosis):
         console.print(f'[bold yellow]mended before the diagnosis:[/] {escape(sentence)}')
@@ -95,6 +95,8 @@ def _print_holds(diagnosis: Diagnosis, console: Console) -> None:
     if diagnosis.posterior is None:
         return
     console.print(escape(elsewhere(diagnosis.posterior, correctable(diagnosis))))
+    if file := which_file(diagnosis.model.alone):
+        console.print(f'[yellow]files:[/] {escape(file)}')
     for sentence in left_open(diagnosis.posterior):
         console.print(f'[yellow]open:[/] {escape(sentence)}')
 

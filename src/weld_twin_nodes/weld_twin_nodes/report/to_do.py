@@ -23,6 +23,7 @@ from .words import (
     not_to_be_tried,
     open_sets,
     open_sites,
+    same_words,
     share_by_site,
     site_name,
     site_of,
@@ -33,8 +34,9 @@ from .words import (
 _LARGEST = 3
 """Actions told; the others are counted."""
 TOGETHER = (
-    'Take them in together, by the corrected robot.yaml or robot.urdf or by corrected programs '
-    '(weld-twin correct-program): one by one they are not certain, their sum is.'
+    'Take them in together, by corrected programs (weld-twin correct-program), or by the corrected '
+    'robot.yaml or robot.urdf, whose head says what it leaves by itself: one by one they are not '
+    'certain, their sum is.'
 )
 
 
@@ -130,7 +132,8 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
     for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
         if site_of(named) in unsure:
             action = f'Should it be {found_name(named)}: {action[:1].lower()}{action[1:]}'
-        action = f'{action} {gearing(named.effect)}'.rstrip()
+        twins = ' '.join(same_words(diagnosis, site_of(named)))
+        action = ' '.join(filter(None, [action, gearing(named.effect), twins]))
         worse = warning(diagnosis, held[site_of(named)]) if site_of(named) in held else ''
         out.append(f'{action} {worse}'.rstrip())
     return out

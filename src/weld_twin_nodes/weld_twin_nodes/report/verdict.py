@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from weld_twin_core.diagnosis.result import Diagnosis, Site
+from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
 from .leading import in_order
 from .mending import advised, left_with
@@ -87,7 +87,9 @@ def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     choices = '; and from '.join(_either(group) for group in open_sets(diagnosis)[:2])
     unsure = open_sites(diagnosis)
     sure = [found for found in diagnosis.effects if site_of(found) not in unsure]
-    settled = listed([found_name(found) for found in sure])
+    settled = listed([f'{found_name(found)}{_twins(diagnosis, found)}' for found in sure])
+    if not choices:
+        return f'The {size} comes from {settled}.', _gain(diagnosis)
     after = _gain(diagnosis, 'Either way')
     if not sure:
         return f'The {size} comes from {choices}: these data do not tell which.', after
@@ -99,6 +101,15 @@ def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     else:
         first = f'from {settled}, in part from {choices}: these data do not tell which.'
     return f'The {size} comes in part {first}', after
+
+
+def _twins(diagnosis: Diagnosis, found: Found) -> str:
+    """Return beside a name what is the same error on any motion, in brackets."""
+    own = site_of(found)
+    others = [site for same in diagnosis.same if own in same for site in same if site != own]
+    if not others:
+        return ''
+    return f' (on any motion the same as {listed([site_name(site) for site in others])})'
 
 
 def _either(group: Sequence[Site]) -> str:

@@ -218,16 +218,41 @@ def open_sets(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
     Return the sets of which these data do not tell which it is.
 
     The set of the largest cause first, and in each the most probable first: so headline, cards and
-    what to do name them alike.
+    what to do name them alike. What is one error on any motion is no question of the data.
     """
     share = share_by_site(diagnosis)
     odds_of = {site: p for held in diagnosis.causes for site, p in held.name}
+    beside = {site for _, *others in diagnosis.same for site in others}
+    asked = [[s for s in group if s not in beside] for group in diagnosis.indistinguishable]
     groups = [
         tuple(sorted(group, key=lambda site: -odds_of.get(site, 0.0)))
-        for group in diagnosis.indistinguishable
+        for group in asked
         if len(group) > 1
     ]
     return sorted(groups, key=lambda group: -max(share.get(site, 0.0) for site in group))
+
+
+def status_word(diagnosis: Diagnosis) -> str:
+    """Return the status as people read it: what only no motion can decide is no open question."""
+    closed = diagnosis.status == 'ambiguous' and diagnosis.same and not open_sets(diagnosis)
+    return STATUS['identified' if closed else diagnosis.status]
+
+
+def same_words(diagnosis: Diagnosis, *sites: Site) -> list[str]:
+    """
+    Return which errors are one on any motion, as sentences: of those at some sites, or of all.
+
+    The first of each is what a person can set; no measurement decides, and none is advised.
+    """
+    out = []
+    for first, *others in diagnosis.same:
+        if not sites or {first, *others} & set(sites):
+            names = listed([site_name(site) for site in others])
+            out.append(
+                f'On any motion {names} would be the same error as {site_name(first)}: no '
+                'measurement tells them apart, and mending the one mends the other.'
+            )
+    return out
 
 
 def open_sites(diagnosis: Diagnosis) -> set[Site]:

@@ -163,6 +163,9 @@ FIELDS: dict[str, Field] = {
         'First link', "of the arm's chain in a URDF", (IMPORT, DIAGNOSE, CORRECT), _name
     ),
     'tip_link': Field('Last link', 'of it', (IMPORT, DIAGNOSE, CORRECT), _name),
+    'flange_link': Field(
+        'Flange', 'the link of a URDF where tools begin', (DIAGNOSE, CORRECT), _name
+    ),
     'language': Field(
         'Language of the program',
         '',

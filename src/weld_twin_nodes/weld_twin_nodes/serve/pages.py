@@ -39,7 +39,7 @@ PROGRAM_FILES = (
 FIRST = ('align',)
 """Fields that everybody is shown; the others are folded away."""
 MORE = ('tolerance', 'uncertainty', 'controller', 'length_unit', 'angle_unit')
-COUNTING = ('joint_signs', 'joint_offsets', 'coupled', 'base_link', 'tip_link')
+COUNTING = ('joint_signs', 'joint_offsets', 'coupled', 'base_link', 'tip_link', 'flange_link')
 """How the controller counts its joints, and which chain of a URDF is the arm."""
 HOW = tuple(name for name, each in FIELDS.items() if CORRECT in each.commands)
 """Fields of a program."""
@@ -125,7 +125,7 @@ def _details(asked: Asked) -> Html:
     hint = 'such as 2026-03-31T14:05 (UTC unless it says +02:00); empty: as its stamps say'
     return tag(
         'details',
-        tag('summary', 'Table units, and history'),
+        tag('summary', 'Tolerance, controller, signs; table units, and history'),
         tag(
             'div',
             *_fields(MORE, asked.told),

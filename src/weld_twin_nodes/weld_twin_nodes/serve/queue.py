@@ -28,14 +28,15 @@ from .directory import Directory
 from .job import (
     DONE,
     FAILED,
-    FILE,
     FOUND,
     IMPORTED,
+    MODEL,
     OPEN,
     PROGRAM,
     REFUSED,
     RUNNING,
     UNSOUND,
+    UPLOADS,
     WAITING,
     Asked,
     Job,
@@ -52,8 +53,6 @@ UNKNOWN = 'unknown at '
 """Begins the party of who comes without a key: all of an address are like one user."""
 LOOK = 5.0
 """Seconds after which a worker that has nothing to do writes what a full disk did not take."""
-_NO_SPACE = ('No space left on device', 'Disk quota exceeded', 'disk is full')
-"""What commands say of a full disk."""
 
 
 class Full(DataError):
@@ -186,9 +185,11 @@ class Queue:
             self._jobs.pop(job.key, None)
             self._sizes.pop(job.key, None)
             self._unwritten.discard(job.key)
-        # Its state goes first: a folder without it is swept by the next start.
-        (self.folder(job) / FILE).unlink(missing_ok=True)
-        shutil.rmtree(self.folder(job), ignore_errors=True)
+        folder = self.folder(job)
+        # Its state goes last: what is cut off on the way can be deleted again.
+        for place in (UPLOADS, IMPORTED, FOUND, MODEL):
+            shutil.rmtree(folder / place, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
 
     def remove_user(self, user: str) -> None:
         """Forget a user: recordings, programs and history."""
@@ -292,7 +293,7 @@ class Queue:
         """Note how a job ended, and what comes of it."""
         state = STATES.get(done.code, FAILED)
         said = _plain(done.said.removeprefix('weld-twin: '), job)
-        if any(sign in said for sign in _NO_SPACE):
+        if done.disk_full:
             state, said = FAILED, NO_ROOM
         if state == UNSOUND:
             said = 'data or set-up are wrong: it asks what to do'

@@ -14,6 +14,7 @@ from ...arm.rotation import rotation_matrix
 from ...arrays import Array
 from ...effects.effect import Effect
 from .readable import frame, metres, number, radians, size, turn
+from .zeros import stands, to_mend
 
 Sentence = Callable[[Effect, Robot], str]
 
@@ -46,11 +47,9 @@ def _general(effect: Effect, robot: Robot) -> str:
 
 
 def _joint_offset(effect: Effect, robot: Robot) -> str:
-    offset = _value(effect, 'offset')
-    return (
-        f'Re-master {effect.site} by {radians(-offset)}: it stands {radians(offset)} from where '
-        'it reads.'
-    )
+    joint, offset = str(effect.site), _value(effect, 'offset')
+    sliding = bool(robot.prismatic[robot.index(joint)])
+    return f'{stands(joint, offset, sliding=sliding)} {to_mend(offset, sliding=sliding)}'
 
 
 def _row(parameter: str, key: str, words: str) -> Sentence:

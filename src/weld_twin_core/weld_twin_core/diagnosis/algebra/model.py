@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,6 +46,34 @@ class Change(NamedTuple):
     effect: Effect
 
 
+class Alone(NamedTuple):
+    """
+    What a robot file does by itself, without the effects that it cannot hold.
+
+    Attributes
+    ----------
+    changes : tuple of Effect
+        What the file has beside the constants of the model, so that it does well by itself; the
+        effects that go with it have the same with the other sign. None where the constants of the
+        model are as good.
+    recorded_m, unseen_m : float [m]
+        RMS that remains with the file alone, where it was recorded and on data not fitted.
+    whole_recorded_m, whole_unseen_m : float [m]
+        The same with the whole model.
+
+    """
+
+    changes: tuple[Effect, ...]
+    recorded_m: float
+    unseen_m: float
+    whole_recorded_m: float
+    whole_unseen_m: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values."""
+        return {**self._asdict(), 'changes': [effect.to_mapping() for effect in self.changes]}
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """
@@ -62,6 +91,10 @@ class Model:
         What differs between the recordings.
     given : tuple of int
         Of which of the recordings given each is a part; see `Problem`.
+    mends : tuple of mapping
+        How it was undone, as plain values to be made again; see `soundness.mending`.
+    alone : Alone or None
+        What its robot file does by itself; None where that is not known.
 
     """
 
@@ -72,6 +105,8 @@ class Model:
     mended: tuple[str, ...] = ()
     changes: tuple[Change, ...] = ()
     given: tuple[int, ...] = ()
+    mends: tuple[Mapping[str, Any], ...] = ()
+    alone: Alone | None = None
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""

@@ -13,6 +13,7 @@ from ..advice import Limits, actions
 from ..advice.next_step import next_step
 from ..frames.places import NOT_TOLD, not_told
 from ..hypotheses.search import Search
+from ..hypotheses.structural_aliases import never_parted
 from ..levels.causes import causes
 from ..levels.contributions import contributions
 from ..levels.curved import Curved
@@ -102,7 +103,7 @@ def answer(
         **_parted(unseen, told, shares, verdict),
         signs=own,
         contacts=contact_spreads(found, unseen),
-        **_compared(found, examined),
+        **_compared(found, examined, verdict),
     )
 
 
@@ -162,8 +163,8 @@ def _of_effect(cause: Cause, signs: Signs) -> Mapping[str, float]:
     return signs.causes[cause.slot] if cause.slot is not None and signs.causes else {}
 
 
-def _compared(found: Search, examined: Examined) -> dict[str, Any]:
-    """Return the recordings, what they say of each other, and what the checks say of that."""
+def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, Any]:
+    """Return the recordings, what they say of each other, and what no recording can say."""
     named = examined.given.may_change
     return {
         'recordings': found.problem.recordings,
@@ -173,4 +174,5 @@ def _compared(found: Search, examined: Examined) -> dict[str, Any]:
         'changed': changed(found, named),
         'may_change': named,
         'unsound': examined.told(found.final.model.found),
+        'same': never_parted(found, verdict.sets),
     }

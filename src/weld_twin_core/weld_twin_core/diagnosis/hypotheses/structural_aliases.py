@@ -26,11 +26,11 @@ from ...effects.registry import REGISTRY
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
-from ..algebra.fit import fit
+from ..algebra.fit import Fit, fit
 from ..beliefs import Beliefs
 from ..result import Site
 from .rivals import Rival, nats_in_place, weighed
-from .search import Search
+from .search import Search, refitted
 from .selection import fitted_with, implausible
 from .still_joints import hardly_moves, moved_most
 
@@ -78,7 +78,60 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
             alike = [replace(r, nats=min(r.nats, most)) for r in kin if r not in clearly]
             slot = weighed([*slot, *alike], beliefs.temperature) if alike else slot
         slots.append(slot)
-    return replace(found, slots=tuple(slots), refused=tuple(better))
+    aliased = replace(found, slots=tuple(slots), refused=tuple(better))
+    return _settable_first(aliased, frozenset(exclude))
+
+
+def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
+    """
+    Return what was found with errors that a person can set in the place of those they always are.
+
+    The tilt of an axis may be the zero of its joint whatever the motion: no measurement can decide,
+    mending one mends both, and the zero is what a controller takes.
+    """
+    robot, align = found.baseline.model.robot, found.work.problem.align
+    effects = list(found.small.model.found)
+    taken = {(e.name, e.site) for e in effects}
+    chosen: dict[int, Site] = {}
+    for k, own in enumerate(effects[: len(found.slots)]):
+        if not _constant(type(own)) or own.set_at_controller or own.coordinates().size > 1:
+            continue
+        for other in _settable(robot, exclude):
+            site = Site(other.name, other.site)
+            if (other.name, other.site) not in taken and always(robot, own, other, align):
+                effects[k], chosen[k] = other, site
+                taken.add((other.name, other.site))
+                break
+    if not chosen:
+        return found
+    work = found.work
+    rest = found.small.model.with_found(tuple(e for k, e in enumerate(effects) if k not in chosen))
+    model = fit(work.problem, rest, work.scale, None, 4).model
+    kept = iter(model.found)
+    placed = tuple(e if k in chosen else next(kept) for k, e in enumerate(effects))
+    small = fit(work.problem, model.with_found(placed), work.scale, None, 4)
+    slots = tuple(
+        _led_by(slot, chosen[k], small) if k in chosen else slot
+        for k, slot in enumerate(found.slots)
+    )
+    return replace(refitted(found, small), slots=slots)
+
+
+def _settable(robot: Robot, exclude: frozenset[str]) -> Iterator[Effect]:
+    """Yield every error of no size that a person can set."""
+    for name, kind in REGISTRY.items():
+        if kind.set_at_controller and name not in exclude:
+            for joint in joints_of(kind, robot.joint_names):
+                yield _of(Site(name, joint))
+
+
+def _led_by(slot: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...]:
+    """Return a slot with one site before all others, as likely as the likeliest."""
+    most = max(slot, key=lambda rival: rival.probability)
+    first = Rival(site, most.nats, small, most.probability)
+    rest = [rival for rival in slot if rival.site != site]
+    whole = sum(rival.probability for rival in (first, *rest))
+    return tuple(replace(r, probability=r.probability / whole) for r in (first, *rest))
 
 
 def _kin(effect: Effect, excluded: Sequence[str]) -> list[type[Effect]]:
@@ -255,15 +308,81 @@ def same_error(robot: Robot, one: Effect, other: Effect) -> bool:
     return _inside(a, b) or _inside(b, a)
 
 
+def never_parted(found: Search, sets: Sequence[Sequence[Site]]) -> tuple[tuple[Site, ...], ...]:
+    """
+    Return which sites are one error on any motion, what a person can set first.
+
+    Parameters
+    ----------
+    found : Search
+    sets : sequence of sequence of Site
+        What the data cannot tell apart.
+
+    """
+    robot, align = found.baseline.model.robot, found.work.problem.align
+    out = []
+    for group in sets:
+        known = [site for site in group if site.effect in REGISTRY]
+        left = [site for site in known if _constant(REGISTRY[site.effect])]
+        left.sort(key=lambda site: not REGISTRY[site.effect].set_at_controller)
+        while len(left) > 1:
+            first = _of(left[0])
+            same = [left[0], *(s for s in left[1:] if always(robot, first, _of(s), align))]
+            left = [site for site in left if site not in same]
+            if len(same) > 1:
+                out.append(tuple(same))
+    return tuple(out)
+
+
+def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> bool:
+    """
+    Return whether two constant errors do the same on any motion, each all that the other does.
+
+    Parameters
+    ----------
+    robot : Robot
+    one, other : Effect
+        Their families and joints count, not their values.
+    align : frozenset of str
+        Frames that are fitted, 'base' and 'tool': what these take up tells nobody apart.
+
+    """
+    a, b = _columns(robot, one), _columns(robot, other)
+    frames = [_frame_columns(robot, name) for name in sorted(align)]
+    if frames:
+        span = np.linalg.qr(np.concatenate(frames).T)[0]
+        whole = [np.linalg.norm(rows, axis=1) for rows in (a, b)]
+        a, b = (rows - (rows @ span) @ span.T for rows in (a, b))
+        pairs = zip((a, b), whole, strict=True)
+        if any((np.linalg.norm(rows, axis=1) < SAME * size).any() for rows, size in pairs):
+            return False  # A frame is what they are.
+    return _inside(a, b) and _inside(b, a)
+
+
 def _columns(robot: Robot, effect: Effect) -> Array:
     """Return what an error does to the tool in many postures, one row per component."""
+    return _levered(_anywhere(robot).columns(effect))
+
+
+def _frame_columns(robot: Robot, name: str) -> Array:
+    """Return what a frame does to the tool in many postures, shape (6, rows)."""
+    maker = _anywhere(robot)
+    return _levered(np.stack([maker.column((name, k)) for k in range(6)]))
+
+
+def _anywhere(robot: Robot) -> Features:
+    """Return the twin in postures all over its range."""
     low = np.maximum(robot.lower, -np.pi)
     high = np.minimum(robot.upper, np.pi)
     q = low + (high - low) * np.random.default_rng(SEED).random((POSTURES, robot.n))
     motion = JointMotion(np.arange(float(POSTURES)), q, static=True)
-    columns = Features(Twin(robot), Recording('postures', motion), motion.t).columns(effect)
-    columns[:, 3:] *= LEVER
-    return columns.reshape(columns.shape[0], -1)
+    return Features(Twin(robot), Recording('postures', motion), motion.t)
+
+
+def _levered(columns: Array) -> Array:
+    out = np.array(columns)
+    out[:, 3:] *= LEVER
+    return out.reshape(out.shape[0], -1)
 
 
 def _inside(rows: Array, span: Array, share: float = SAME) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from .clocks import clocks
 from .computed import computed
 from .evidence import Checker
+from .gravity import gravity
 from .mixups import mixups
 from .orientation import orientation
 from .outliers import outliers
@@ -24,6 +25,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'readings': (stuck, 'No reading stands still while the tool moves.'),
     'tools': (parted, 'No recording has another tool than the first.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
+    'gravity': (gravity, 'Gravity pulls down where the base stands.'),
     'orientation': (orientation, 'Orientations turn as the joints say.'),
     'instrument': (computed, 'The poses have the noise of an instrument.'),
     'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),

@@ -20,7 +20,7 @@ from .base_change import BaseChange, base_change, thinned
 from .lag import Lag, lag
 from .lengths import length
 from .limits import LATE_LEFT, RATE_MOST, UNEXPLAINED
-from .mending import Mend
+from .mending import Mend, as_entry
 from .slips import Slip, slips
 from .snapshot import Snapshot, measured, snapshot
 
@@ -57,7 +57,15 @@ class Mistake(NamedTuple):
 
     def told(self, *, applied: bool) -> Unsound:
         """Return what is told of it in a diagnosis, undone or not."""
-        return Unsound(self.kind, self.at, self.sentence, self.remedy, applied, self.alike)
+        return Unsound(
+            self.kind,
+            self.at,
+            self.sentence,
+            self.remedy,
+            applied,
+            self.alike,
+            as_entry(self.mend),
+        )
 
 
 class Finding(NamedTuple):

@@ -27,7 +27,7 @@ from ..result import Check, Unsound
 from .checks import CHECKS
 from .evidence import Case, Mistake
 from .limits import ENDS
-from .mending import Given, measured
+from .mending import Given, as_entry, measured
 from .slips import Slip
 from .streams import streams, velocities_checked
 from .touches import touches
@@ -186,7 +186,9 @@ class _Look(NamedTuple):
         alone = len(self.posed[0].recordings) == 1
         dated = tuple(slip.effect() for slip in self.dated) if alone else ()
         problem = replace(self.posed[0], dated=dated)
-        return problem, replace(self.posed[1], mended=tuple(m.sentence for m in mistakes))
+        told = tuple(mistake.sentence for mistake in mistakes)
+        made = tuple(e for mistake in mistakes if (e := as_entry(mistake.mend)) is not None)
+        return problem, replace(self.posed[1], mended=told, mends=made)
 
 
 def _looked(problem: Problem, model: Model) -> _Look:

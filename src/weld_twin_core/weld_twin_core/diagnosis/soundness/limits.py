@@ -90,8 +90,11 @@ Median gap [m] from which given frames are looked at: below, they are plausible 
 
 Whether they are a cause then is for `effects.plausible`, `base_pose` and `tool_pose`, to say.
 """
+TILTED = 0.17
+"""Angle [rad] within which a base counts as upright and gravity as pulling down: floors and levelled
+instruments are better by far, arms that are tilted on purpose are at 15 degrees and more."""
 TURNED = 0.035
-"""Angle [rad] within which a base is turned by half a turn, and not by anything."""
+"""Angle [rad] within which a base is turned axis onto axis, and not by anything."""
 BESIDE = 0.1
 """Distance [m] within which a turned base still stands where it was given."""
 

@@ -1,19 +1,30 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Corrections of what was given: each takes recordings, robot and frames, and returns them."""
+"""
+Corrections of what was given: each takes recordings, robot and frames, and returns them.
+
+A correction is kept as a function of this file with its values (`functools.partial`). So it can stand
+in diagnosis.json (`as_entry`) and be made again wherever the model of that diagnosis is used on the
+same source (`from_entry`, `replayed`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...arm import catalog
 from ...arm.robot import Robot
+from ...arm.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ...arrays import Array
 from ...bursts import evenly
-from ...errors import DataError
-from ...recording import Measurements, Recording
+from ...errors import DataError, ModelError
+from ...recording import Measurements, Recording, Signal
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,18 +80,45 @@ def positions_as(given: Given, factor: Array) -> Given:
     """
     out = []
     for r in given.recordings:
+        if r.measured is None:
+            out.append(r)
+            continue
         seen = measured(r)
         turn = None if np.prod(factor) < 0.0 else seen.rotation
         out.append(r.with_measured(replace(seen, position=seen.position * factor, rotation=turn)))
     return replace(given, recordings=tuple(out))
 
 
-def turns_as(given: Given, undo: Callable[[Array], Array]) -> Given:
-    """Return what was given with measured rotations, shape (M, 3, 3), changed."""
+WAYS: dict[str, tuple[str, Callable[[Array], Array]]] = {
+    'inverted': (
+        'Measured orientations are those of the instrument seen from the tool (inverted)',
+        lambda turn: np.swapaxes(turn, -1, -2),
+    ),
+    'w_first': (
+        'Quaternions were written w first and read x first',
+        lambda turn: _rolled(turn, -1),
+    ),
+    'w_last': (
+        'Quaternions were written x first and read w first',
+        lambda turn: _rolled(turn, 1),
+    ),
+}
+"""Ways to write orientations that get mixed up: in words, and what undoes it."""
+
+
+def _rolled(turn: Array, places: int) -> Array:
+    return matrix_from_quaternion(np.roll(quaternion_from_matrix(turn), places, axis=-1))
+
+
+def turns_as(given: Given, way: str) -> Given:
+    """Return what was given with measured rotations, shape (M, 3, 3), by one of `WAYS`."""
     out = []
     for r in given.recordings:
+        if r.measured is None:
+            out.append(r)
+            continue
         seen = measured(r)
-        turn = None if seen.rotation is None else undo(seen.rotation)
+        turn = None if seen.rotation is None else WAYS[way][1](seen.rotation)
         out.append(r.with_measured(replace(seen, rotation=turn)))
     return replace(given, recordings=tuple(out))
 
@@ -94,9 +132,11 @@ def poses_inverted(given: Given) -> Given:
     return replace(given, recordings=tuple(out))
 
 
-def robot_as(given: Given, robot: Robot) -> Given:
-    """Return what was given with another robot that stands where the first did, same tool."""
-    placed = robot.with_frames(base=given.robot.T_world_base, tool=given.robot.T_flange_tool)
+def robot_as(given: Given, name: str) -> Given:
+    """Return what was given with a bundled robot that stands where the first did, same tool."""
+    placed = catalog.load(name).with_frames(
+        base=given.robot.T_world_base, tool=given.robot.T_flange_tool
+    )
     return replace(given, robot=placed)
 
 
@@ -105,21 +145,23 @@ def differing(given: Given, families: tuple[str, ...]) -> Given:
     return replace(given, may_change=tuple(dict.fromkeys([*given.may_change, *families])))
 
 
-def frames_fitted(given: Given, frames: frozenset[str]) -> Given:
+def frames_fitted(given: Given, frames: Iterable[str]) -> Given:
     """Return what was given with more frames to be fitted."""
-    return replace(given, align=given.align | frames)
+    return replace(given, align=given.align | frozenset(frames))
 
 
 def base_turned(given: Given, turn: Array) -> Given:
     """Return what was given with the base turned about its own axes, rotation shape (3, 3)."""
     base = np.array(given.robot.T_world_base)
-    base[:3, :3] = base[:3, :3] @ turn
+    base[:3, :3] = base[:3, :3] @ np.asarray(turn)
     return replace(given, robot=given.robot.with_frames(base=base))
 
 
 def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> Given:
     """
-    Return what was given with measurements of recording k earlier by a lag [s] and its rate.
+    Return what was given with the arm's own stamps of recording k on the clock of the measurements.
+
+    The measurements keep their stamps, so that whatever is told of an instant is told in theirs.
 
     Parameters
     ----------
@@ -130,20 +172,37 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     late : float [s]
         How late its measurements are in the middle.
     rate : float [s/s]
-        How much later they get with every second.
+        How much later they get with every second of theirs.
     middle : float [s]
-        The instant that ``late`` belongs to.
+        The instant that ``late`` belongs to, on the clock of the measurements.
 
     """
     recordings = list(given.recordings)
-    seen = measured(recordings[k])
-    earlier = seen.t - (late + rate * (seen.t - middle))
-    recordings[k] = recordings[k].with_measured(replace(seen, t=earlier))
+    own = recordings[k]
+
+    def moved(t: Array) -> Array:
+        return np.asarray((t + late - rate * middle) / (1.0 - rate))
+
+    def signal(of: Signal | None) -> Signal | None:
+        return None if of is None else replace(of, t=moved(of.t))
+
+    qd = None if own.joints.qd is None else own.joints.qd * (1.0 - rate)
+    recordings[k] = replace(
+        own,
+        joints=replace(own.joints, t=moved(own.joints.t), qd=qd),
+        wrench=signal(own.wrench),
+        temperature=signal(own.temperature),
+    )
     return replace(given, recordings=tuple(recordings))
 
 
 def stamped_evenly(
-    given: Given, k: int, first: float, step: float, lost: Sequence[int] | Array, count: int
+    given: Given,
+    k: int,
+    first: float,
+    step: float,
+    lost: Sequence[int] | NDArray[np.int_],
+    count: int,
 ) -> Given:
     """
     Return what was given with measurements of recording k stamped by an even clock.
@@ -177,6 +236,119 @@ def velocities_left_out(given: Given, k: int) -> Given:
     recordings = list(given.recordings)
     recordings[k] = replace(recordings[k], joints=replace(recordings[k].joints, qd=None))
     return replace(given, recordings=tuple(recordings))
+
+
+MENDS: dict[str, Callable[..., Given]] = {
+    'joints': joints_as,
+    'positions': positions_as,
+    'orientations': turns_as,
+    'poses_inverted': poses_inverted,
+    'robot': robot_as,
+    'frames': frames_fitted,
+    'base': base_turned,
+    'stamps': stamps_as,
+    'even_stamps': stamped_evenly,
+    'may_change': differing,
+    'velocities': velocities_left_out,
+}
+"""What diagnosis.json calls each correction."""
+_ONE = 'k'
+"""What a correction of one recording alone calls its number."""
+
+
+def as_entry(mend: Mend | None) -> dict[str, Any] | None:
+    """Return a correction as plain values, for diagnosis.json; None for none."""
+    if not isinstance(mend, partial):
+        return None
+    name = next((name for name, made in MENDS.items() if made is mend.func), None)
+    return (
+        None if name is None else {'do': name, **{k: _plain(v) for k, v in mend.keywords.items()}}
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, frozenset | set | tuple):
+        return sorted(value)
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def from_entry(entry: Mapping[str, Any]) -> Mend:
+    """
+    Return a correction from plain values, as `as_entry` gives them.
+
+    Raises
+    ------
+    ModelError
+        It is none that is known.
+
+    """
+    try:
+        values = {key: value for key, value in entry.items() if key != 'do'}
+        made = MENDS[entry['do']]
+    except (KeyError, TypeError, AttributeError):
+        raise ModelError(f'no correction of data is known that is {entry!r}') from None
+    lists = {key: np.array(v, dtype=float) for key, v in values.items() if _numbers(v)}
+    return partial(made, **{**values, **lists})
+
+
+def _numbers(value: Any) -> bool:
+    return isinstance(value, list) and not any(isinstance(part, str) for part in value)
+
+
+def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0) -> Given:
+    """
+    Return what is given after the corrections of a diagnosis.
+
+    Parameters
+    ----------
+    entries : sequence of mapping
+        In the order in which they were made.
+    given : Given
+        One recording of the same source, or none for the robot alone.
+    which : int
+        Which recording of that diagnosis it is: some corrections are of one alone.
+
+    Raises
+    ------
+    ModelError
+        A correction does not fit what is given.
+
+    """
+    for entry in entries:
+        own = dict(entry)
+        if _ONE in own:
+            if own[_ONE] != which or not given.recordings:
+                continue
+            own[_ONE] = 0
+        try:
+            given = from_entry(own)(given)
+        except (TypeError, ValueError, KeyError, IndexError, DataError) as error:
+            raise ModelError(f'a correction of data cannot be made again: {error}') from None
+    return given
+
+
+def reading_map(entries: Sequence[Mapping[str, Any]], count: int) -> tuple[Array, Array]:
+    """
+    Return what corrections make of joint positions as they were recorded.
+
+    Parameters
+    ----------
+    entries : sequence of mapping
+    count : int
+        Joints of the robot, n.
+
+    Returns
+    -------
+    matrix, offset : array, shape (n, n) and (n,) [rad or m]
+        Mended positions are q matrix' + offset.
+
+    """
+    matrix, offset = np.eye(count), np.zeros(count)
+    for entry in entries:
+        if entry.get('do') == 'joints':
+            turn = np.asarray(entry['matrix'], dtype=float)
+            matrix, offset = turn @ matrix, turn @ offset + np.asarray(entry['offset'])
+    return matrix, offset
 
 
 def measured(recording: Recording) -> Measurements:

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from ...arm.robot import Robot
+from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.joint_offset import JointOffset
 from ...effects.plausible import plausible
@@ -33,7 +34,7 @@ from .limits import (
 from .mending import base_turned, frames_fitted
 from .other_links import GIVE_ITS_MODEL, other_links
 from .snapshot import Arm, Snapshot, rough_models
-from .suspicions import Suspicion, doubles, robots, suspicions
+from .suspicions import AXES, Suspicion, doubles, robots, suspicions
 
 
 def mixups(case: Case) -> Sequence[Finding]:
@@ -201,19 +202,10 @@ def _framed(
 ) -> Mistake:
     turn = None
     if more == {'base'}:
-        turn = _half_turn(shot.robot.T_world_base, model.bases[0])
+        turn = _turned(shot.robot.T_world_base, model.bases[0])
     falls = f'the gap falls from {length(before)} to {length(left)}'
     if turn is not None:
-        return Mistake(
-            'base_turned',
-            ('base',),
-            'The base of the robot stands turned by 180 degrees about its z axis against '
-            f'the frame that was given; turned back, {falls}.',
-            'Use the axes of the robot base that the controller counts in (for a UR: base or '
-            'base_link), or add the half turn to the base frame; a joint 1 whose zero is off by '
-            'as much would look the same',
-            partial(base_turned, turn=turn),
-        )
+        return _base(shot.robot, turn, falls)
     names = listed(sorted(more))
     return Mistake(
         'other',
@@ -226,13 +218,47 @@ def _framed(
     )
 
 
-def _half_turn(given: Array, fitted: Array) -> Array | None:
-    """Return by how many degrees about its z axis a base is turned, if by half and nearby."""
+def _base(robot: Robot, turn: Array, falls: str) -> Mistake:
+    """Return the mistake that a base is that stands turned, shape (3, 3)."""
+    vector = np.degrees(rotation_vector(turn))
+    k, angle = int(np.abs(vector).argmax()), float(np.linalg.norm(vector))
+    if abs(abs(vector[k]) - angle) < 1.0:
+        about, size = f'{AXES[k]} axis', float(vector[k])
+    else:
+        parts = ', '.join(f'{part:+.0f}' for part in vector / np.abs(vector).max())
+        about, size = f'axis ({parts})', angle
+    size = abs(size) if angle > 179.0 else size
+    first = robot.joint_names[0]
+    alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    words = ''
+    # About its own first axis an arm cannot tell its base from the zero of its first joint.
+    if k == 2 and about.startswith('z') and not robot.prismatic[0]:
+        alike = (('constant_angle', (first,)),)
+        words = f'; a joint {first} whose zero is off by as much would look the same'
+    return Mistake(
+        'base_turned',
+        ('base',),
+        f'The base of the robot stands turned by {size:.0f} degrees about its {about} against '
+        f'the frame that was given; turned back, {falls}.',
+        'Use the axes of the robot base that the controller counts in (for a UR: base or '
+        f'base_link), or add the turn to the base frame{words}',
+        partial(base_turned, turn=turn),
+        alike=alike,
+    )
+
+
+def _turned(given: Array, fitted: Array) -> Array | None:
+    """Return by which turn a base stands that has axes along those given, where it is nearby."""
     off = np.linalg.inv(given) @ fitted
     if np.linalg.norm(off[:3, 3]) > BESIDE:
         return None
-    turn = np.diag([-1.0, -1.0, 1.0])
-    cosine = 0.5 * (np.trace(turn @ off[:3, :3]) - 1.0)
+    # Of all turns that lead axes onto axes the nearest has ones where the turn is largest.
+    turn = np.zeros((3, 3))
+    rows = np.abs(off[:3, :3]).argmax(axis=1)
+    turn[np.arange(3), rows] = np.sign(off[np.arange(3), rows])
+    if len(set(rows.tolist())) < 3 or np.linalg.det(turn) < 0.0 or np.array_equal(turn, np.eye(3)):
+        return None
+    cosine = 0.5 * (np.trace(turn.T @ off[:3, :3]) - 1.0)
     return turn if np.arccos(np.clip(cosine, -1.0, 1.0)) < TURNED else None
 
 

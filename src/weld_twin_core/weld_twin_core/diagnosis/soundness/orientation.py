@@ -9,12 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from ...arm.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ...arrays import Array
 from ..algebra.problem import Model
 from .evidence import Case, Finding, Mistake
 from .limits import UNEXPLAINED
-from .mending import turns_as
+from .mending import WAYS, turns_as
 from .snapshot import Snapshot, gap
 
 WRONG = 0.05
@@ -34,12 +33,12 @@ def orientation(case: Case) -> Sequence[Finding]:
     points = shot.with_turns([None] * len(shot.recordings))
     if turned < WRONG or gap(points.problem, points.framed()) > UNEXPLAINED:
         return ()
-    for words, undo in _ways().items():
+    for way, (words, undo) in WAYS.items():
         trial = shot.with_turns(_changed(shot, undo))
         if disagreement(trial, trial.framed()) < 0.2 * turned:
             sentence = f'{words}; undone, they agree with the joints.'
             remedy = 'Mend the convention where the orientations are exported'
-            mend = partial(turns_as, undo=undo)
+            mend = partial(turns_as, way=way)
             mistake = Mistake('other', ('instrument',), sentence, remedy, mend)
             return (Finding.of(mistake),)
     return (
@@ -48,22 +47,6 @@ def orientation(case: Case) -> Sequence[Finding]:
             f'Measured orientations disagree with the joints by {np.degrees(turned):.3g} degrees '
             '(median) though positions agree; check their convention, or give positions only.',
         ),
-    )
-
-
-def _ways() -> dict[str, Undo]:
-    return {
-        'Measured orientations are those of the instrument seen from the tool (inverted)': lambda turn: (
-            np.swapaxes(turn, -1, -2)
-        ),
-        'Quaternions were written w first and read x first': _rolled(-1),
-        'Quaternions were written x first and read w first': _rolled(1),
-    }
-
-
-def _rolled(places: int) -> Undo:
-    return lambda turn: matrix_from_quaternion(
-        np.roll(quaternion_from_matrix(turn), places, axis=-1)
     )
 
 

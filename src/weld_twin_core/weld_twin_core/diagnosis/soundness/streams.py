@@ -133,8 +133,8 @@ def _evenly(given: Given, k: int, found: Bursts) -> tuple[float, Bursts, float]:
 
 def _stamped(even: Bursts, k: int, count: int) -> Mend:
     """Return what stamps recording k by an even clock."""
-    values = {'first': even.first, 'step': even.step, 'lost': even.lost, 'count': count}
-    return partial(stamped_evenly, k=k, **values)
+    first, step, lost = even.first, even.step, even.lost
+    return partial(stamped_evenly, k=k, first=first, step=step, lost=lost, count=count)
 
 
 def _posed(given: Given) -> Case:

@@ -181,7 +181,7 @@ def robots(robot: Robot) -> Iterator[Suspicion]:
                 ('robot',),
                 f'the robot is a {name}, not a {robot.name}',
                 f'Give --robot {name}, or the file of the robot that was measured',
-                partial(robot_as, robot=other),
+                partial(robot_as, name=name),
             )
 
 

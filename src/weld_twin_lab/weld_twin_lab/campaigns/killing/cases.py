@@ -16,6 +16,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.in_process import weld_twin
 
 from .commands import Row, Words, file_case, folder_case
+from .services import fleet_case, server_case
 
 Once = Callable[[np.random.Generator], Row]
 """Kills once, at a moment drawn, and says what came of it."""
@@ -145,11 +146,21 @@ def _dump(file: Path) -> str:
     return '\n'.join(map(str, told))
 
 
+def _fleet(place: Path) -> Once:
+    return fleet_case(place, _bag(place, 4e-4), ROBOT)
+
+
+def _serve(place: Path) -> Once:
+    return server_case(place, _bag(place, 4e-4), ROBOT)
+
+
 CASES = (
     Case('diagnose', _diagnose),
     Case('plan-measurement', _plan),
     Case('correct-program', _correct),
     Case('fleet page', _page),
     Case('history add', _history),
+    Case('fleet run', _fleet),
+    Case('serve', _serve),
 )
 """In the order of the table."""

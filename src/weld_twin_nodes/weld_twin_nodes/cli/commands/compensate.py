@@ -30,6 +30,8 @@ def run(args: argparse.Namespace) -> int:
     recording = read_recording(args.bag, robot, topics_of(args))
     made = compensated(robot, args.model, recording)
     say_doubts(made.model.twin, args.model)
+    if made.told:
+        print(f'note: {made.told}')
     robot.check_positions(made.result.motion.q)
     write_compensated(args.out, made, recording, storage=args.storage)
     before, after = made.result.rms

@@ -12,7 +12,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..options import add_output, add_robot, output, robot_of
 from ..program_options import add_program_options, context_of, quantity, start_of
@@ -79,10 +79,18 @@ def run(args: argparse.Namespace) -> int:
 
 def _corrected(args: argparse.Namespace, context: Context, program: Program) -> int:
     from weld_twin_core.twin.program_correction import Caps
+    from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
     from weld_twin_msgs_py.files.input_files import hashed
     from weld_twin_msgs_py.files.whole_files import write_text
 
-    from ...offline.correcting import corrected_program, correction_entry, program_model
+    from ...offline.correcting import (
+        corrected_program,
+        correction_entry,
+        not_told,
+        program_model,
+        way,
+    )
+    from ...offline.told_twin import other_readings
     from ...report.correction_page import correction_page, headline
 
     length, angle = args.max_correction
@@ -92,8 +100,12 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
     )
     robot = context.robot
     model = program_model(robot, args.model, args.temperature, args.setup - 1)
-    made = corrected_program(program, context, model, caps, start_of(args, robot))
-    entry = correction_entry(made, robot, caps)
+    content = read_diagnosis(args.model) if Path(args.model).suffix.lower() == '.json' else {}
+    made = corrected_program(
+        program, context, model, caps, start_of(args, robot), other_readings(content)
+    )
+    entry = correction_entry(made, robot, caps) | {'way': way(made, model)}
+    entry['notes'] += not_told(content)
     inputs = [hashed('program', args.program), hashed('model', args.model)]
     entry['inputs'] = [item.as_dict() for item in inputs]
     with output(args, RESULT) as place:
@@ -101,6 +113,13 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
         write_text(place / PAGE, correction_page(entry, inputs))
         _write_entry(place, entry)
     print(f'{Path(args.out) / program.sources[0].name}: {headline(entry)}')
+    _tell(entry)
+    print(f'report: {Path(args.out) / PAGE}')
+    return 0
+
+
+def _tell(entry: dict[str, Any]) -> None:
+    """Print what was left, where the model knows nothing, and what else is to be known."""
     for left in entry['left']:
         print(f'left as it was: {left["why"]}')
     outside = [move['where'] for move in entry['moves'] if move['outside']]
@@ -108,8 +127,6 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
         print(f'{len(outside)} moves lie outside what the model knows, the first at {outside[0]}')
     for note in entry['notes']:
         print(f'note: {note}')
-    print(f'report: {Path(args.out) / PAGE}')
-    return 0
 
 
 def _write_texts(place: Path, program: Program, texts: Sequence[str]) -> None:

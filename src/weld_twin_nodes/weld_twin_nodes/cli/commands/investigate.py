@@ -26,6 +26,8 @@ LEAST = 0.5
 """Minutes that an experiment is planned with where hardly any are left; it is then not asked for."""
 BUDGET = 60.0
 """Minutes of experiments, with what has to be set up for them, unless told: one visit to a cell."""
+CHAIN = ('--base-link', '--tip-link', '--flange-link')
+"""Options that say which links of a URDF the arm is between, and where its tools begin."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -162,8 +164,7 @@ def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
         raise DataError(f'--budget must be minutes, got {budget}')
     words = [('--align', args.align), ('--effects-known', args.effects_known)]
     words += [('--cell-box', args.cell_box)]
-    words += [('--base-link', args.base_link), ('--tip-link', args.tip_link)]
-    words += [('--flange-link', args.flange_link)]
+    words += zip(CHAIN, (args.base_link, args.tip_link, args.flange_link), strict=True)
     # A box may begin with a minus, and is then taken for an option unless it is joined.
     options = [f'{word}={value}' for word, value in words if value]
     return begin(args.robot, options, budget)
@@ -279,10 +280,12 @@ def _write_experiment(
     with new_directory(place, mark=EXPERIMENT, force=args.force, shared=True) as made:
         write_joint_motion(made / EXPERIMENT, asked.pop('motion'), asked['sentence'])
         if args.controller:
-            _write_program(args, state['robot'], made, place)
+            _write_program(args, state, made, place)
 
 
-def _write_program(args: argparse.Namespace, robot: str, made: Path, place: Path) -> None:
+def _write_program(
+    args: argparse.Namespace, state: dict[str, Any], made: Path, place: Path
+) -> None:
     from weld_twin_core.errors import TwinError
     from weld_twin_msgs_py.programs.languages import LANGUAGES
 
@@ -292,7 +295,8 @@ def _write_program(args: argparse.Namespace, robot: str, made: Path, place: Path
     name = f'experiment{suffix}'
     parser = argparse.ArgumentParser()
     export_program.add_arguments(parser)
-    words = [str(made / EXPERIMENT), '--robot', robot]
+    words = [str(made / EXPERIMENT), '--robot', state['robot']]
+    words += [word for word in state['options'] if word.partition('=')[0] in CHAIN]
     words += ['--controller', args.controller, '--out', str(made / name)]
     try:
         lines = export_program.write_program(parser.parse_args(words), made / name, place / name)

@@ -46,16 +46,20 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.bags import read_recording
 
-    from ...offline.prediction import predictor, told_sureness, write_prediction
+    from ...offline.prediction import on_one_clock, predictor, told_sureness, write_prediction
     from ...offline.prediction_table import write_prediction_table
 
     if args.table and Path(args.table).exists():
         raise DataError(f"'{args.table}' exists already and is not overwritten")
     robot = robot_of(args)
-    recording = read_recording(args.bag, robot, topics_of(args))
+    # Two clocks may be what the diagnosis mended.
+    recording = read_recording(args.bag, robot, topics_of(args), one_clock=False)
     if args.temperature is not None:
         recording = recording.at_temperature(args.temperature)
     model = predictor(robot, args.model, args.bag, recording, args.setup)
+    recording = on_one_clock(recording if model.source is None else model.source)
+    if model.told:
+        print(f'note: {model.told}')
     say_doubts(model.twin, args.model)
     made = {'model': str(args.model)}
     got = write_prediction(args.out, model, recording, storage=args.storage, provenance=made)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from weld_twin_nodes.history import Entry
+    from weld_twin_nodes.history.verifications import Verified
 
 WIDTH = 100
 """Columns of the table, whatever the terminal has."""
@@ -28,13 +29,44 @@ def run(args: argparse.Namespace) -> int:
     """Print a table."""
     from rich.console import Console
 
+    from weld_twin_nodes.history.verifications import verifications
+
     with opened(args) as database:
         if not args.cell:
             print('\n'.join(database.cells()) or 'no cell yet')
             return 0
         entries = database.entries(args.cell)
-    Console(highlight=False, width=WIDTH).print(_table(entries))
+        verified = verifications(database, args.cell)
+    console = Console(highlight=False, width=WIDTH)
+    console.print(_table(entries))
+    if verified:
+        console.print(_verified(verified))
     return 0
+
+
+def _verified(found: list[Verified]) -> Table:
+    """Return what was measured after corrections, a row each."""
+    from rich.table import Table
+
+    from weld_twin_nodes.report.quantities import millimetres
+    from weld_twin_nodes.report.words import cause
+
+    table = Table('measured again', 'promise', 'promised', 'measured', 'did not go away', box=None)
+    for at, _, content in found:
+        still = [
+            cause(site['effect'], site['joint'])
+            for item in content['causes']
+            if item['state'] not in ('gone', 'open')
+            for site in item['sites']
+        ]
+        table.add_row(
+            at.date().isoformat(),
+            'kept' if content['kept'] else 'not kept',
+            millimetres(content['promised']['rms_m']),
+            millimetres(content['measured']['rms_m']),
+            ', '.join(still),
+        )
+    return table
 
 
 def _table(entries: list[Entry]) -> Table:

@@ -1,0 +1,67 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every correction of data can be written down and made again, and does the same."""
+
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+from measured_cells import moving, recorded
+
+from weld_twin_core.diagnosis.soundness import mending
+from weld_twin_core.diagnosis.soundness.mending import Given, as_entry, replayed
+from weld_twin_core.errors import ModelError
+
+TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+MADE = {
+    'joints': {'matrix': np.eye(6)[[0, 1, 2, 4, 3, 5]], 'offset': np.arange(6.0)},
+    'positions': {'factor': np.array([1.0, -1.0, 1e-3])},
+    'orientations': {'way': 'w_first'},
+    'robot': {'name': 'ur10'},
+    'frames': {'frames': frozenset({'tool', 'base'})},
+    'base': {'turn': TURN},
+    'stamps': {'k': 0, 'late': 0.3, 'rate': 1e-4, 'middle': 5.0},
+    'velocities': {'k': 0},
+    'poses_inverted': {},
+    'even_stamps': {'k': 0, 'first': 0.1, 'step': 0.02, 'lost': (5, 9), 'count': 100},
+    'may_change': {'families': ('tool_pose',)},
+}
+
+
+def test_every_kind_is_tried_here():
+    assert set(MADE) == set(mending.MENDS)
+
+
+@pytest.mark.parametrize('kind', MADE)
+def test_a_correction_that_was_written_down_does_the_same_again(kind, ur5, rng):
+    recording = recorded(ur5, moving(ur5, rng), rng)
+    given = Given((recording,), ur5, frozenset({'tool'}))
+    mend = partial(mending.MENDS[kind], **MADE[kind])
+    entry = json.loads(json.dumps(as_entry(mend)))
+    once, again = mend(given), replayed([entry], given)
+    assert once.align == again.align and once.robot.name == again.robot.name
+    np.testing.assert_array_equal(once.robot.T_world_base, again.robot.T_world_base)
+    one, other = once.recordings[0], again.recordings[0]
+    for name in ('t', 'q'):
+        np.testing.assert_array_equal(getattr(one.joints, name), getattr(other.joints, name))
+    for name in ('t', 'position', 'rotation'):
+        np.testing.assert_array_equal(getattr(one.measured, name), getattr(other.measured, name))
+    assert (one.joints.qd is None) == (other.joints.qd is None)
+
+
+def test_clocks_are_of_one_recording_alone(ur5, rng):
+    given = Given((recorded(ur5, moving(ur5, rng), rng),), ur5)
+    entry = as_entry(partial(mending.stamps_as, k=1, late=0.3, rate=0.0, middle=0.0))
+    assert replayed([entry], given, 0) is given
+    t = replayed([entry], given, 1).recordings[0].joints.t
+    np.testing.assert_allclose(t - given.recordings[0].joints.t, 0.3)
+
+
+@pytest.mark.parametrize(
+    'entry',
+    [{'do': 'magic'}, {}, {'do': 'joints', 'matrix': [[1.0]], 'offset': [0.0]}, {'do': 'base'}],
+)
+def test_a_correction_that_does_not_fit_is_refused(entry, ur5, rng):
+    with pytest.raises(ModelError, match='correction'):
+        replayed([entry], Given((recorded(ur5, moving(ur5, rng), rng),), ur5))

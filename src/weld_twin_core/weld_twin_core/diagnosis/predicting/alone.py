@@ -1,0 +1,190 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a robot file can do by itself, without the effects that it cannot hold.
+
+A file of link lengths and zeros holds no springs and no play. The constants of a model with springs
+are right beside the springs; without them the arm of the file hangs otherwise than the real one, and
+may be worse than the nominal arm. So the constants of the file are fitted once more, by themselves,
+and taken where they leave less of what was not fitted. What they were changed by stands beside the
+springs with the other sign: file and effects together are the whole model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
+from ...effects import REGISTRY
+from ...effects.constant import ChannelError, FrameError
+from ...effects.effect import Effect
+from ...effects.setup_motion import of_the_robot
+from ...twin.corrected import corrected
+from ...twin.features import joints_of
+from ..algebra.fit import fit, robust_scale, trusted
+from ..algebra.model import Alone
+from ..algebra.prior import effect_precision, frame_offset
+from ..algebra.problem import Model, Problem, Scale
+from ..result import Shrink
+from ..unseen.regions import posture_regions
+
+ROWS = 900
+"""Rows that the constants are fitted on: three hundred positions show frames and some zeros well, and
+each fold costs a fit."""
+FOLDS = 8
+"""Stretches that take their turn in being left out, as for the whole model."""
+LEAST_GAIN = 0.95
+"""Ratio of what is left below which constants of their own are taken: less is a matter of the
+stretches, and numbers that mean the arm itself are worth more than a few per cent."""
+OUT = 1e-12
+"""Weight of a sample that is left out of a fit, against 1."""
+STEPS = 2
+"""Steps of a fit that starts nearby; constants are nearly linear."""
+
+
+def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False) -> Alone | None:
+    """
+    Return what is left with the constants of a model alone, and how they are best changed for that.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Model
+        The whole model, fitted.
+    shrink : Shrink
+        What the whole model leaves on data that were not fitted.
+    many : bool
+        Whether many small errors were fitted together, of which none is certain by itself. Else
+        constants that were found mean the arm, and stay: frames and other zeros give way.
+
+    Returns
+    -------
+    Alone or None
+        None where places of contacts take the part of an instrument, which no file is judged by.
+
+    """
+    if problem.touched or not model.found + model.known:
+        return None
+    problem = problem.thinned(ROWS)
+    scale = robust_scale(problem, problem.residuals(model))
+    good = trusted(scale.weights)
+    whole = _rms(problem, model, good)
+    constants = _constants(model)
+    recorded = _rms(problem, constants, good)
+    unseen = float(np.sqrt(max(shrink.rms_after_m**2 + recorded**2 - whole**2, 0.0)))
+    out = Alone((), recorded, unseen, whole, shrink.rms_after_m)
+    if not _left(model):
+        return out
+    start = _freed(constants, many=many)
+    scale = replace(scale, position=max(scale.position, recorded / np.sqrt(3.0)))
+    tried = max(_left_out(problem, start, scale, good, rows) for rows in _folds(problem))
+    if tried >= LEAST_GAIN * unseen:
+        return out
+    own = _fitted(problem, start, scale)
+    return Alone(
+        _changes(constants, own), _rms(problem, own, good), tried, whole, shrink.rms_after_m
+    )
+
+
+def _left(model: Model) -> tuple[Effect, ...]:
+    """Return what a robot file cannot hold of the arm and its cell."""
+    causes = [effect for effect in model.known + model.found if effect.cause]
+    return corrected(model.robot, of_the_robot(causes))[1]
+
+
+def _constants(model: Model) -> Model:
+    """Return the model with what a robot file holds, and nothing else."""
+    left = {id(effect) for effect in _left(model)}
+    held = tuple(
+        effect
+        for effect in of_the_robot([e for e in model.known + model.found if e.cause])
+        if id(effect) not in left and isinstance(effect, ChannelError | FrameError)
+    )
+    return replace(model, known=(), found=held, changes=())
+
+
+def _freed(constants: Model, *, many: bool) -> Model:
+    """Return the model with zeros of all joints to be fitted beside the constants that it has."""
+    own = {(effect.name, effect.site) for effect in constants.found}
+    robot = constants.robot
+    more = tuple(
+        kind(joint)  # type: ignore[call-arg]
+        for kind in REGISTRY.values()
+        if kind.set_at_controller
+        for joint in joints_of(kind, robot.joint_names)
+        if (kind.name, joint) not in own
+    )
+    if many:
+        return constants.with_found((*constants.found, *more))
+    return replace(constants, known=constants.found, found=more)
+
+
+def _fitted(problem: Problem, start: Model, scale: Scale) -> Model:
+    return fit(problem, start, scale, effect_precision(start), STEPS).model
+
+
+def _left_out(
+    problem: Problem,
+    start: Model,
+    scale: Scale,
+    good: Sequence[NDArray[np.bool_]],
+    rows: Array,
+) -> float:
+    """Return what constants of their own leave on parts left out in turn, RMS [m]."""
+    labels = _of_samples(problem, rows)
+    squares: list[Array] = []
+    for fold in np.unique(np.concatenate(labels)):
+        weights = tuple(
+            np.where(own == fold, OUT * w, w) for w, own in zip(scale.weights, labels, strict=True)
+        )
+        parts = problem.residuals(_fitted(problem, start, replace(scale, weights=weights)))
+        squares += [
+            (part[:3, (own == fold) & fine] ** 2).sum(axis=0)
+            for part, own, fine in zip(parts, labels, good, strict=True)
+        ]
+    return float(np.sqrt(np.concatenate(squares).mean()))
+
+
+def _folds(problem: Problem) -> list[Array]:
+    """Return which part every row is in, by stretches, and by postures of stations at rest."""
+    by_stretch = problem.block_labels(FOLDS)
+    return [by_stretch, posture_regions(problem)] if problem.at_rest else [by_stretch]
+
+
+def _of_samples(problem: Problem, rows: Array) -> list[Array]:
+    """Return the part of every sample from that of every row, (M,) per recording."""
+    out, at = [], 0
+    for c, m in zip(problem.rows, problem.samples, strict=True):
+        out.append(rows[at : at + c * m : c])
+        at += c * m
+    return out
+
+
+def _rms(problem: Problem, model: Model, good: Sequence[NDArray[np.bool_]]) -> float:
+    parts = problem.residuals(model)
+    squares = [(p[:3, fine] ** 2).sum(axis=0) for p, fine in zip(parts, good, strict=True)]
+    return float(np.sqrt(np.concatenate(squares).mean()))
+
+
+def _changes(constants: Model, own: Model) -> tuple[Effect, ...]:
+    """Return what a file has to have beside the constants, as constant effects."""
+    before = {(effect.name, effect.site): effect for effect in constants.found}
+    out: list[Effect] = []
+    for effect in own.found:
+        old = before.get((effect.name, effect.site))
+        step = effect.coordinates() - (0.0 if old is None else old.coordinates())
+        if np.abs(step).max() > 0.0:
+            out.append(effect.with_coordinates(step))
+    frames = {
+        'base': frame_offset(own.bases[0], constants.bases[0], left=True),
+        'tool': frame_offset(own.robot.T_flange_tool, constants.robot.T_flange_tool, left=False),
+    }
+    for kind in REGISTRY.values():
+        moved = frames.get(str(kind.fitted_with))
+        if issubclass(kind, FrameError) and moved is not None and np.abs(moved).max() > 0.0:
+            out.append(kind(xyz=moved[:3], rotvec=moved[3:]))  # type: ignore[call-arg]
+    return tuple(out)

@@ -1,0 +1,149 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A fleet run and a server, killed: what was finished stays, what waited is done afterwards."""
+
+from __future__ import annotations
+
+import subprocess
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ...fleet.fleet_runs import command, rows, timed
+from ...fleet.users import Visitor, started, wait
+from .commands import Row
+
+LINES = 3
+"""Recordings of the list whose run is killed."""
+MOST = 1.0
+"""Share of the time of a whole run up to which kills are drawn; the first part is Python's start."""
+LEAST = 0.3
+"""Share from which they are drawn."""
+AFTER = 4.0
+"""Seconds from the beginning of an upload up to which a server is killed; a diagnosis takes as long."""
+Once = Callable[[np.random.Generator], Row]
+
+
+def fleet_case(place: Path, bag: Path, robot: str) -> Once:
+    """
+    Return what kills a fleet run, whose finished rows must stay and whose others must come.
+
+    Parameters
+    ----------
+    place : Path
+        To work in.
+    bag : Path
+        A recording.
+    robot : str
+
+    """
+    listed = place / 'list.csv'
+    lines = [f'line {k},{bag},{robot},2026-03-0{k + 1}' for k in range(LINES)]
+    listed.write_text('cell,recording,robot,at\n' + '\n'.join(lines) + '\n', encoding='utf-8')
+    whole = str(place / 'whole.db')
+    took = timed(listed, whole, '--workers', '2')
+    expected = rows(whole)
+
+    def once(rng: np.random.Generator) -> Row:
+        database = place / 'killed.db'
+        while True:
+            for file in place.glob('killed.db*'):
+                file.unlink()
+            moment = float(rng.uniform(LEAST, MOST) * took)
+            if _killed(command(listed, str(database), '--workers', '2'), moment):
+                break
+        left = rows(str(database), with_cost=True) if database.exists() else {}
+        short = {key: row[:-3] for key, row in left.items()}
+        odd = [key for key, row in short.items() if expected.get(key) != row]
+        timed(listed, str(database), '--workers', '2')
+        final = rows(str(database), with_cost=True)
+        again = [key for key, row in left.items() if final.get(key) != row]
+        gone = {key: row[:-3] for key, row in final.items()} != expected
+        return Row(
+            case='fleet run',
+            how=f'after {moment:.3f} s',
+            lost='rows are lost or written again' if again or gone else '',
+            half=f'{len(odd)} rows are none of a run in peace' if odd else '',
+            mixed=0 < len(left) < LINES,
+        )
+
+    return once
+
+
+def _killed(words: list[str], moment: float) -> bool:
+    """Run a command and kill it; return whether it was still running."""
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            process.wait(timeout=moment)
+            return False
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return True
+
+
+def server_case(place: Path, bag: Path, robot: str) -> Once:
+    """
+    Return what kills a server while somebody drops a recording, or it is diagnosed.
+
+    Parameters
+    ----------
+    place : Path
+        To work in.
+    bag : Path
+        A recording.
+    robot : str
+
+    """
+    served, files = place / 'served', sorted(bag.iterdir())
+    process, root = started(served)
+    person = Visitor(root)
+    earlier = person.drop(files, robot=robot)[1]
+    wait(person, earlier)
+    process.kill()
+    process.wait()
+    first = _results(served, earlier)
+
+    def once(rng: np.random.Generator) -> Row:
+        process, person.root = started(served)
+        moment = float(rng.uniform(0.0, AFTER))
+        dropped: list[str] = []
+        thread = threading.Thread(target=_drop, args=(person, files, robot, dropped))
+        thread.start()
+        time.sleep(moment)
+        process.kill()
+        process.wait()
+        thread.join()
+        process, person.root = started(served)
+        lost = '' if _results(served, earlier) == first else 'an earlier verdict was changed'
+        for address in dropped:
+            if '<iframe' not in wait(person, address):
+                lost = lost or 'what was taken was not diagnosed'
+            person.page(f'{address}/delete', b'')
+        jobs = len(list((served / 'jobs').iterdir()))
+        scratch = list((served / 'scratch').iterdir())
+        process.kill()
+        process.wait()
+        half = 'something of it is left' if jobs > 1 + (not dropped) or scratch else ''
+        how = f'{moment:.3f} s after an upload began'
+        return Row(case='serve', how=how, lost=lost, half=half, mixed=False)
+
+    return once
+
+
+def _drop(person: Visitor, files: list[Path], robot: str, dropped: list[str]) -> None:
+    """Drop a recording; note its address where it was taken, whatever became of the server."""
+    try:
+        status, address, _ = person.drop(files, robot=robot)
+    except OSError:
+        return
+    if status == 200 and address.startswith('/recordings/'):
+        dropped.append(address)
+
+
+def _results(served: Path, address: str) -> dict[str, bytes]:
+    """Return the files that a finished recording has."""
+    found = served / 'jobs' / address.rpartition('/')[2] / 'found'
+    return {file.name: file.read_bytes() for file in found.iterdir() if file.is_file()}

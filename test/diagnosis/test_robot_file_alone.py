@@ -1,0 +1,113 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A corrected robot file says what it leaves by itself, and is no worse than the arm it came from.
+
+The arm yields under a load at its tool. Its sag is worked out here from weight and lever.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.twin import Twin
+from weld_twin_lab.programs.plain_arm import _frames, tool_pose
+from weld_twin_msgs_py.bags import write_recording
+from weld_twin_msgs_py.files.diagnosis_model import load_model
+from weld_twin_msgs_py.files.effects_file import read_effects
+from weld_twin_msgs_py.robots import read_robot_yaml, write_robot_yaml
+from weld_twin_nodes.cli import main
+
+LOAD, YIELDS, LONGER, G = 12.0, 4e-6, 5e-4, 9.80665
+"""Load [kg], what joint 2 yields [rad/(N m)], how much link 2 is longer [m]."""
+TOOL = np.eye(4)
+TOOL[:3, 3] = [0.05, -0.03, 0.22]
+NOMINAL = load('fanuc_m20id25')
+NOMINAL = replace(
+    NOMINAL.with_frames(tool=TOOL),
+    mass=np.zeros(6),
+    com=np.zeros((6, 3)),
+    payload_mass=LOAD,
+    payload_com=np.zeros(3),
+)
+LONG = replace(NOMINAL, a=NOMINAL.a + [0.0, LONGER, 0.0, 0.0, 0.0, 0.0])
+
+
+def true_point(q):
+    """Return where the tool of the loaded arm is: joint 2 yields by what weight and lever make."""
+    _, second, *_ = _frames(LONG, q)
+    tip = tool_pose(LONG, q, TOOL)[:3, 3]
+    torque = second[:3, 2] @ np.cross(tip - second[:3, 3], [0.0, 0.0, -LOAD * G])
+    return tool_pose(LONG, q, TOOL, np.array([0.0, YIELDS * torque, 0, 0, 0, 0]))[:3, 3]
+
+
+def postures(seed, count):
+    rng = np.random.default_rng(seed)
+    return rng, np.array([0.2, 0.1, 0.2, 0.1, 0.9, 0.2]) + rng.uniform(-0.7, 0.7, (count, 6))
+
+
+def rms(robot, q, true):
+    base = robot.T_world_base
+    own = np.array([(base @ tool_pose(robot, row, robot.T_flange_tool))[:3, 3] for row in q])
+    return np.sqrt(((own - true) ** 2).sum(axis=1).mean())
+
+
+@pytest.fixture(scope='module')
+def found(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('alone')
+    rng, q = postures(3, 50)
+    points = np.array([true_point(row) for row in q]) + rng.normal(scale=2e-5, size=(50, 3))
+    t = 5.0 * np.arange(50)
+    given = Recording('cell', JointMotion(t, q, static=True), Measurements(t, points))
+    write_recording(folder / 'rec', given, NOMINAL)
+    write_robot_yaml(folder / 'robot.yaml', NOMINAL)
+    words = ['diagnose', folder / 'rec', '--robot', folder / 'robot.yaml', '--align', 'base,tool']
+    few = ('transmission_ripple', 'bearing_tilt', 'joint_coupling', 'hose_pull', 'loaded_play')
+    words += ['--out', folder / 'found', '--exclude-effect', *few]
+    assert main([str(word) for word in words]) == 0
+    return folder / 'found'
+
+
+def test_the_head_says_what_the_file_leaves_by_itself_on_postures_never_measured(found):
+    head = (found / 'robot.yaml').read_text()
+    alone, whole = (
+        float(text) * 1e-3
+        for text in re.search(
+            r'alone leaves .* and ([\d.]+) mm on data.*leaves .* and ([\d.]+) mm', head
+        ).groups()
+    )
+    _, q = postures(11, 200)
+    true = np.array([true_point(row) for row in q])
+    own = rms(read_robot_yaml(found / 'robot.yaml'), q, true)
+    assert 0.6 * own < alone < 1.8 * own
+    assert whole < 0.5 * alone
+    # No better frames make the nominal arm as good: they are fitted to the very same postures.
+    bare = np.array([tool_pose(NOMINAL, row, TOOL)[:3, 3] for row in q])
+    one, other = (part - part.mean(axis=0) for part in (bare, true))
+    left, _, right = np.linalg.svd(other.T @ one)
+    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    assert own < np.sqrt(((one @ turn.T - other) ** 2).sum(axis=1).mean())
+
+
+def test_file_and_effects_together_are_the_whole_model(found):
+    robot = read_robot_yaml(found / 'robot.yaml')
+    both = Twin(robot, read_effects(found / 'robot_effects.yaml', robot))
+    whole = load_model(read_robot_yaml(found.parent / 'robot.yaml'), found / 'diagnosis.json')
+    _, q = postures(12, 30)
+    motion = Recording('new', JointMotion(5.0 * np.arange(30), q, static=True))
+    one, other = (twin.poses(motion).position for twin in (both, whole))
+    assert np.abs(one - other).max() < 2e-6
+    changed = yaml.safe_load((found / 'robot_effects.yaml').read_text())
+    assert {'joint_compliance', 'joint_offset'} <= {item['effect'] for item in changed}
+
+
+def test_page_says_which_file_to_take(found):
+    page = (found / 'report.html').read_text()
+    assert 'robot.yaml and robot.urdf cannot hold all that was found, and leave 0.' in page

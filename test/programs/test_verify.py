@@ -1,0 +1,190 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Measured again after a correction: the laboratory's own controller and arm carry it out, or do not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_lab.programs import plain_readers as readers
+from weld_twin_lab.programs.plain_arm import along, tool_pose
+from weld_twin_lab.programs.plain_controller import driven
+from weld_twin_msgs_py.bags import write_recording
+from weld_twin_msgs_py.robots import write_robot_yaml
+from weld_twin_nodes.cli.in_process import weld_twin
+
+MADE = Path(__file__).parent / 'made'
+FILES = ('bracket.src', 'bracket.dat')
+ROBOT = load('kuka_kr16_2')
+TOOL = ROBOT.T_flange_tool @ along(2, 0.25)
+ARM = ROBOT.with_frames(tool=TOOL)
+NEAR = np.radians([8, -85, 100, 5, 70, -3])
+OFF = np.array([0.0, 8e-4, 0.0, -9e-4, 0.0, 0.0])
+"""How much further joints 2 and 4 stand than they read [rad]."""
+NOISE = 2e-5
+KEPT, NOT_KEPT = 0, 4
+
+
+def measured(q, off, seed, *, still=True, clock=None):
+    rng = np.random.default_rng(seed)
+    points = np.array([tool_pose(ROBOT, row, TOOL, off)[:3, 3] for row in q])
+    t = 5.0 * np.arange(len(q)) if clock is None else clock
+    seen = Measurements(t, points + rng.normal(scale=NOISE, size=points.shape))
+    return Recording('cell', JointMotion(t, q, static=still), seen)
+
+
+def stations(seed, count=40):
+    return NEAR + np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 6))
+
+
+def run_program(folder, off, seed):
+    """Return what is recorded while the controller runs a program and a tracker looks on."""
+    text = [(folder / name).read_bytes().decode('latin-1') for name in FILES]
+    way = driven(ARM, readers.krl(text), NEAR, 0.05)
+    keep = slice(None, None, max(len(way.clock) // 400, 1))
+    q, clock = way.joints[keep], way.clock[keep]
+    return measured(q, off, seed, still=False, clock=clock)
+
+
+@pytest.fixture(scope='module')
+def cell(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('verify')
+    write_robot_yaml(folder / 'robot.yaml', ARM)
+    write_recording(folder / 'before', measured(stations(1), OFF, 1), ARM)
+    few = ('transmission_ripple', 'bearing_tilt', 'joint_coupling', 'hose_pull', 'loaded_play')
+    said = weld_twin(
+        *('diagnose', folder / 'before', '--robot', folder / 'robot.yaml'),
+        *('--out', folder / 'found', '--exclude-effect', *few),
+    )
+    assert said.code == 0, said.err
+    said = weld_twin(
+        *('correct-program', MADE / FILES[0], '--robot', folder / 'robot.yaml'),
+        *('--model', folder / 'found' / 'diagnosis.json', '--out', folder / 'better'),
+    )
+    assert said.code == 0, said.err
+    return folder
+
+
+def verify(cell, tmp_path, recording, *words):
+    write_recording(tmp_path / 'after', recording, ARM)
+    model = ('--model', cell / 'found' / 'diagnosis.json')
+    said = weld_twin('verify', tmp_path / 'after', *model, *words, '--out', tmp_path / 'out')
+    page = (tmp_path / 'out' / 'report.html').read_text()
+    assert said.out.splitlines()[0].split(':')[0] in page
+    return said, json.loads((tmp_path / 'out' / 'verification.json').read_text())
+
+
+def states(content):
+    return {
+        site['joint']: cause['state'] for cause in content['causes'] for site in cause['sites']
+    }
+
+
+def test_a_program_that_was_corrected_and_run_keeps_its_promise(cell, tmp_path):
+    recording = run_program(cell / 'better', OFF, 2)
+    said, content = verify(cell, tmp_path, recording, '--program', cell / 'better')
+    assert said.code == KEPT and said.out.startswith('Kept: promised along bracket.src')
+    assert content['kept'] and content['measured']['rms_m'] < content['promised']['interval_m'][1]
+    assert set(states(content).values()) == {'gone'}
+
+
+def test_a_program_that_was_never_loaded_is_told(cell, tmp_path):
+    said, content = verify(cell, tmp_path, run_program(MADE, OFF, 3), '--program', cell / 'better')
+    assert said.code == NOT_KEPT and 'The motion is not that of the corrected' in said.out
+    assert not content['kept']
+
+
+def test_an_arm_that_changed_since_breaks_the_promise_and_the_joint_is_named(cell, tmp_path):
+    now = OFF + [0.0, 2.4e-3, 0.0, 0.0, 0.0, 0.0]
+    said, content = verify(
+        cell, tmp_path, run_program(cell / 'better', now, 4), '--program', cell / 'better'
+    )
+    true = np.linalg.norm(
+        [tool_pose(ROBOT, NEAR, TOOL, now)[:3, 3] - tool_pose(ROBOT, NEAR, TOOL, OFF)[:3, 3]]
+    )
+    assert said.code == NOT_KEPT
+    assert 0.5 * true < content['measured']['rms_m'] < 2.0 * true
+    assert states(content) == {'joint_a2': 'grew', 'joint_a4': 'gone'}
+
+
+@pytest.mark.parametrize(
+    ('mended', 'code', 'left'),
+    [
+        (OFF, KEPT, {'joint_a2': 'gone', 'joint_a4': 'gone'}),
+        (OFF * [0, 1, 0, 0, 0, 0], NOT_KEPT, {'joint_a2': 'gone', 'joint_a4': 'stays'}),
+        (-OFF, NOT_KEPT, {'joint_a2': 'grew', 'joint_a4': 'grew'}),
+        (0.0 * OFF, NOT_KEPT, {'joint_a2': 'stays', 'joint_a4': 'stays'}),
+    ],
+)
+def test_zeros_that_were_mastered_are_told_one_by_one(mended, code, left, cell, tmp_path):
+    said, content = verify(cell, tmp_path, measured(stations(5, 30), OFF - mended, 5))
+    assert said.code == code and states(content) == left
+
+
+def test_a_tracker_that_was_set_up_anew_is_asked_for_and_fitted(cell, tmp_path):
+    recording = measured(stations(6, 30), 0.0 * OFF, 6)
+    moved = Measurements(
+        recording.measured.t,
+        recording.measured.position @ along(0, 0)[:3, :3].T + [0.4, -2.0, 0.3],
+    )
+    recording = recording.with_measured(moved)
+    write_recording(tmp_path / 'elsewhere', recording, ARM)
+    model = ('--model', cell / 'found' / 'diagnosis.json')
+    said = weld_twin('verify', tmp_path / 'elsewhere', *model)
+    assert said.code == 2 and '--align base' in said.err and said.err.count('\n') == 1
+    said, content = verify(cell, tmp_path, recording, '--align', 'base')
+    assert said.code == KEPT and content['measured']['rms_m'] < 3 * NOISE
+
+
+def test_what_is_no_correction_is_refused(cell):
+    words = ('verify', cell / 'before', '--model', cell / 'found' / 'diagnosis.json')
+    said = weld_twin(*words, '--program', cell / 'found')
+    assert said.code == 2 and 'correction.json' in said.err and said.err.count('\n') == 1
+
+
+def test_history_keeps_whether_the_promise_was_kept(cell, tmp_path):
+    pytest.importorskip('sqlalchemy')
+    recording = measured(stations(7, 20), OFF * [0, 0, 0, 1, 0, 0], 7)
+    said, _ = verify(cell, tmp_path, recording)
+    assert said.code == NOT_KEPT
+    words = ('--cell', 'line 3', '--db', tmp_path / 'history.db')
+    for found, at in ((cell / 'found', '2026-03-01'), (tmp_path / 'out', '2026-03-09')):
+        said = weld_twin('history', 'add', found, *words, '--at', at)
+        assert said.code == 0, said.err
+    assert 'promise not kept: added' in said.out
+    again = weld_twin('history', 'add', tmp_path / 'out', *words, '--at', '2026-03-09')
+    assert 'was there already' in again.out
+    shown = weld_twin('history', 'show', *words).out
+    row = next(line for line in shown.splitlines() if '2026-03-09' in line)
+    assert 'not kept' in row and 'zero offset of joint_a4' in row
+
+
+def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
+    off = OFF + [1.5e-3, 0.0, 0.0, 0.0, 0.0, 0.0]
+    write_recording(tmp_path / 'rec', measured(stations(8), off, 8), ARM)
+    few = ('transmission_ripple', 'bearing_tilt', 'joint_coupling', 'hose_pull', 'loaded_play')
+    robot = ('--robot', cell / 'robot.yaml')
+    said = weld_twin(
+        *('diagnose', tmp_path / 'rec', *robot, '--align', 'base'),
+        *('--out', tmp_path / 'found', '--exclude-effect', *few),
+    )
+    assert said.code == 0, said.err
+    model = ('--model', tmp_path / 'found' / 'diagnosis.json')
+    said = weld_twin('correct-program', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
+    assert said.code == 0 and 'frames were fitted to the recording (base)' in said.out
+    texts = [
+        [(folder / name).read_bytes().decode('latin-1') for name in FILES]
+        for folder in (MADE, tmp_path / 'out')
+    ]
+    meant, run = (driven(ARM, readers.krl(text), NEAR, 0.05) for text in texts)
+    real = np.array([tool_pose(ROBOT, q, TOOL, off)[:3, 3] for q in run.joints[::5]])
+    apart = np.linalg.norm(real[:, None] - meant.tool[None], axis=2).min(axis=1)
+    true = np.sqrt((apart**2).mean())
+    after = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']['after']
+    assert after['rms_ci90_same_setup_m'][1] < true < after['rms_ci90_m'][1]

@@ -181,7 +181,7 @@ class EffectStages:
         for spring in springs:
             soft[..., self.robot.index(str(spring.site))] += spring.number('compliance')
         matrix = np.eye(self.robot.n) + soft[..., None] * gives
-        return np.moveaxis(np.linalg.inv(matrix), (-2, -1), (0, 1))
+        return np.asarray(np.moveaxis(np.linalg.inv(matrix), (-2, -1), (0, 1)))
 
 
 def load_torque(view: View) -> Shift:

@@ -102,7 +102,7 @@ def _alone(entry: Any, robot: Robot) -> Alone | None:
 
 def _at_rest(model: dict[str, Any], key: str) -> list[dict[str, Any]]:
     """Return the entries of a model's effects; springs that do not say how they rest are older."""
-    entries = model.get(key, [])
+    entries: list[dict[str, Any]] = model.get(key, [])
     if 'statics' in model or not isinstance(entries, list):
         return entries
     return [

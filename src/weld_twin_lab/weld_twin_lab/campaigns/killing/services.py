@@ -23,6 +23,8 @@ MOST = 1.0
 """Share of the time of a whole run up to which kills are drawn; the first part is Python's start."""
 LEAST = 0.3
 """Share from which they are drawn."""
+RECORDING = r'href="(/recordings/[0-9a-f]{32})"'
+"""How the list of recordings refers to one of them."""
 AFTER = 4.0
 """Seconds from the beginning of an upload up to which a server is killed; a diagnosis takes as long."""
 Once = Callable[[np.random.Generator], Row]
@@ -119,9 +121,7 @@ def server_case(place: Path, bag: Path, robot: str) -> Once:
         thread.join()
         process, person.root = started(served)
         lost = '' if _results(served, earlier) == first else 'an earlier verdict was changed'
-        listed = set(
-            re.findall(r'href="(/recordings/[0-9a-f]{32})"', person.page('/recordings')[2])
-        )
+        listed = set(re.findall(RECORDING, person.page('/recordings')[2]))
         if not listed.issuperset([earlier, *dropped]):
             lost = lost or 'what was taken is not there'
         # The answer may have been lost on the way, and the recording be there all the same.

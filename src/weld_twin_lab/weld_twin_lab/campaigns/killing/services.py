@@ -126,8 +126,10 @@ def server_case(place: Path, bag: Path, robot: str) -> Once:
             lost = lost or 'what was taken is not there'
         # The answer may have been lost on the way, and the recording be there all the same.
         for address in listed - {earlier}:
-            if '<iframe' not in wait(person, address):
-                lost = lost or 'what was taken was not diagnosed'
+            page = wait(person, address)
+            if '<iframe' not in page:
+                why = re.findall(r'role="alert">(.*?)</p>', page)
+                lost = lost or f'what was taken was not diagnosed: {" ".join(why)}'
         jobs = {f'/recordings/{folder.name}' for folder in (served / 'jobs').iterdir()}
         half = '' if jobs == listed else 'a folder is left that is no recording'
         if list((served / 'scratch').iterdir()):

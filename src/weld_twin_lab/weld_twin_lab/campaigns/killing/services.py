@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import threading
 import time
@@ -118,15 +119,23 @@ def server_case(place: Path, bag: Path, robot: str) -> Once:
         thread.join()
         process, person.root = started(served)
         lost = '' if _results(served, earlier) == first else 'an earlier verdict was changed'
-        for address in dropped:
+        listed = set(
+            re.findall(r'href="(/recordings/[0-9a-f]{32})"', person.page('/recordings')[2])
+        )
+        if not listed.issuperset([earlier, *dropped]):
+            lost = lost or 'what was taken is not there'
+        # The answer may have been lost on the way, and the recording be there all the same.
+        for address in listed - {earlier}:
             if '<iframe' not in wait(person, address):
                 lost = lost or 'what was taken was not diagnosed'
+        jobs = {f'/recordings/{folder.name}' for folder in (served / 'jobs').iterdir()}
+        half = '' if jobs == listed else 'a folder is left that is no recording'
+        if list((served / 'scratch').iterdir()):
+            half = half or 'scratch is left'
+        for address in listed - {earlier}:
             person.page(f'{address}/delete', b'')
-        jobs = len(list((served / 'jobs').iterdir()))
-        scratch = list((served / 'scratch').iterdir())
         process.kill()
         process.wait()
-        half = 'something of it is left' if jobs > 1 + (not dropped) or scratch else ''
         how = f'{moment:.3f} s after an upload began'
         return Row(case='serve', how=how, lost=lost, half=half, mixed=False)
 

@@ -130,10 +130,7 @@ def server_case(place: Path, bag: Path, robot: str) -> Once:
             if '<iframe' not in page:
                 why = re.findall(r'role="alert">(.*?)</p>', page)
                 lost = lost or f'what was taken was not diagnosed: {" ".join(why)}'
-        jobs = {f'/recordings/{folder.name}' for folder in (served / 'jobs').iterdir()}
-        half = '' if jobs == listed else 'a folder is left that is no recording'
-        if list((served / 'scratch').iterdir()):
-            half = half or 'scratch is left'
+        half = _half(served, listed)
         for address in listed - {earlier}:
             person.page(f'{address}/delete', b'')
         process.kill()
@@ -142,6 +139,14 @@ def server_case(place: Path, bag: Path, robot: str) -> Once:
         return Row(case='serve', how=how, lost=lost, half=half, mixed=False)
 
     return once
+
+
+def _half(served: Path, listed: set[str]) -> str:
+    """Return what a server's directory holds beside the recordings that it lists."""
+    jobs = {f'/recordings/{folder.name}' for folder in (served / 'jobs').iterdir()}
+    if jobs != listed:
+        return 'a folder is left that is no recording'
+    return 'scratch is left' if list((served / 'scratch').iterdir()) else ''
 
 
 def _drop(person: Visitor, files: list[Path], robot: str, dropped: list[str]) -> None:

@@ -66,6 +66,11 @@ class Scratch:
         if held is not None:
             os.close(held)
 
+    @property
+    def is_whole(self) -> bool:
+        """Return whether nobody has deleted the directory meanwhile; one made anew does not count."""
+        return self._held is not None and os.fstat(self._held).st_nlink > 0
+
     def __enter__(self) -> Path:
         return self.path
 

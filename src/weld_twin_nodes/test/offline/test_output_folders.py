@@ -6,15 +6,19 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from datetime import datetime, timezone
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.offline.output_directory import new_directory, write_owned
 
@@ -350,3 +354,65 @@ def test_a_folder_that_cannot_be_written_is_a_sentence(weld_twin, program, tmp_p
         refused = correct(weld_twin, program, out)
         assert refused.code == 2 and refused.err.count('\n') == 1
     assert (tmp_path / 'file').read_text() == 'mine'
+
+
+@pytest.mark.parametrize('led', ['../mine.txt', '{folder}/mine.txt', 'link/mine.txt'])
+@pytest.mark.parametrize('in_note', [False, True])
+def test_a_folder_from_anybody_deletes_and_replaces_nothing_outside_itself(tmp_path, led, in_note):
+    """A folder that came in an archive may hold a list, or a change of a killed run, made by hand."""
+    mine, out = tmp_path / 'mine.txt', tmp_path / 'out'
+    mine.write_text('mine')
+    out.mkdir()
+    os.symlink(tmp_path, out / 'link')
+    name, digest = led.format(folder=tmp_path), sha256(b'mine').hexdigest()
+    if in_note:
+        scratch = out / '.weld_twin-abcdefgh'
+        (scratch / 'made').mkdir(parents=True)
+        (scratch / '.weld_twin_lock').touch()
+        os.symlink(tmp_path, scratch / 'made/taken')
+        place = {'taken/mine.txt': None} if led[0] == 'l' else {}
+        note = {'mark': 'x', 'place': place, 'drop': {name: digest}, 'listed': {**place}}
+        (scratch / 'change.json').write_text(json.dumps(note))
+    else:
+        told = {'schema': 'weld_twin/files/1', 'results': {'result.json': {name: digest}}}
+        (out / LIST).write_text(json.dumps(told))
+
+    with suppress(DataError):
+        make(out)
+
+    assert [path.read_text() for path in tmp_path.glob('mine*')] == ['mine']
+
+
+@pytest.mark.parametrize('text', ['[' * 100_000, '{"": "a"}', '{"a\\u0000b": "a"}', None])
+def test_a_list_that_no_program_wrote_is_no_trouble(tmp_path, text):
+    folder = tmp_path / 'out'
+    folder.mkdir()
+    if text is None:
+        os.mkfifo(folder / LIST)  # whoever opens it waits for ever
+        with pytest.raises(DataError, match=r'(?s)weld_twin_files.*--force'):
+            make(folder)
+        return
+    if text[0] == '{':
+        text = f'{{"schema": "weld_twin/files/1", "results": {{"result.json": {text}}}}}'
+    (folder / LIST).write_text(text)
+
+    make(folder)
+
+    assert content(folder) == {'result.json': b'{}'}
+
+
+@pytest.mark.parametrize('there', [False, True])
+def test_a_result_whose_folder_is_deleted_meanwhile_is_not_told_as_written(tmp_path, there):
+    out = tmp_path / 'out'
+    if there:
+        make(out)
+
+    with (
+        pytest.raises(DataError, match='was deleted while it was being written; run it again'),
+        new_directory(out, mark='result.json') as place,
+    ):
+        write_text(place / 'data.csv', '1')
+        shutil.rmtree(out if there else place.parent)
+        write_text(place / 'result.json', '{}')
+
+    assert not list(tmp_path.glob('*out*/*'))

@@ -181,6 +181,8 @@ def _alone(folder: Path) -> Iterator[None]:
 def _install(
     target: Path, scratch: Scratch, mark: str, force: bool, adds: bool, tell: Callable[[str], None]
 ) -> None:
+    if not scratch.is_whole:
+        raise DataError(f"'{target}' was deleted while it was being written; run it again")
     folder = scratch.path / MADE
     made = owned_files.files_of(folder)
     if not os.path.lexists(target):

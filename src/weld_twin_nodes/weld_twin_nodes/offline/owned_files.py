@@ -20,7 +20,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import count
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import hashed
@@ -37,6 +38,11 @@ _ABOUT = (
     'What weld-twin wrote here, with SHA-256. It replaces these files as long as nobody has changed '
     'them, and no others. Without this list it replaces nothing.'
 )
+
+LARGEST = 50_000_000
+"""Bytes of a list or a note that are read; a list of 100,000 files has 15 million."""
+_DAMAGED = (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
+"""What reading a list or a note raises that somebody or something has changed."""
 
 Digests = dict[str, str]
 """SHA-256 by the name of a file, relative to the folder, with slashes."""
@@ -87,13 +93,14 @@ def listed(folder: Path) -> dict[str, Digests]:
     """
     Return what the list of a folder holds: the files of every result, by its mark.
 
-    A list that is damaged, or of another version, lists nothing: what it may have meant is not ours.
+    A list that is damaged, of another version, or with a name that leads out of the folder lists
+    nothing: what it may have meant is not ours.
     """
     try:
-        content = json.loads((folder / LIST).read_text(encoding='utf-8'))
+        content = _read(folder / LIST)
         results = content['results'] if content['schema'] == SCHEMA else {}
-        return {str(k): {str(n): str(d) for n, d in v.items()} for k, v in results.items()}
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return {str(mark): _digests(files) for mark, files in results.items()}
+    except _DAMAGED:
         return {}
 
 
@@ -127,18 +134,19 @@ def change_of(folder: Path, made: Mapping[str, str], mark: str, *, adds: bool) -
 
 def in_the_way(folder: Path, change: Change) -> Iterator[str]:
     """Yield the files of a folder that a change would replace or drop, and that are not ours."""
+    if _is_no_list(folder):
+        yield LIST
     for name, ours in change.place.items():
-        blocking = _blocking(folder, name)
-        if blocking is not None:
-            yield blocking
-        elif _there(folder / name) and digest(folder / name) != ours:
-            yield name
+        foreign = _foreign(folder, name, ours)
+        if foreign is not None:
+            yield foreign
     yield from changed(folder, change.drop)
 
 
 def changed(folder: Path, own: Mapping[str, str]) -> list[str]:
     """Return the files that are there and are not what was written."""
-    return [n for n, ours in own.items() if _there(folder / n) and digest(folder / n) != ours]
+    there = (_foreign(folder, name, own[name]) for name in own if _there(folder / name))
+    return [name for name in dict.fromkeys(there) if name is not None]
 
 
 def decide(scratch: Path, change: Change) -> None:
@@ -158,25 +166,29 @@ def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -
 
     """
     try:
-        change = Change(**json.loads((scratch / NOTE).read_text(encoding='utf-8')))
-    except (OSError, ValueError, TypeError):
+        change = _decided(scratch / NOTE)
+    except _DAMAGED:
         return
+    made = scratch / MADE
     for name, ours in change.place.items():
-        new = scratch / MADE / name
-        if not new.exists():
-            continue  # moved before the one who began was killed
-        blocking = _blocking(folder, name)
-        if blocking is not None:
-            kept(blocking, _keep(folder, blocking))
-        elif _there(folder / name) and digest(folder / name) not in (ours, digest(new)):
-            kept(name, _keep(folder, name))
+        new = change.listed[name]
+        if not _there(made / name) or _foreign(made, name, new) is not None:
+            continue  # moved before the one who began was killed, or not what was made
+        foreign = _foreign(folder, name, ours, new)
+        if foreign is not None:
+            kept(foreign, _keep(folder, foreign))
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        os.replace(new, folder / name)
+        os.replace(made / name, folder / name)
     for name, ours in change.drop.items():
-        if digest(folder / name) == ours:
+        if not _there(folder / name):
+            continue
+        foreign = _foreign(folder, name, ours)
+        if foreign is None:
             _drop(folder, name)
-        elif _there(folder / name):
-            kept(name, _keep(folder, name))
+        else:
+            kept(foreign, _keep(folder, foreign))
+    if _is_no_list(folder):
+        kept(LIST, _keep(folder, LIST))
     write_list(scratch, {**listed(folder), change.mark: change.listed})
     os.replace(scratch / LIST, folder / LIST)
 
@@ -197,13 +209,53 @@ def _there(path: Path) -> bool:
     return os.path.lexists(path)
 
 
+def _read(file: Path) -> Any:
+    """Return what a file of ours holds; it may have come with a folder from anybody."""
+    if file.is_symlink() or not file.is_file() or file.stat().st_size > LARGEST:
+        raise ValueError('it is none of ours')
+    return json.loads(file.read_text(encoding='utf-8'))
+
+
+def _decided(note: Path) -> Change:
+    """Return the change that a note holds."""
+    change = Change(**_read(note))
+    place = {name: None if ours is None else str(ours) for name, ours in change.place.items()}
+    new = _digests(change.listed)
+    if not place.keys() <= new.keys():
+        raise ValueError('it places what it does not list')
+    return Change(str(change.mark), place, _digests(change.drop), new)
+
+
+def _digests(told: Mapping[str, object]) -> Digests:
+    """Return digests by names that stay in their folder, refused if one does not."""
+    for name in told:
+        path = PurePosixPath(name)
+        if not path.parts or path.is_absolute() or '..' in path.parts or '\0' in name:
+            raise ValueError(f'{name!r} is no name of a file in this folder')
+    return {name: str(value) for name, value in told.items()}
+
+
+def _is_no_list(folder: Path) -> bool:
+    """Tell whether something else has the name of the list."""
+    list_ = folder / LIST
+    return _there(list_) and (list_.is_symlink() or not list_.is_file())
+
+
+def _foreign(folder: Path, name: str, *ours: str | None) -> str | None:
+    """Return what is not ours where a file of ours should be; None where nothing is."""
+    blocking = _blocking(folder, name)
+    if blocking is None and _there(folder / name) and digest(folder / name) not in ours:
+        return name
+    return blocking
+
+
 def _blocking(folder: Path, name: str) -> str | None:
-    """Return what stands where a folder of ours, or a file, should be: a file, or a folder."""
+    """Return what stands where a folder of ours, or a file, should be: a link, a file, a folder."""
     parts = Path(name).parts
     for k in range(1, len(parts)):
-        above = Path(*parts[:k])
-        if _there(folder / above) and not (folder / above).is_dir():
-            return above.as_posix()
+        above = folder / Path(*parts[:k])
+        if above.is_symlink() or (_there(above) and not above.is_dir()):
+            return above.relative_to(folder).as_posix()
     return name if (folder / name).is_dir() else None
 
 

@@ -79,7 +79,8 @@ def test_a_mistake_is_the_whole_answer_and_leaves_no_model(bags, tmp_path, capsy
     assert run('diagnose', bags / 'swapped', '--robot', 'ur5', '--out', out) == 3
     first = capsys.readouterr().out.split('\n\n')[0]
     assert first.startswith('Unsound data') and 'swapped' in first
-    assert sorted(path.name for path in out.iterdir()) == ['diagnosis.json', 'report.html']
+    ours = ['.weld_twin_files.json', 'diagnosis.json', 'report.html']
+    assert sorted(path.name for path in out.iterdir()) == ours
     said = content(out)
     assert said['verdict']['status'] == 'unsound'
     assert said['verdict']['effects'] == [] and said['verdict']['confidence'] is None
@@ -120,7 +121,10 @@ def test_a_zero_of_a_joint_that_was_recorded_the_other_way_says_whose_sign_it_ha
     (action,) = content(out)['verdict']['actions']
     assert 'elbow_joint stands at X + 0.11' in action
     needed = 'as it was recorded needs the opposite sign'
-    for told in (action, *((out / name).read_text() for name in ('joint_offsets.csv', 'report.html'))):
+    for told in (
+        action,
+        *((out / name).read_text() for name in ('joint_offsets.csv', 'report.html')),
+    ):
         assert needed in told
     assert needed not in (found / 'joint_offsets.csv').read_text() + str(content(found))
 

@@ -296,8 +296,11 @@ def settled(
             progress(f'rivals of {Site(effect.name, effect.site)} weighed')
             leader = slots[-1][0]
             if leader.fit is not now and attempt < SWAPS:
-                now = backward(work, leader.fit, effective)
-                break
+                swapped = backward(work, leader.fit, effective)
+                # A rival that does not earn a place itself takes none from what did.
+                if leader.site in [Site(e.name, e.site) for e in swapped.model.found]:
+                    now = swapped
+                    break
         else:
             break
     return now, tuple(slots)

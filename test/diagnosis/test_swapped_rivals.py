@@ -1,0 +1,37 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What was found stays found where a rival looks better and is then not worth its own numbers."""
+
+from diagnosis_cells import effect, tiny
+
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.hypotheses import search
+from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.hypotheses.selection import fitted_with
+from weld_twin_core.diagnosis.result import Site
+
+TRUE = (
+    effect('joint_offset', joint='elbow_joint', offset=6e-4),
+    effect('link_length', joint='shoulder_lift_joint', da=4e-4),
+)
+"""What the tool of the cell really does."""
+IDLE = effect('gear_ratio', joint='wrist_3_joint')
+"""An effect that these data do not show."""
+
+
+def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch):
+    problem, model = tiny(TRUE)
+    work, now, _ = search._workspace(problem, model.with_found(TRUE), (), Beliefs())
+
+    def rivals(work, now, k, effective):
+        own = Rival(Site(now.model.found[k].name, now.model.found[k].site), 6.2, now, 0.4)
+        if k == 0:
+            return (own,)
+        idle = fitted_with(work, now.model.without(k), IDLE)
+        assert [e.name for e in idle.model.found] == ['joint_offset', 'gear_ratio']
+        return Rival(Site(IDLE.name, IDLE.site), 6.7, idle, 0.6), own
+
+    monkeypatch.setattr(search, 'rivals', rivals)
+    kept, slots = search.settled(work, now, lambda found: float(found.residual.size), str)
+    assert [e.name for e in kept.model.found] == ['joint_offset', 'link_length']
+    assert len(slots) == 2

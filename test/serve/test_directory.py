@@ -60,12 +60,15 @@ def test_a_server_removes_nothing_but_its_own_uploads_that_were_cut_off(tmp_path
         (made.jobs / name).mkdir()
         (made.jobs / name / 'cv.pdf').write_text('mine')
     (place / 'notes.txt').write_text('mine')
+    moved = 'ba5eba11' * 4  # its file lies on another disk, which is not there now
+    upload(made.jobs, moved)
+    os.symlink(tmp_path / 'disk/job.json', made.jobs / moved / 'job.json')
     made.close()
     again = Directory(place)
-    assert [folder.name for folder in again.kept()] == [whole.key]
+    assert {folder.name for folder in again.kept()} == {whole.key, moved}
     again.close()
     left = {path.name for path in (place / 'jobs').iterdir()}
-    assert left == {whole.key, 'welding', 'feedface' * 4}
+    assert left == {whole.key, moved, 'welding', 'feedface' * 4}
     assert (place / 'notes.txt').read_text() == 'mine'
     assert mode(place) == 0o755 and mode(place / 'jobs') == mode(place / 'users') == 0o700
 

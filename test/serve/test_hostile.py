@@ -178,11 +178,14 @@ def test_a_full_disk_and_damaged_jobs_cost_nothing_that_was_there(tmp_path):
 def spoilt_jobs(jobs, address):
     """Write jobs that are damaged, or newer than this server; return their texts."""
     told = json.loads((jobs / address.rpartition('/')[2] / 'job.json').read_text())
-    cut, newer, asleep = (letter * 32 for letter in 'abc')
+    cut, newer, asleep, deep, timeless, outside = (letter * 32 for letter in 'abcdef')
     texts = {
         cut: '{"key": "cut", "us',
         newer: json.dumps({**told, 'key': newer, 'colour': 'red'}),
         asleep: json.dumps({**told, 'key': asleep, 'state': 'asleep'}),
+        deep: '[' * 100_000,
+        timeless: json.dumps({**told, 'key': timeless, 'since': float('nan')}),
+        outside: json.dumps({**told, 'key': outside, 'user': '../..', 'names': ['../../a.csv']}),
     }
     for name, text in texts.items():
         (jobs / name).mkdir()

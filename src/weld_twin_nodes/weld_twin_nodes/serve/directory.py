@@ -77,9 +77,13 @@ class Directory:
         for folder in sorted(self.jobs.iterdir()):
             if folder.is_symlink() or not _KEY.fullmatch(folder.name) or not folder.is_dir():
                 continue  # a person's
-            if (folder / FILE).is_file():
+            try:
+                names = os.listdir(folder)
+            except OSError:  # whoever reads it tells why it cannot be
+                names = [FILE]
+            if FILE in names:
                 yield folder
-            elif all(_cut_off(entry.name) for entry in folder.iterdir()):
+            elif all(_cut_off(name) for name in names):
                 shutil.rmtree(folder, ignore_errors=True)
 
     def close(self) -> None:

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import json
+import math
 import secrets
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,8 @@ NO_ROBOT = 'which robot is it? Choose it below, or drop its file with the record
 OPEN = (WAITING, RUNNING)
 """States of a job that is not finished; a server that starts again takes these up."""
 STATES = (*OPEN, DONE, UNSOUND, REFUSED, FAILED)
+_DAMAGED = (ValueError, TypeError, KeyError, AttributeError, RecursionError, OSError, DataError)
+"""What reading a job raises that somebody or something has changed."""
 TABLES = ('.csv', '.tsv', '.txt')
 OTHERS = ('.yaml', '.yml', '.urdf', '.xml')
 """Suffixes of tables, and of what may be dropped besides: a bag's description, and robot files."""
@@ -68,7 +71,12 @@ class Asked:
         unknown = data.keys() - own.keys() - FIELDS.keys() - {'told'}
         if unknown:
             raise DataError(f'it asks for {", ".join(sorted(unknown))}, which is not known')
-        return cls(**own, told={**older, **data.get('told', {})})
+        told = {**older, **data.get('told', {})}
+        texts = [own.get(name, '') for name in ('robot', 'cell', 'at')] + list(told.values())
+        if not isinstance(own.get('apply', False), bool):
+            raise DataError('it applies neither something nor nothing')
+        _check_texts(texts)
+        return cls(**own, told=told)
 
 
 @dataclass(frozen=True)
@@ -130,6 +138,8 @@ class Job:
 
         """
         try:
+            if not (folder / FILE).is_file():  # a pipe would be waited for
+                raise ValueError('it is no file')
             data: Mapping[str, Any] = json.loads((folder / FILE).read_text(encoding='utf-8'))
             later = data.get('later')
             told = {
@@ -140,14 +150,21 @@ class Job:
                 'party': data.get('party') or data['user'],
             }
             job = cls(**told)
-            plain = (job.user, job.said, job.party, *job.names)
-            if job.key != folder.name or job.state not in STATES or not job.names:
-                raise ValueError('it is of another job, or of a state that is not known')
-            if not all(isinstance(each, str) for each in plain) or job.since + job.seconds < 0.0:
-                raise ValueError('it has values of another kind')
-        except (ValueError, TypeError, KeyError, AttributeError, OSError, DataError) as error:
+            job._check(folder)
+        except _DAMAGED as error:
             raise DataError(f"'{folder / FILE}' cannot be read: {error}") from None
         return job
+
+    def _check(self, folder: Path) -> None:
+        """Refuse values that no server writes."""
+        _check_texts((self.user, self.said, self.party, *self.names))
+        known = self.state in STATES and self.kind in (RECORDING, PROGRAM)
+        if self.key != folder.name or not known or not self.names:
+            raise ValueError('it is of another job, or of a state that is not known')
+        if not all(Path(name).parts == (name,) != ('..',) for name in (self.user, *self.names)):
+            raise ValueError('it names files outside its folder')
+        if not (math.isfinite(self.since) and self.since + self.seconds >= 0.0):
+            raise ValueError('its times are impossible')
 
     def write(self, folder: Path) -> None:
         """
@@ -207,6 +224,11 @@ class Job:
         out = ['correct-program', str(place / main_file(self.names)), '--robot', robot]
         out += ['--model', f'{MODEL}/{DIAGNOSIS}', '--out', FOUND]
         return out + words(self.asked.told, CORRECT)
+
+
+def _check_texts(values: Iterable[object]) -> None:
+    if not all(isinstance(each, str) for each in values):
+        raise DataError('it has values of another kind')
 
 
 def title(names: Sequence[str]) -> str:

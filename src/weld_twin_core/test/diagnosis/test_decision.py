@@ -380,6 +380,9 @@ def test_an_effect_on_whose_joint_something_is_left_loses_its_name(left):
     assert decide(structured(left, *slots, structure=rest)).sets == ((OFFSET,), (DRIFT,))
     better = evidence(*slots, lacking=(f'friction of {WRIST}',))
     assert decide(better).sets == ((PLAY,), (DRIFT,))
+    refused = (f'vibration of {ELBOW} with gain 40', f'friction of {WRIST} with windup 1')
+    absurd = evidence(*slots, refused=refused, structure=left_over(0.1, 9.0, ()))
+    assert decide(absurd).sets == ((OFFSET,), (DRIFT,))
 
 
 # Nothing found ----------------------------------------------------------------------------------

@@ -15,3 +15,28 @@ def test_only_a_few_of_seventy_stations_are_left_out(strays, few, left_out):
     good = trusted([weights], few)[0]
     assert (~good).sum() == left_out
     assert good[strays:].all()
+
+
+def wild(where, count=60, weight=1e-5):
+    """Return the weights of a sound recording of which some readings are hundreds of times off."""
+    weights = np.ones(count)
+    weights[where] = weight
+    return weights
+
+
+def test_four_wild_readings_of_sixty_leave_every_quoted_figure():
+    good = trusted([np.ones(60), wild([3, 20, 21, 58])])
+    assert good[0].all()
+    assert np.flatnonzero(~good[1]).tolist() == [3, 20, 21, 58]
+
+
+@pytest.mark.parametrize(
+    'weights',
+    [
+        wild(slice(55, None)),  # the set-up moved before the last five
+        wild(slice(None, None, 8)),  # every eighth is no stray
+        wild([3, 20, 41, 58], weight=0.05),  # as far off as a missing effect may be
+    ],
+)
+def test_what_structure_may_be_stays_in_every_quoted_figure(weights):
+    assert (~trusted([weights])[0]).sum() <= 1

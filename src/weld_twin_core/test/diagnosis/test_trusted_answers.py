@@ -3,9 +3,11 @@
 """Belief that was learned: log odds by hand, bounds on what may be said, an answer that adds up."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
+from weld_twin_core.diagnosis.answer.settled import settled
 from weld_twin_core.diagnosis.result import Cause, Site
 from weld_twin_core.diagnosis.trust.model import trust_from, usual_trust
 from weld_twin_core.diagnosis.trust.signs import Signs
@@ -148,3 +150,27 @@ def test_a_family_that_is_missing_counts_as_not_named():
     absent, named = (trust.learned('answer', 'named', s) for s in ({}, {'named_backlash': 1.0}))
     assert absent == pytest.approx(1.0 / (1.0 + math.exp(0.5)))
     assert named == pytest.approx(0.5)
+
+
+def test_names_beside_what_has_none_make_the_whole_as_likely_as_all_of_them():
+    causes = [
+        Cause((), (), ((PLAY, 0.8),), 0.5, (0.4, 0.6), slot=0),
+        Cause((), (), ((Site('joint_offset', 'wrist'), 0.5),), 0.3, (0.2, 0.4), slot=1),
+        Cause((('base', 0.9),), (), (), 0.2, (0.1, 0.3), rest=True),
+    ]
+    signs = Signs({'partly': 1.0}, ({}, {}, {}))
+    verdict, told = trusted(Verdict('unknown', 0.9, ((PLAY,),), ()), causes, signs, taught())
+    assert verdict.confidence == pytest.approx(0.9 * 0.8 * 0.5)
+    assert [cause.probability for cause in told] == pytest.approx([0.8, 0.5, 0.9])
+    assert not verdict.sure and not any(cause.sure for cause in told)
+
+
+@pytest.mark.parametrize(('left', 'status'), [(0.45, 'identified'), (0.55, 'unknown')])
+def test_unknown_is_what_leaves_more_without_a_name_than_with_one(left, status):
+    named = Cause((), (), ((PLAY, 0.8),), 0.5, (0.4, 0.6), probability=0.8, slot=0)
+    doubtful = replace(named, share=0.4, probability=0.5)
+    rest = Cause((('base', 0.9),), (), (), left, (0.0, 1.0), rest=True)
+    verdict = Verdict('unknown', 0.9, ((PLAY,),), ('what remains',))
+    assert settled(verdict, (named, doubtful, rest)).status == status
+    assert settled(verdict, (doubtful, rest)).status == 'unknown'
+    assert settled(replace(verdict, sets=()), (named, rest)).status == 'unknown'

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
@@ -121,15 +122,24 @@ def quantization(cell):
     cell.q[1] = np.floor(cell.q[1] / 1e-2 + 0.5) * 1e-2
 
 
+def settled(cell, torque):
+    """A spring of joint 1 rests where it balances the load of the posture it has sagged to."""
+
+    def unbalanced(give):
+        q = cell.q.copy()
+        q[1] += give
+        return give - 1e-4 * torque(q)[1]
+
+    cell.q[1] += brentq(unbalanced, -0.2, 0.2, xtol=1e-15)
+
+
 def joint_compliance(cell):
-    torque = cell.textbook.load_torque(cell.robot, cell.q, cell.wrench)
-    cell.q[1] += 1e-4 * torque[1]
+    settled(cell, lambda q: cell.textbook.load_torque(cell.robot, q, cell.wrench))
 
 
 def payload(cell):
     extra = {'extra_mass': 1.5, 'extra_com': SMALL * 50}
-    torque = cell.textbook.load_torque(cell.robot, cell.q, cell.wrench, **extra)
-    cell.q[1] += 1e-4 * torque[1]
+    settled(cell, lambda q: cell.textbook.load_torque(cell.robot, q, cell.wrench, **extra))
 
 
 def cartesian_compliance(cell):
@@ -224,9 +234,12 @@ def hose_pull(cell):
         return 0.5 * 40.0 * place @ place - place @ [10.0, -20.0, 30.0]
 
     step = 1e-5 * np.eye(cell.robot.n)[1]
-    torque = cell.textbook.load_torque(cell.robot, cell.q, cell.wrench)[1]
-    torque -= (energy(cell.q + step) - energy(cell.q - step)) / 2e-5
-    cell.q[1] += 1e-4 * torque
+
+    def torque(q):
+        pull = (energy(q + step) - energy(q - step)) / 2e-5
+        return cell.textbook.load_torque(cell.robot, q, cell.wrench) - pull
+
+    settled(cell, torque)
 
 
 def refraction(cell):

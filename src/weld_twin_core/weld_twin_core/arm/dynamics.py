@@ -7,6 +7,9 @@ A positive torque turns the joint in its positive direction; it is what the load
 joint, the negative of what the motor must hold.
 """
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -139,26 +142,111 @@ def gravity_torque(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array
 
 def chain_gravity_torque(robot: Robot, chain: Frames) -> Array:
     """Return load torques, shape (n, ...) [N m], for frames already at hand."""
+    torque = np.zeros((robot.n, *chain.position.shape[:-1]))
+    gravity = gravity_direction(robot, chain)
+    for i, (mass, lever) in enumerate(_carried(robot, chain)):
+        z = chain.rows[i].z
+        torque[i] = mass * dot(z, gravity) if robot.prismatic[i] else dot(cross(z, lever), gravity)
+    return torque
+
+
+def _carried(robot: Robot, chain: Frames) -> list[tuple[float, Array]]:
+    """Return the mass beyond each joint, and its first moment about the joint, (3, ...) [kg m]."""
     samples = chain.position.shape[:-1]
-    total = np.zeros((robot.n,) + samples)
-    if robot.mass is not None and robot.com is not None:
-        gravity = gravity_direction(robot, chain)
-        mass_beyond = 0.0
-        moment_beyond = np.zeros((3,) + samples)
-        for i in reversed(range(robot.n)):
-            moment_beyond = moment_beyond + robot.mass[i] * link_point(
-                robot, chain, i, robot.com[i]
-            )
-            mass_beyond += robot.mass[i]
-            row = chain.rows[i]
-            if robot.prismatic[i]:
-                total[i] = mass_beyond * dot(row.z, gravity)
-            else:
-                lever = moment_beyond - mass_beyond * row.z_point
-                total[i] = dot(cross(row.z, lever), gravity)
-    if robot.payload_mass:
-        total = total + payload_torque(robot, chain, robot.payload_mass, robot.payload_com)
-    return total
+    mass = robot.payload_mass
+    moment = np.zeros((3, *samples))
+    if mass:
+        centre = chain.position + chain.rotation @ robot.payload_com
+        moment = mass * components(centre)
+    carried = []
+    for i in reversed(range(robot.n)):
+        if robot.mass is not None and robot.com is not None:
+            moment = moment + robot.mass[i] * link_point(robot, chain, i, robot.com[i])
+            mass += robot.mass[i]
+        carried.append((mass, moment - mass * chain.rows[i].z_point))
+    return carried[::-1]
+
+
+def torque_slope(
+    robot: Robot, chain: Frames, wrench: Array | None = None, frame: str = 'tool'
+) -> Array:
+    """
+    Return how the load torques change with the joints, d tau_i / d q_j, shape (n, n, ...).
+
+    Of gravity it is minus the Hessian of the potential: what joint j sets in motion shifts the
+    first moment that joint i carries. A wrench fixed to the tool turns along with it.
+
+    Parameters
+    ----------
+    robot : Robot
+    chain : Frames
+        The chain at the samples.
+    wrench : array, shape (..., 6), optional [N, N m]
+        On the tool; see `wrench_torque`.
+    frame : str
+        Where the wrench is expressed: 'tool' or 'base'.
+
+    """
+    slope = _weight_slope(robot, chain, _carried(robot, chain))
+    return slope if wrench is None else slope + _wrench_slope(robot, chain, wrench, frame)
+
+
+def payload_slope(robot: Robot, chain: Frames, mass: Array | float, com: Array) -> Array:
+    """
+    Return how the load torques of a mass carried by the tool change with the joints.
+
+    Parameters
+    ----------
+    robot, chain, mass, com
+        As for `payload_torque`.
+
+    Returns
+    -------
+    array, shape (n, n, ...)
+        Torque first, then joint.
+
+    """
+    centre = components(chain.position + (chain.rotation @ np.asarray(com)[..., None])[..., 0])
+    levers = [mass * (centre - pad(row.z_point, centre.ndim - 1)) for row in chain.rows]
+    return _weight_slope(robot, chain, [(mass, lever) for lever in levers])
+
+
+def _weight_slope(robot: Robot, chain: Frames, carried: Sequence[tuple[Any, Array]]) -> Array:
+    """Return d tau_i / d q_j of weights, by the mass and first moment beyond each joint."""
+    axes = carried[0][1].ndim - 1
+    gravity = pad(gravity_direction(robot, chain), axes)
+    slope = np.zeros((robot.n, robot.n, *carried[0][1].shape[1:]))
+    for j, (mass, lever) in enumerate(carried):
+        z = pad(chain.rows[j].z, axes)
+        shifted = mass * z if robot.prismatic[j] else cross(z, lever)
+        pull = cross(shifted, gravity)
+        for i in range(j + 1):
+            if not robot.prismatic[i]:
+                slope[i, j] = slope[j, i] = dot(pad(chain.rows[i].z, axes), pull)
+    return slope
+
+
+def _wrench_slope(robot: Robot, chain: Frames, wrench: Array, frame: str) -> Array:
+    """Return d tau_i / d q_j of a wrench on the tool, shape (n, n, ...)."""
+    rotation = wrench_rotation(robot, chain, frame)
+    force = components((rotation @ wrench[..., :3, None])[..., 0])
+    moment = components((rotation @ wrench[..., 3:, None])[..., 0])
+    tip, still = components(chain.position), np.zeros_like(force)
+    slides = robot.prismatic
+    levers = [tip - row.z_point for row in chain.rows]
+    slope = np.zeros((robot.n, robot.n, *chain.position.shape[:-1]))
+    for j, row in enumerate(chain.rows):
+        turned = np.zeros_like(row.z) if slides[j] else row.z
+        moved = row.z if slides[j] else cross(row.z, levers[j])
+        for i in range(robot.n):
+            beyond = j > i
+            # The force turns against what carries joint i: with the tool, or not with the arm.
+            turns = turned * (beyond if frame == 'tool' else -(not beyond))
+            by_force, by_moment = cross(turns, force), cross(turns, moment)
+            shifted = moved if beyond else still
+            own = by_moment + cross(levers[i], by_force) + cross(shifted, force)
+            slope[i, j] = dot(chain.rows[i].z, by_force if slides[i] else own)
+    return slope
 
 
 def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:

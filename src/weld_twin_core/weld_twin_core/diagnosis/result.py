@@ -630,6 +630,7 @@ class Diagnosis:
         return {
             'robot': robot.name,
             'kinematics': fingerprint(robot),
+            'statics': 'equilibrium',
             'tool': _frame(robot.T_flange_tool),
             'bases': [_frame(base) for base in self.model.bases],
             'epochs_ns': [r.epoch_ns for r in self.recordings],

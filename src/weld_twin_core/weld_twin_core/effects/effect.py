@@ -28,6 +28,9 @@ __all__ = ['Effect', 'MemoryEffect', 'Parameter', 'Stage', 'Value', 'View']
 RELATIVE_STEP = 1e-5
 """Step of numerical derivatives, in typical magnitudes of the parameter."""
 
+JOINT_STEP = 1e-5
+"""Step of numerical derivatives by a joint's position [rad or m]: rounding and bend weigh alike."""
+
 
 @dataclass(frozen=True, eq=False)
 class Effect(Hooks, ABC):
@@ -87,6 +90,23 @@ class Effect(Hooks, ABC):
             width = ends[1, k] - ends[0, k]
             out.append({key: (high[key] - low[key]) / width for key in high})
         return out
+
+    def load_slope(self, view: View) -> Array:
+        """
+        Return how the load torques that this adds change with the joints, shape (n, n, ..., N).
+
+        Torque first, then joint. Unless an effect gives the closed form, by central differences.
+        """
+        n = view.robot.n
+        slope = np.zeros((n, n, *view.frames.position.shape[:-1]))
+        for j in range(n):
+            high, low = (
+                self.displace(view.displaced({('q', j): np.full(view.t.shape, step)}))
+                for step in (JOINT_STEP, -JOINT_STEP)
+            )
+            for channel, value in high.items():
+                slope[channel[1], j] = (value - low[channel]) / (2.0 * JOINT_STEP)
+        return slope
 
     def check(self, robot: Robot) -> None:
         """

@@ -128,6 +128,11 @@ class Hooks(Parametric, ABC):
 
     # The twin: derivatives through effects that act later ---------------------------------------
 
+    @property
+    def settles(self) -> bool:
+        """Return whether a spring takes the load of the posture that it has sagged to."""
+        return True
+
     def slope(self, view: View) -> Shift:
         """Return d displacement / d own joint position, per ('q', i) channel; empty when none."""
         return {}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Shift
-from ..arm.dynamics import payload_torque
+from ..arm.dynamics import payload_slope, payload_torque
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
@@ -39,6 +39,10 @@ class Payload(Effect):
         """Return the extra torque on the 'tau' channel of every joint."""
         torque = payload_torque(view.robot, view.frames, self.number('mass'), self._centre())
         return _on_joints(torque)
+
+    def load_slope(self, view: View) -> Array:
+        """Return how the extra torque changes with the joints, shape (n, n, ..., N)."""
+        return payload_slope(view.robot, view.frames, self.number('mass'), self._centre())
 
     def _centre(self) -> Array:
         com = np.asarray(self.com, dtype=np.float64)

@@ -9,12 +9,11 @@ derivative of the pose by each channel are computed once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
 
-from ..arm.chain import column
 from ..arm.channels import Channel, Shift
 from ..arrays import Array
 from ..effects.effect import Effect, Stage, View
@@ -54,12 +53,15 @@ class Features:
         self.recording = recording
         self.at = at
         self._remembered = {} if remembered is None else remembered
-        self._columns: dict[Channel, Array] = {}
 
     @cached_property
     def run(self) -> Evaluation:
         """Return the twin's own pass."""
         return self.twin.evaluate(self.recording, self.at)
+
+    @cached_property
+    def _columns(self) -> Callable[[Channel], Array]:
+        return self.twin.columns(self.run)
 
     @cached_property
     def view(self) -> View:
@@ -76,10 +78,7 @@ class Features:
 
     def column(self, channel: Channel) -> Array:
         """Return d pose / d channel, shape (6, M)."""
-        if channel not in self._columns:
-            run = self.run
-            self._columns[channel] = column(self.twin.robot, run.chain, channel, run.view.shift)
-        return self._columns[channel]
+        return self._columns(channel)
 
     def pose_change(self, shift: Shift) -> Array:
         """Return the change of pose, shape (6, M), that displaced channels make."""

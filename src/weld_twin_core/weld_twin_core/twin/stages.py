@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arm.chain import Frames
 from ..arm.channels import Channel, Shift
-from ..arm.dynamics import chain_gravity_torque, wrench_torque
+from ..arm.dynamics import chain_gravity_torque, torque_slope, wrench_torque
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects.effect import Effect, Stage, View
@@ -23,6 +23,8 @@ from .poses import Poses, posed
 CLOCK_ROUNDS = 3
 """Rounds that find the stamp of an instant: each leaves a ten-thousandth, the rate of a clock."""
 POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
+SETTLING_ROUNDS = 3
+"""Rounds in which springs settle: each leaves a hundredth, how much a sag changes its own load."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,18 +130,58 @@ class EffectStages:
         own: list[Tangent] = []
         for stage in POINTWISE:
             effects = [(k, e) for k, e in enumerate(self.effects) if e.stage == stage]
-            if stage == Stage.LOAD and (effects or self.of_stage(Stage.ELASTIC)):
-                view = view.displaced(load_torque(view), keep_frames=True)
+            if stage == Stage.LOAD:
+                view = self._settled(view)
             if tangents is not None:
                 for k, effect in effects:
                     own += indexed(k, effect.gradient(view))
                     for key, value in effect.slope(view).items():
                         slopes[key] = slopes.get(key, 0.0) + value
-            if effects:
+            if effects and stage not in (Stage.LOAD, Stage.ELASTIC):
                 shifts = [effect.displace(view) for _, effect in effects]
-                view = view.displaced(*shifts, keep_frames=stage in (Stage.LOAD, Stage.POSE))
+                view = view.displaced(*shifts, keep_frames=stage == Stage.POSE)
         before = [(k, c, _sloped(shift, slopes)) for k, c, shift in tangents or ()]
         return view, tuple(sorted(before + own, key=lambda item: item[:2]))
+
+    def _settled(self, view: View) -> View:
+        """Return the view with loads and springs, at rest where they balance: q = theta + C tau(q)."""
+        loads, springs = self.of_stage(Stage.LOAD), self.of_stage(Stage.ELASTIC)
+        if not loads and not springs:
+            return view
+        loaded = _loaded(view, loads)
+        rigid = [spring.displace(loaded) for spring in springs if not spring.settles]
+        settling = [spring for spring in springs if spring.settles]
+        give = [*rigid, *(spring.displace(loaded) for spring in settling)]
+        for _ in range(SETTLING_ROUNDS if settling else 0):
+            loaded = _loaded(view.displaced(*give), loads)
+            give = [*rigid, *(spring.displace(loaded) for spring in settling)]
+        torque = {key: value for key, value in loaded.shift.items() if key[0] == 'tau'}
+        return view.displaced(torque, keep_frames=True).displaced(*give, keep_frames=not springs)
+
+    def yielding(self, view: View) -> Array | None:
+        """
+        Return how joints before the springs move those behind, shape (n, n, ...); None if alike.
+
+        (1 - C dtau/dq)^-1, the derivative of q = theta + C tau(q) by theta.
+
+        Parameters
+        ----------
+        view : View
+            Behind all stages, as `pointwise` leaves it.
+
+        """
+        springs = [spring for spring in self.of_stage(Stage.ELASTIC) if spring.settles]
+        if not springs:
+            return None
+        slope = torque_slope(self.robot, view.frames, view.wrench, view.wrench_frame)
+        for effect in self.of_stage(Stage.LOAD):
+            slope = slope + effect.load_slope(view)
+        gives = -np.moveaxis(slope, (0, 1), (-2, -1))
+        soft = np.zeros((*np.broadcast_shapes(gives.shape[:-2], (*self.draws, 1)), self.robot.n))
+        for spring in springs:
+            soft[..., self.robot.index(str(spring.site))] += spring.number('compliance')
+        matrix = np.eye(self.robot.n) + soft[..., None] * gives
+        return np.asarray(np.moveaxis(np.linalg.inv(matrix), (-2, -1), (0, 1)))
 
 
 def load_torque(view: View) -> Shift:
@@ -149,6 +191,12 @@ def load_torque(view: View) -> Shift:
     if view.wrench is not None:
         torque = torque + wrench_torque(view.robot, chain, view.wrench, view.wrench_frame)
     return {('tau', i): torque[i] for i in range(view.robot.n)}
+
+
+def _loaded(view: View, loads: Sequence[Effect]) -> View:
+    """Return the view with the load torques of the posture that it shows."""
+    view = view.displaced(load_torque(view), keep_frames=True)
+    return view.displaced(*(effect.displace(view) for effect in loads), keep_frames=True)
 
 
 def _sloped(shift: Shift, slopes: dict[Channel, Any]) -> Shift:

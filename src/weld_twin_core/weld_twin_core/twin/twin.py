@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -124,8 +124,8 @@ class Twin(EffectStages):
         Return the poses and d pose / d components, shape (..., M, 6, P), linear part first.
 
         Exact for each effect and for effects of different kinds together, but for products of
-        two small displacements (a spring's torque at the displaced joint, the scale of a
-        displaced point).
+        two small displacements (a spring's torque on a longer link, the scale of a displaced
+        point).
 
         Parameters
         ----------
@@ -141,11 +141,35 @@ class Twin(EffectStages):
         """
         run = self._evaluate(recording, at, True)
         poses = self._full(run)
-        columns = partial(column, self.robot, run.chain, shift=run.view.shift)
+        columns = self.columns(run)
         out = np.empty((6, len(run.tangents), *poses.position.shape[:-1]))
         for k, (_, _, shift) in enumerate(run.tangents):
             out[:, k] = self.pose_change(shift, columns, run.chain.position.shape[:-1])
         return poses, np.moveaxis(out, (0, 1), (-2, -1))
+
+    def columns(self, run: Evaluation) -> Callable[[Channel], Array]:
+        """
+        Return what gives d pose / d channel, shape (6, ...); joints move springs behind them.
+
+        Parameters
+        ----------
+        run : Evaluation
+            The pass at which the derivative is taken.
+
+        """
+        rigid = cache(partial(column, self.robot, run.chain, shift=run.view.shift))
+        yielding = self.yielding(run.view)
+        if yielding is None:
+            return rigid
+
+        @cache
+        def settled(channel: Channel) -> Array:
+            name, i = channel
+            if name != 'q':
+                return rigid(channel)
+            return np.asarray(sum(rigid(('q', j)) * yielding[j, i] for j in range(self.robot.n)))
+
+        return settled
 
     def _full(self, run: Evaluation) -> Poses:
         """Return the poses with every draw written out, whether it moves the tool or not."""

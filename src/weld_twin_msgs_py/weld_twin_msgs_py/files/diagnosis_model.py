@@ -78,8 +78,9 @@ def read_model(robot: Robot, path: Path | str) -> Model:
     try:
         tool = _frame(model['tool'], 'model.tool')
         bases = tuple(_frame(base, 'model.bases') for base in model['bases'])
-        known = effects_from_list(model.get('known', []), robot)
-        found = effects_from_list(model.get('found', []), robot)
+        known, found = (
+            effects_from_list(_at_rest(model, key), robot) for key in ('known', 'found')
+        )
         alone = _alone(model.get('alone'), robot)
     except (KeyError, TypeError) as error:
         raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
@@ -97,6 +98,19 @@ def _alone(entry: Any, robot: Robot) -> Alone | None:
         return None
     sizes = {key: float(entry[key]) for key in Alone._fields if key != 'changes'}
     return Alone(effects_from_list(entry['changes'], robot), **sizes)
+
+
+def _at_rest(model: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    """Return the entries of a model's effects; springs that do not say how they rest are older."""
+    entries: list[dict[str, Any]] = model.get(key, [])
+    if 'statics' in model or not isinstance(entries, list):
+        return entries
+    return [
+        {'statics': 'first_order', **entry}
+        if isinstance(entry, dict) and entry.get('effect') == 'joint_compliance'
+        else entry
+        for entry in entries
+    ]
 
 
 def _without_model(path: Path | str, content: dict[str, Any]) -> str:

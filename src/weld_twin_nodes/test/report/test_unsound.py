@@ -79,7 +79,8 @@ def test_a_mistake_is_the_whole_answer_and_leaves_no_model(bags, tmp_path, capsy
     assert run('diagnose', bags / 'swapped', '--robot', 'ur5', '--out', out) == 3
     first = capsys.readouterr().out.split('\n\n')[0]
     assert first.startswith('Unsound data') and 'swapped' in first
-    assert sorted(path.name for path in out.iterdir()) == ['diagnosis.json', 'report.html']
+    ours = ['.weld_twin_files.json', 'diagnosis.json', 'report.html']
+    assert sorted(path.name for path in out.iterdir()) == ours
     said = content(out)
     assert said['verdict']['status'] == 'unsound'
     assert said['verdict']['effects'] == [] and said['verdict']['confidence'] is None
@@ -108,6 +109,24 @@ def test_apply_mends_it_and_every_output_says_so(bags, found, tmp_path, capsys):
     again = tmp_path / 'exported.yaml'
     assert run('export', out / 'diagnosis.json', '--robot', 'ur5', '--out', again) == 0
     assert 'swapped' in again.read_text()
+
+
+def test_a_zero_of_a_joint_that_was_recorded_the_other_way_says_whose_sign_it_has(found, tmp_path):
+    sound = measured(1)
+    turned = sound.joints.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]
+    away = replace(sound, joints=replace(sound.joints, q=turned))
+    write_recording(tmp_path / 'bag', away, load('ur5'))
+    out = tmp_path / 'd'
+    assert run('diagnose', tmp_path / 'bag', '--robot', 'ur5', '--apply', '--out', out) == 0
+    (action,) = content(out)['verdict']['actions']
+    assert 'elbow_joint stands at X + 0.11' in action
+    needed = 'as it was recorded needs the opposite sign'
+    for told in (
+        action,
+        *((out / name).read_text() for name in ('joint_offsets.csv', 'report.html')),
+    ):
+        assert needed in told
+    assert needed not in (found / 'joint_offsets.csv').read_text() + str(content(found))
 
 
 def test_a_sound_recording_says_that_nothing_is_wrong(found):

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.diagnosis.advice.zeros import stands, to_mend
+from weld_twin_core.diagnosis.advice.zeros import TURNED_ROUND, stands, to_mend
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.diagnosis.soundness.mending import reading_map
+from weld_twin_core.diagnosis.soundness.mending import reading_map, turned_joints
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.twin.corrected import corrected, joint_offsets
@@ -49,11 +49,13 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     del notes
     robot = model.robot
     offsets = joint_offsets(robot, _causes(model)) + _zeros(model)
-    rows = []
+    turned, rows = turned_joints(model.mends, robot), []
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
         units = ('m', 'mm') if slides else ('rad', 'deg')
         told = f'{stands(name, offset, sliding=slides)} {to_mend(offset, sliding=slides)}'
+        if name in turned:
+            told += f' {TURNED_ROUND}'
         meaning = told if offset else ''
         rows.append((name, float(offset), units[0], f'{shown:.6f}', units[1], meaning))
     remarks = ''.join(f'# {line}\n' for line in _readings(model))

@@ -257,7 +257,7 @@ def _action(diagnosis: Diagnosis, k: int) -> Html | str | None:
     if unnamed(cause):
         sentences = look_at(diagnosis, k)
     else:
-        told = dict.fromkeys(actions(effects, diagnosis.model.robot))
+        told = dict.fromkeys(actions(effects, diagnosis.model.robot, diagnosis.model.mends))
         ways = dict.fromkeys(map(gearing, effects))
         sites = [Site(effect.name, effect.site) for effect in effects]
         twins = same_words(diagnosis, *sites)

@@ -171,7 +171,8 @@ def _at(diagnosis: Diagnosis, k: int) -> str:
         return ' '.join(look_at(diagnosis, k))
     found = diagnosis.model.found
     held = [found[m] for m in cause.members if m < len(found)]
-    return ' '.join(actions(held, diagnosis.model.robot))
+    model = diagnosis.model
+    return ' '.join(actions(held, model.robot, model.mends))
 
 
 def minutes(wanted: Mapping[str, Any] | None) -> str:

@@ -170,6 +170,8 @@ class Queue:
     def again(self, job: Job, asked: Asked) -> None:
         """Ask for the same files in another way, now or after what is in work."""
         with self._news:
+            if job.key not in self._jobs:
+                return  # it was deleted
             job = self._jobs[job.key]
             if job.state == RUNNING:
                 self._put(replace(job, later=asked))

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +14,16 @@ from ...arm.robot import Robot
 from ...arm.rotation import rotation_matrix
 from ...arrays import Array
 from ...effects.effect import Effect
+from ..soundness.mending import turned_joints
 from .readable import frame, metres, number, radians, size, turn
-from .zeros import stands, to_mend
+from .zeros import TURNED_ROUND, stands, to_mend
 
 Sentence = Callable[[Effect, Robot], str]
 
 
-def actions(found: Sequence[Effect], robot: Robot) -> tuple[str, ...]:
+def actions(
+    found: Sequence[Effect], robot: Robot, mends: Sequence[Mapping[str, Any]] = ()
+) -> tuple[str, ...]:
     """
     Return what to do about every effect found, one sentence each, in their order.
 
@@ -28,9 +32,18 @@ def actions(found: Sequence[Effect], robot: Robot) -> tuple[str, ...]:
     found : sequence of Effect
     robot : Robot
         The nominal model: what is entered in the controller now.
+    mends : sequence of mapping
+        What was undone of the data, as a model has it.
 
     """
-    return tuple(_SENTENCES.get(effect.name, _general)(effect, robot) for effect in found)
+    turned = turned_joints(mends, robot)
+    return tuple(_action(effect, robot, turned) for effect in found)
+
+
+def _action(effect: Effect, robot: Robot, turned: Collection[str]) -> str:
+    out = _SENTENCES.get(effect.name, _general)(effect, robot)
+    zero = effect.name == 'joint_offset'
+    return f'{out} {TURNED_ROUND}' if zero and effect.site in turned else out
 
 
 def _value(effect: Effect, name: str) -> float:

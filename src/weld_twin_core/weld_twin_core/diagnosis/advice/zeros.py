@@ -6,6 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
+TURNED_ROUND = (
+    'X is the recorded reading with its sign turned round: a controller that shows the joint as '
+    'it was recorded needs the opposite sign in all of this.'
+)
+"""What a person has to know of a joint whose readings were recorded with the other sign."""
+
 
 def further(offset: float, *, sliding: bool = False) -> str:
     """

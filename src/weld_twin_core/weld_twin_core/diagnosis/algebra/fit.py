@@ -28,6 +28,14 @@ TRUSTED = 0.2
 """A sample of less weight is an outlier: reported, and left out of every quoted RMS."""
 SET_ASIDE = 0.02
 """Share of the samples that may be outliers; beyond that they are structure."""
+STRAY = 20.0
+"""
+Robust deviations from which a sample is a stray: twice what the data check calls far off.
+
+What a missing effect does to some postures widens the deviation that it is measured in.
+"""
+STRAYS, STRAYS_TOGETHER = 0.1, 2
+"""Share of the samples that may be strays, and how many in a row: more are a set-up that moved."""
 LEAST_TURN = 0.5
 """
 Least noise of orientation per noise of position [rad/m]: no probe is wider than some metres.
@@ -340,7 +348,8 @@ def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
     Return which samples count in every quoted figure, (M,) per recording.
 
     All but outliers, and of those no more than `SET_ASIDE` (or a few) are left out, the farthest:
-    what many samples do is structure, and must show in what is left.
+    what many samples do is structure, and must show in what is left. Strays, each by itself and
+    farther off than any structure, are left out all the same: one would be the whole RMS.
 
     Parameters
     ----------
@@ -351,9 +360,19 @@ def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
 
     """
     every = np.concatenate(list(weights)) if weights else np.zeros(0)
-    aside = max(few, int(SET_ASIDE * every.size))
+    aside = max(few, int(SET_ASIDE * every.size), _strays(weights))
     least = float(np.sort(every)[aside]) if every.size > aside else 0.0
     return [weight >= min(TRUSTED, least) for weight in weights]
+
+
+def _strays(weights: Sequence[Array]) -> int:
+    """Return how many samples are strays; 0 where they are too many, or too many in a row."""
+    found, in_a_row = [weight < (HUBER / STRAY) ** 2 for weight in weights], 0
+    for stray in found:
+        runs = np.diff(np.flatnonzero(np.concatenate([[True], ~stray, [True]]))) - 1
+        in_a_row = max(in_a_row, int(runs.max()))
+    count, samples = sum(int(stray.sum()) for stray in found), sum(part.size for part in found)
+    return count if in_a_row <= STRAYS_TOGETHER and count <= STRAYS * samples else 0
 
 
 def robust_fit(

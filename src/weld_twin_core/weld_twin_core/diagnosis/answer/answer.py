@@ -83,6 +83,7 @@ def answer(
         found, unseen, evidence, verdict, signs, rival, placing, stability
     )
     effects, verdict, told = named_effects(found, unseen, verdict, told)
+    robot = found.baseline.model.robot
     return Diagnosis(
         gap=gap(found, evidence.floor),
         where=locate(found, unseen, told),
@@ -95,7 +96,7 @@ def answer(
         shrink=shrink,
         unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, placing),
         next_experiment=None if limits is None else next_step(found, verdict, limits, rival),
-        actions=actions([named.effect for named in effects], found.baseline.model.robot),
+        actions=actions([named.effect for named in effects], robot, found.final.model.mends),
         model=found.final.model,
         families=verdict.families,
         evidence=evidence,

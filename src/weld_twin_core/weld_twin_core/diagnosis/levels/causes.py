@@ -30,6 +30,9 @@ from .free_form import FreeForm, Part
 
 LISTED = 0.02
 """A place, dependence or name less probable than this is not listed."""
+ALONE = 0.5
+"""Belief at most in a lone name beside what has none: two cells of a delay and of a clock that gains,
+both taken out of the library, were told as lags and as a delay. A judgement."""
 LIKELY = 0.1
 """Weight from which a place or dependence of the free form counts as found."""
 STUDENT = 1.86
@@ -97,17 +100,36 @@ def causes(
     whole = _shares(squares, parts, claims, np.ones(labels.size, dtype=bool))
     spread = _spread(squares, parts, claims, labels)
     whole, spread = _as_placed(whole, spread, claims, placing)
+    noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
+    left = max(1.0 - float(whole.sum()) - noise, 0.0)
+    if verdict.status == 'unknown':
+        claims = [_beside(c, float(s), left, told) for c, s in zip(claims, whole, strict=True)]
     out = [
         _cause(claim, float(share), float(error))
         for claim, share, error in zip(claims, whole, spread, strict=True)
     ]
     out.sort(key=lambda cause: -cause.share)
-    noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
-    left = max(1.0 - float(whole.sum()) - noise, 0.0)
-    if rest is not None and (left > beliefs.unexplained or not out):
+    # Of what nothing is known, neither a place nor what stands beside it, there is nothing to tell.
+    much = left > beliefs.unexplained and bool(out)
+    if rest is not None and (much or (rest.place and not out)):
         error = float(np.sqrt((spread**2).sum()))
         out.append(replace(_cause(rest, left, error), rest=True))
     return tuple(out), Shares(unexplained=left, noise=max(noise, 0.0))
+
+
+def _beside(claim: _Claim, share: float, left: float, told: Sequence[_Claim]) -> _Claim:
+    """
+    Return a claim with its name believed as far as it outweighs what is left beside it.
+
+    What is left may be what its formula misses. A lone name beside a rest is as likely as not an
+    imitation of one cause that the library lacks.
+    """
+    if claim.slot is None:
+        return claim
+    factor = share / max(share + left, 1e-300)
+    if len(told) == 1:
+        factor = min(factor, ALONE / max(sum(claim.name.values()), ALONE))
+    return replace(claim, name={site: factor * p for site, p in claim.name.items()})
 
 
 def _cause(claim: _Claim, share: float, error: float) -> Cause:

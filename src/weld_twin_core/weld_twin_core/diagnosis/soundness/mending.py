@@ -351,6 +351,12 @@ def reading_map(entries: Sequence[Mapping[str, Any]], count: int) -> tuple[Array
     return matrix, offset
 
 
+def turned_joints(entries: Sequence[Mapping[str, Any]], robot: Robot) -> tuple[str, ...]:
+    """Return the joints whose readings were recorded with the other sign; see `reading_map`."""
+    matrix, _ = reading_map(entries, robot.n)
+    return tuple(robot.joint_names[k] for k in np.flatnonzero(np.diag(matrix) < 0.0).tolist())
+
+
 def measured(recording: Recording) -> Measurements:
     """
     Return what was measured.

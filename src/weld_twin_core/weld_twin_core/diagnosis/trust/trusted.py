@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
+import numpy as np
+
 from ..result import NAMING, Cause
 from ..verdict.decision import Verdict
 from .model import Trust
@@ -77,6 +79,10 @@ def trusted(
         trusted_cause(cause, verdict.status, {**signs.answer, **own}, trust)
         for cause, own in zip(causes, signs.causes, strict=True)
     )
+    if group_of(verdict.status, signs.answer) == PARTLY and f'answer {PARTLY}' not in trust.levels:
+        # Nothing was learned of the whole: it is right where something is left and each name holds.
+        each = [cause.probability for cause in told if cause.slot is not None]
+        verdict = replace(verdict, confidence=float(verdict.confidence * np.prod(each)))
     if verdict.status not in NAMING:
         return verdict, told
     # Who believes the whole answer believes each part of it.

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import threading
 import time
@@ -22,6 +23,8 @@ MOST = 1.0
 """Share of the time of a whole run up to which kills are drawn; the first part is Python's start."""
 LEAST = 0.3
 """Share from which they are drawn."""
+RECORDING = r'href="(/recordings/[0-9a-f]{32})"'
+"""How the list of recordings refers to one of them."""
 AFTER = 4.0
 """Seconds from the beginning of an upload up to which a server is killed; a diagnosis takes as long."""
 Once = Callable[[np.random.Generator], Row]
@@ -118,19 +121,32 @@ def server_case(place: Path, bag: Path, robot: str) -> Once:
         thread.join()
         process, person.root = started(served)
         lost = '' if _results(served, earlier) == first else 'an earlier verdict was changed'
-        for address in dropped:
-            if '<iframe' not in wait(person, address):
-                lost = lost or 'what was taken was not diagnosed'
+        listed = set(re.findall(RECORDING, person.page('/recordings')[2]))
+        if not listed.issuperset([earlier, *dropped]):
+            lost = lost or 'what was taken is not there'
+        # The answer may have been lost on the way, and the recording be there all the same.
+        for address in listed - {earlier}:
+            page = wait(person, address)
+            if '<iframe' not in page:
+                why = re.findall(r'role="alert">(.*?)</p>', page)
+                lost = lost or f'what was taken was not diagnosed: {" ".join(why)}'
+        half = _half(served, listed)
+        for address in listed - {earlier}:
             person.page(f'{address}/delete', b'')
-        jobs = len(list((served / 'jobs').iterdir()))
-        scratch = list((served / 'scratch').iterdir())
         process.kill()
         process.wait()
-        half = 'something of it is left' if jobs > 1 + (not dropped) or scratch else ''
         how = f'{moment:.3f} s after an upload began'
         return Row(case='serve', how=how, lost=lost, half=half, mixed=False)
 
     return once
+
+
+def _half(served: Path, listed: set[str]) -> str:
+    """Return what a server's directory holds beside the recordings that it lists."""
+    jobs = {f'/recordings/{folder.name}' for folder in (served / 'jobs').iterdir()}
+    if jobs != listed:
+        return 'a folder is left that is no recording'
+    return 'scratch is left' if list((served / 'scratch').iterdir()) else ''
 
 
 def _drop(person: Visitor, files: list[Path], robot: str, dropped: list[str]) -> None:

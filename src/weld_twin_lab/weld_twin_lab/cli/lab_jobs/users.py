@@ -95,7 +95,8 @@ def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:
         beside = _beside(root, somebody, files, fields, args, many) if args.hostile else None
         malicious = _malicious(somebody, place)
     return {
-        'options': ' --chromium' * args.chromium,
+        'options': f' {args.bag} --robot {args.robot}' * bool(args.bag)
+        + ' --chromium' * args.chromium,
         'recording': str(args.bag or 'a recording of 60 s, moving, made by the plant'),
         'browser': 'a Chromium profile' if args.chromium else 'a plain client',
         'command_s': command,

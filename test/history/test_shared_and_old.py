@@ -238,6 +238,34 @@ def test_reading_makes_nothing_and_another_application_is_left_alone(tmp_path):
     assert db.read_bytes() == before and not (tmp_path / 'pages').exists()
 
 
+@pytest.mark.parametrize('version', ['first', b'1', 1.5])
+def test_a_version_that_is_no_number_is_a_sentence_for_who_writes_too(
+    diagnosed, tmp_path, version
+):
+    db = tmp_path / 'history.db'
+    add = ('history', 'add', diagnosed, '--cell', 'a', '--at', '2026-03-02', '--db', db)
+    with sqlite3.connect(db) as connection:
+        for name in ('cells', 'verdicts', 'runs', 'findings', 'about'):
+            connection.execute(f'create table {name} (version)')
+        connection.execute('insert into about values (?)', (version,))
+    before = db.read_bytes()
+    for job in (add, ('history', 'show', '--db', db)):
+        said = weld_twin(*job)
+        assert said.code == 2 and 'its version is' in said.err and 'Traceback' not in said.err
+    assert db.read_bytes() == before
+
+
+@pytest.mark.parametrize('name', ['', '  ', 'a\nb', 'x' * 201])
+def test_a_cell_that_no_page_could_show_is_not_made(url, diagnosed, name):
+    said = weld_twin(
+        'history', 'add', diagnosed, '--cell', name, '--at', '2026-03-02', '--db', url
+    )
+    assert said.code == 2 and 'is no name of a cell' in said.err
+    database = Database(url)
+    assert name not in database.cells()
+    database.close()
+
+
 def test_a_damaged_row_ends_one_cell_and_not_the_page_of_all(tmp_path):
     db = tmp_path / 'fleet.db'
     database = Database(str(db))

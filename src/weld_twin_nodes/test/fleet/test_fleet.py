@@ -73,6 +73,7 @@ def test_bad_recordings_harm_nobody_and_nothing_runs_twice(plant):
         ('cell,recording,robot\na,b\n', 'line 2 has not as many cells'),
         ('cell,recording,robot,at\na,b,ur5,Monday\n', "'Monday' is no date"),
         ('cell,recording,robot,apply\na,b,ur5,maybe\n', 'apply is yes or no'),
+        ('cell,recording,robot\n"a\nb",c,ur5\n', 'is no name of a cell'),
         ('cell,recording,robot\n', 'names no recording'),
         ('', "no column 'cell'"),
         ('cell,recording,robot\n"a,b,c\n', 'no table of text'),

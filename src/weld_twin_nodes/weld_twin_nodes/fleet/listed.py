@@ -15,6 +15,7 @@ from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.files.input_files import hashed
 
 from ..history.entry import instant
+from ..history.schema import not_a_cell
 from ..offline.content_hash import digest
 
 LONGEST = 1_000_000
@@ -133,6 +134,8 @@ def _line(file: Path, number: int, row: Mapping[str | None, str | None]) -> List
     for name in NEEDED:
         if not told[name]:
             raise DataError(f"'{file}' line {number} has no {name}")
+    if why := not_a_cell(told['cell']):
+        raise DataError(f"'{file}' line {number}: {why}")
     for name in PATHS:
         if told.get(name):
             told[name] = str(file.parent / told[name])

@@ -26,7 +26,7 @@ from weld_twin_core.errors import DataError
 from .entry import Entry
 from .opening import WRITES, alone, bring_up, engine_of, refuse_missing, version_of
 from .passing import Unavailable, passes, unavailable, waits
-from .schema import ARRAYS, VERSION, schema, stored
+from .schema import ARRAYS, VERSION, not_a_cell, schema, stored
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine, Row
@@ -147,6 +147,8 @@ class Database:
 
     def _number(self, connection: Connection, cell: str, entry: Entry) -> int:
         """Return the number of a cell, held until the transaction ends; refuse another robot."""
+        if why := not_a_cell(cell):
+            raise Refused(why)
         cells = self.table('cells')
         new = {'name': cell, 'robot': entry.robot, 'kinematics': entry.kinematics}
         connection.execute(self.insert(cells).values(new).on_conflict_do_nothing())

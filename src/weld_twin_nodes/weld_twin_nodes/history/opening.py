@@ -107,7 +107,12 @@ def version_of(connection: Connection, shown: str, *, make: bool) -> int:
             f'{others}); give the history a database of its own with --db'
         )
     row = connection.execute(sqlalchemy.text('SELECT version FROM about')).first()
-    if row is None or not 0 < int(row[0]) <= VERSION:
+    if row is not None and not isinstance(row[0], int):  # SQLite takes anything as a number
+        raise DataError(
+            f"'{shown}' is no history, or a damaged one: its version is {row[0]!r}; give another "
+            'with --db, or restore it from a copy'
+        )
+    if row is None or not 0 < row[0] <= VERSION:
         found = 'no version' if row is None else f'version {row[0]}'
         raise DataError(
             f"'{shown}' is a history of {found}, and this program knows versions up to {VERSION}; "

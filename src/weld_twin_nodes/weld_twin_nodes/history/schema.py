@@ -14,12 +14,21 @@ if TYPE_CHECKING:
 
 VERSION = 1 + len(STEPS)
 """Of the schema; an older database is brought to it, a newer one is refused."""
+NAME = 200
+"""Characters of the name of a cell or a robot; PostgreSQL refuses longer ones."""
 ARRAYS = ('value', 'prior_std', 'covariance', 'tool')
 
 
 def stored(at: datetime) -> datetime:
     """Return an instant as it is stored: UTC, without saying so."""
     return at.astimezone(timezone.utc).replace(tzinfo=None)
+
+
+def not_a_cell(name: str) -> str:
+    """Return why no cell can have a name; empty if one can."""
+    if name.strip() and name.isprintable() and len(name) <= NAME:
+        return ''
+    return f'{name[:NAME]!r} is no name of a cell; it takes 1 to {NAME} signs that can be shown'
 
 
 def schema() -> MetaData:
@@ -32,8 +41,8 @@ def schema() -> MetaData:
         'cells',
         tables,
         sql.Column('id', sql.Integer, primary_key=True),
-        sql.Column('name', sql.String(200), unique=True, nullable=False),
-        sql.Column('robot', sql.String(200), nullable=False),
+        sql.Column('name', sql.String(NAME), unique=True, nullable=False),
+        sql.Column('robot', sql.String(NAME), nullable=False),
         sql.Column('kinematics', sql.String(64), nullable=False),
     )
     sql.Table(
@@ -84,7 +93,7 @@ def _fleet(tables: MetaData) -> None:
         tables,
         sql.Column('id', sql.Integer, primary_key=True),
         sql.Column('key', sql.String(64), unique=True, nullable=False),
-        sql.Column('cell', sql.String(200), nullable=False, index=True),
+        sql.Column('cell', sql.String(NAME), nullable=False, index=True),
         sql.Column('recording', sql.Text, nullable=False),
         sql.Column('state', sql.String(40), nullable=False),
         sql.Column('sentence', sql.Text, nullable=False),

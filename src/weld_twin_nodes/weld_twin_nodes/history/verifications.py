@@ -66,7 +66,7 @@ def verified_of(path: Path | str, at: datetime | None = None) -> Verified | None
         content = json.loads(file.read_text(encoding='utf-8'))
         own = [item['sha256'] for item in content['inputs'] if item['use'] == 'recording']
         return Verified(at or date_of_stamp(int(content['epoch_ns']), file), own[0], content)
-    except (OSError, ValueError, KeyError, TypeError, IndexError):
+    except (OSError, ValueError, KeyError, TypeError, IndexError, RecursionError):
         raise DataError(
             f"'{file}' is no verification; make it anew with weld-twin verify"
         ) from None
@@ -85,7 +85,9 @@ def put_verified(
 
     """
     sql, cells, rows = database.sql, database.table('cells'), database.table('verifications')
-    own = connection.execute(sql.select(cells).where(cells.c.name == cell)).first()
+    # Whoever writes to the same cell waits here, and then sees what was written.
+    query = sql.select(cells).where(cells.c.name == cell).with_for_update()
+    own = connection.execute(query).first()
     if own is None:
         raise DataError(
             f'there is no cell {cell!r} yet; add the diagnosis that was verified first'

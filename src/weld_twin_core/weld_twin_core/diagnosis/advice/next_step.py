@@ -155,7 +155,8 @@ def promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     if verdict.status != 'unknown':
         return parted * (NAMED + GAINED * verdict.confidence)
     named = all(REGISTRY[item['effect']].cause for side in wanted['between'] for item in side)
-    return parted * max(1.0 - verdict.confidence, 0.0 if named else EVEN)
+    believed = verdict.confidence if verdict.sets else 1.0 - verdict.confidence
+    return parted * max(believed, 0.0 if named else EVEN)
 
 
 def _in_place(found: Search, verdict: Verdict, *, named: bool) -> list[tuple[Effect, ...]]:

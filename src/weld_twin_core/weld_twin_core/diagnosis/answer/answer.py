@@ -89,7 +89,6 @@ def answer(
         where=locate(found, unseen, told),
         status=verdict.status,
         effects=effects,
-        confidence=verdict.confidence,
         indistinguishable=verdict.sets,
         reasons=verdict.reasons,
         candidates=weighed_candidates(found, evidence),
@@ -119,6 +118,7 @@ def _parted(
         'causes': told,
         'shares': shares,
         'contributions': contributions(unseen, told),
+        'confidence': verdict.confidence,
         'sure': verdict.sure,
         'complete': verdict.complete,
     }

@@ -16,7 +16,7 @@ LIKELIER = 0.5
 
 def settled(verdict: Verdict, causes: Sequence[Cause]) -> Verdict:
     """
-    Return the verdict; it is 'unknown' only where what is left is more than what is named.
+    Return the verdict; it is 'unknown' where what is left, or unlikely, is more than what is named.
 
     Parameters
     ----------
@@ -27,6 +27,8 @@ def settled(verdict: Verdict, causes: Sequence[Cause]) -> Verdict:
     """
     named = sum(c.share for c in causes if c.slot is not None and c.probability > LIKELIER)
     left = sum(c.share for c in causes if c.slot is None)
+    if verdict.status in ('identified', 'ambiguous') and causes and named <= left:
+        return replace(verdict, status='unknown')
     if verdict.status != 'unknown' or not verdict.sets or left >= named:
         return verdict
     alone = all(len(group) == 1 for group in verdict.sets)

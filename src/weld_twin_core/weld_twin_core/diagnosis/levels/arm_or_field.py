@@ -14,9 +14,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..algebra.fit import Fit, robust_fit, robust_scale
-from ..algebra.problem import Problem, Scale
+from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.regions import posture_regions
@@ -28,6 +29,9 @@ from .own_place import told_by, worse_of
 AS_GOOD = 0.9
 """Share of what a field takes off unseen data that an arm must take off to be one with it. Of two
 that are one they take the same to a few hundredths."""
+TILT = 0.2
+"""Tilt of the tool [rad], RMS about its mean, up to which it keeps one direction: a hand that is held
+level by eye, or a torch that follows a seam's slope."""
 FIELD = 0.2
 """Belief left for the instrument then: trackers and cameras are checked, and arms are not."""
 STATIC = ('constant', 'load')
@@ -48,7 +52,7 @@ def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> Fre
 
     """
     fields = [part for part in form.parts if part.group.at == 'instrument']
-    if not fields:
+    if not fields or _tilt(found.problem, found.baseline.model) > TILT:
         return form
     small = found.problem.thinned(rows)
     start = found.baseline.model
@@ -66,6 +70,15 @@ def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> Fre
     sizes = {name: (1.0 - FIELD) * gain / whole for name, gain in gains.items()}
     part = _shared(fields, joints, sizes)
     return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
+
+
+def _tilt(problem: Problem, model: Model) -> float:
+    """Return how far the tool turns about more than one axis of the world, RMS [rad]."""
+    features = problem.features(model)
+    turns = Rotation.concatenate([Rotation.from_matrix(f.run.poses.rotation) for f in features])
+    vectors = (turns * turns.mean().inv()).as_rotvec()
+    about = np.linalg.svd(vectors, compute_uv=False)
+    return float(np.linalg.norm(about[1:]) / np.sqrt(len(vectors)))
 
 
 def _shared(

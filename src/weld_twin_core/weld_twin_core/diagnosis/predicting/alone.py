@@ -97,14 +97,14 @@ def _left(model: Model) -> tuple[Effect, ...]:
 
 
 def _constants(model: Model) -> Model:
-    """Return the model with what a robot file holds, and nothing else."""
+    """Return the model with what a robot file holds, and how the recordings' set-ups differ."""
     left = {id(effect) for effect in _left(model)}
     held = tuple(
         effect
         for effect in of_the_robot([e for e in model.known + model.found if e.cause])
         if id(effect) not in left and isinstance(effect, ChannelError | FrameError)
     )
-    return replace(model, known=(), found=held, changes=())
+    return replace(model, known=(), found=held)
 
 
 def _freed(constants: Model, *, many: bool) -> Model:

@@ -141,8 +141,8 @@ def clear_postures(robot: Robot, spread: float) -> Array:
     least = CLEAR * float(abs(robot.a).sum() + abs(robot.d).sum())
     (height,), (side,) = _room(robot, centre[None])
     heights, sides = _room(robot, q)
-    above = heights > min(least, height - NEARER * abs(height))
-    off = sides > min(least, NEARER * side)
+    above = heights > (least if height > least else height - NEARER * abs(height))
+    off = sides > (least if side > least else NEARER * side)
     return np.asarray(q[above & off])
 
 

@@ -43,7 +43,7 @@ DRAWS = st.builds(
 @pytest.mark.slow
 @pytest.mark.filterwarnings('ignore')
 @settings(
-    max_examples=200, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+    max_examples=80, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
 )
 @given(DRAWS)
 def test_no_traceback_and_nothing_absurd(draw):

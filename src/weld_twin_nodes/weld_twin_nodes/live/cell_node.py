@@ -47,6 +47,8 @@ READY_EVERY = 0.02
 """Seconds between two looks at whether the listeners are there."""
 HEALTH_EVERY = 1.0
 """Seconds between two health messages."""
+MEETS = 0.5
+"""Seconds in which listeners that are known find a publisher: some tenths on busy cores."""
 LAST_WORDS = 8.0
 """
 Seconds an ending node waits in all until its subscribers have everything. Acknowledgements take
@@ -141,12 +143,20 @@ class CellNode(Node):
     def destroy_node(self) -> None:
         """Tell what was sent in all, and stay until everybody has it."""
         if self.context.ok():
+            self._meet_listeners()
             self._tell_health()
             self._tell_last_losses()
             begun = time.monotonic()
             for output in self._outputs:
                 self._wait_for_readers(output, begun)
         super().destroy_node()  # type: ignore[no-untyped-call]
+
+    def _meet_listeners(self) -> None:
+        """Wait until those who listen to the health of nodes have found this one: it may be new."""
+        end = time.monotonic() + MEETS
+        there = self._diagnostics.get_subscription_count
+        while there() < self.count_subscribers(DIAGNOSTICS.name) and time.monotonic() < end:
+            time.sleep(READY_EVERY)
 
     def _wait_for_readers(self, output: Output, begun: float) -> None:
         """Wait until all who take an output have all of it, or stand still; and say so."""

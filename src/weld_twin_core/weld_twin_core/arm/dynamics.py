@@ -59,9 +59,13 @@ def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array)
         Centre of the mass in the tool frame.
 
     """
-    centre = chain.position + (chain.rotation @ np.asarray(com)[..., None])[..., 0]
     weight = mass * pad(gravity_direction(robot, chain), np.ndim(mass))
-    return point_force_torque(robot, chain, components(centre), weight)
+    return point_force_torque(robot, chain, _carried_point(chain, com), weight)
+
+
+def _carried_point(chain: Frames, point: Array) -> Array:
+    """Return a point of the tool frame, shape (..., 3), in the world, components first [m]."""
+    return components(chain.position + (chain.rotation @ np.asarray(point)[..., None])[..., 0])
 
 
 def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
@@ -82,6 +86,15 @@ def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
     return np.asarray(chain.base_rotation @ robot.T_base_origin[:3, :3])
 
 
+def _wrench_in_world(
+    robot: Robot, chain: Frames, wrench: Array, frame: str
+) -> tuple[Array, Array]:
+    """Return force and moment of a wrench in the world frame, components first, (3, ...) each."""
+    rotation = wrench_rotation(robot, chain, frame)
+    force = components((rotation @ wrench[..., :3, None])[..., 0])
+    return force, components((rotation @ wrench[..., 3:, None])[..., 0])
+
+
 def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool') -> Array:
     """
     Return load torques, shape (n, ...) [N m], of a wrench on the tool: J^T w.
@@ -97,9 +110,7 @@ def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool
         Where they are expressed: 'tool' or 'base'.
 
     """
-    rotation = wrench_rotation(robot, chain, frame)
-    force = components((rotation @ wrench[..., :3, None])[..., 0])
-    moment = components((rotation @ wrench[..., 3:, None])[..., 0])
+    force, moment = _wrench_in_world(robot, chain, wrench, frame)
     torque = point_force_torque(robot, chain, components(chain.position), force)
     moment = pad(moment, torque.ndim - 1)
     for i, row in enumerate(chain.rows):
@@ -206,7 +217,7 @@ def payload_slope(robot: Robot, chain: Frames, mass: Array | float, com: Array) 
         Torque first, then joint.
 
     """
-    centre = components(chain.position + (chain.rotation @ np.asarray(com)[..., None])[..., 0])
+    centre = _carried_point(chain, com)
     levers = [mass * (centre - pad(row.z_point, centre.ndim - 1)) for row in chain.rows]
     return _weight_slope(robot, chain, [(mass, lever) for lever in levers])
 
@@ -228,9 +239,7 @@ def _weight_slope(robot: Robot, chain: Frames, carried: Sequence[tuple[Any, Arra
 
 def _wrench_slope(robot: Robot, chain: Frames, wrench: Array, frame: str) -> Array:
     """Return d tau_i / d q_j of a wrench on the tool, shape (n, n, ...)."""
-    rotation = wrench_rotation(robot, chain, frame)
-    force = components((rotation @ wrench[..., :3, None])[..., 0])
-    moment = components((rotation @ wrench[..., 3:, None])[..., 0])
+    force, moment = _wrench_in_world(robot, chain, wrench, frame)
     tip, still = components(chain.position), np.zeros_like(force)
     slides = robot.prismatic
     levers = [tip - row.z_point for row in chain.rows]
@@ -309,8 +318,6 @@ def base_moment(
         lever = lever + robot.payload_mass * (components(centre) - origin)
     moment: Array = cross(lever, gravity_direction(robot, chain))
     if wrench is not None:
-        rotation = wrench_rotation(robot, chain, frame)
-        force = components((rotation @ wrench[..., :3, None])[..., 0])
-        own = components((rotation @ wrench[..., 3:, None])[..., 0])
+        force, own = _wrench_in_world(robot, chain, wrench, frame)
         moment = moment + own + cross(components(chain.position) - origin, force)
     return moment

@@ -20,7 +20,13 @@ from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.process import MODULES
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ['weld_twin_core', 'weld_twin_lab', 'weld_twin_msgs_py', 'weld_twin_nodes']
+PACKAGES = [
+    'weld_twin_core',
+    'weld_twin_lab',
+    'weld_twin_msgs_py',
+    'weld_twin_nodes',
+    'weld_twin_report',
+]
 NODES = list(MODULES)
 
 pytestmark = [pytest.mark.slow, pytest.mark.cells]
@@ -42,7 +48,7 @@ def colcon(folder: Path, *words: str) -> str:
 
 @pytest.fixture(scope='module')
 def workspace(tmp_path_factory) -> Path:
-    """Build the four packages away from the tree; return the folder with ``install``."""
+    """Build the five packages away from the tree; return the folder with ``install``."""
     folder = tmp_path_factory.mktemp('ws')
     colcon(folder, 'build', '--base-paths', str(ROOT / 'src'))
     return folder
@@ -59,7 +65,7 @@ def sourced(workspace) -> dict[str, str]:
     return dict(item.split('=', 1) for item in out.split('\0') if '=' in item)
 
 
-def test_colcon_finds_exactly_the_four_packages():
+def test_colcon_finds_exactly_the_five_packages():
     found = subprocess.run(
         [sys.executable, '-m', 'colcon', 'list', '--names-only'],
         cwd=ROOT,

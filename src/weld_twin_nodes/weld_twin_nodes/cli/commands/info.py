@@ -79,7 +79,7 @@ def _effect(entry: Mapping[str, Any]) -> str:
     """Return an entry of an effects file in words, with its units where the effect is known."""
     from weld_twin_core.effects import REGISTRY
 
-    from ...report.words import cause
+    from ...wording.words import cause
 
     kind = REGISTRY.get(entry['effect'])
     units = {} if kind is None else {p.name: p.unit.strip('-') for p in kind.parameters}

@@ -29,8 +29,7 @@ from ...arrays import Array
 from ...errors import DataError
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem
-from .in_turn import in_turn
-from .track import FLOOR, LEVER, TIE, Track, chord, nearest_rotation
+from .in_turn import FLOOR, LEVER, TIE, Track, chord, in_turn, nearest_rotation
 
 NEAR = 0.02
 """Median gap [m] from which a least-squares fit finds its own way."""

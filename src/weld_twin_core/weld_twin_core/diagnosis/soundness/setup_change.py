@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..algebra.problem import Model, Problem
-from .base_change import BaseChange, base_change, thinned
+from .base_change import CONSTANTS, BaseChange, base_change, other_shapes, thinned
 from .evidence import Case, Finding, distance, length
 from .lengths import instant
-from .smooth_shapes import CONSTANTS, other_shapes
 from .snapshot import measured
 
 SURE = 6.0

@@ -56,14 +56,7 @@ def in_turn(
         Tool vectors to start from.
 
     """
-    starts = vectors.shape[:2]
-    found = [
-        Bases(
-            np.broadcast_to(b[:, None, :3, :3], (*starts, 3, 3)),
-            np.broadcast_to(b[:, None, :3, 3], (*starts, 3)),
-        )
-        for b in bases
-    ]
+    found = _started(bases, vectors)
     for _ in range(ROUNDS):
         found = [_based(*pair, turn, vectors, STEPS) for pair in zip(tracks, found, strict=True)]
         vectors = _vectors(tracks, found, turn, vectors)
@@ -73,6 +66,35 @@ def in_turn(
     each = np.arange(len(best)), best
     frames = tuple(transform(base.rotation[each], base.origin[each]) for base in found)
     return frames, transform(turn, vectors[each])
+
+
+def bases_of(tracks: Sequence[Track], bases: Sequence[Array], tools: Array) -> tuple[Array, ...]:
+    """
+    Return the base frames, each (T, 4, 4), of tools that are known, (T, 4, 4).
+
+    Parameters
+    ----------
+    tracks, bases
+        As `in_turn` takes them.
+    tools : array, shape (T, 4, 4)
+
+    """
+    turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
+    pairs = zip(tracks, _started(bases, vectors), strict=True)
+    found = [_based(*pair, turn, vectors, ROUNDS) for pair in pairs]
+    return tuple(transform(base.rotation[:, 0], base.origin[:, 0]) for base in found)
+
+
+def _started(bases: Sequence[Array], vectors: Array) -> list[Bases]:
+    """Return base frames (T, 4, 4) as those of every start."""
+    starts = vectors.shape[:2]
+    return [
+        Bases(
+            np.broadcast_to(b[:, None, :3, :3], (*starts, 3, 3)),
+            np.broadcast_to(b[:, None, :3, 3], (*starts, 3)),
+        )
+        for b in bases
+    ]
 
 
 def _reached(track: Track, vectors: Array) -> Array:

@@ -13,17 +13,11 @@ from .checks import CHECKS
 from .gate import Examined, examine
 from .mending import Given
 from .repeats import refuse_reused
-from .setup_change import Settling, Step, changes, moved_setup, settling
 
 __all__ = [
     'CHECKS',
     'Examined',
     'Given',
-    'Settling',
-    'Step',
-    'changes',
     'examine',
-    'moved_setup',
     'refuse_reused',
-    'settling',
 ]

@@ -13,7 +13,7 @@ import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.contacts import Contacts
-from weld_twin_core.diagnosis.frames.frames_only import frames_only
+from weld_twin_core.diagnosis.frames.aligned import frames_only
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 from ..transfer.splits import Rows, alone

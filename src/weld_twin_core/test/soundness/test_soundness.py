@@ -23,12 +23,10 @@ from weld_twin_core.diagnosis.frames.alignment import initial_frames
 from weld_twin_core.diagnosis.soundness import (
     CHECKS,
     Given,
-    Step,
     examine,
-    moved_setup,
-    settling,
 )
 from weld_twin_core.diagnosis.soundness.evidence import Case
+from weld_twin_core.diagnosis.soundness.setup_change import Settling, Step, changes_of
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -277,7 +275,8 @@ def test_a_step_of_the_base_is_found_where_it_happened(ur5, request, kind):
     bad = spoilt(recording, 5e-4 * (t >= when))
     problem, model = asked(ur5, bad)
     model = initial_frames(problem, model)
-    (step,) = moved_setup(problem.residuals(model), problem, model)
+    (step,) = changes_of(*Case(problem, model).change)
+    assert isinstance(step, Step)
     assert step.time == pytest.approx(when, abs=0.02 * t[-1])
     assert step.size == pytest.approx(5e-4, rel=0.1)
     (slip,) = looked_at(ur5, bad).slips
@@ -292,7 +291,8 @@ def test_warming_up_is_settling_and_a_steady_drift_is_neither(ur5, request, kind
     warm = spoilt(recording, 5e-4 * np.exp(-age / 0.2))
     problem, model = asked(ur5, warm)
     model = initial_frames(problem, model)
-    (found,) = settling(problem.residuals(model), problem, model)
+    (found,) = changes_of(*Case(problem, model).change)
+    assert isinstance(found, Settling)
     assert found.time_constant == pytest.approx(0.2 * recording.measured.t[-1], rel=0.3)
     drift = spoilt(recording, 5e-4 * age)
     assert not [c for c in findings(ur5, drift) if c.name == 'set-up']

@@ -19,8 +19,8 @@ from ...effects.effect import Effect
 from ...errors import DataError, ModelError
 from ...recording import Measurements, Recording
 from ...twin.features import Features, Remembered
+from .independent_rows import by_sample
 from .model import Anchor, Change, Model, Scale
-from .row_layout import by_sample
 
 __all__ = [
     'FRAMES',

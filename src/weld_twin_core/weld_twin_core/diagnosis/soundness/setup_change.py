@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..algebra.problem import Model, Problem
-from .base_change import BaseChange, base_change, thinned
+from ..algebra.problem import Problem
+from .base_change import CONSTANTS, BaseChange, other_shapes
 from .evidence import Case, Finding, distance, length
 from .lengths import instant
-from .smooth_shapes import CONSTANTS, other_shapes
 from .snapshot import measured
 
 SURE = 6.0
@@ -72,41 +71,7 @@ def setup(case: Case) -> Sequence[Finding]:
     ]
 
 
-def moved_setup(parts: list[Array], problem: Problem, model: Model) -> list[Step]:
-    """
-    Return the steps of the base frame among its `changes`.
-
-    Parameters
-    ----------
-    parts : list of array, each shape (c, M) [m, rad]
-        Residuals of every recording; see `Problem.residuals`.
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-
-    """
-    return [each for each in changes(parts, problem, model) if isinstance(each, Step)]
-
-
-def settling(parts: list[Array], problem: Problem, model: Model) -> list[Settling]:
-    """
-    Return the settlings of the base frame among its `changes`.
-
-    Parameters
-    ----------
-    parts : list of array, each shape (c, M) [m, rad]
-        Residuals of every recording; see `Problem.residuals`.
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-
-    """
-    return [each for each in changes(parts, problem, model) if isinstance(each, Settling)]
-
-
-def changes(parts: list[Array], problem: Problem, model: Model) -> list[Step | Settling]:
+def changes_of(problem: Problem, change: BaseChange) -> list[Step | Settling]:
     """
     Return steps and settlings of the base frame, strongest first.
 
@@ -116,18 +81,11 @@ def changes(parts: list[Array], problem: Problem, model: Model) -> list[Step | S
 
     Parameters
     ----------
-    parts : list of array, shape (c, M)
-        Residuals of the model, one per recording; of the baseline or of any later model.
     problem : Problem
-    model : Model
+    change : BaseChange
+        What a change in time would explain of its residuals.
 
     """
-    problem, parts = thinned(problem, parts)
-    return changes_of(problem, base_change(parts, problem, model))
-
-
-def changes_of(problem: Problem, change: BaseChange) -> list[Step | Settling]:
-    """Return the same where what a change would explain is known already."""
     out: list[Step | Settling] = []
     taken: list[_Trial] = []
     for _ in range(MOST):

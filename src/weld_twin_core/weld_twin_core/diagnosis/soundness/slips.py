@@ -24,7 +24,7 @@ from ...effects.joint_slip import JointSlip
 from ...effects.tool_slip import ToolSlip
 from ...recording import Recording
 from ..algebra.problem import Problem
-from .base_change import BaseChange
+from .base_change import BaseChange, smooth_shapes
 from .lengths import instant, length
 from .limits import (
     DATED,
@@ -38,7 +38,6 @@ from .limits import (
     NEARLY,
 )
 from .mending import measured
-from .smooth_shapes import smooth_shapes
 
 KNOCKED, JUMPED, SLIPPED = 'instrument_knocked', 'reflector_jumped', 'joint_slipped'
 _OTHERWISE = {

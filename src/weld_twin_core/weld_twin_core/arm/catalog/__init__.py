@@ -22,7 +22,6 @@ from __future__ import annotations
 import json
 import re
 from importlib.resources import files
-from typing import Any
 
 from ...errors import ModelError
 from ..robot import Robot
@@ -67,17 +66,5 @@ def load(name: str) -> Robot:
     """
     if name not in _NAMES:
         raise ModelError(f'no bundled robot is called {name!r}; there are ' + ', '.join(_NAMES))
-    return Robot.from_mapping(parsed((files(__package__) / f'{name}.yaml').read_text('utf-8')))
-
-
-def parsed(text: str) -> Any:
-    """
-    Return the mapping of a bundled robot's file.
-
-    Parameters
-    ----------
-    text : str
-        YAML in the form of JSON, with comments.
-
-    """
-    return json.loads(_COMMENT.sub('', text))
+    text = (files(__package__) / f'{name}.yaml').read_text('utf-8')
+    return Robot.from_mapping(json.loads(_COMMENT.sub('', text)))

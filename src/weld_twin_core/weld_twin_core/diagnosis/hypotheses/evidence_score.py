@@ -15,10 +15,10 @@ FEWEST = 3.0
 
 
 def evidence(rss: float, gain: float, freedom: float, effective: float) -> float:
-    """
+    r"""
     Return the nats that a fall of the sum of squares is worth, noise level unknown.
 
-    .. math:: \\tfrac{n}{2} \\log\\frac{RSS}{RSS - gain} - \\tfrac{p}{2} \\log n
+    .. math:: \tfrac{n}{2} \log\frac{RSS}{RSS - gain} - \tfrac{p}{2} \log n
 
     Parameters
     ----------

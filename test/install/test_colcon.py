@@ -21,7 +21,13 @@ from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.process import MODULES
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ['weld_twin_core', 'weld_twin_lab', 'weld_twin_msgs_py', 'weld_twin_nodes']
+PACKAGES = [
+    'weld_twin_core',
+    'weld_twin_lab',
+    'weld_twin_msgs_py',
+    'weld_twin_nodes',
+    'weld_twin_report',
+]
 NODES = list(MODULES)
 SOME = 'test_conformity or test_topics'
 """What runs of the tests of two packages, after all of them were collected."""
@@ -45,7 +51,7 @@ def colcon(folder: Path, *words: str) -> str:
 
 @pytest.fixture(scope='module')
 def workspace(tmp_path_factory) -> Path:
-    """Build copies of the four packages away from the tree; return the folder with ``install``."""
+    """Build copies of the five packages away from the tree; return the folder with ``install``."""
     folder = tmp_path_factory.mktemp('ws')
     leave = shutil.ignore_patterns('__pycache__')
     for name in PACKAGES:
@@ -65,7 +71,7 @@ def sourced(workspace) -> dict[str, str]:
     return dict(item.split('=', 1) for item in out.split('\0') if '=' in item)
 
 
-def test_colcon_finds_exactly_the_four_packages():
+def test_colcon_finds_exactly_the_five_packages():
     found = subprocess.run(
         [sys.executable, '-m', 'colcon', 'list', '--names-only'],
         cwd=ROOT,

@@ -244,7 +244,6 @@ def hose_pull(cell):
 
 def refraction(cell):
     """Half the square of the way across the gradient to the warmth; as much nearer along it."""
-
     less = 7.86e-4 * 101.325 * (1.0 / 293.14 - 1.0 / 293.16) / 0.02
 
     def move(pose):

@@ -21,23 +21,13 @@ if TYPE_CHECKING:  # what tools see; at run time `__getattr__` finds the same by
     from .gate import examine as examine
     from .mending import Given as Given
     from .repeats import refuse_reused as refuse_reused
-    from .setup_change import Settling as Settling
-    from .setup_change import Step as Step
-    from .setup_change import changes as changes
-    from .setup_change import moved_setup as moved_setup
-    from .setup_change import settling as settling
 
 __all__ = [
     'CHECKS',
     'Examined',
     'Given',
-    'Settling',
-    'Step',
-    'changes',
     'examine',
-    'moved_setup',
     'refuse_reused',
-    'settling',
 ]
 
 _HOMES = {
@@ -47,13 +37,13 @@ _HOMES = {
     'examine': 'gate',
     'refuse_reused': 'repeats',
 }
-"""Modules of names that are not of `setup_change`."""
+"""Modules of the public names."""
 
 
 def __getattr__(name: str) -> Any:
     """Return a public name, loading its module first."""
     if name not in __all__:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    found = getattr(import_module(f'.{_HOMES.get(name, "setup_change")}', __name__), name)
+    found = getattr(import_module(f'.{_HOMES[name]}', __name__), name)
     globals()[name] = found
     return found

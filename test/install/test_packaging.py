@@ -55,6 +55,7 @@ ROS = {
     'rosidl_typesupport_fastrtps_c',
     'rosidl_typesupport_introspection_c',
     'sensor_msgs',
+    'sros2',
     'std_srvs',
 }
 

@@ -184,6 +184,14 @@ def not_corrected(model: ProgramModel) -> list[str]:
     return list(dict.fromkeys(e.name for e in left))
 
 
+def too_large(length: float, turn: float, limits: GoalLimits) -> str:
+    """Return that a point would move by more than is allowed [m, rad]."""
+    return (
+        f'a point would move by {length * 1e3:.3f} mm and {np.degrees(turn):.3f} degrees, at most '
+        f'{limits.length * 1e3:g} mm and {np.degrees(limits.turn):g} degrees are allowed'
+    )
+
+
 def _mended(effect: Effect) -> bool:
     return commandable(effect) and effect.stage != Stage.SERVO
 
@@ -191,9 +199,7 @@ def _mended(effect: Effect) -> bool:
 class _Work:
     """One goal on its way."""
 
-    def __init__(
-        self, model: ProgramModel, goal: Goal, limits: GoalLimits, start: Start
-    ) -> None:
+    def __init__(self, model: ProgramModel, goal: Goal, limits: GoalLimits, start: Start) -> None:
         self.model, self.goal, self.limits, self.start = model, goal, limits, start
         mended = [e for e in model.effects if _mended(e)]
         self.real = Twin(model.robot, mended)
@@ -221,7 +227,10 @@ class _Work:
         added = self._added(found, self.goal.t)
         waits = self._waits(found)
         if waits:
-            more = [*more, f'the correction sets in before the goal, which begins {waits:.3f} s later']
+            more = [
+                *more,
+                f'the correction sets in before the goal, which begins {waits:.3f} s later',
+            ]
         return CorrectedGoal(
             found.later(waits),
             added,
@@ -402,11 +411,7 @@ class _Work:
     def _refuse_large(self, added: Array) -> None:
         length, turn = _largest(added)
         if length > self.limits.length or turn > self.limits.turn:
-            raise _RefusedError(
-                f'a point would move by {length * 1e3:.3f} mm and {np.degrees(turn):.3f} degrees, at '
-                f'most {self.limits.length * 1e3:g} mm and {np.degrees(self.limits.turn):g} degrees '
-                'are allowed'
-            )
+            raise _RefusedError(too_large(length, turn, self.limits))
 
     def _refuse_quick(self, found: Goal) -> None:
         if self.meant.t.size < 2:

@@ -198,10 +198,10 @@ def _projected(left: Array, pull: Array, k: Index) -> tuple[Array, Array]:
 
 
 def evidence(rss: float, gain: float, freedom: float, effective: float) -> float:
-    """
+    r"""
     Return the nats that a fall of the sum of squares is worth, noise level unknown.
 
-    .. math:: \\tfrac{n}{2} \\log\\frac{RSS}{RSS - gain} - \\tfrac{p}{2} \\log n
+    .. math:: \tfrac{n}{2} \log\frac{RSS}{RSS - gain} - \tfrac{p}{2} \log n
 
     Parameters
     ----------

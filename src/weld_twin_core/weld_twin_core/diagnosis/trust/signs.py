@@ -273,15 +273,15 @@ def _of_curves(unseen: Unseen, rival: Curved | None, floor: float) -> Numbers:
 def _of_data(problem: Problem) -> Numbers:
     """Return how rich the recordings are."""
     travel = np.max([np.ptp(r.joints.q, axis=0) for r in problem.recordings], axis=0)
-    first = problem.recordings[0]
+    every = problem.recordings
     return {
-        'static': float(first.joints.static),
+        'static': float(any(r.joints.static for r in every)),
         'orientation': float(max(problem.rows) > 3),
         'aligned': len(problem.align),
-        'recordings': len(problem.recordings),
+        'recordings': len(every),
         'samples': log(sum(problem.samples)),
-        'wrench': float(first.wrench is not None),
-        'temperature': float(first.temperature is not None),
+        'wrench': float(any(r.wrench is not None for r in every)),
+        'temperature': float(any(r.temperature is not None for r in every)),
         'moving': float((travel > MOVES).mean()),
         'wide': float((travel > WIDE).mean()),
         'travel': log(float(np.median(travel))),

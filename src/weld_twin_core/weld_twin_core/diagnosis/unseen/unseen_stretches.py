@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from itertools import pairwise
 from weakref import WeakKeyDictionary
 
@@ -63,8 +63,11 @@ class Unseen:
         P columns: frames, then the coordinates of every found effect.
     parts : tuple of slice
         Columns of every effect.
-    targets : array, shape (1 + K, rows)
-        The final residual, then what each effect takes off it, exactly.
+    residual : array, shape (rows,)
+        The final residual.
+    taken : callable
+        Returns what each effect takes off the residual, exactly, shape (K, rows): a run of the
+        twin for each, which a model of all effects does not need.
     precision, pull : array, shape (P,)
         Prior precision of every column, and how hard it pulls from where the fit is now.
 
@@ -75,7 +78,8 @@ class Unseen:
     labels: Array
     columns: Design
     parts: tuple[slice, ...]
-    targets: Array
+    residual: Array
+    taken: Callable[[], Array]
     precision: Array
     pull: Array
 
@@ -119,6 +123,11 @@ class Unseen:
     def _others(self) -> dict[bytes, Unseen]:
         return {}
 
+    @cached_property
+    def targets(self) -> Array:
+        """Return the final residual, then what each effect takes off it, shape (1 + K, rows)."""
+        return np.concatenate([self.residual[None], self.taken()])
+
     @property
     def frames(self) -> int:
         """Return the number of nuisance columns."""
@@ -134,7 +143,7 @@ class Unseen:
         if gone.size > index.size:
             return self.base(kept).residual
         mix = self._mix(kept)
-        residual = mix @ self.targets
+        residual = self._explained(mix).copy()
         for b, rows in enumerate(self._spans):
             inverse = self._inverses[b]
             step = inverse.times(self._right(b, mix))
@@ -163,7 +172,7 @@ class Unseen:
     def base(self, kept: Sequence[int]) -> Base:
         """Return a model of some effects, fitted with each stretch left out in turn."""
         index, mix = self._index(kept), self._mix(kept)
-        target = mix @ self.targets
+        target = self._explained(mix)
         solvers, residual = list[Solver](), target.copy()
         for b, rows in enumerate(self._spans if index.size else ()):
             solver = self._solver(b, index)
@@ -182,9 +191,13 @@ class Unseen:
 
     def _mix(self, kept: Sequence[int]) -> Array:
         """Return which targets a model of some effects is to explain, shape (1 + K,)."""
-        mix = np.ones(self.targets.shape[0])
+        mix = np.ones(1 + len(self.parts))
         mix[[1 + k for k in kept]] = 0.0
         return mix
+
+    def _explained(self, mix: Array) -> Array:
+        """Return what such a model is to explain, shape (rows,)."""
+        return np.asarray(mix @ self.targets) if mix[1:].any() else self.residual
 
     def _index(self, kept: Sequence[int]) -> Index:
         """Return the columns of the frames and of some effects."""
@@ -216,8 +229,16 @@ class Unseen:
     @cached_property
     def _rights(self) -> list[Array]:
         """Return the products of the columns with all targets on every stretch, (P, 1 + K)."""
+        return self._products(self.targets)
+
+    @cached_property
+    def _rights_of_residual(self) -> list[Array]:
+        """Return the same with the final residual alone, (P, 1)."""
+        return self._products(self.residual[None])
+
+    def _products(self, targets: Array) -> list[Array]:
         parts = zip(self._stretches, self._spans, strict=True)
-        return [part.products(self.targets[:, rows]) for part, rows in parts]
+        return [part.products(targets[:, rows]) for part, rows in parts]
 
     @cached_property
     def _total(self) -> Array:
@@ -230,6 +251,10 @@ class Unseen:
     @cached_property
     def _right_total(self) -> Array:
         return np.asarray(sum(self._rights))
+
+    @cached_property
+    def _right_total_of_residual(self) -> Array:
+        return np.asarray(sum(self._rights_of_residual))
 
     def _system(self, b: int, index: Index) -> Array:
         """
@@ -246,7 +271,10 @@ class Unseen:
 
     def _right(self, b: int, mix: Array) -> Array:
         """Return the right-hand side of every column on all stretches but one."""
-        return np.asarray((self._right_total - self._rights[b]) @ mix - self.pull)
+        if mix[1:].any():
+            return np.asarray((self._right_total - self._rights[b]) @ mix - self.pull)
+        right = self._right_total_of_residual - self._rights_of_residual[b]
+        return np.asarray(right[:, 0] - self.pull)
 
     def wandered(self) -> Array:
         """
@@ -255,7 +283,7 @@ class Unseen:
         Mean of the squared steps over what noise alone makes them; a formula that does not hold
         wants other parameters on every stretch.
         """
-        every, mix = np.arange(self.columns.count), np.eye(self.targets.shape[0])[0]
+        every, mix = np.arange(self.columns.count), np.eye(1 + len(self.parts))[0]
         whole = _spread(self._total)
         ratios = np.zeros((len(self._spans), every.size))
         for b in range(len(self._spans)):
@@ -358,10 +386,6 @@ def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Uns
     columns, _ = designed(problem, model, scale)
     frames = columns.count - fit.coordinates.size
     ends = np.cumsum([frames, *(effect.coordinates().size for effect in model.found)]).tolist()
-    targets = [fit.residual] + [
-        problem.whitened(problem.residuals(model.without(k)), scale) - fit.residual
-        for k in range(len(model.found))
-    ]
     prior = np.zeros(columns.count)
     prior[:frames], off = frame_prior(problem, model)
     if precision.size:
@@ -375,10 +399,18 @@ def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Uns
         labels=problem.block_labels(BLOCKS),
         columns=columns,
         parts=tuple(slice(a, b) for a, b in pairwise(ends)),
-        targets=np.array(targets),
+        residual=fit.residual,
+        taken=cache(partial(_taken, problem, scale, fit)),
         precision=prior + tether,
         pull=prior * x,
     )
+
+
+def _taken(problem: Problem, scale: Scale, fit: Fit) -> Array:
+    """Return what each effect takes off the final residual, exactly, shape (K, rows)."""
+    without = (fit.model.without(k) for k in range(len(fit.model.found)))
+    left = [problem.whitened(problem.residuals(model), scale) for model in without]
+    return np.array(left).reshape(-1, fit.residual.size) - fit.residual
 
 
 def _solved(factor: tuple[Array, bool], size: Array, right: Array) -> Array:

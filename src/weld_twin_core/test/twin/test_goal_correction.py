@@ -195,7 +195,12 @@ def test_lag_and_delay_are_told_and_left():
         (goal(), model(play(8e-4)), GoalLimits(acceleration=0.26), 'the corrected goal breaks'),
         (goal(), model(offset(5e-4), posterior=sure(high=1.4)), None, 'outside what was recorded'),
         (goal(), model(offset(5e-4), posterior=sure(1e-3)), None, 'less sure of this goal'),
-        (Goal(goal().t * 0.01, goal().q), model(offset(5e-4)), None, 'breaks the limit of velocity'),
+        (
+            Goal(goal().t * 0.01, goal().q),
+            model(offset(5e-4)),
+            None,
+            'breaks the limit of velocity',
+        ),
     ],
 )
 def test_a_goal_is_refused_with_its_reason(asked, found, limits, reason):

@@ -76,6 +76,11 @@ class Controller(Node):
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
+    def destroy_node(self) -> None:
+        """Be gone at once, whatever runs."""
+        self._server.destroy()
+        super().destroy_node()  # type: ignore[no-untyped-call]
+
     async def _take(self, goal: Any) -> GoalResponse:
         if self.answers:
             thought: Future = Future()

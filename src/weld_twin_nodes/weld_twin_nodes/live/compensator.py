@@ -393,6 +393,7 @@ class Compensator(ManagedNode):
 
     async def _decide(self, goal: Any) -> Decision:
         """Return what becomes of a goal."""
+        self._look()
         token = self._token()
         if not goal.trajectory.points:  # the order to stop, which nothing may hold up
             return Decision(goal, '', partial(self._settled, None, 'passed', 'it has no point'))
@@ -516,6 +517,7 @@ class Compensator(ManagedNode):
 
     def _since(self, token: object) -> str:
         """Return what has happened to the model since a goal was decided on."""
+        self._look()
         if self._token() != token:
             return 'the model was exchanged meanwhile'
         why = self._withdrawn()

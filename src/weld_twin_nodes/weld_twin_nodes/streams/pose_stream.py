@@ -6,14 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_core.twin.goal_correction import SMOOTH_SPEED, GoalLimits
-from weld_twin_core.twin.pose_correction import Looked, PoseCorrection, between, moved
+from weld_twin_core.twin.goal_correction import SMOOTH_PEAK, SMOOTH_SPEED, GoalLimits
+from weld_twin_core.twin.pose_correction import LEVER, Looked, PoseCorrection, between, moved
 
 STILL = 2e-5
 """Poses that stay within this [m, rad] stand still: far below what a seam moves between two of them."""
@@ -324,7 +325,14 @@ class PoseStream:
         if max(way) < SHORT:
             self._mode, self._held = mode, end
             return Given(moved(pose, end), end, why)
-        span = SMOOTH_SPEED * max(way[0] / self._limits.rate, way[1] / self._limits.turn_rate)
+        most = min(
+            self._limits.acceleration, float(self.correction.model.robot.max_acceleration.min())
+        )
+        span = max(
+            SMOOTH_SPEED * way[0] / self._limits.rate,
+            SMOOTH_SPEED * way[1] / self._limits.turn_rate,
+            sqrt(SMOOTH_PEAK * (way[0] / LEVER + way[1]) / most),
+        )
         self._ramp = _Ramp(pose, self._held, end, now, span, mode)
         return self._on_ramp(now, why)
 

@@ -14,10 +14,9 @@ from ..algebra.fit import fit, robust_fit, robust_scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Site
-from ..unseen.unseen_stretches import Unseen
+from ..unseen.unseen_stretches import Unseen, steadiness
 from ..verdict.decision import Verdict
 from .free_form import FreeForm, free_form
-from .sparse_groups import steadiness
 
 ROWS = 6000
 """Rows that groups are chosen on; the curves are fitted on all."""

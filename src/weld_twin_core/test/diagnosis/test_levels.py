@@ -11,7 +11,7 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.levels.held_against import held_against
+from weld_twin_core.diagnosis.levels.formulas import held_against
 from weld_twin_core.diagnosis.levels.sparse_groups import (
     Choosing,
     Folds,

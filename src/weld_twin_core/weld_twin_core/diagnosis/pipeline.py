@@ -22,8 +22,7 @@ from .frames.places import not_told
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .hypotheses.structural_aliases import with_structural_aliases
-from .levels.carried import carried
-from .levels.curved import curved, standing
+from .levels.curved import carried, curved, standing
 from .levels.formulas import formulas
 from .levels.placed import placed
 from .many.fitted_together import fitted_together

@@ -15,9 +15,8 @@ from ...effects.plausible import beyond
 from ..algebra.fit import Fit, design, fit
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
-from .choices import Choice, ranking
-from .library import Library, Unit
-from .seed_systems import SeedSystems, evidence
+from .library import Library
+from .seed_systems import Choice, SeedSystems, Unit, evidence, ranking
 from .starts import searched, started
 
 SHORTLIST = 4

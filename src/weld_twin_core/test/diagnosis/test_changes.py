@@ -24,10 +24,10 @@ def robot():
     return wt.load('ur5')
 
 
-def day(robot, seed, *changed, base=(0.0, 0.0, 0.0), turned=False):
+def day(robot, seed, *changed, base=(0.0, 0.0, 0.0), turned=False, near=0.0):
     """Return sixty stations of one arm on one day."""
     rng = np.random.default_rng(seed)
-    middle = np.array([0.0, -1.2, 1.3, -1.2, -1.5, 0.0])
+    middle = np.array([0.0, -1.2, 1.3, -1.2 + near, -1.5, near])
     t = 5.0 * np.arange(60)
     stations = wt.JointMotion(t, middle + rng.uniform(-0.8, 0.8, (60, 6)), static=True)
     placed = np.array(robot.T_world_base)
@@ -123,3 +123,12 @@ def test_a_whole_diagnosis(robot):
     assert (entry['recording'], entry['joint']) == (1, 'elbow_joint')
     assert entry['value'] == pytest.approx(1e-3, abs=5e-5)
     assert 0.0 < entry['std'] < 5e-5
+
+
+def test_what_the_common_errors_passed_for_is_no_change(robot):
+    """Postures differ between the days: until the errors are found they look like another tool."""
+    spring = (LinkTwist('elbow_joint', 4e-3), JointOffset('wrist_1_joint', 3e-3))
+    pair = [day(robot, 1, *spring, near=0.0), day(robot, 2, *spring, near=0.9)]
+    rest = [name for name in REGISTRY if name not in ('joint_offset', 'link_twist')]
+    found = wt.diagnose(pair, robot, exclude=rest, may_change='joint_offset, tool_pose')
+    assert found.as_dict()['changed'] == []

@@ -368,10 +368,10 @@ class Problem:
         """
         Return a block number for every row: contiguous stretches, at least one per recording.
 
-        The numbers are the same whichever recording was given first. Recordings count by their length; a stretch never spans two recordings. Where each has a
-        base of its own, block k is the k-th part of every one: left out whole, a short recording
-        would lose its base. Of contacts each place is a stretch, where there are at least
-        `PLACES`.
+        The numbers do not hang on which recording was given first. Recordings count by their
+        length; a stretch never spans two recordings. Where each has a base of its own, block k is
+        the k-th part of every one: left out whole, a short recording would lose its base. Of
+        contacts each place is a stretch, where there are at least `PLACES`.
         """
         if self.own_bases:
             parts = [(np.arange(m) * blocks) // max(m, 1) for m in self.samples]

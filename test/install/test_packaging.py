@@ -20,7 +20,13 @@ else:
     tomllib = pytest.importorskip('tomli')
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ['weld_twin_core', 'weld_twin_lab', 'weld_twin_msgs_py', 'weld_twin_nodes']
+PACKAGES = [
+    'weld_twin_core',
+    'weld_twin_lab',
+    'weld_twin_msgs_py',
+    'weld_twin_nodes',
+    'weld_twin_report',
+]
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
 MODULES = {
     'PyYAML': 'yaml',
@@ -49,6 +55,7 @@ ROS = {
     'rosidl_typesupport_fastrtps_c',
     'rosidl_typesupport_introspection_c',
     'sensor_msgs',
+    'sros2',
     'std_srvs',
 }
 
@@ -141,7 +148,8 @@ def test_everything_imported_is_declared(package):
     ('package', 'forbidden'),
     [
         ('weld_twin_core', {'weld_twin_msgs_py', 'weld_twin_nodes', 'rclpy', 'rosbags', 'yaml'}),
-        ('weld_twin_msgs_py', {'weld_twin_nodes'}),
+        ('weld_twin_msgs_py', {'weld_twin_nodes', 'weld_twin_report'}),
+        ('weld_twin_nodes', {'weld_twin_report', 'weld_twin_lab', 'fastapi', 'sqlalchemy'}),
     ],
 )
 def test_imports_point_one_way(package, forbidden):

@@ -238,7 +238,7 @@ def test_what_stood_in_for_two_goes_once_both_are_there():
 
 
 def test_a_wrong_unit_that_no_effect_stands_for_is_placed_at_the_instrument():
-    recording = recorded(lambda angle: 0.0 * angle)
+    recording = recorded(lambda angle: 0.0 * angle, seconds=16.0)
     measured = recording.measured
     stretched = wt.Measurements(measured.t, 1.0004 * measured.position)
     told = wt.diagnose(

@@ -3,7 +3,6 @@
 """Each way to spoil data is found and named; sound data raise no warning."""
 
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -23,12 +22,11 @@ from weld_twin_core.diagnosis.frames.alignment import initial_frames
 from weld_twin_core.diagnosis.soundness import (
     CHECKS,
     Given,
-    Step,
     examine,
-    moved_setup,
-    settling,
 )
 from weld_twin_core.diagnosis.soundness.evidence import Case
+from weld_twin_core.diagnosis.soundness.setup_change import setup
+from weld_twin_core.diagnosis.soundness.slips import KNOCKED, Settling, Slip
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -302,7 +300,8 @@ def test_a_step_of_the_base_is_found_where_it_happened(ur5, request, kind):
     bad = spoilt(recording, 5e-4 * (t >= when))
     problem, model = asked(ur5, bad)
     model = initial_frames(problem, model)
-    (step,) = moved_setup(problem.residuals(model), problem, model)
+    (step,) = Case(problem, model).changes
+    assert step.kind == KNOCKED
     assert step.time == pytest.approx(when, abs=0.02 * t[-1])
     assert step.size == pytest.approx(5e-4, rel=0.1)
     (slip,) = looked_at(ur5, bad).slips
@@ -317,7 +316,8 @@ def test_warming_up_is_settling_and_a_steady_drift_is_neither(ur5, request, kind
     warm = spoilt(recording, 5e-4 * np.exp(-age / 0.2))
     problem, model = asked(ur5, warm)
     model = initial_frames(problem, model)
-    (found,) = settling(problem.residuals(model), problem, model)
+    (found,) = Case(problem, model).changes
+    assert isinstance(found, Settling)
     assert found.time_constant == pytest.approx(0.2 * recording.measured.t[-1], rel=0.3)
     drift = spoilt(recording, 5e-4 * age)
     assert not [c for c in findings(ur5, drift) if c.name == 'set-up']
@@ -336,10 +336,9 @@ def test_a_set_up_moved_between_recordings_is_named_unless_each_has_its_own_base
 def test_a_step_larger_than_any_gap_shows_did_not_happen(ur5, run, monkeypatch, times, named):
     case = Case(*asked(ur5, spoilt(run, np.full(run.measured.t.size, 5e-4)), align=()))
     largest = float(np.linalg.norm(case.residuals[0][:3], axis=0).max())
-    step = Step(run.name, 5.0, times * largest, 500.0)
-    module = import_module('weld_twin_core.diagnosis.soundness.setup_change')
-    monkeypatch.setattr(module, 'changes_of', lambda *_: [step])
-    assert bool(module.setup(case)) is named
+    step = Slip(KNOCKED, None, 0, 5.0, times * largest, 500.0, dated=False)
+    monkeypatch.setattr(Case, 'changes', [step])
+    assert bool(setup(case)) is named
 
 
 # No false alarms -------------------------------------------------------------------------------

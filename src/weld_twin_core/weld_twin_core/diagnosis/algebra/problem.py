@@ -19,8 +19,8 @@ from ...effects.effect import Effect
 from ...errors import DataError, ModelError
 from ...recording import Measurements, Recording
 from ...twin.features import Features, Remembered
+from .independent_rows import by_sample
 from .model import Anchor, Change, Model, Scale
-from .row_layout import by_sample
 
 __all__ = [
     'FRAMES',
@@ -368,7 +368,7 @@ class Problem:
         """
         Return a block number for every row: contiguous stretches, at least one per recording.
 
-        The numbers do not hang on which recording was given first. Recordings count by their
+        The numbers are the same whichever recording was given first. Recordings count by their
         length; a stretch never spans two recordings. Where each has a base of its own, block k is
         the k-th part of every one: left out whole, a short recording would lose its base. Of
         contacts each place is a stretch, where there are at least `PLACES`.

@@ -11,8 +11,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.gram import Index
-from ..algebra.unit_diagonal import unit_diagonal
+from ..algebra.gram import Index, unit_diagonal
 from .library import Unit
 from .seed_systems import SINGULAR, Alike, SeedSystems
 

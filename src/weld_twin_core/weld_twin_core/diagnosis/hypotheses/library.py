@@ -4,14 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
+from ...effects.view import View
 from ...twin.features import Features, joints_of
 from ..algebra.atoms import Amounts, Columns, MovedJoint, Whole, amounts, gathered, moved_joint
 from ..algebra.gram import Index
@@ -231,3 +233,26 @@ class _Shelf:
             made = MovedJoint.of(self.problem, self.features, self.scale, joint)
             self._joints[joint] = made
         return self._joints[joint]
+
+
+def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
+    """
+    Return causes in joints and links that depend on nothing but some quantities, at zero.
+
+    Parameters
+    ----------
+    robot : Robot
+    view : View
+        The samples that reach them.
+    on : collection of str
+        What they may depend on: 'constant', 'load'.
+
+    """
+    out: dict[tuple[str, ...], Effect] = {}
+    for kind in REGISTRY.values():
+        if kind.of not in ('joint', 'link') or not kind.cause or kind.dated:
+            continue
+        for joint in joints_of(kind, robot.joint_names):
+            if kind.applicable(view, joint) is None:
+                out |= {e.key: e for e in kind.small(view, joint, 1) if e.on in on}
+    return list(out.values())

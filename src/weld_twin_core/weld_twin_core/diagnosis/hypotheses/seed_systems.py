@@ -17,13 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..algebra.gram import FLAT, Index
-from ..algebra.unit_diagonal import EMPTY, unit_diagonal
-from .evidence_score import evidences
+from ..algebra.gram import EMPTY, FLAT, Index, unit_diagonal
 
 SINGULAR = 1e-11
 """Added to the diagonal of ones, so that columns that repeat others do no harm; far above
 rounding, far below what a column must carry to be told from the others."""
+PERFECT = 1e-12
+"""Share of the sum of squares that counts as left at the least; keeps a logarithm finite."""
+FEWEST = 3.0
+"""Independent rows at the least: a position has three coordinates."""
 
 
 class Alike(NamedTuple):
@@ -193,3 +195,50 @@ def _projected(left: Array, pull: Array, k: Index) -> tuple[Array, Array]:
     diagonal = np.einsum('sii->si', left)
     diagonal[:] = np.maximum(diagonal, SINGULAR)
     return left, pull
+
+
+def evidence(rss: float, gain: float, freedom: float, effective: float) -> float:
+    r"""
+    Return the nats that a fall of the sum of squares is worth, noise level unknown.
+
+    .. math:: \tfrac{n}{2} \log\frac{RSS}{RSS - gain} - \tfrac{p}{2} \log n
+
+    Parameters
+    ----------
+    rss : float
+        Sum of squares before.
+    gain : float
+        By how much it falls.
+    freedom : float
+        Coordinates that the fall took.
+    effective : float
+        Number of independent rows [1]_: autocorrelated residuals carry less than their count.
+
+    References
+    ----------
+    .. [1] G. Schwarz, "Estimating the dimension of a model", Ann. Statist. 6, 1978.
+
+    """
+    return float(evidences(rss, np.asarray(gain), freedom, effective))
+
+
+def evidences(rss: float, gain: Array, freedom: Array | float, effective: float) -> Array:
+    """
+    Return the `evidence` of many falls at once.
+
+    Parameters
+    ----------
+    rss : float
+        Sum of squares before.
+    gain : array, shape (S,)
+        By how much it falls.
+    freedom : float, or array, shape (S,)
+        Coordinates that each fall took.
+    effective : float
+        Number of independent rows.
+
+    """
+    # Where nothing was left before, nothing can fall.
+    left = np.maximum(rss - gain, PERFECT * rss) / rss if rss > 0.0 else np.ones_like(gain)
+    count = max(effective, FEWEST)
+    return np.asarray(-0.5 * count * np.log(left) - 0.5 * freedom * np.log(count))

@@ -17,9 +17,8 @@ from ..algebra.fit import Fit, design, fit
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from .choices import Choice, ranking
-from .evidence_score import evidence
 from .library import Library, Unit
-from .seed_systems import SeedSystems
+from .seed_systems import SeedSystems, evidence
 from .starts import searched, started
 
 SHORTLIST = 4

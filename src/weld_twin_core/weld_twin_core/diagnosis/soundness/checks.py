@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from .clocks import clocks
 from .computed import computed
 from .evidence import Checker
 from .gravity import gravity
@@ -12,12 +11,11 @@ from .mixups import mixups
 from .orientation import orientation
 from .outliers import outliers
 from .parted import parted
-from .quantity import quantity
 from .repeats import repeats
-from .richness import motion
+from .richness import motion, quantity
 from .setup_change import setup
 from .source import source
-from .stamp_regularity import stamps
+from .stamp_regularity import clocks, stamps
 from .stuck import stuck
 
 CHECKS: dict[str, tuple[Checker, str]] = {

@@ -21,7 +21,7 @@ from .lag import Lag, lag
 from .lengths import length
 from .limits import BY_ITSELF, LATE_LEFT, LATE_WORTH, RATE_MOST, UNEXPLAINED
 from .mending import Mend, as_entry
-from .slips import Slip, slips
+from .slips import Settling, Slip, changes
 from .snapshot import Snapshot, measured, snapshot
 
 ENOUGH = 30
@@ -178,10 +178,15 @@ class Case:
         return problem, base_change(parts, problem, self.model)
 
     @cached_property
-    def slips(self) -> list[Slip]:
-        """Return what gave way at an instant."""
+    def changes(self) -> list[Slip | Settling]:
+        """Return what gave way at an instant, and how the base settled."""
         most = max(float(np.quantile(distance(part), LARGEST)) for part in self.residuals)
-        return slips(*self.change, self.model.robot.joint_names, most)
+        return changes(*self.change, self.model.robot.joint_names, most)
+
+    @property
+    def slips(self) -> list[Slip]:
+        """Return what gave way at an instant and is more than a small step."""
+        return [each for each in self.changes if isinstance(each, Slip) and each.dated]
 
     @cached_property
     def snapshot(self) -> Snapshot:

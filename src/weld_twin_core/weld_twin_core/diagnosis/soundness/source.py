@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...recording import JointMotion
-from ..algebra.robust_spread import NORMAL
+from ..algebra.independent_rows import NORMAL
 from .evidence import Case, Finding
 
 SMOOTH = 2e-8

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array
-from ..hypotheses.evidence_score import PERFECT
+from ..hypotheses.seed_systems import PERFECT
 from .tableau import Mask, Tableau
 
 MOVES = 12
@@ -36,7 +36,7 @@ class Prices:
         self.each = 0.5 * freedom * np.log(counts)[:, None] + trials
 
     def evidence(self, more: Array, less: Array) -> Array:
-        """Return the evidence (H, U) of a fall of the sum of squares from more to less."""
+        """Return what a fall of the sum of squares from more to less tells, (H, U) nats."""
         ratio = np.log(more / np.maximum(less, PERFECT * more))
         return np.asarray(0.5 * self.counts[:, None] * ratio - self.each)
 

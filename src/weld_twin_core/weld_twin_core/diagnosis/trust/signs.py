@@ -27,7 +27,7 @@ from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
 from ..verdict.weighing import Weighed
 from .numbers import FAR, Numbers, log, log1, plain, rms
-from .signs_of_found import left_at_joints, residual_signs, worst_of
+from .signs_of_found import residual_signs, worst_of
 
 MOVES = 0.02
 """Travel [rad, m] from which on a joint shows something at all."""
@@ -98,7 +98,6 @@ def signs_of_answer(
             **_of_data(found.problem),
             **families_in('named_', 'alone_', verdict.sets),
             **residual_signs(unseen),
-            **({} if found.dense else left_at_joints(unseen, found.final.model)),
             **worst_of(each),
             'rows': log(found.effective(found.small)),
             'notes': sum(check.level == 'note' for check in checks),

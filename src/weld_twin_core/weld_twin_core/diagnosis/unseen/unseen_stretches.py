@@ -28,10 +28,9 @@ from ..algebra.atoms import Rows
 from ..algebra.definite import Triangle, inverses
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
-from ..algebra.gram import Index
+from ..algebra.gram import Index, unit_diagonal
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.unit_diagonal import unit_diagonal
 
 BLOCKS = 8
 """Stretches left out in turn: enough for a standard error, few enough that each tells much."""

@@ -1,0 +1,22 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The linters of ROS 2 over this package, where they are installed."""
+
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1]
+
+
+def test_every_file_names_its_copyright_and_licence(monkeypatch):
+    main = pytest.importorskip('ament_copyright.main', reason='needs ament_copyright')
+    monkeypatch.chdir(PACKAGE)
+    assert main.main(argv=['.']) == 0
+
+
+def test_flake8_finds_nothing(monkeypatch):
+    main = pytest.importorskip('ament_flake8.main', reason='needs ament_flake8')
+    monkeypatch.chdir(PACKAGE)
+    code, found = main.main_with_errors(argv=['--config', 'setup.cfg', '.'])
+    assert code == 0, '\n'.join(found)

@@ -35,6 +35,10 @@ BESIDE = 5
 after the other and would else end last; 5 is a third of the weight."""
 
 
+SOLVED = 'test/diagnosis: solved('
+"""Folder, and what its files call for a diagnosis that is made once in a process."""
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
     """Let tests of cells go first where tests run side by side."""
@@ -56,7 +60,8 @@ def pytest_xdist_make_scheduler(config, log):
 
     Files with the mark `cells` stand in two lines, those that record or install and the others, so
     that no more than two cells of nodes compete for the processor. Any other file goes to the next
-    process that is free, and stays whole, so that its fixtures are made once.
+    process that is free, and stays whole, so that its fixtures are made once; files that ask
+    `SOLVED` for the same diagnoses stay together.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -66,7 +71,8 @@ def pytest_xdist_make_scheduler(config, log):
             file = nodeid.partition('::')[0]
             text = (config.rootpath / file).read_text(encoding='utf-8')
             if f'mark.{CELLS}' not in text:
-                return file
+                folder, call = SOLVED.split(': ')
+                return SOLVED if file.startswith(folder) and call in text else file
             return f'{CELLS} {any(part in file for part in FIRST_LINE)}'
 
     return ByFile(config, log)

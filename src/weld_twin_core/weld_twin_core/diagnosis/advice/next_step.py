@@ -15,8 +15,8 @@ from ...effects import REGISTRY
 from ...effects.effect import Effect
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale
-from ..hypotheses.choices import ranking
 from ..hypotheses.search import Search
+from ..hypotheses.seed_systems import ranking
 from ..hypotheses.still_joints import narrow
 from ..levels.curved import Curved
 from ..verdict.decision import Verdict

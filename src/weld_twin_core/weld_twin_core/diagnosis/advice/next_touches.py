@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.problem import PLACES, Model, Problem, Scale
-from ..hypotheses.plain_causes import plain_causes
+from ..hypotheses.library import plain_causes
 from .touch_design import Design, Touchable, chosen, scatter
 from .touch_postures import SECONDS, again, beside
 

@@ -24,7 +24,7 @@ from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Base, Unseen
 from .free_form import FreeForm, Part
 from .groups import Group, all_groups, smooth_field, spanned
-from .own_place import told_by, worse_of
+from .own_place import worse_of
 
 AS_GOOD = 0.9
 """Share of what a field takes off unseen data that an arm must take off to be one with it. Of two
@@ -117,4 +117,4 @@ def _bases(problem: Problem, bare: Fit, scale: Scale) -> list[Base]:
 def _gain(bases: Sequence[Base], groups: Sequence[Group]) -> float:
     """Return the share of the squared unseen error that groups take off together."""
     columns = np.concatenate([group.columns for group in groups])
-    return worse_of([told_by(base, columns) for base in bases])[0]
+    return worse_of([base.taken(columns) for base in bases]).gain

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Do the formulas of the names hold? Free forms at their own places, and noise from a joint."""
+"""Do the formulas of the names hold? Free forms instead of them and at their places, and noise."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from ..hypotheses.search import Search
 from ..result import NAMING, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
-from .curved import Curved
-from .held_against import held_against
+from .curved import Curved, gain_of
 from .own_place import Beside, beside_names
 from .scatter import Scatter, scatter
 
@@ -122,3 +121,54 @@ def _misses(one: Beside) -> str:
         f'{100.0 * one.gain:.0f} % of what is left on unseen stretches: the formula of what was '
         'found does not hold'
     )
+
+
+def held_against(
+    verdict: Verdict, named: Unseen, rival: Curved | None, beliefs: Beliefs
+) -> Verdict:
+    """
+    Return the verdict, or 'unknown' where a free form predicts clearly better than the names.
+
+    There is no 'none' where a free form predicts what looks like noise, whether or not a curve can
+    carry it to another motion. What is named stays told; `standing` says whether it holds beside
+    what is left.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    named : Unseen
+        Of the model with the effects named.
+    rival : Curved or None
+    beliefs : Beliefs
+
+    """
+    if rival is None:
+        return verdict
+    if verdict.status == 'none':
+        return _something(verdict, rival, beliefs)
+    if verdict.status == 'unknown':
+        return verdict
+    gain, steady = gain_of(named, rival.unseen)
+    if gain < beliefs.beaten_share or steady < beliefs.beaten_steady:
+        return verdict
+    reason = (
+        f'a curve at {_places(rival)} predicts unseen stretches better than any effect in the library '
+        f'({100.0 * gain:.0f} % less squared error)'
+    )
+    return Verdict('unknown', beliefs.beaten_belief, verdict.sets, (reason,))
+
+
+def _something(verdict: Verdict, rival: Curved, beliefs: Beliefs) -> Verdict:
+    """Return 'unknown' where what looks like noise follows something on unseen stretches."""
+    form = rival.form
+    if form.gain < beliefs.beaten_share or form.steady < beliefs.beaten_steady:
+        return verdict
+    reason = (
+        f'no effect in the library explains the gap, but it is no noise: {_places(rival)} predicts '
+        f'{100.0 * form.gain:.0f} % of it on unseen stretches'
+    )
+    return Verdict('unknown', beliefs.beaten_belief, (), (reason,))
+
+
+def _places(rival: Curved) -> str:
+    return ' and '.join(str(part.group) for part in rival.form.parts)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array
-from ..hypotheses.evidence_score import PERFECT
+from ..hypotheses.seed_systems import PERFECT
 from .tableau import Mask, Tableau
 
 MOVES = 12

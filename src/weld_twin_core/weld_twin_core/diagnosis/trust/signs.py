@@ -27,7 +27,7 @@ from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
 from ..verdict.weighing import Weighed
 from .numbers import FAR, Numbers, log, log1, plain, rms
-from .signs_of_found import left_at_joints, residual_signs, worst_of
+from .signs_of_found import residual_signs, worst_of
 
 MOVES = 0.02
 """Travel [rad, m] from which on a joint shows something at all."""
@@ -98,7 +98,6 @@ def signs_of_answer(
             **_of_data(found.problem),
             **families_in('named_', 'alone_', verdict.sets),
             **residual_signs(unseen),
-            **({} if found.dense else left_at_joints(unseen, found.final.model)),
             **worst_of(each),
             'rows': log(found.effective(found.small)),
             'notes': sum(check.level == 'note' for check in checks),
@@ -274,15 +273,15 @@ def _of_curves(unseen: Unseen, rival: Curved | None, floor: float) -> Numbers:
 def _of_data(problem: Problem) -> Numbers:
     """Return how rich the recordings are."""
     travel = np.max([np.ptp(r.joints.q, axis=0) for r in problem.recordings], axis=0)
-    first = problem.recordings[0]
+    every = problem.recordings
     return {
-        'static': float(first.joints.static),
+        'static': float(any(r.joints.static for r in every)),
         'orientation': float(max(problem.rows) > 3),
         'aligned': len(problem.align),
-        'recordings': len(problem.recordings),
+        'recordings': len(every),
         'samples': log(sum(problem.samples)),
-        'wrench': float(first.wrench is not None),
-        'temperature': float(first.temperature is not None),
+        'wrench': float(any(r.wrench is not None for r in every)),
+        'temperature': float(any(r.temperature is not None for r in every)),
         'moving': float((travel > MOVES).mean()),
         'wide': float((travel > WIDE).mean()),
         'travel': log(float(np.median(travel))),

@@ -3,8 +3,8 @@
 """
 Signs of every effect found, as plain numbers: does its formula hold, and does its name come back?
 
-A formula that stands in for another leaves something at its own joint, wants other parameters on
-every stretch, and is beaten by another on a motion that was not fitted.
+A formula that stands in for another wants other parameters on every stretch, and is beaten by
+another on a motion that was not fitted.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...recording import Recording
-from ..algebra.problem import Model, Problem
+from ..algebra.problem import Problem
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..result import CameBack, Site
 from ..unseen.held_out_shrink import left_on
-from ..unseen.own_joint import MOVING, added, free_columns
 from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
@@ -32,9 +31,8 @@ from .numbers import FAR, Numbers, log, log1, plain, rms
 
 FEWEST_STATES = 4
 """Joint states from which a recording tells how fast and how often a joint turns."""
-LARGE = 300_000
-"""Rows above which free columns at joints are left out: they would cost seconds, and what is
-learned from are recordings of less than a minute."""
+MOVING = 2e-3
+"""Speed [rad/s or m/s] below which noise makes the direction."""
 WORST = {
     'own_back': min,
     'own_margin': min,
@@ -42,9 +40,6 @@ WORST = {
     'own_leader': min,
     'own_nats': min,
     'own_elsewhere': min,
-    'own_formula': min,
-    'own_left': max,
-    'own_left_sure': max,
     'own_wander': max,
     'own_wander_place': max,
 }
@@ -78,7 +73,6 @@ def signs_of_found(
         return ()
     chosen = {site for group in verdict.sets for site in group}
     wandered, elsewhere = unseen.wandered(), _of_places(unseen)
-    free = _free(unseen, found.final.model)
     out = []
     for k, (effect, slot, back) in enumerate(
         zip(found.final.model.found, found.slots, came_back, strict=False)
@@ -87,7 +81,6 @@ def signs_of_found(
             **_of_slot(slot, chosen),
             **_of_joint(effect, found.problem, found.final.model.robot),
             **_held_out(found, evidence, slot, chosen, holdout),
-            **free.get(k, {}),
             'own_size': _size(effect),
             'own_wander': log(wandered[k]),
             'own_wander_place': log(elsewhere[k]),
@@ -100,51 +93,6 @@ def signs_of_found(
 
 def _of_places(unseen: Unseen) -> Array:
     return unseen.by(posture_regions(unseen.problem)).wandered()
-
-
-def _free(unseen: Unseen, model: Model) -> dict[int, Numbers]:
-    """Return what free columns say of every effect at a joint that moves, by its number."""
-    if unseen.labels.size > LARGE:
-        return {}
-    out, every = {}, range(len(model.found))
-    base = unseen.base(every)
-    left = float(unseen.squares(base.residual).mean())
-    for k, effect in enumerate(model.found):
-        columns = free_columns(unseen, model, effect.site) if effect.site else None
-        if columns is None:
-            continue
-        gain, sure = added(base, columns)
-        without = unseen.base([i for i in every if i != k])
-        free, _ = added(without, columns)
-        instead = float(unseen.squares(without.residual).mean()) * (1.0 - free)
-        out[k] = {
-            'own_left': gain,
-            'own_left_sure': sure,
-            'own_formula': float(np.log10(max(instead, 1e-300) / max(left, 1e-300))),
-        }
-    return out
-
-
-def left_at_joints(unseen: Unseen, model: Model) -> Numbers:
-    """
-    Return the most that free columns at one joint add to the whole model.
-
-    Parameters
-    ----------
-    unseen : Unseen
-        Of the final model.
-    model : Model
-
-    """
-    if unseen.labels.size > LARGE:
-        return {}
-    base = unseen.base(range(len(model.found)))
-    each = [free_columns(unseen, model, joint) for joint in model.robot.joint_names]
-    told = [added(base, columns) for columns in each if columns is not None]
-    if not told:
-        return {}
-    gain, sure = max(told)
-    return {'left_at_joint': gain, 'left_at_joint_sure': sure}
 
 
 def worst_of(each: Sequence[Mapping[str, float]]) -> Numbers:

@@ -11,18 +11,18 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.levels.formulas import held_against
 from weld_twin_core.diagnosis.levels.groups import Group
-from weld_twin_core.diagnosis.levels.held_against import held_against
 from weld_twin_core.diagnosis.levels.sparse_groups import (
     Choosing,
     Folds,
     Member,
     choosing,
     chosen,
-    steadiness,
     worth,
 )
 from weld_twin_core.diagnosis.unseen.regions import posture_regions
+from weld_twin_core.diagnosis.unseen.unseen_stretches import steadiness
 from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.effects.curve import basis
 from weld_twin_core.effects.joint_curve import JointCurve

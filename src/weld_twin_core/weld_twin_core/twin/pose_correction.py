@@ -218,7 +218,7 @@ class PoseCorrection:
             error = between(poses_of(q), wanted)
         if not np.abs(error).max() < OPEN:
             raise DataError('the pose cannot be reached from where the arm stands')
-        return q
+        return np.asarray(q)
 
     def _real_poses(self, q: Array) -> Array:
         position, rotation = self._twin.poses(self._still.recording(_standing(q)))

@@ -19,10 +19,8 @@ from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
 from weld_twin_msgs_py.messages.goals import read_goal
 from weld_twin_msgs_py.messages.topics import JOINT_STATES
 
-TICK = 0.004
+TICK = 0.008
 """Seconds between two looks at what is due."""
-AT_REST = 20
-"""Looks between two joint states of an arm that stands."""
 
 
 class Controller(Node):
@@ -68,7 +66,6 @@ class Controller(Node):
             JOINT_STATES.message_class(), JOINT_STATES.relative, JOINT_STATES.offered.to_rclpy()
         )
         self._now: tuple[Any, Goal, float, Future] | None = None
-        self._looks = 0
         self._timer = self.create_timer(TICK, self._look)
         self._server = ActionServer(
             self,
@@ -78,6 +75,11 @@ class Controller(Node):
             goal_callback=self._take,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
+
+    def destroy_node(self) -> None:
+        """Be gone at once, whatever runs."""
+        self._server.destroy()
+        super().destroy_node()  # type: ignore[no-untyped-call]
 
     async def _take(self, goal: Any) -> GoalResponse:
         if self.answers:
@@ -116,10 +118,8 @@ class Controller(Node):
 
     def _look(self) -> None:
         """Go on, and tell where the arm is."""
-        self._looks += 1
         if self._now is None:
-            if self._looks % AT_REST == 0:
-                self._tell()
+            self._tell()
             return
         handle, goal, begun, done = self._now
         t = min((time.monotonic() - begun) * self._pace, float(goal.t[-1]))

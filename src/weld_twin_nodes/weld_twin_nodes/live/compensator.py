@@ -26,7 +26,6 @@ from weld_twin_core.twin.goal_correction import (
     CorrectedGoal,
     GoalLimits,
     Refusal,
-    Start,
     corrected_goal,
 )
 from weld_twin_core.twin.pose_correction import PoseCorrection
@@ -55,7 +54,7 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.loaded_model import LoadedModel, loaded
 from ..streams.arm_state import ArmState
-from ..streams.pose_stream import PoseStream
+from ..streams.pose_stream import Found, PoseStream, Work
 from ..streams.supervision import Supervision
 from .cell_frames import base_frame
 from .goal_relay import Decision, GoalRelay
@@ -78,6 +77,10 @@ LATE = 0.5
 """A goal that should have begun so long ago [s] begins in the middle, and its correction with a step."""
 WITHDRAWN = 'withdrawn'
 """Under which the node keeps why it corrects nothing."""
+
+
+Judged = tuple[CorrectedGoal | Refusal, tuple[int, ...]]
+"""What becomes of a goal, and where the robot's joints stand in it."""
 
 
 class Compensator(ManagedNode):
@@ -353,7 +356,7 @@ class Compensator(ManagedNode):
             later=self._later,
         )
 
-    def _later(self, work: Callable[[], object]) -> Callable[[], object]:
+    def _later(self, work: Work) -> Callable[[], Found | None]:
         """Begin work beside; return what tells its result once it is there."""
         doing = self._beside.submit(work)
         return lambda: doing.result() if doing.done() else None
@@ -390,6 +393,7 @@ class Compensator(ManagedNode):
 
     async def _decide(self, goal: Any) -> Decision:
         """Return what becomes of a goal."""
+        self._look()
         token = self._token()
         if not goal.trajectory.points:  # the order to stop, which nothing may hold up
             return Decision(goal, '', partial(self._settled, None, 'passed', 'it has no point'))
@@ -397,39 +401,55 @@ class Compensator(ManagedNode):
         if why:
             passed = goal if not applied and self._active else None
             return Decision(passed, why, partial(self._settled, None, 'refused', why), token)
+        if not applied:  # it does not wait for what is only told
+            return Decision(goal, '', partial(self._judged_later, goal), token)
+        judged: Future = Future()
+        self._judge(goal, judged.set_result)
+        found, columns = await judged
+        if isinstance(found, Refusal):
+            settled = partial(self._settled, found, 'refused', found.reason)
+            return Decision(None, found.reason, settled, token)
+        trajectory = corrected_trajectory(goal.trajectory, columns, found.goal, found.waits)
+        rest = [name for name in goal.get_fields_and_field_types() if name != 'trajectory']
+        sent = type(goal)(trajectory=trajectory, **{name: getattr(goal, name) for name in rest})
+        self._tell_added(goal.trajectory.header, found)
+        return Decision(sent, '', partial(self._settled, found, _verdict(found), ''), token)
+
+    def _judged_later(self, goal: Any, below: str) -> None:
+        """Tell of a goal that was passed on what a correction would have done."""
+
+        def tell(judged: Judged) -> None:
+            found = judged[0]
+            if isinstance(found, CorrectedGoal):
+                self._tell_added(goal.trajectory.header, found)
+            why = found.reason if isinstance(found, Refusal) else ''
+            self._settled(found, _verdict(found), why, below)
+
+        self._judge(goal, tell)
+
+    def _judge(self, goal: Any, told: Callable[[Judged], None]) -> None:
+        """Work a goal out beside, so that poses and the rest are served meanwhile; then tell."""
         try:
             points = self._read(goal)
         except TwinError as error:
-            given, found = None, Refusal(str(error))
-        else:
-            start = self._arm.start(time.monotonic(), self.setting('max_age'))
-            given, found = points, await self._worked_out(points, start)
-        if isinstance(found, CorrectedGoal) and given is not None:
-            far = [*goal.path_tolerance, *goal.goal_tolerance]
-            moved = found.goal.q - given.goal.q
-            beyond = beyond_tolerance(far, goal.trajectory.joint_names, given.columns, moved)
-            found = Refusal(beyond, found.largest) if beyond else found
-        if isinstance(found, Refusal):
-            settled = partial(self._settled, found, 'refused', found.reason)
-            return Decision(None if applied else goal, found.reason, settled, token)
-        assert given is not None
-        self._tell_added(goal.trajectory.header, found)
-        settled = partial(
-            self._settled, found, 'corrected' if found.before else 'nothing to do', ''
+            told((Refusal(str(error)), ()))
+            return
+        start = self._arm.start(time.monotonic(), self.setting('max_age'))
+        doing = self._goals.submit(
+            corrected_goal, self._present(), points.goal, self._limits(), start
         )
-        if not applied:
-            return Decision(goal, '', settled, token)
-        sent = type(goal)(
-            **{
-                name: getattr(goal, name)
-                for name in goal.get_fields_and_field_types()
-                if name != 'trajectory'
-            },
-            trajectory=corrected_trajectory(
-                goal.trajectory, given.columns, found.goal, found.waits
-            ),
-        )
-        return Decision(sent, '', settled, token)
+
+        def look() -> None:
+            if not doing.done() or timer.is_canceled():
+                return
+            timer.cancel()
+            self.destroy_timer(timer)
+            try:
+                told((_tolerated(goal, points, doing.result()), points.columns))
+            except TwinError as error:
+                told((Refusal(str(error)), ()))
+
+        timer = self.every(POLL, look)
 
     def _read(self, goal: Any) -> GoalPoints:
         """Return the points of a goal; refuse one that should have begun already."""
@@ -440,22 +460,6 @@ class Compensator(ManagedNode):
         if at and late > LATE:
             raise DataError(f'the goal should have begun {late:.2f} s ago, by its stamp')
         return given
-
-    async def _worked_out(self, points: GoalPoints, start: Start) -> CorrectedGoal | Refusal:
-        """Return a goal corrected beside, so that poses and the rest are served meanwhile."""
-        doing = self._goals.submit(
-            corrected_goal, self._present(), points.goal, self._limits(), start
-        )
-        done: Future = Future()
-        timer = self.every(
-            POLL, lambda: doing.done() and not done.done() and done.set_result(None)
-        )
-        await done
-        self.destroy_timer(timer)
-        try:
-            return doing.result()
-        except TwinError as error:
-            return Refusal(str(error))
 
     def _tell_added(self, header: Any, found: CorrectedGoal) -> None:
         """Publish what is added at every point, at the time when the arm is to be there."""
@@ -513,10 +517,32 @@ class Compensator(ManagedNode):
 
     def _since(self, token: object) -> str:
         """Return what has happened to the model since a goal was decided on."""
+        self._look()
         if self._token() != token:
             return 'the model was exchanged meanwhile'
         why = self._withdrawn()
         return f'the model was withdrawn meanwhile: {why}' if why else ''
+
+
+def _verdict(found: CorrectedGoal | Refusal) -> str:
+    if isinstance(found, Refusal):
+        return 'refused'
+    return 'corrected' if found.before else 'nothing to correct'
+
+
+def _tolerated(
+    goal: Any, points: GoalPoints, found: CorrectedGoal | Refusal
+) -> CorrectedGoal | Refusal:
+    """Return a corrected goal, or that it goes beyond what the goal itself tolerates."""
+    if isinstance(found, Refusal):
+        return found
+    beyond = beyond_tolerance(
+        [*goal.path_tolerance, *goal.goal_tolerance],
+        goal.trajectory.joint_names,
+        points.columns,
+        found.goal.q - points.goal.q,
+    )
+    return Refusal(beyond, found.largest) if beyond else found
 
 
 def main(args: list[str] | None = None) -> int:

@@ -5,14 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_core.twin.goal_correction import SMOOTH_SPEED, GoalLimits
-from weld_twin_core.twin.pose_correction import Looked, PoseCorrection, between, moved
+from weld_twin_core.twin.goal_correction import SMOOTH_PEAK, SMOOTH_SPEED, GoalLimits
+from weld_twin_core.twin.pose_correction import LEVER, Looked, PoseCorrection, between, moved
 
 STILL = 2e-5
 """Poses that stay within this [m, rad] stand still: far below what a seam moves between two of them."""
@@ -52,6 +54,18 @@ class Given(NamedTuple):
     pose: Array | None
     added: Array | None
     why: str = ''
+
+
+class Found(NamedTuple):
+    """An exact look, why the pose must not be corrected, and how sure the model is where asked [m]."""
+
+    looked: Looked | None
+    why: str = ''
+    doubt: float | None = None
+
+
+Work = Callable[[], Found]
+"""What is to be worked out."""
 
 
 class _Ramp(NamedTuple):
@@ -99,11 +113,11 @@ class PoseStream:
         *,
         passing: bool = False,
         shadow: bool = False,
-        later: Callable[[Callable[[], object]], Callable[[], object]] | None = None,
+        later: Callable[[Work], Callable[[], Found | None]] | None = None,
     ) -> None:
         self.correction, self._limits = correction, limits
         self._passing, self._shadow, self._later = passing, shadow, later
-        self._coming: Callable[[], object] | None = None
+        self._coming: Callable[[], Found | None] | None = None
         self.forget()
 
     def forget(self) -> None:
@@ -169,7 +183,7 @@ class PoseStream:
         self._next = None
         if pose is None or known is None or self._coming is not None:
             return
-        work = lambda: self._look(pose, known)  # noqa: E731
+        work = partial(self._found, partial(self.correction.exact, pose, known))
         if self._later is None:
             done = work()
             self._coming = lambda: done
@@ -194,7 +208,7 @@ class PoseStream:
             self._tried = now
             if arm is None:
                 return None, 'where the arm stands is not known: no joint states are heard'
-            self._try(lambda: self.correction.first(pose, arm), now)
+            self._adopt(self._found(partial(self.correction.first, pose, arm)), now)
             if self._refused:
                 return None, self._refused
         added, far = self.correction.added(pose)
@@ -202,7 +216,7 @@ class PoseStream:
             known = self.correction.looked
             assert known is not None
             self._coming = None
-            self._try(lambda: self.correction.exact(pose, known), now)
+            self._adopt(self._found(partial(self.correction.exact, pose, known)), now)
             if self._refused:
                 return None, self._refused
             added, far = self.correction.added(pose)
@@ -210,23 +224,13 @@ class PoseStream:
             self._next = pose
         return added, ''
 
-    def _try(self, solve: Callable[[], Looked], now: float) -> None:
+    def _found(self, solve: Callable[[], Looked]) -> Found:
+        """Return an exact look with why it is refused, or why there is none."""
         try:
             looked = solve()
         except DataError as error:
-            self._refused = str(error)
-            return
-        self._adopt(
-            (looked, self.correction.refusal(looked, self._limits), self._asked(looked)), now
-        )
-
-    def _look(self, pose: Array, known: Looked) -> object:
-        """Return an exact look with why it is refused, or why there is none."""
-        try:
-            looked = self.correction.exact(pose, known)
-        except DataError as error:
-            return str(error)
-        return looked, self.correction.refusal(looked, self._limits), self._asked(looked)
+            return Found(None, str(error))
+        return Found(looked, self.correction.refusal(looked, self._limits), self._asked(looked))
 
     def _asked(self, looked: Looked) -> float | None:
         """Return how sure the model is of a look [m], where that is to be asked anew."""
@@ -243,11 +247,11 @@ class PoseStream:
             self._coming = None
             self._adopt(found, now)
 
-    def _adopt(self, found: object, now: float) -> None:
-        if isinstance(found, str):
-            self._refused = found
+    def _adopt(self, found: Found, now: float) -> None:
+        looked, why, doubt = found
+        if looked is None:
+            self._refused = why
             return
-        looked, why, doubt = found  # type: ignore[misc]
         why = why or self._too_quick(looked, now)
         if doubt is not None:
             self._sizes += float(looked.added[:3] @ looked.added[:3])
@@ -321,7 +325,14 @@ class PoseStream:
         if max(way) < SHORT:
             self._mode, self._held = mode, end
             return Given(moved(pose, end), end, why)
-        span = SMOOTH_SPEED * max(way[0] / self._limits.rate, way[1] / self._limits.turn_rate)
+        most = min(
+            self._limits.acceleration, float(self.correction.model.robot.max_acceleration.min())
+        )
+        span = max(
+            SMOOTH_SPEED * way[0] / self._limits.rate,
+            SMOOTH_SPEED * way[1] / self._limits.turn_rate,
+            sqrt(SMOOTH_PEAK * (way[0] / LEVER + way[1]) / most),
+        )
         self._ramp = _Ramp(pose, self._held, end, now, span, mode)
         return self._on_ramp(now, why)
 

@@ -139,7 +139,9 @@ def joint_compliance(cell):
 
 def payload(cell):
     extra = {'extra_mass': 1.5, 'extra_com': SMALL * 50}
-    settled(cell, lambda q: cell.textbook.load_torque(cell.robot, q, cell.wrench, joints=[1], **extra))
+    settled(
+        cell, lambda q: cell.textbook.load_torque(cell.robot, q, cell.wrench, joints=[1], **extra)
+    )
 
 
 def cartesian_compliance(cell):

@@ -44,9 +44,13 @@ def spread():
     rng = np.random.default_rng(0)
     columns = {}
     for name, values in VALUES.items():
-        places = (np.arange(DRAWS) * len(values) // DRAWS + rng.integers(len(values))) % len(values)
+        places = (np.arange(DRAWS) * len(values) // DRAWS + rng.integers(len(values))) % len(
+            values
+        )
         columns[name] = [values[place] for place in rng.permutation(places)]
-    return [Draw(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+    return [
+        Draw(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)
+    ]
 
 
 @pytest.mark.slow

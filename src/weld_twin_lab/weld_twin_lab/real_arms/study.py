@@ -122,7 +122,9 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         ),
         'told a cause borne out against all kinds': sum(worth(e, 'against_all') for e in entries),
         'claims': len(claims),
-        'claims borne out against all that is told': sum(_holds(c, 'against_told') for c in claims),
+        'claims borne out against all that is told': sum(
+            _holds(c, 'against_told') for c in claims
+        ),
         'claims borne out against all kinds': sum(_holds(c, 'against_all') for c in claims),
         'kinds borne out against all others': len(shown),
         'of these told': sum(k in _kinds_of(e['claims']) for e, k in shown),
@@ -255,4 +257,3 @@ def _spread(model: Model, other: Recording) -> float:
 
 def _rms(parts: Array) -> float:
     return float(np.sqrt((parts**2).sum(axis=0).mean()))
-

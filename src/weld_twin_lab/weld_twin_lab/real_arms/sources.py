@@ -147,7 +147,9 @@ def motoman(data: Path, *, masses: bool) -> Source:
         mapping['links'] = [{'mass': m, 'com': [x, 0.0, 0.0]} for m, x in each]
     t = np.arange(float(len(q)))
     motion = JointMotion(t, q, static=True)
-    return Source(Robot.from_mapping(mapping), Recording('motoman', motion, Measurements(t, place)))
+    return Source(
+        Robot.from_mapping(mapping), Recording('motoman', motion, Measurements(t, place))
+    )
 
 
 def swinging(data: Path) -> Source:

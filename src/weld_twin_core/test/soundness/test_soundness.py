@@ -173,6 +173,31 @@ def test_clocks_that_are_not_synchronised_are_named_with_the_lag(ur5, run, late,
     assert words in found and said == pytest.approx(abs(late) * 1e3, abs=8.0)
 
 
+def test_a_clock_that_was_late_is_late_in_that_recording_alone(ur5, run):
+    """What is mended of all recordings of a cell is mended of others too, a clock is not."""
+    late = remeasured(run, t=run.measured.t + 0.3)
+    (other,) = looked_at(ur5, late, apply=True).mended((run,))
+    np.testing.assert_array_equal(other.joints.t, run.joints.t)
+    long = remeasured(run, position=1e3 * run.measured.position)
+    (other,) = looked_at(ur5, long, apply=True).mended((long,))
+    np.testing.assert_allclose(other.measured.position, run.measured.position)
+
+
+@pytest.mark.parametrize(('joint', 'sweep', 'back'), [(1, -0.08, 2.4), (2, 0.07, 2.1)])
+def test_play_on_a_way_out_and_back_is_no_clock(ur5, rng, joint, sweep, back):
+    """The arm trails behind by half the play both ways: later where it is slower."""
+    t = np.arange(0.0, 2.2 + back, 0.008)
+    s = np.interp(t, [0.0, 1.2, 2.2, 2.2 + back], [0.0, 1.0, 1.0, 0.0])
+    q = np.tile([0.24, -1.05, 1.23, -1.07, -1.27, 0.38], (t.size, 1))
+    q[:, joint] += sweep * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    real, arm = q.copy(), q[0, joint]
+    for k, commanded in enumerate(q[:, joint]):
+        arm = float(np.clip(arm, commanded - 1e-3, commanded + 1e-3))
+        real[k, joint] = arm
+    seen = recorded(ur5, JointMotion(t, real), rng, points=True)
+    assert looked_at(ur5, replace(seen, joints=JointMotion(t, q)), align=()).unsound == ()
+
+
 def test_clocks_that_run_apart_are_named(ur5, run):
     bad = remeasured(run, t=run.measured.t * 1.005)
     assert 'run apart' in wrong(ur5, 'clock', bad)

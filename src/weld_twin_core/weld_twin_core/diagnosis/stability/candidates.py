@@ -13,8 +13,8 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ...twin.features import Features
-from ..hypotheses.choices import ranking
 from ..hypotheses.search import Search
+from ..hypotheses.seed_systems import ranking
 from ..result import Site
 
 OTHERS = 8

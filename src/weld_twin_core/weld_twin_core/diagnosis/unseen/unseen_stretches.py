@@ -146,7 +146,7 @@ class Unseen:
         if gone.size > index.size:
             return self.base(kept).residual
         mix = self._mix(kept)
-        residual = self._explained(mix).copy()
+        residual: Array = np.array(self._explained(mix))
         for b, rows in enumerate(self._spans):
             inverse = self._inverses[b]
             step = inverse.times(self._right(b, mix))

@@ -156,6 +156,7 @@ def judged(families, gain=0.0, sure=0.0):
             independent=False,
             parts=(),
             families=weighed,
+            believed=(0.9,),
         )
     )
 

@@ -35,7 +35,7 @@ from .switches import (
     trusted,
 )
 from .to_do import TOGETHER
-from .words import again_words, same_words, unnamed
+from .words import same_words, unnamed
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
@@ -134,7 +134,6 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
     name = cause_name(diagnosis, cause)
     entries = [
         ('How sure', sure_entry(diagnosis, cause)),
-        ('Comes back', again_words(cause, many=bool(diagnosis.families))),
         ('By how much', _off_by(diagnosis, cause)),
         ('Stands on', _commanded(diagnosis, cause)),
         (_EFFECT[at_rest(diagnosis)], _effect(diagnosis, k)),
